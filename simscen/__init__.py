@@ -59,7 +59,7 @@ def variations(
     from pathlib import Path
 
     from simscen.core.errors import InvalidInput
-    from simscen.loading.discovery import default_root
+    from simscen.loading.files.discovery import default_root
     from simscen.loading.scenario import try_variations
 
     file = Path(scenario)

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
     from simscen.spec.base import Ranged, Spec, Value, by_default
     from simscen.spec.choice import Choice
-    from simscen.spec.orplace import PlaceOrPoint, PlaceOrPose
+    from simscen.spec.named_places import PlaceOrPoint, PlaceOrPose
     from simscen.spec.places import Point, PoseSpec
     from simscen.spec.quantities import (
         Angle,
@@ -236,7 +236,7 @@ _WHERE = {
         "Ratio",
         "Speed",
     ),
-    "simscen.spec.orplace": (
+    "simscen.spec.named_places": (
         "PlaceOrPoint",
         "PlaceOrPose",
     ),

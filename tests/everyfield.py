@@ -11,7 +11,7 @@ from simscen.cli.catalog.json_schema import MODELS
 from simscen.model.criteria_file import CriteriaSpec
 from simscen.model.rosmap import RosMapSpec
 from simscen.spec.bytype import ByType
-from simscen.spec.ondemand import OnDemand
+from simscen.spec.lazy import LazySpec
 
 
 class Written(NamedTuple):
@@ -46,10 +46,10 @@ def _values(model: type[BaseModel]) -> Iterator[Written]:
 
 
 def _inside(kind: Any, marks: tuple[Any, ...]) -> Iterator[tuple[Any, tuple[Any, ...]]]:
-    found = next((mark for mark in marks if isinstance(mark, OnDemand | ByType)), None)
+    found = next((mark for mark in marks if isinstance(mark, LazySpec | ByType)), None)
     if found is not None:
         rest = tuple(mark for mark in marks if mark is not found)
-        yield from _inside(found.load() if isinstance(found, OnDemand) else found.own, rest)
+        yield from _inside(found.load() if isinstance(found, LazySpec) else found.own, rest)
     elif get_origin(kind) is Annotated:
         inner, *more = get_args(kind)
         yield from _inside(inner, (*marks, *_flat(more)))

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from simscen.actions.base import Action
 from simscen.spec.choice import Choice
-from simscen.spec.ondemand import OnDemand
+from simscen.spec.lazy import LazySpec
 from simscen.spec.places import RobotName
 
 if TYPE_CHECKING:
@@ -18,23 +18,23 @@ class AnyAction(Choice):
     group: ClassVar[str] = "action"
     modifiers: ClassVar[frozenset[str]] = frozenset({"robot"})
 
-    spawn: Annotated[Action | None, OnDemand("simscen.actions.spawn", "Spawn")] = None
-    pedestrian: Annotated[Action | None, OnDemand("simscen.actions.pedestrian", "Pedestrian")] = None
-    crowd: Annotated[Action | None, OnDemand("simscen.actions.pedestrian", "Crowd")] = None
-    remove: Annotated[Action | None, OnDemand("simscen.actions.remove", "Remove")] = None
-    move: Annotated[Action | None, OnDemand("simscen.actions.move", "Move")] = None
-    teleport: Annotated[Action | None, OnDemand("simscen.actions.teleport", "Teleport")] = None
-    stop: Annotated[Action | None, OnDemand("simscen.actions.stop", "Stop")] = None
-    open: Annotated[Action | None, OnDemand("simscen.actions.doors", "OpenDoor")] = None
-    close: Annotated[Action | None, OnDemand("simscen.actions.doors", "CloseDoor")] = None
-    kidnap: Annotated[Action | None, OnDemand("simscen.actions.robot", "Kidnap")] = None
-    push: Annotated[Action | None, OnDemand("simscen.actions.push", "Push")] = None
-    new_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "NewGoal")] = None
-    cancel_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "CancelGoal")] = None
-    friction: Annotated[Action | None, OnDemand("simscen.actions.friction", "FrictionPatch")] = None
-    keepout: Annotated[Action | None, OnDemand("simscen.actions.zones", "SwitchKeepout")] = None
-    speed_zone: Annotated[Action | None, OnDemand("simscen.actions.zones", "SwitchSpeedZone")] = None
-    mark: Annotated[Action | None, OnDemand("simscen.actions.mark", "Mark")] = None
+    spawn: Annotated[Action | None, LazySpec("simscen.actions.spawn", "Spawn")] = None
+    pedestrian: Annotated[Action | None, LazySpec("simscen.actions.pedestrian", "Pedestrian")] = None
+    crowd: Annotated[Action | None, LazySpec("simscen.actions.pedestrian", "Crowd")] = None
+    remove: Annotated[Action | None, LazySpec("simscen.actions.remove", "Remove")] = None
+    move: Annotated[Action | None, LazySpec("simscen.actions.move", "Move")] = None
+    teleport: Annotated[Action | None, LazySpec("simscen.actions.teleport", "Teleport")] = None
+    stop: Annotated[Action | None, LazySpec("simscen.actions.stop", "Stop")] = None
+    open: Annotated[Action | None, LazySpec("simscen.actions.doors", "OpenDoor")] = None
+    close: Annotated[Action | None, LazySpec("simscen.actions.doors", "CloseDoor")] = None
+    kidnap: Annotated[Action | None, LazySpec("simscen.actions.robot", "Kidnap")] = None
+    push: Annotated[Action | None, LazySpec("simscen.actions.push", "Push")] = None
+    new_goal: Annotated[Action | None, LazySpec("simscen.actions.goals", "NewGoal")] = None
+    cancel_goal: Annotated[Action | None, LazySpec("simscen.actions.goals", "CancelGoal")] = None
+    friction: Annotated[Action | None, LazySpec("simscen.actions.friction", "FrictionPatch")] = None
+    keepout: Annotated[Action | None, LazySpec("simscen.actions.zones", "SwitchKeepout")] = None
+    speed_zone: Annotated[Action | None, LazySpec("simscen.actions.zones", "SwitchSpeedZone")] = None
+    mark: Annotated[Action | None, LazySpec("simscen.actions.mark", "Mark")] = None
 
     robot: RobotName | None = None
     """Which of several robots it is about; default: the only one."""

@@ -10,7 +10,7 @@ from simscen.actions.base import Action
 from simscen.core.stage import Effect, Stage
 from simscen.core.surface import Patch, disc
 from simscen.spec.base import Spec
-from simscen.spec.orplace import PlaceOrPoint
+from simscen.spec.named_places import PlaceOrPoint
 from simscen.spec.places import PlaceName
 from simscen.spec.quantities import Friction, PositiveDuration, PositiveLength
 from simscen.spec.references import RegionName

@@ -3,7 +3,7 @@
 from simscen.actions.base import Action
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
-from simscen.spec.orplace import PlaceOrPose
+from simscen.spec.named_places import PlaceOrPose
 from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
 

@@ -14,7 +14,7 @@ from simscen.core.stage import Effect, Stage
 from simscen.core.walker import Behavior, Unseen, Walker
 from simscen.core.world import Polygon
 from simscen.spec.base import Spec
-from simscen.spec.orplace import PlaceOrPoint, PlaceOrPose
+from simscen.spec.named_places import PlaceOrPoint, PlaceOrPose
 from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration, PositiveLength, PositiveSpeed
 from simscen.spec.references import RegionName

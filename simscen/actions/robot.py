@@ -4,7 +4,7 @@ from simscen.actions.base import Action
 from simscen.core.geometry import wrap
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
-from simscen.spec.orplace import PlaceOrPose
+from simscen.spec.named_places import PlaceOrPose
 
 SAME = 1e-3
 """Metres and radians within which the robot is where a kidnapper wants it."""

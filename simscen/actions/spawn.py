@@ -12,8 +12,8 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.navigation import Path
 from simscen.core.shapes import Body
 from simscen.core.stage import Effect, Stage
+from simscen.spec.named_places import PlaceOrPose
 from simscen.spec.objects import Shaped
-from simscen.spec.orplace import PlaceOrPose
 from simscen.spec.places import Name
 from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength
 

@@ -4,7 +4,7 @@ from simscen.actions.base import Action
 from simscen.core.geometry import wrap
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
-from simscen.spec.orplace import PlaceOrPose
+from simscen.spec.named_places import PlaceOrPose
 from simscen.spec.references import MovableName
 
 SAME = 1e-3

@@ -6,7 +6,7 @@ from pathlib import Path
 
 def scenarios(incomplete: str) -> list[str]:
     """Scenario files and folders, as far as one of them is written."""
-    from simscen.loading.discovery import SCENARIO
+    from simscen.loading.files.discovery import SCENARIO
 
     return list(_files(incomplete, SCENARIO))
 
@@ -40,7 +40,7 @@ def stacks(incomplete: str) -> list[str]:
     """The names of stacks: simscen's own, those of packages, those of the user's configuration."""
     from simscen.cli.process import config_file
     from simscen.core.errors import SimscenError
-    from simscen.loading.userconfig import load_config
+    from simscen.loading.stacks.userconfig import load_config
     from simscen.spec.registry import entries
 
     try:

@@ -7,7 +7,7 @@ from pydantic import BaseModel, model_validator
 
 from simscen.criteria.base import Criterion
 from simscen.spec.choice import Choice
-from simscen.spec.ondemand import OnDemand
+from simscen.spec.lazy import LazySpec
 from simscen.spec.places import Name
 
 
@@ -21,40 +21,40 @@ class AnyCriterion(Choice):
     """What the verdict is called in reports; default: the criterion's key."""
     severity: Literal["fail", "warn"] = "fail"
     """Whether a violation fails the run or is only reported."""
-    then: Annotated[BaseModel | None, OnDemand("simscen.criteria.stl.condition", "Condition")] = None
+    then: Annotated[BaseModel | None, LazySpec("simscen.criteria.stl.condition", "Condition")] = None
     """Beside `whenever` alone: the condition that must hold then."""
 
-    goals_reached: Annotated[Criterion | None, OnDemand("simscen.criteria.goals_reached", "GoalsReached")] = None
-    result: Annotated[Criterion | None, OnDemand("simscen.criteria.result", "Result")] = None
-    error_code: Annotated[Criterion | None, OnDemand("simscen.criteria.result", "ErrorCodeIs")] = None
-    no_false_success: Annotated[Criterion | None, OnDemand("simscen.criteria.no_false_success", "NoFalseSuccess")] = (
+    goals_reached: Annotated[Criterion | None, LazySpec("simscen.criteria.goals_reached", "GoalsReached")] = None
+    result: Annotated[Criterion | None, LazySpec("simscen.criteria.result", "Result")] = None
+    error_code: Annotated[Criterion | None, LazySpec("simscen.criteria.result", "ErrorCodeIs")] = None
+    no_false_success: Annotated[Criterion | None, LazySpec("simscen.criteria.no_false_success", "NoFalseSuccess")] = (
         None
     )
-    collisions: Annotated[Criterion | None, OnDemand("simscen.criteria.collisions", "Collisions")] = None
-    clearance: Annotated[Criterion | None, OnDemand("simscen.criteria.clearance", "Clearance")] = None
-    personal_space: Annotated[Criterion | None, OnDemand("simscen.criteria.personal_space", "PersonalSpace")] = None
-    keepout: Annotated[Criterion | None, OnDemand("simscen.criteria.keepout", "Keepout")] = None
-    time_to_goal: Annotated[Criterion | None, OnDemand("simscen.criteria.time_to_goal", "TimeToGoal")] = None
-    path_length: Annotated[Criterion | None, OnDemand("simscen.criteria.path_length", "PathLength")] = None
-    speed: Annotated[Criterion | None, OnDemand("simscen.criteria.speed", "Speed")] = None
-    stopped_within: Annotated[Criterion | None, OnDemand("simscen.criteria.stopped_within", "StoppedWithin")] = None
-    stuck: Annotated[Criterion | None, OnDemand("simscen.criteria.stuck", "Stuck")] = None
+    collisions: Annotated[Criterion | None, LazySpec("simscen.criteria.collisions", "Collisions")] = None
+    clearance: Annotated[Criterion | None, LazySpec("simscen.criteria.clearance", "Clearance")] = None
+    personal_space: Annotated[Criterion | None, LazySpec("simscen.criteria.personal_space", "PersonalSpace")] = None
+    keepout: Annotated[Criterion | None, LazySpec("simscen.criteria.keepout", "Keepout")] = None
+    time_to_goal: Annotated[Criterion | None, LazySpec("simscen.criteria.time_to_goal", "TimeToGoal")] = None
+    path_length: Annotated[Criterion | None, LazySpec("simscen.criteria.path_length", "PathLength")] = None
+    speed: Annotated[Criterion | None, LazySpec("simscen.criteria.speed", "Speed")] = None
+    stopped_within: Annotated[Criterion | None, LazySpec("simscen.criteria.stopped_within", "StoppedWithin")] = None
+    stuck: Annotated[Criterion | None, LazySpec("simscen.criteria.stuck", "Stuck")] = None
     localization_error: Annotated[
-        Criterion | None, OnDemand("simscen.criteria.localization_error", "LocalizationError")
+        Criterion | None, LazySpec("simscen.criteria.localization_error", "LocalizationError")
     ] = None
     relocalized_within: Annotated[
-        Criterion | None, OnDemand("simscen.criteria.relocalized_within", "RelocalizedWithin")
+        Criterion | None, LazySpec("simscen.criteria.relocalized_within", "RelocalizedWithin")
     ] = None
     localization_consistency: Annotated[
-        Criterion | None, OnDemand("simscen.criteria.localization_consistency", "LocalizationConsistency")
+        Criterion | None, LazySpec("simscen.criteria.localization_consistency", "LocalizationConsistency")
     ] = None
-    smoothness: Annotated[Criterion | None, OnDemand("simscen.criteria.smoothness", "Smoothness")] = None
-    replans: Annotated[Criterion | None, OnDemand("simscen.criteria.event_counts", "Replans")] = None
-    recoveries: Annotated[Criterion | None, OnDemand("simscen.criteria.event_counts", "Recoveries")] = None
-    always: Annotated[Criterion | None, OnDemand("simscen.criteria.always_eventually", "Always")] = None
-    eventually: Annotated[Criterion | None, OnDemand("simscen.criteria.always_eventually", "Eventually")] = None
-    until: Annotated[Criterion | None, OnDemand("simscen.criteria.until", "Until")] = None
-    whenever: Annotated[BaseModel | None, OnDemand("simscen.criteria.whenever", "Whenever")] = None
+    smoothness: Annotated[Criterion | None, LazySpec("simscen.criteria.smoothness", "Smoothness")] = None
+    replans: Annotated[Criterion | None, LazySpec("simscen.criteria.event_counts", "Replans")] = None
+    recoveries: Annotated[Criterion | None, LazySpec("simscen.criteria.event_counts", "Recoveries")] = None
+    always: Annotated[Criterion | None, LazySpec("simscen.criteria.always_eventually", "Always")] = None
+    eventually: Annotated[Criterion | None, LazySpec("simscen.criteria.always_eventually", "Eventually")] = None
+    until: Annotated[Criterion | None, LazySpec("simscen.criteria.until", "Until")] = None
+    whenever: Annotated[BaseModel | None, LazySpec("simscen.criteria.whenever", "Whenever")] = None
 
     @model_validator(mode="after")
     def _whenever_then(self) -> "AnyCriterion":

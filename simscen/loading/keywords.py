@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol, TypeVar
 
 from simscen.core.errors import NothingSelected, UsageError
-from simscen.loading.messages import quoted, suggestion
+from simscen.loading.schema.messages import quoted, suggestion
 from simscen.model.scenario import ScenarioSpec
 
 _TOKEN = re.compile(r"[()]|[^\s()]+")

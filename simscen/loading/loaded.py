@@ -9,8 +9,8 @@ from simscen.core.expectation import Expectation
 from simscen.core.externalcommand import ExternalCommand
 from simscen.core.problems import Problem
 from simscen.core.result import RunKey, title
-from simscen.loading.stackchoice import StackChoice
-from simscen.loading.tree import Fields, Key, Place, key_place, value_place
+from simscen.loading.stacks.choice import StackChoice
+from simscen.loading.yaml.tree import Key, MappingNode, Position, key_position, value_position
 from simscen.model.robot import RobotSpec
 from simscen.model.rosmap import RosMapSpec
 from simscen.model.scenario import ScenarioSpec
@@ -46,7 +46,7 @@ class LoadedWorld:
     spec: WorldSpec | None = None
     map: LoadedMap | None = None
     sdf: Path | None = None
-    tree: Fields | None = field(default=None, repr=False, compare=False)
+    tree: MappingNode | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class LoadedRobot:
     spec: RobotSpec | None = None
     urdf: Path | None = None
     bundled: bool = False
-    tree: Fields | None = field(repr=False, default=None)
+    tree: MappingNode | None = field(repr=False, default=None)
     packages: Mapping[str, Path] = field(default_factory=dict)
 
 
@@ -95,7 +95,7 @@ class LoadedScenario:
     world: LoadedWorld
     map: LoadedMap | Literal["none"] | None
     robot: LoadedRobot
-    tree: Fields = field(repr=False)
+    tree: MappingNode = field(repr=False)
     sources: Mapping[str, str] = field(repr=False, default_factory=dict)
     files: Mapping[str, Path] = field(default_factory=dict)
     read: tuple[Path, ...] = ()
@@ -108,7 +108,7 @@ class LoadedScenario:
     several_stacks: bool = False
     runs: ExternalCommand | None = None
     variation: str = ""
-    set_by: Mapping[Place, str] = field(default_factory=dict, repr=False)
+    set_by: Mapping[Position, str] = field(default_factory=dict, repr=False)
     robots: Mapping[str, "LoadedScenario"] = field(default_factory=dict)
     robot_name: str = ""
     other_robots: tuple[str, ...] = ()
@@ -155,19 +155,19 @@ class LoadedScenario:
         """The key of its run with this seed."""
         return RunKey(self.id, seed, self.variation, self.stack_name)
 
-    def place_of(self, *keys: Key) -> Place:
+    def place_of(self, *keys: Key) -> Position:
         """Where the value at `keys` stands in its file, e.g. `place_of("goals", 0, "pose")`."""
-        return value_place(self.tree, keys)
+        return value_position(self.tree, keys)
 
-    def key_place_of(self, *keys: Key) -> Place:
+    def key_place_of(self, *keys: Key) -> Position:
         """Where the last of `keys` stands."""
-        return key_place(self.tree, keys)
+        return key_position(self.tree, keys)
 
     def problem(self, keys: tuple[Key, ...], code: str, message: str, hint: str = "") -> Problem:
         """A problem at the value of `keys`, with the text of its line."""
         return self.problem_at(self.place_of(*keys), code, message, hint)
 
-    def problem_at(self, place: Place, code: str, message: str, hint: str = "") -> Problem:
+    def problem_at(self, place: Position, code: str, message: str, hint: str = "") -> Problem:
         """A problem at a place in any of the files read, with the text of its line."""
         return self.sourced(Problem(*place, code=code, message=message, hint=hint))
 

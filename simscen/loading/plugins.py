@@ -5,7 +5,7 @@ from typing import Any
 
 from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.sense.specwalk import Keys, below
+from simscen.loading.spec_walk import Keys, walk
 from simscen.spec.choice import Choice
 from simscen.spec.registry import Entry, find, origin_of
 
@@ -25,7 +25,7 @@ def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[Entry, ...]:
 
 def used_by(*specs: Any) -> tuple[Entry, ...]:
     """What validated specifications take from installed packages, sorted."""
-    found = {entry for spec in specs for keys, part in below(spec) for entry in _used(keys, part)}
+    found = {entry for spec in specs for keys, part in walk(spec) for entry in _used(keys, part)}
     return _sorted(found)
 
 
@@ -34,12 +34,12 @@ def fact_of(entry: Entry) -> str:
     return f"{_FACT}{entry.group}.{entry.name}"
 
 
-def origin(entry: Entry) -> str:
+def requirement_of(entry: Entry) -> str:
     """Its package and version as pip writes them."""
     return f"{entry.distribution}=={entry.version}"
 
 
-def absent(facts: Mapping[str, str], kinds: Container[str]) -> list[Problem]:
+def missing_plugins(facts: Mapping[str, str], kinds: Container[str]) -> list[Problem]:
     """What of these kinds a log was made with, by its header's `facts`, and is not installed as it was then."""
     missing = []
     for fact, then in sorted(facts.items()):
@@ -47,7 +47,7 @@ def absent(facts: Mapping[str, str], kinds: Container[str]) -> list[Problem]:
         if not fact.startswith(_FACT) or kind not in kinds:
             continue
         entry = find(kind, name)
-        now = origin(entry) if entry is not None else ""
+        now = requirement_of(entry) if entry is not None else ""
         if now != then:
             instead = f"installed is {now}" if now else "it is not installed"
             message = f"the run was judged with {kind} `{name}` of {then}, and {instead}"

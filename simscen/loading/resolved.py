@@ -1,19 +1,22 @@
 """A scenario as one self-contained text: what a log and an output folder keep of it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
+import yaml
+
+from simscen.core.disturbance import Disturbance
 from simscen.core.errors import InvalidInput
-from simscen.loading.compose import compose
-from simscen.loading.document import Library
+from simscen.loading.files.paths import PathSandbox
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.paths import Fence
-from simscen.loading.placing import placed_criteria, places_of
-from simscen.loading.plugins import absent
-from simscen.loading.robots import each_of
-from simscen.loading.tree import Fields, Node
-from simscen.loading.validation import Model, check
-from simscen.loading.writing import to_yaml
+from simscen.loading.multirobot import split_by_robot
+from simscen.loading.places import places_of, resolve_criteria_places
+from simscen.loading.plugins import missing_plugins
+from simscen.loading.schema.validate import Model, check
+from simscen.loading.yaml.library import Library
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.scalars import to_yaml
+from simscen.loading.yaml.tree import Key, MappingNode, Node, node_at
 from simscen.model.criteria_file import CriteriaSpec
 from simscen.model.scenario import ScenarioSpec
 
@@ -27,19 +30,19 @@ def resolved_text(loaded: LoadedScenario) -> str:
 
     Where criteria name places, their poses stand there instead: it is judged by without its world.
     """
-    own, _ = compose(loaded.text, loaded.path)
-    plain = placed_criteria(loaded.tree.plain, _checked(ScenarioSpec, loaded.tree), places_of(loaded.world))
-    if isinstance(own, Fields) and own.plain == plain:
+    own, _ = parse_yaml(loaded.text, loaded.path)
+    plain = resolve_criteria_places(loaded.tree.plain, _checked(ScenarioSpec, loaded.tree), places_of(loaded.world))
+    if isinstance(own, MappingNode) and own.plain == plain:
         return loaded.text
     return to_yaml(plain)
 
 
-def whole_text(loaded: LoadedScenario) -> str:
+def unexpanded_text(loaded: LoadedScenario) -> str:
     """Likewise, with all the variations that the file has instead of the values of one."""
     if not loaded.variation:
         return resolved_text(loaded)
-    own, _ = compose(loaded.text, loaded.path)
-    tree, _ = Library(Fence.around(loaded.root, loaded.world_path)).read(loaded.file, defaults=True)
+    own, _ = parse_yaml(loaded.text, loaded.path)
+    tree, _ = Library(PathSandbox.around(loaded.root, loaded.world_path)).read(loaded.file, defaults=True)
     return loaded.text if tree is None or own is None or own.plain == tree.plain else to_yaml(tree.plain)
 
 
@@ -48,16 +51,16 @@ def spec_of_text(text: str, name: str) -> ScenarioSpec:
     return _checked(ScenarioSpec, _read(text, name))
 
 
-def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, Fields]:
+def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, MappingNode]:
     """The specification in a resolved text, of one of several robots if named, and the tree that says where it stands.
 
     A file of criteria will do. Raises InvalidInput.
     """
     tree = _read(text, name)
-    if isinstance(tree, Fields) and robot:
-        tree = each_of(tree).get(robot, tree)
+    if isinstance(tree, MappingNode) and robot:
+        tree = split_by_robot(tree).get(robot, tree)
     spec = _checked(CriteriaSpec, tree)
-    assert isinstance(tree, Fields)
+    assert isinstance(tree, MappingNode)
     return spec, tree
 
 
@@ -68,17 +71,17 @@ def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str 
     Only that is looked at: what else of installed packages the run was made with need not be there to judge it. Raises
     InvalidInput, also where a criterion is not installed that judged the run then.
     """
-    if missing := absent(facts, JUDGING):
+    if missing := missing_plugins(facts, JUDGING):
         raise InvalidInput([replace(problem, path=name) for problem in missing])
     tree = _read(text, name)
-    if isinstance(tree, Fields):
-        tree = each_of(tree)[robot] if robot else tree
+    if isinstance(tree, MappingNode):
+        tree = split_by_robot(tree)[robot] if robot else tree
         tree = replace(tree, entries={key: entry for key, entry in tree.entries.items() if key in _JUDGED})
     return _checked(CriteriaSpec, tree)
 
 
 def _read(text: str, name: str) -> Node:
-    tree, problems = compose(text, name)
+    tree, problems = parse_yaml(text, name)
     if tree is None or problems:
         raise InvalidInput(problems)
     return tree
@@ -89,3 +92,36 @@ def _checked(model: type[Model], tree: Node) -> Model:
     if isinstance(spec, list):
         raise InvalidInput(spec)
     return spec
+
+
+# MERGED: The events and faults of a scenario as it orders them, with their triggers as they are written.
+def disturbances_of(loaded: LoadedScenario) -> tuple[Disturbance, ...]:
+    """Events, each with the steps of its story after it, then faults, in the order of the scenario."""
+    return (*_events(loaded), *_faults(loaded))
+
+
+def _events(loaded: LoadedScenario) -> Iterator[Disturbance]:
+    for step in loaded.spec.steps:
+        when = "" if step.when is None else _written(loaded, *step.keys, "when")
+        yield Disturbance(step.name, "event", when, step.required, _line(loaded, *step.keys), step.after)
+
+
+def _faults(loaded: LoadedScenario) -> Iterator[Disturbance]:
+    for index, entry in enumerate(loaded.spec.faults):
+        keys = ("faults", index)
+        when = "" if entry.when is None else _written(loaded, *keys, "when")
+        yield Disturbance(entry.label, "fault", when, entry.required, _line(loaded, *keys))
+
+
+def _written(loaded: LoadedScenario, *keys: Key) -> str:
+    """A mapping on one line as an author would write it, without its braces."""
+    text = yaml.safe_dump(
+        node_at(loaded.tree, keys).plain, default_flow_style=True, sort_keys=False, allow_unicode=True, width=10**9
+    )
+    return text.strip().removeprefix("{").removesuffix("}")
+
+
+def _line(loaded: LoadedScenario, *keys: Key) -> int:
+    """0 for what a base file holds: the line would be taken for one of the scenario's own."""
+    place = loaded.place_of(*keys)
+    return place.line if place.path == loaded.path else 0

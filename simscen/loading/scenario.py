@@ -7,23 +7,22 @@ from typing import Literal
 
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.problems import Problem
-from simscen.loading import robots
-from simscen.loading.assets import Assets
-from simscen.loading.consistency import inconsistencies
-from simscen.loading.document import Library
+from simscen.loading import multirobot
+from simscen.loading.checks.robots import check_robot_names
+from simscen.loading.checks.runner import check_scenario
+from simscen.loading.files.assets import Assets, load_judged_masks
+from simscen.loading.files.paths import PathSandbox
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
-from simscen.loading.masks import judged_masks
-from simscen.loading.messages import quoted, suggestion
-from simscen.loading.nav2stack import with_nav2_parameters
-from simscen.loading.paths import Fence
-from simscen.loading.placing import placed, places_of, unknown_places
-from simscen.loading.sense.whose import whose
-from simscen.loading.stackchoice import StackChoice
-from simscen.loading.strangers import no_scenario, stranger
-from simscen.loading.tree import Fields, Key, Leaf, Node, at, child, value_place
-from simscen.loading.validation import check
-from simscen.loading.variations.expand import Variation, variations_of
-from simscen.loading.variations.telling import Found, told
+from simscen.loading.nav2.stack import with_nav2_parameters
+from simscen.loading.places import places_of, resolve_places, unknown_places
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.schema.validate import check
+from simscen.loading.stacks.choice import StackChoice
+from simscen.loading.stacks.stackfile import not_a_scenario, recognize_stack_file
+from simscen.loading.variations.expand import Variation, expand_variations
+from simscen.loading.variations.problems import VariationProblems, merge_problems
+from simscen.loading.yaml.library import Library
+from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import WorldSpec
 
@@ -51,8 +50,10 @@ def load_scenario(
     names = [one.variation for one in loaded if one.variation]
     if not names:
         raise UsageError(f"{path} has no variations, so none is called {quoted(variation)}")
-    told = f"has no variation {quoted(variation)}" if variation else f"has {len(names)} variations: say which one"
-    raise UsageError(f"{path} {told}; {suggestion(variation, names)}")
+    merge_problems = (
+        f"has no variation {quoted(variation)}" if variation else f"has {len(names)} variations: say which one"
+    )
+    raise UsageError(f"{path} {merge_problems}; {suggestion(variation, names)}")
 
 
 def try_scenario(
@@ -70,28 +71,30 @@ def try_variations(
 
     A file without variations is its only one, without a name.
     """
-    fence = Fence.around(root, world_path)
+    fence = PathSandbox.around(root, world_path)
     library = Library(fence)
     file = fence.entered(path)
     if isinstance(file, Problem):
         return [file]
-    if unusable_name(name := scenario_id(file, fence.root).rpartition("/")[2]):
+    if is_unusable_name(name := scenario_id(file, fence.root).rpartition("/")[2]):
         message, hint = f"its id would end in {name!r}, which is no folder", "give the file a name before its suffix"
         return [Problem(fence.shown(file), 0, 0, "SC041", message, hint)]
     tree, problems = library.read(file, defaults=True)
-    if kind := stranger(tree, library.texts.get(shown := fence.shown(file), ""), shown):
-        return [no_scenario(kind, shown)]
+    if kind := recognize_stack_file(tree, library.texts.get(shown := fence.shown(file), ""), shown):
+        return [not_a_scenario(kind, shown)]
     if choice is not None:
         library.add(choice.texts, choice.files)
-    if problems or not isinstance(tree, Fields):
-        wrong = check(ScenarioSpec, tree, robots.lacking) if tree is not None and not problems else []
+    if problems or not isinstance(tree, MappingNode):
+        wrong = check(ScenarioSpec, tree, multirobot.missing_in_scenario) if tree is not None and not problems else []
         return library.with_source(sorted([*problems, *(wrong if isinstance(wrong, list) else ())]))
-    variations = variations_of(tree)
+    variations = expand_variations(tree)
     if not isinstance(variations[0], Variation):
         return library.with_source(sorted(variations))
     tried = [(one, _with_choice(one, library, file, choice)) for one in variations]
     if any(isinstance(found, list) for _, found in tried):
-        return told([Found(one.name, one.set_by, found if isinstance(found, list) else ()) for one, found in tried])
+        return merge_problems(
+            [VariationProblems(one.name, one.set_by, found if isinstance(found, list) else ()) for one, found in tried]
+        )
     return tuple(found for _, found in tried if isinstance(found, LoadedScenario))
 
 
@@ -99,17 +102,17 @@ def _with_choice(
     one: Variation, library: Library, file: Path, choice: StackChoice | None
 ) -> LoadedScenario | list[Problem]:
     """One variation with the chosen stack in place of its own, or all that is wrong with it."""
-    tree = one.tree if choice is None else robots.with_chosen(one.tree, choice)
+    tree = one.tree if choice is None else multirobot.apply_stack_choice(one.tree, choice)
     if choice is not None and (lost := list(_without_effect(one, tree, choice))):
         return library.with_source(lost)
     taken = with_nav2_parameters(tree, library)
     if taken.problems:
         return library.with_source(sorted(taken.problems))
     tree = taken.tree
-    spec = check(ScenarioSpec, tree, robots.lacking)
+    spec = check(ScenarioSpec, tree, multirobot.missing_in_scenario)
     if isinstance(spec, list):
         return library.with_source(sorted([*spec, *_problems_of_world(tree, library)]))
-    if problems := list(whose(spec, tree)):
+    if problems := list(check_robot_names(spec, tree)):
         return library.with_source(problems)
     loaded = _several(spec, tree, library, file) if spec.robots else _one(spec, tree, library, file)
     if isinstance(loaded, list):
@@ -118,11 +121,11 @@ def _with_choice(
     return replace(loaded, notes=notes).having(choice=choice, variation=one.name, set_by=one.set_by)
 
 
-def _without_effect(one: Variation, tree: Fields, choice: StackChoice) -> Iterator[Problem]:
+def _without_effect(one: Variation, tree: MappingNode, choice: StackChoice) -> Iterator[Problem]:
     """Values for a stack that another takes the place of: the run would be called by what it is not run with."""
-    each = [tree, *robots.each_of(tree).values()] if robots.has_several(tree) else [tree]
+    each = [tree, *multirobot.split_by_robot(tree).values()] if multirobot.has_multiple_robots(tree) else [tree]
     for change in one.changes:
-        if all(at(part, change.target.keys) is not change.value for part in each):
+        if all(node_at(part, change.target.keys) is not change.value for part in each):
             message = f"{quoted(change.target.path)} changes nothing with --stack {choice.written}"
             hint = "choose variations without it with -k or --variation, or another stack"
             yield Problem(*change.target.place, "SC055", message, hint)
@@ -131,16 +134,16 @@ def _without_effect(one: Variation, tree: Fields, choice: StackChoice) -> Iterat
 def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
     """What is wrong with the world file of a scenario that is wrong itself: better told at once than next time."""
     assets, node = Assets(library), child(tree, "world")
-    if isinstance(node, Leaf) and isinstance(node.value, str):
+    if isinstance(node, ScalarNode) and isinstance(node.value, str):
         assets.world(node)
     return assets.problems
 
 
-def _several(spec: ScenarioSpec, tree: Fields, library: Library, file: Path) -> LoadedScenario | list[Problem]:
+def _several(spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path) -> LoadedScenario | list[Problem]:
     """A scenario of several robots; what is wrong is told once, whomever of them it concerns."""
     views: dict[str, LoadedScenario] = {}
     problems: list[Problem] = []
-    for name, own in robots.each_of(tree).items():
+    for name, own in multirobot.split_by_robot(tree).items():
         one = check(ScenarioSpec, own)
         others = tuple(other for other in sorted(spec.robots or ()) if other != name)
         found = one if isinstance(one, list) else _one(one, own, library, file, name, others)
@@ -153,7 +156,7 @@ def _several(spec: ScenarioSpec, tree: Fields, library: Library, file: Path) -> 
     first, notes = next(iter(views.values())), [note for view in views.values() for note in view.notes]
     return replace(
         first,
-        spec=placed(spec, places_of(first.world)),
+        spec=resolve_places(spec, places_of(first.world)),
         tree=tree,
         robots=views,
         notes=tuple(dict.fromkeys(notes)),
@@ -163,7 +166,7 @@ def _several(spec: ScenarioSpec, tree: Fields, library: Library, file: Path) -> 
 
 
 def _one(
-    spec: ScenarioSpec, tree: Fields, library: Library, file: Path, name: str = "", others: tuple[str, ...] = ()
+    spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path, name: str = "", others: tuple[str, ...] = ()
 ) -> LoadedScenario | list[Problem]:
     """A scenario of one robot, or as one of several sees it."""
     assets = Assets(library)
@@ -172,8 +175,8 @@ def _one(
     keepout_mask = _mask(spec.stack.keepout_mask, tree, ("stack", "keepout_mask"), assets)
     limits = spec.stack.speed_mask
     speed_mask = _mask(limits.file if limits else None, tree, ("stack", "speed_mask", "file"), assets)
-    judged = judged_masks(spec, tree, assets)
-    robot = assets.robot(spec.own.model, value_place(tree, ("robot", "model")))
+    judged = load_judged_masks(spec, tree, assets)
+    robot = assets.robot(spec.own.model, value_position(tree, ("robot", "model")))
     if world is None or robot is None or assets.problems:
         return library.with_source(sorted(assets.problems))
     fence, shown, places = library.fence, library.fence.shown(file), places_of(world)
@@ -185,7 +188,7 @@ def _one(
         root=fence.root,
         world_path=fence.world_path,
         text=library.texts[shown],
-        spec=placed(spec, places),
+        spec=resolve_places(spec, places),
         world=world,
         map=robot_map,
         robot=robot,
@@ -205,30 +208,30 @@ def _one(
         robot_name=name,
         other_robots=others,
     )
-    problems = sorted(inconsistencies(loaded, strangers=strangers))
+    problems = sorted(check_scenario(loaded, strangers=strangers))
     if any(problem.severity == "error" for problem in problems):
         return problems
     return replace(loaded, notes=(*loaded.notes, *problems))
 
 
-def _world(spec: ScenarioSpec, tree: Fields, assets: Assets, file: Path) -> LoadedWorld | None:
-    node = at(tree, ("world",))
+def _world(spec: ScenarioSpec, tree: MappingNode, assets: Assets, file: Path) -> LoadedWorld | None:
+    node = node_at(tree, ("world",))
     if isinstance(spec.world, WorldSpec):
         return assets.own_world(spec.world, node, file)
-    return assets.world(node) if isinstance(node, Leaf) else None
+    return assets.world(node) if isinstance(node, ScalarNode) else None
 
 
-def _map(spec: ScenarioSpec, tree: Fields, assets: Assets) -> LoadedMap | Literal["none"] | None:
-    node = at(tree, ("map",))
-    if spec.map is None or spec.map == "none" or not isinstance(node, Leaf):
+def _map(spec: ScenarioSpec, tree: MappingNode, assets: Assets) -> LoadedMap | Literal["none"] | None:
+    node = node_at(tree, ("map",))
+    if spec.map is None or spec.map == "none" or not isinstance(node, ScalarNode):
         return "none" if spec.map == "none" else None
     return assets.map(node)
 
 
-def _mask(written: str | None, tree: Fields, keys: tuple[Key, ...], assets: Assets) -> LoadedMap | None:
+def _mask(written: str | None, tree: MappingNode, keys: tuple[Key, ...], assets: Assets) -> LoadedMap | None:
     """The filter mask that the stack names there."""
-    node = at(tree, keys)
-    return assets.map(node) if written is not None and isinstance(node, Leaf) else None
+    node = node_at(tree, keys)
+    return assets.map(node) if written is not None and isinstance(node, ScalarNode) else None
 
 
 def _notes(*maps: LoadedMap | None) -> tuple[Problem, ...]:
@@ -236,7 +239,7 @@ def _notes(*maps: LoadedMap | None) -> tuple[Problem, ...]:
     return tuple(dict.fromkeys(note for used in maps if used for note in used.notes))
 
 
-def unusable_name(name: str) -> bool:
+def is_unusable_name(name: str) -> bool:
     """Whether a scenario of that name could have no folder of its own in the output."""
     return name in ("", ".", "..")
 

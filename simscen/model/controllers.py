@@ -6,7 +6,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from simscen.model.controllerspec import ControllerSpec, Weight
 from simscen.model.mppi import Mppi
-from simscen.spec.base import Ranged, type_or
+from simscen.spec.base import Ranged, type_discriminator
 from simscen.spec.bytype import ByType
 from simscen.spec.quantities import (
     Angle,
@@ -184,7 +184,7 @@ _Controllers = Annotated[
     Annotated[RegulatedPurePursuit, Tag("regulated_pure_pursuit")]
     | Annotated[DynamicWindow, Tag("dwb")]
     | Annotated[Mppi, Tag("mppi")],
-    Discriminator(type_or("regulated_pure_pursuit")),
+    Discriminator(type_discriminator("regulated_pure_pursuit")),
 ]
 Controller = Annotated[ControllerSpec, ByType("controller", _Controllers)]
 CONTROLLERS = {

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from simscen.spec.base import Ranged, type_or
+from simscen.spec.base import Ranged, type_discriminator
 from simscen.spec.bytype import ByType
 from simscen.spec.component import Typed
 from simscen.spec.quantities import (
@@ -194,7 +194,7 @@ _Localizers = Annotated[
     | Annotated[Ekf, Tag("ekf")]
     | Annotated[GroundTruth, Tag("ground_truth")]
     | Annotated[OdometryOnly, Tag("odometry")],
-    Discriminator(type_or("amcl")),
+    Discriminator(type_discriminator("amcl")),
 ]
 
 

@@ -6,7 +6,7 @@ from pydantic import Discriminator, Field, Tag
 
 from simscen.core.goalnames import FAILED, Mode
 from simscen.spec.base import Spec
-from simscen.spec.ondemand import OnDemand
+from simscen.spec.lazy import LazySpec
 from simscen.spec.quantities import Duration, PositiveLength
 
 
@@ -34,7 +34,7 @@ def _text_or_mapping(value: Any) -> str:
 
 Expectation = Annotated[
     Annotated[Literal["succeeded", "failed"], Tag("text")]
-    | Annotated[Spec, OnDemand("simscen.model.expectederror", "ExpectedError"), Tag("mapping")],
+    | Annotated[Spec, LazySpec("simscen.model.expected_error", "ExpectedError"), Tag("mapping")],
     Discriminator(_text_or_mapping),
 ]
 

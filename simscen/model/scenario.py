@@ -13,8 +13,8 @@ from simscen.model.anystack import AnyStack
 from simscen.model.navigation import Expectation, Navigation, OnReached
 from simscen.model.world import WorldSpec
 from simscen.spec.base import Spec, by_default
-from simscen.spec.ondemand import OnDemand
-from simscen.spec.orplace import OrPlace, PlaceAlone, PlaceOrPose
+from simscen.spec.lazy import LazySpec
+from simscen.spec.named_places import OrPlace, PlaceAlone, PlaceOrPose
 from simscen.spec.places import Name, PlaceName, PoseSpec, RobotName
 from simscen.spec.quantities import (
     Duration,
@@ -33,14 +33,14 @@ from simscen.spec.references import Refers
 
 if TYPE_CHECKING:
     from simscen.criteria.plugin_metric import AnyMeasure
-    from simscen.model.disturbance import EventEntry, FaultEntry, Step
+    from simscen.model.disturbances import EventEntry, FaultEntry, Step
     from simscen.model.variations import Variations
     from simscen.triggers.trigger import Trigger
 else:
-    AnyMeasure = Annotated[Spec, OnDemand("simscen.criteria.plugin_metric", "AnyMeasure")]
-    EventEntry = Annotated[Spec, OnDemand("simscen.model.disturbance", "EventEntry")]
-    FaultEntry = Annotated[Spec, OnDemand("simscen.model.disturbance", "FaultEntry")]
-    Variations = Annotated[Spec, OnDemand("simscen.model.variations", "Variations")]
+    AnyMeasure = Annotated[Spec, LazySpec("simscen.criteria.plugin_metric", "AnyMeasure")]
+    EventEntry = Annotated[Spec, LazySpec("simscen.model.disturbances", "EventEntry")]
+    FaultEntry = Annotated[Spec, LazySpec("simscen.model.disturbances", "FaultEntry")]
+    Variations = Annotated[Spec, LazySpec("simscen.model.variations", "Variations")]
 
 
 def _text_or_mapping(value: Any) -> str:
@@ -50,7 +50,7 @@ def _text_or_mapping(value: Any) -> str:
 FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 WorldOrFile = Annotated[
     Annotated[FilePath, Tag("text")]
-    | Annotated[WorldSpec, OnDemand("simscen.model.world", "WorldSpec"), Tag("mapping")],
+    | Annotated[WorldSpec, LazySpec("simscen.model.world", "WorldSpec"), Tag("mapping")],
     Discriminator(_text_or_mapping),
 ]
 
@@ -266,7 +266,7 @@ class ScenarioSpec(Spec):
     @property
     def steps(self) -> "list[Step]":
         """The events, each with the steps of its story after it: everything that is to happen to the world."""
-        from simscen.model.disturbance import steps_of
+        from simscen.model.disturbances import steps_of
 
         return steps_of(self.events)
 

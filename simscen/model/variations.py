@@ -4,9 +4,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, StringConstraints, Tag, model_validator
 
-from simscen.spec.amounts import AnyAmount
 from simscen.spec.base import Spec, Value
 from simscen.spec.choice import Choice
+from simscen.spec.quantities import AnyAmount
 
 MOST = 1000
 """Variations of one scenario."""

@@ -6,8 +6,8 @@ from pydantic import Field, model_validator
 
 from simscen.spec.base import Spec
 from simscen.spec.motions import Motion
+from simscen.spec.named_places import PlaceOrPoint, PlaceOrPose
 from simscen.spec.objects import Shaped
-from simscen.spec.orplace import PlaceOrPoint, PlaceOrPose
 from simscen.spec.places import Name, PlaceName, PoseSpec, Ring
 from simscen.spec.quantities import Duration, Friction, Mass, PositiveLength
 

@@ -12,7 +12,7 @@ from simscen.cli.session.selection import Checks, checked
 from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import InvalidInput, SimscenError, UsageError
 from simscen.core.result import Outcome
-from simscen.loading.discovery import default_root
+from simscen.loading.files.discovery import default_root
 from simscen.pytesting.failure import ScenarioFailed, as_seen
 from simscen.pytesting.runner import runner_of
 from simscen.report.complaints import label

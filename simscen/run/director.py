@@ -5,7 +5,7 @@ from typing import cast
 from simscen.core.chance import Streams
 from simscen.core.events import Event, EventKind, Value
 from simscen.core.stage import Situation
-from simscen.model.disturbance import FaultEntry, Step
+from simscen.model.disturbances import FaultEntry, Step
 from simscen.run.faultrig import FaultRig
 from simscen.run.firing import Firing
 from simscen.run.live import LiveStage

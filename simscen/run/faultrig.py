@@ -20,7 +20,7 @@ from simscen.core.motion import Twist
 from simscen.core.readings import BELIEF, COMMAND, WHEELS
 from simscen.core.sensing import Odometry, Reading, Readings
 from simscen.faults.base import Disturbance, FaultSetting
-from simscen.model.disturbance import FaultEntry
+from simscen.model.disturbances import FaultEntry
 from simscen.run.commandlink import CommandLink
 from simscen.run.streamnames import stream_names
 from simscen.stack.localizers.ground_truth import TRUTH

@@ -10,7 +10,7 @@ from simscen.core.readings import INSTANCES
 from simscen.core.shapes import TriangleMesh
 from simscen.core.time import Clock
 from simscen.faults.base import FaultSetting, Sight
-from simscen.model.disturbance import FaultEntry
+from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import RobotSpec
 from simscen.run.sight import SensorSight
 from simscen.sensors.sensor import SensorView

@@ -10,7 +10,7 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.readings import INSTANCES, MAP
 from simscen.core.time import Clock
 from simscen.faults.base import FaultSetting
-from simscen.model.disturbance import FaultEntry
+from simscen.model.disturbances import FaultEntry
 from simscen.run.prepare import Prepared
 from simscen.run.streamnames import stream_names
 

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from simscen.loading.document import DEFAULTS
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
+from simscen.loading.yaml.library import DEFAULTS_FILE
 from simscen.run.digest import named_files
 from simscen.run.plugincode import files_of as plugin_files
 
@@ -18,7 +18,7 @@ def files_of(loaded: LoadedScenario) -> set[Path]:
     programs = [part for view in loaded.each.values() if view.runs is not None for part in _program(view)]
     return {
         loaded.file,
-        loaded.file.with_name(DEFAULTS),
+        loaded.file.with_name(DEFAULTS_FILE),
         *loaded.files.values(),
         *loaded.read,
         *named_files(loaded),

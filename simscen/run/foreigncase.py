@@ -7,7 +7,7 @@ from simscen.core.case import Case
 from simscen.core.geometry import Pose2
 from simscen.core.maskcells import MaskCells
 from simscen.core.problems import Problem
-from simscen.loading.criteria_file import LoadedCriteria
+from simscen.loading.files.criteriafile import LoadedCriteria
 from simscen.model.world import WorldSpec
 from simscen.run.goals import expected_of, goals_of
 from simscen.run.masks import load_judged_masks

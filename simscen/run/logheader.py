@@ -3,7 +3,7 @@
 from dataclasses import replace
 from weakref import WeakKeyDictionary
 
-from simscen.loading.plugins import fact_of, origin
+from simscen.loading.plugins import fact_of, requirement_of
 from simscen.loading.resolved import resolved_text
 from simscen.record.header import CHOSEN, STACK_NAME, VARIATION, LogHeader
 from simscen.record.sceneryfile import NAME as SCENERY
@@ -39,7 +39,7 @@ def _of_one(prepared: Prepared) -> LogHeader:
         robot_description=describe(prepared.body),
         frames=sensor_frames(prepared.robot),
         sensors=sensor_kinds(prepared),
-        facts={**_key_facts(prepared), **{fact_of(entry): origin(entry) for entry in prepared.plugins}},
+        facts={**_key_facts(prepared), **{fact_of(entry): requirement_of(entry) for entry in prepared.plugins}},
     )
 
 

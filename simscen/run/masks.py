@@ -9,7 +9,7 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.maskcells import MaskCells, cells_of
 from simscen.core.problems import Problem
 from simscen.loading.loaded import JudgedMask, LoadedMap, LoadedScenario
-from simscen.loading.tree import Fields, Key, value_place
+from simscen.loading.yaml.tree import Key, MappingNode, value_position
 from simscen.run.worldsource import load_map
 
 KEEPOUT: tuple[Key, ...] = ("stack", "keepout_mask")
@@ -31,17 +31,17 @@ def load_masks(loaded: LoadedScenario) -> FilterMasks:
     return FilterMasks(keepout, spec.over(grid))
 
 
-def load_judged_masks(masks: Mapping[str, JudgedMask], tree: Fields, sourced: Sourced) -> dict[str, MaskCells]:
+def load_judged_masks(masks: Mapping[str, JudgedMask], tree: MappingNode, sourced: Sourced) -> dict[str, MaskCells]:
     """The masks that criteria judge by. Raises InvalidInput, at the line that names it, for one that is unusable."""
     return {name: _judged(mask, tree, sourced) for name, mask in masks.items()}
 
 
-def _judged(mask: JudgedMask, tree: Fields, sourced: Sourced) -> MaskCells:
+def _judged(mask: JudgedMask, tree: MappingNode, sourced: Sourced) -> MaskCells:
     cells = cells_of(_grid(mask.map, mask.keys, tree, sourced))
     if len(cells.blocks) > MOST_BLOCKS:
         message = f"mask image {mask.map.image.name} falls into {len(cells.blocks)} rectangles of equal cells"
         hint = f"criteria judge by masks of {MOST_BLOCKS} at most; is it a photograph, or a map with noise?"
-        raise InvalidInput([sourced(Problem(*value_place(tree, mask.keys), "SC320", message, hint))])
+        raise InvalidInput([sourced(Problem(*value_position(tree, mask.keys), "SC320", message, hint))])
     return cells
 
 
@@ -49,11 +49,11 @@ def _of_stack(loaded: LoadedScenario, keys: tuple[Key, ...], source: LoadedMap |
     return None if source is None else _grid(source, keys, loaded.tree, loaded.sourced)
 
 
-def _grid(source: LoadedMap, keys: tuple[Key, ...], tree: Fields, sourced: Sourced) -> OccupancyGrid:
+def _grid(source: LoadedMap, keys: tuple[Key, ...], tree: MappingNode, sourced: Sourced) -> OccupancyGrid:
     try:
         return load_map(source)
     except InvalidInput as error:
-        place, image = value_place(tree, keys), source.image.name
+        place, image = value_position(tree, keys), source.image.name
         told = [replace(problem, path=place.path, line=place.line, col=place.col) for problem in error.problems]
         raise InvalidInput(
             [sourced(replace(problem, message=f"mask image {image}: {problem.message}")) for problem in told]

@@ -15,9 +15,9 @@ from simscen.core.navigation import Goal
 from simscen.core.shapes import TriangleMesh
 from simscen.core.world import BuiltWorld
 from simscen.criteria.base import Criterion
-from simscen.loading.disturbances import disturbances_of
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
+from simscen.loading.resolved import disturbances_of
 from simscen.model.anystack import AnyStack
 from simscen.model.localizers import Amcl, OdometryOnly
 from simscen.model.robot import RobotSpec

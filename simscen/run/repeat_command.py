@@ -4,9 +4,9 @@ import os
 import shlex
 from pathlib import Path
 
-from simscen.loading.discovery import default_root
+from simscen.loading.files.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.stackchoice import StackChoice
+from simscen.loading.stacks.choice import StackChoice
 
 
 def repeat_command(scenario: LoadedScenario, seed: int) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedRobot
-from simscen.loading.tree import value_place
+from simscen.loading.yaml.tree import value_position
 from simscen.model.robot import RobotSpec
 from simscen.run.worldsource import read_mesh
 from simscen.sim.robot_body import RobotBody
@@ -41,7 +41,7 @@ def otherwise(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]:
         if abs(said - drawn[name]) > AGREE * drawn[name]:
             message = f"{name} is {said:g} m here, but {drawn[name]:.4g} m in {robot.urdf.name}"
             hint = "the wheels stand where the URDF has them; commands and odometry reckon with what is written here"
-            yield Problem(*value_place(robot.tree, ("drive", name)), "SC404", message, hint, "warning")
+            yield Problem(*value_position(robot.tree, ("drive", name)), "SC404", message, hint, "warning")
 
 
 def _drawn(wheels: tuple[Wheel, ...]) -> dict[str, float]:

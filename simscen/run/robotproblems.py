@@ -2,7 +2,7 @@
 
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
-from simscen.loading.robotfile import RobotFile
+from simscen.loading.files.robotfile import RobotFile
 from simscen.run.worldsource import robot_of
 from simscen.sim.ground import refuse_dragging
 

@@ -14,7 +14,7 @@ from simscen.core.trace import Trace
 from simscen.judge.multi_robot import combine_robots
 from simscen.judge.result_json import to_json
 from simscen.judge.run_result import judge_run
-from simscen.loading.discovery import default_root
+from simscen.loading.files.discovery import default_root
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import WAITS, Backlog, Log
 from simscen.record.recorder import Recorder

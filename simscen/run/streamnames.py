@@ -7,8 +7,8 @@ from typing import Any
 
 from pydantic import BaseModel, RootModel
 
-from simscen.loading.sense.specwalk import below
-from simscen.model.disturbance import EventEntry, FaultEntry, StepEntry
+from simscen.loading.spec_walk import walk
+from simscen.model.disturbances import EventEntry, FaultEntry, StepEntry
 from simscen.spec.choice import Choice
 
 
@@ -29,7 +29,7 @@ def stream_names(entries: Sequence[EventEntry | StepEntry | FaultEntry]) -> list
 
 
 def _written(entry: BaseModel) -> str:
-    if any(isinstance(part, Choice) and part.narrow is not None for _, part in below(entry)):
+    if any(isinstance(part, Choice) and part.narrow is not None for _, part in walk(entry)):
         return json.dumps(_plain(entry), sort_keys=True)
     _build(entry)
     return entry.model_dump_json(exclude_defaults=True)

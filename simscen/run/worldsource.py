@@ -12,8 +12,8 @@ from simscen.core.problems import Problem
 from simscen.core.shapes import Mesh
 from simscen.core.world import World
 from simscen.loading.loaded import LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
-from simscen.loading.messages import quoted, suggestion
-from simscen.loading.tree import key_place
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.yaml.tree import key_position
 from simscen.model.robot import RobotSpec
 from simscen.model.world import WorldSpec
 from simscen.worlds.own import build_own
@@ -111,7 +111,7 @@ def _unknown(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Prob
     assert robot.tree is not None and robot.urdf is not None  # who else would give arguments
     message = f"{quoted(robot.urdf.name)} declares no argument {quoted(argument)}"
     hint = suggestion(argument, declared) or "it has no <xacro:arg>"
-    return Problem(*key_place(robot.tree, ("arguments", argument)), "SC403", message, hint)
+    return Problem(*key_position(robot.tree, ("arguments", argument)), "SC403", message, hint)
 
 
 def _inferred(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:

@@ -1,6 +1,10 @@
 """The base of everything a user writes in YAML."""
 
+import ast
+import inspect
+import sys
 from collections.abc import Callable
+from functools import cache
 from typing import Any, Generic, TypeVar
 
 from pydantic import (
@@ -13,8 +17,6 @@ from pydantic import (
 )
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
-
-from simscen.spec.docs import field_docs
 
 
 class Spec(BaseModel):
@@ -72,7 +74,7 @@ def by_default() -> Any:
     return Field(default_factory=dict, validate_default=True)
 
 
-def type_or(default: str) -> Callable[[Any], str | None]:
+def type_discriminator(default: str) -> Callable[[Any], str | None]:
     """Tells the members of a union apart by their `type`, which may be left out for the default one."""
 
     def tag(value: Any) -> str | None:
@@ -81,3 +83,35 @@ def type_or(default: str) -> Callable[[Any], str | None]:
         return getattr(value, "type", None)
 
     return tag
+
+
+# MERGED: The docstring under each field of a specification, read from its source when somebody asks.
+# MERGED:
+# MERGED: Pydantic can collect them itself (`use_attribute_docstrings`), but it does so when a class is made, by reading and
+# MERGED: parsing source for each class: 45 ms of start-up for every command. Only schema, explain and the reference need them.
+def field_docs(model: type) -> dict[str, str]:
+    """Field name → docstring, those of base classes included."""
+    docs: dict[str, str] = {}
+    for base in reversed(model.__mro__):
+        if base.__module__.partition(".")[0] not in ("builtins", "pydantic", "abc", "typing"):
+            docs.update(_of_module(base.__module__).get(base.__name__, {}))
+    return docs
+
+
+@cache
+def _of_module(module: str) -> dict[str, dict[str, str]]:
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except OSError:  # a package that was installed without its source
+        return {}
+    return {node.name: _of_class(node) for node in tree.body if isinstance(node, ast.ClassDef)}
+
+
+def _of_class(node: ast.ClassDef) -> dict[str, str]:
+    docs = {}
+    for statement, following in zip(node.body, node.body[1:], strict=False):
+        if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+            match following:
+                case ast.Expr(value=ast.Constant(value=str(text))):
+                    docs[statement.target.id] = inspect.cleandoc(text)
+    return docs

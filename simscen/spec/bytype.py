@@ -1,5 +1,6 @@
 """Mappings that are told apart by their `type`: what simscen ships, or what an installed package adds."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -9,7 +10,7 @@ from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, Val
 
 from simscen.core.navigation import RecoveryBehavior
 from simscen.spec.component import Typed
-from simscen.spec.ofpackage import validated
+from simscen.spec.lazy import LazySpec
 from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped
 
 GROUP, NAMES, WHOLE = "simscen group", "simscen names", "simscen mappings"
@@ -71,7 +72,7 @@ BehaviorName = Annotated[RecoveryBehavior, NameOf("behavior")]
 
 def specification(entry: Entry, value: dict[str, Any]) -> BaseModel:
     """The specification of an installed package with these values, which may lack its `type`."""
-    return validated(entry, {**value, "type": entry.name})
+    return validate_plugin_spec(entry, {**value, "type": entry.name})
 
 
 def added(group: str) -> Iterator[tuple[str, type[BaseModel]]]:
@@ -98,3 +99,48 @@ def _found(group: str, name: str) -> Entry:
 def _unknown(group: str, name: str) -> PydanticCustomError:
     every = [*(entry.name for entry in shipped(group)), *(entry.name for entry in installed(group))]
     return PydanticCustomError("unknown_type", "no such type", {"value": name, "names": ", ".join(every)})
+
+
+# MERGED: Specifications of installed packages: imported when a file uses them, and a problem of that file where broken.
+_ASKED = ("horizon", "clearance_range")
+"""What a criterion says of itself, in seconds and metres."""
+
+
+@dataclass(frozen=True)
+class PluginSpec(LazySpec):
+    """Marks a type that stands for the specification of a name that an installed package adds."""
+
+    entry: Entry
+
+    def load(self) -> type[BaseModel]:
+        """The specification; its package is imported now. Raises BrokenPlugin."""
+        return self.entry.load()
+
+    def _validate(self, value: Any) -> BaseModel:
+        return validate_plugin_spec(self.entry, value)
+
+
+def validate_plugin_spec(entry: Entry, value: Any) -> BaseModel:
+    """The specification of an entry with these values; whatever its package does wrong is a problem of the file."""
+    try:
+        return _kept(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
+    except BrokenPlugin as broken:
+        raise _plugin_error(broken) from broken
+    except (ValueError, AssertionError):  # what pydantic takes for a mistake in the file, ValidationError included
+        raise
+    except Exception as error:  # the boundary to code of others, which can raise anything
+        why = f"it breaks down over what is written here: {type(error).__name__}: {error}"
+        raise _plugin_error(BrokenPlugin(entry, why)) from error
+
+
+def _plugin_error(broken: BrokenPlugin) -> PydanticCustomError:
+    return PydanticCustomError("plugin", "{problem}", {"problem": str(broken), "hint": broken.hint})
+
+
+def _kept(entry: Entry, spec: BaseModel) -> BaseModel:
+    """The specification. Raises BrokenPlugin where what simscen asks of it before any run is no number."""
+    for name in _ASKED:
+        number = getattr(spec, name) if hasattr(type(spec), name) else 0.0
+        if isinstance(number, bool) or not isinstance(number, int | float) or not (0 <= number < math.inf):
+            raise BrokenPlugin(entry, f"its `{name}` is {number!r}, no finite number from 0 on")
+    return spec

@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails
 
 from simscen.spec.base import Spec
-from simscen.spec.ondemand import OnDemand
+from simscen.spec.lazy import LazySpec
 
 
 class Choice(Spec):
@@ -112,14 +112,14 @@ def widened(choice: type[Choice]) -> type[Choice]:
     """The choice with a field for each name that installed packages add to its group; itself where there is none."""
     from pydantic import create_model
 
-    from simscen.spec.ofpackage import OfPackage
+    from simscen.spec.bytype import PluginSpec
     from simscen.spec.registry import installed
 
     if choice.narrow is not None or not choice.group:
         return choice
     fields: dict[str, Any] = {
         f"plugin_{entry.name}": (
-            Annotated[BaseModel | None, OfPackage(*entry.value.partition(":")[::2], entry)],
+            Annotated[BaseModel | None, PluginSpec(*entry.value.partition(":")[::2], entry)],
             Field(default=None, alias=entry.name),
         )
         for entry in installed(choice.group)
@@ -154,7 +154,7 @@ def blank(narrow: type[Choice]) -> Choice:
 
 def _address(field: FieldInfo) -> str:
     """Where the specification under a key is; "" where there is none: a list, or the choice itself."""
-    mark = next((mark for mark in field.metadata if isinstance(mark, OnDemand)), None)
+    mark = next((mark for mark in field.metadata if isinstance(mark, LazySpec)), None)
     if mark is not None:
         return f"{mark.module}:{mark.name}"
     kinds = [kind for kind in get_args(field.annotation) if isinstance(kind, type) and issubclass(kind, Spec)]

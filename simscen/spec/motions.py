@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.shapes import MotionPath
 from simscen.spec.base import Spec
-from simscen.spec.orplace import PlaceOrPoint
+from simscen.spec.named_places import PlaceOrPoint
 from simscen.spec.quantities import Angle, Duration, Length, PositiveSpeed
 
 TURN = 0.25

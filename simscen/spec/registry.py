@@ -144,7 +144,7 @@ def find(group: str, name: str) -> Entry | None:
     return own or next((entry for entry in installed(group) if entry.name == name), None)
 
 
-def strangers() -> tuple[Entry, ...]:
+def unknown_groups() -> tuple[Entry, ...]:
     """Entry points in groups `simscen.…` that there are not, each with its flaw: a slip of the pen in a package."""
     return tuple(entry for entry in _scanned() if entry.group not in GROUPS)
 

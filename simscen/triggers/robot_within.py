@@ -6,7 +6,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.polygons import distance_to_polygon
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
-from simscen.spec.orplace import PlaceOrPoint
+from simscen.spec.named_places import PlaceOrPoint
 from simscen.spec.quantities import NonNegativeLength
 from simscen.spec.references import MoverName, RegionName
 from simscen.triggers.base import Condition

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from simscen.core.errors import BROKEN, RunError
 from simscen.spec.choice import Choice
-from simscen.spec.ondemand import OnDemand
+from simscen.spec.lazy import LazySpec
 from simscen.spec.places import RobotName
 from simscen.spec.quantities import Duration, PositiveDuration, Probability
 from simscen.triggers.base import Condition
@@ -23,31 +23,31 @@ class Test(Choice):
     group: ClassVar[str] = "trigger"
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot"})
 
-    time: Annotated[Condition | None, OnDemand("simscen.triggers.time", "Time")] = None
-    robot_within: Annotated[Condition | None, OnDemand("simscen.triggers.robot_within", "RobotWithin")] = None
-    robot_in: Annotated[Condition | None, OnDemand("simscen.triggers.robot_in", "RobotIn")] = None
-    travelled: Annotated[Condition | None, OnDemand("simscen.triggers.travelled", "Travelled")] = None
-    speed_below: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "SpeedBelow")] = None
-    speed_above: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "SpeedAbove")] = None
-    distance_remaining: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "DistanceRemaining")] = None
+    time: Annotated[Condition | None, LazySpec("simscen.triggers.time", "Time")] = None
+    robot_within: Annotated[Condition | None, LazySpec("simscen.triggers.robot_within", "RobotWithin")] = None
+    robot_in: Annotated[Condition | None, LazySpec("simscen.triggers.robot_in", "RobotIn")] = None
+    travelled: Annotated[Condition | None, LazySpec("simscen.triggers.travelled", "Travelled")] = None
+    speed_below: Annotated[Condition | None, LazySpec("simscen.triggers.motion", "SpeedBelow")] = None
+    speed_above: Annotated[Condition | None, LazySpec("simscen.triggers.motion", "SpeedAbove")] = None
+    distance_remaining: Annotated[Condition | None, LazySpec("simscen.triggers.motion", "DistanceRemaining")] = None
     believed_distance_remaining: Annotated[
-        Condition | None, OnDemand("simscen.triggers.believed_distance", "BelievedDistanceRemaining")
+        Condition | None, LazySpec("simscen.triggers.believed_distance", "BelievedDistanceRemaining")
     ] = None
-    turning_below: Annotated[Condition | None, OnDemand("simscen.triggers.turning", "TurningBelow")] = None
-    turning_above: Annotated[Condition | None, OnDemand("simscen.triggers.turning", "TurningAbove")] = None
-    clearance_below: Annotated[Condition | None, OnDemand("simscen.triggers.clearance_below", "ClearanceBelow")] = None
-    scan_age: Annotated[Condition | None, OnDemand("simscen.triggers.scan_age", "ScanAge")] = None
-    localization_error: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "LocalizationError")] = None
+    turning_below: Annotated[Condition | None, LazySpec("simscen.triggers.turning", "TurningBelow")] = None
+    turning_above: Annotated[Condition | None, LazySpec("simscen.triggers.turning", "TurningAbove")] = None
+    clearance_below: Annotated[Condition | None, LazySpec("simscen.triggers.clearance_below", "ClearanceBelow")] = None
+    scan_age: Annotated[Condition | None, LazySpec("simscen.triggers.scan_age", "ScanAge")] = None
+    localization_error: Annotated[Condition | None, LazySpec("simscen.triggers.motion", "LocalizationError")] = None
     localization_lost: Annotated[
-        Condition | None, OnDemand("simscen.triggers.localization_lost", "LocalizationLost")
+        Condition | None, LazySpec("simscen.triggers.localization_lost", "LocalizationLost")
     ] = None
-    goal: Annotated[Condition | None, OnDemand("simscen.triggers.goal", "GoalStatus")] = None
-    waypoint: Annotated[Condition | None, OnDemand("simscen.triggers.waypoint", "Waypoint")] = None
-    replan: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "Replan")] = None
-    recovery: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "RecoveryStatus")] = None
-    collision: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "Collided")] = None
-    pedestrian: Annotated[Condition | None, OnDemand("simscen.triggers.pedestrian", "PedestrianStatus")] = None
-    event: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "EventStatus")] = None
+    goal: Annotated[Condition | None, LazySpec("simscen.triggers.goal", "GoalStatus")] = None
+    waypoint: Annotated[Condition | None, LazySpec("simscen.triggers.waypoint", "Waypoint")] = None
+    replan: Annotated[Condition | None, LazySpec("simscen.triggers.happened", "Replan")] = None
+    recovery: Annotated[Condition | None, LazySpec("simscen.triggers.happened", "RecoveryStatus")] = None
+    collision: Annotated[Condition | None, LazySpec("simscen.triggers.happened", "Collided")] = None
+    pedestrian: Annotated[Condition | None, LazySpec("simscen.triggers.pedestrian", "PedestrianStatus")] = None
+    event: Annotated[Condition | None, LazySpec("simscen.triggers.happened", "EventStatus")] = None
     all: Annotated[list["Test"], Field(min_length=1, max_length=50)] | None = None
     """True while all of these are."""
     any: Annotated[list["Test"], Field(min_length=1, max_length=50)] | None = None

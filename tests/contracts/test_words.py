@@ -11,7 +11,7 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.faults.fault import AnyFault
 from simscen.model.robot import Bumper, Camera, InertialUnit, Lidar, WheelOdometry
 from simscen.spec.choice import Choice
-from simscen.spec.ondemand import type_of
+from simscen.spec.lazy import annotation_of
 from simscen.testing import Promise, promises_of
 from simscen.testing.subjects import named
 from simscen.triggers.trigger import Trigger
@@ -20,7 +20,7 @@ from simscen.triggers.trigger import Trigger
 def examples(choice: type[Choice], below: str = "", skipped: tuple[str, ...] = ()) -> Iterator[Promise]:
     for key, field in choice.choices().items():
         if key not in skipped:
-            text = re.search(r"Example: `(.+)`", type_of(choice.model_fields[field]).__doc__ or "")
+            text = re.search(r"Example: `(.+)`", annotation_of(choice.model_fields[field]).__doc__ or "")
             assert text, key
             words = yaml.safe_load(text[1])
             words = {"off" if name is False else name: value for name, value in words.get(below, words).items()}

@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from simscen.cli.main import app
-from simscen.loading.anyfile import problems_of
-from simscen.loading.userconfig import load_config
+from simscen.loading.files.kinds import check_file
+from simscen.loading.stacks.userconfig import load_config
 
 ROOT = Path(__file__).parents[2]
 GUIDE = (ROOT / "docs" / "guides" / "compare-stacks.md").read_text(encoding="utf-8")
@@ -44,7 +44,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_its_files_and_its_configuration_are_valid(project: Path) -> None:
     assert set(FILES) == {"scenarios/room.scenario.yaml", "stacks/dwb.stack.yaml"}
     for name in FILES:
-        assert problems_of(name.split(".")[-2], project / name, project) == []
+        assert check_file(name.split(".")[-2], project / name, project) == []
     command = load_config(project / "home/simscen/config.yaml").command("mine", {"PATH": "/usr/bin:/bin"}, project)
     assert command is not None
     assert (command.start_limit, command.answer_limit, command.cwd) == (60.0, 2.0, str(project / "home/my_nav"))

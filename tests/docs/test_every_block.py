@@ -13,8 +13,8 @@ import pytest
 import typer
 
 from simscen.cli.main import app
-from simscen.loading.anyfile import problems_of
-from simscen.loading.userconfig import load_config
+from simscen.loading.files.kinds import check_file
+from simscen.loading.stacks.userconfig import load_config
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -140,7 +140,7 @@ def test_a_part_of_a_file_is_one(block: Block, tmp_path: Path) -> None:
     file = tmp_path / f"a.{kind}.yaml"
     file.write_text(f"simscen: 1\n{block.text}" if kind == "robot" else block.text)
     (tmp_path / "masks").mkdir()
-    wrong = [str(problem) for problem in problems_of(kind, file, tmp_path)]
+    wrong = [str(problem) for problem in check_file(kind, file, tmp_path)]
     # A robot's file is shown in part, and the files that it names are those of a manufacturer.
     assert [told for told in wrong if kind == "base" or not re.search("missing key|no such file", told)] == []
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.loading.anyfile import kind_of, problems_of
+from simscen.loading.files.kinds import check_file, file_kind
 
 ROOT = Path(__file__).parents[2]
 # Those on packages of one's own are done step by step: test_own_packages.py.
@@ -38,7 +38,7 @@ def test_a_complete_example_is_valid(block, project):
     folder = "scenarios/theme" if "../../worlds" in block else "scenarios"
     file = project / folder / f"example.{kind}.yaml"
     file.write_text(block, encoding="utf-8")
-    problems = problems_of(kind_of(file, project), file, project, ())
+    problems = check_file(file_kind(file, project), file, project, ())
     assert [f"{problem.place}: {problem.message}" for problem in problems] == []
 
 

@@ -4,8 +4,8 @@ import re
 import textwrap
 from pathlib import Path
 
-from simscen.loading.document import Library
-from simscen.loading.paths import Fence
+from simscen.loading.files.paths import PathSandbox
+from simscen.loading.yaml.library import Library
 
 GUIDE = Path(__file__).parents[2] / "docs/guides/extends.md"
 
@@ -15,7 +15,7 @@ def test_the_files_of_the_guide_become_one(tmp_path: Path) -> None:
     assert [name for name, _ in shown] == ["defaults.yaml", "aisle.base.yaml", "slow.scenario.yaml"]
     for name, text in shown:
         (tmp_path / name).write_text(textwrap.dedent(text))
-    tree, problems = Library(Fence.around(tmp_path)).read(tmp_path / "slow.scenario.yaml", defaults=True)
+    tree, problems = Library(PathSandbox.around(tmp_path)).read(tmp_path / "slow.scenario.yaml", defaults=True)
     assert problems == []
     assert tree is not None
     assert tree.plain == {

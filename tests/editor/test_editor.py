@@ -21,7 +21,7 @@ from simscen.cli.catalog.topics import Topic, fields_of, topics
 from simscen.core.version import PACKAGE
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.fault import AnyFault
-from simscen.loading.compose import compose
+from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.robot import Sensor
 from simscen.spec.choice import Choice
 from simscen.spec.registry import GROUPS, entries
@@ -103,7 +103,7 @@ def body_of(topic: Topic) -> Any:
     """What stands behind a word in its example."""
     if not topic.example:
         return {"all": [{"time": 1}], "any": [{"time": 1}], "not": {"time": 1}}.get(topic.name, {})
-    read, problems = compose(topic.example, "example")
+    read, problems = parse_yaml(topic.example, "example")
     assert read is not None and not problems
     return next(_below(read.plain, topic.name))
 

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from simscen.cli.diagnostics import as_text
 from simscen.core.errors import UsageError
 from simscen.core.problems import Problem
-from simscen.loading.compose import compose
 from simscen.loading.keywords import keyword_matcher
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_scenario
+from simscen.loading.yaml.parser import parse_yaml
 from simscen.report.text import visible
 
 SCENARIO = """\
@@ -40,7 +40,7 @@ events:
 faults: [{sensor: lidar, off: {}, when: {travelled: 1 m}, for: 2 s}]
 pass: [{goals_reached: {}}, {stopped_within: {time: 1, after: lidar.off}, severity: warn}]
 """
-TREE = compose(SCENARIO, "f")[0]
+TREE = parse_yaml(SCENARIO, "f")[0]
 assert TREE is not None
 PLAIN: Any = TREE.plain
 

@@ -17,12 +17,12 @@ from simscen.core.events import EventKind
 from simscen.core.readings import INSTANCES, MAP
 from simscen.core.trace import Moment
 from simscen.faults.fault import AnyFault
+from simscen.loading.checks.faults import instances, unfit_faults
 from simscen.loading.scenario import load_scenario
-from simscen.loading.sense.unfitfaults import instances, unfit_faults
 from simscen.run.prepare import prepare
 from simscen.run.simulate import simulate
 from simscen.spec.choice import Choice
-from simscen.spec.ondemand import type_of
+from simscen.spec.lazy import annotation_of
 
 ROBOT = """\
 simscen: 1
@@ -85,7 +85,7 @@ ACTIONS: dict[str, str] = {}
 
 
 def example(choice: type[Choice], key: str) -> str:
-    text = re.search(r"Example: `(.+)`", type_of(choice.model_fields[choice.choices()[key]]).__doc__ or "")
+    text = re.search(r"Example: `(.+)`", annotation_of(choice.model_fields[choice.choices()[key]]).__doc__ or "")
     assert text, f"`{key}` has no example"
     return text[1]
 
@@ -99,7 +99,7 @@ def fault_example(word: str, kind: str) -> str:
 
 
 def kinds_of(word: str) -> list[str]:
-    affects = type_of(AnyFault.model_fields[AnyFault.choices()[word]]).affects
+    affects = annotation_of(AnyFault.model_fields[AnyFault.choices()[word]]).affects
     return sorted(affects - {MAP})  # what befalls the map befalls the whole run
 
 
@@ -212,7 +212,9 @@ def test_with_everything_that_never_begins_the_run_is_the_one_without_it_to_its_
         assert same(moment, known), f"tick {moment.tick}"
 
 
-MAPS = [word for word in AnyFault.choices() if MAP in type_of(AnyFault.model_fields[AnyFault.choices()[word]]).affects]
+MAPS = [
+    word for word in AnyFault.choices() if MAP in annotation_of(AnyFault.model_fields[AnyFault.choices()[word]]).affects
+]
 
 
 @pytest.mark.parametrize("word", MAPS)

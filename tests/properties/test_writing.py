@@ -8,12 +8,12 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simscen.loading.compose import compose
+from simscen.loading.files.worldfile import world_text
 from simscen.loading.resolved import resolved_text, spec_of_text
 from simscen.loading.scenario import load_scenario
-from simscen.loading.source import read_text
-from simscen.loading.worldfile import world_text
-from simscen.loading.writing import to_yaml
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.scalars import to_yaml
+from simscen.loading.yaml.textfile import read_text
 from simscen.model.world import WorldSpec
 
 ODD = [
@@ -44,7 +44,7 @@ def test_what_is_written_is_read_back_equal_and_of_the_same_types(file: Path, da
     file.write_text(to_yaml(data), encoding="utf-8", newline="")
     text = read_text(file, "a")
     assert isinstance(text, str), text
-    tree, problems = compose(text, "a")
+    tree, problems = parse_yaml(text, "a")
     assert not problems
     assert tree is not None and repr(tree.plain) == repr(data)
 
@@ -65,7 +65,7 @@ def test_a_name_that_looks_like_something_else_survives_in_a_merged_scenario(tmp
 def test_a_world_that_is_written_is_read_back_with_its_names() -> None:
     """`simscen world convert` writes with the same hand; a world called 0o7 came back as the number 7."""
     spec = WorldSpec.model_validate({"simscen": 1, "name": "0o7", "places": {"on": {"x": 0, "y": 0}}})
-    tree, problems = compose(world_text(spec), "world")
+    tree, problems = parse_yaml(world_text(spec), "world")
     assert not problems
     assert tree is not None and WorldSpec.model_validate(tree.plain) == spec
 

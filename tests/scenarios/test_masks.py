@@ -11,7 +11,7 @@ import simscen
 from simscen.cli.main import main
 from simscen.core.errors import InvalidInput
 from simscen.loading.scenario import load_scenario
-from simscen.run.precheck.feasibility import check
+from simscen.run.worldchecks.runner import check_in_world
 
 SCENARIO = """\
 simscen: 1
@@ -92,7 +92,7 @@ def told(file):
     """What is said about a scenario before it runs: file, line, code, severity and words of each problem."""
     try:
         loaded = load_scenario(file, file.parent)
-        problems = [*loaded.notes, *check(loaded)]
+        problems = [*loaded.notes, *check_in_world(loaded)]
     except InvalidInput as error:
         problems = error.problems
     return [(p.path, p.line, p.code, p.severity, f"{p.message}; {p.hint}") for p in problems]

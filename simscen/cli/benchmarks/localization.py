@@ -14,7 +14,7 @@ from simscen.cli.benchmarks.navigation_table import aligned, broken, fits, named
 from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import NothingSelected
-from simscen.loading.messages import quoted
+from simscen.loading.schema.messages import quoted
 from simscen.report.look import look_of
 
 if TYPE_CHECKING:

@@ -114,7 +114,7 @@ def command(
 def with_stack(file: Path, experiments: list["Experiment"], made: Path, project: Path) -> list["Experiment"]:
     """The same experiments with the parameters of a stack file. Raises InvalidInput."""
     from simscen.bench.navigation.experiment import with_stack_parameters
-    from simscen.loading.stackfile import load_stack_file
+    from simscen.loading.stacks.stackfile import load_stack_file
 
     choice = load_stack_file(file.name.split(".")[0], str(file), file, project)
     if choice.notes:

@@ -171,7 +171,7 @@ def _buildings(folder: Path, numbers: Sequence[int]) -> Mapping[str, BuiltWorld]
 
 def _built(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, BuiltWorld]:
     """Worlds by the name that scenarios in `folder` give them, made ready."""
-    from simscen.loading.worldfile import load_world_file
+    from simscen.loading.files.worldfile import load_world_file
     from simscen.run.worldsource import world_of
     from simscen.worlds.build import build
 

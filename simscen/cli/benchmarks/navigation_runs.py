@@ -18,9 +18,9 @@ from simscen.cli.session.selection import checked
 from simscen.core.errors import Exit, InvalidInput
 from simscen.core.result import Outcome, RunKey
 from simscen.core.sessionevents import RunFinished, SessionEvent
+from simscen.loading.checks.events import top_speed
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
-from simscen.loading.sense.neverhappens import top_speed
 from simscen.record.replay import read_log
 from simscen.report.journal import Journal
 from simscen.report.line import text_of

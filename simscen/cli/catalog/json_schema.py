@@ -7,8 +7,8 @@ from pydantic import BaseModel, RootModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from simscen.loading.document import MORE
-from simscen.loading.stackchoice import OF_THE_SCENARIO
+from simscen.loading.stacks.choice import SCENARIO_KEYS
+from simscen.loading.yaml.library import APPEND_SUFFIX
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.stackfile import StackFileSpec
@@ -50,7 +50,7 @@ def schema_of(name: str, installed: bool = False) -> Schema:
 def _leave_to_the_scenario(generated: Schema) -> None:
     """What a stack file may not say of a stack."""
     for definition in generated["$defs"].values():
-        for key in OF_THE_SCENARIO:
+        for key in SCENARIO_KEYS:
             definition.get("properties", {}).pop(key, None)
 
 
@@ -58,7 +58,7 @@ def _added(generated: Schema) -> Schema:
     """`pass+` and the like: what is added to the list of the file that is extended."""
     lists = {name: told for name, told in generated["properties"].items() if told.get("type") == "array"}
     return {
-        f"{name}{MORE}": {**told, "description": f"Added to `{name}` of the file that is extended."}
+        f"{name}{APPEND_SUFFIX}": {**told, "description": f"Added to `{name}` of the file that is extended."}
         for name, told in lists.items()
     }
 

@@ -6,7 +6,7 @@ from pydantic import BaseModel
 
 from simscen.cli.catalog.json_schema import MODELS
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, fields_of
-from simscen.loading.grammar import models_at
+from simscen.loading.schema.lookup import models_at
 from simscen.spec.choice import Choice
 
 

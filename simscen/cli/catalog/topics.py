@@ -19,7 +19,7 @@ from simscen.model import (
     checkers,
     controllers,
     costmaps,
-    expectederror,
+    expected_error,
     guards,
     latency,
     localizers,
@@ -34,15 +34,15 @@ from simscen.model import (
     variations,
     world,
 )
-from simscen.model.disturbance import EventEntry, FaultEntry, StepEntry
+from simscen.model.disturbances import EventEntry, FaultEntry, StepEntry
 from simscen.model.rosmap import RosMapSpec
 from simscen.model.stackbase import SpeedZone
 from simscen.spec import bytype, registry
+from simscen.spec.base import field_docs
 from simscen.spec.bytype import ByType
 from simscen.spec.choice import Choice, added
-from simscen.spec.docs import field_docs
-from simscen.spec.ondemand import type_of
-from simscen.spec.orplace import OrPlace, PlaceAlone
+from simscen.spec.lazy import annotation_of
+from simscen.spec.named_places import OrPlace, PlaceAlone
 from simscen.spec.places import PoseSpec
 from simscen.spec.quantities import UNITS, Quantity
 from simscen.spec.speedmask import SpeedMask
@@ -134,7 +134,7 @@ _SCENARIO: dict[str, type[BaseModel]] = {
     "payload": scenario.Payload,
     "goals": scenario.GoalEntry,
     "navigation": navigation.Navigation,
-    "expect": expectederror.ExpectedError,
+    "expect": expected_error.ExpectedError,
     "on_reached": navigation.OnReached,
     "events": EventEntry,
     "then": StepEntry,
@@ -277,7 +277,7 @@ def _default(field: FieldInfo) -> str:
 def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
     docs = field_docs(choice)
     for key, name in choice.choices().items():
-        kind = type_of(choice.model_fields[name])
+        kind = annotation_of(choice.model_fields[name])
         models = [m for m in get_args(kind) or (kind,) if isinstance(m, type) and m is not NoneType]
         model = models[0] if models and issubclass(models[0], BaseModel) and models[0] is not choice else None
         yield _topic(group, key, model) if model is not None else Topic(group, key, None, docs.get(name, ""))

@@ -95,7 +95,7 @@ def cache() -> str:
 def stacks() -> str:
     """What the names of external stacks run, by the user's own configuration."""
     from simscen.cli.process import config_file, environment
-    from simscen.loading.userconfig import load_config
+    from simscen.loading.stacks.userconfig import load_config
 
     try:
         config = load_config(config_file())

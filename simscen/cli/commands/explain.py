@@ -13,7 +13,7 @@ from simscen.cli.catalog.topics import OPTIONAL, Field, Topic
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import UsageError
 from simscen.loading.codes import CODES
-from simscen.loading.messages import quoted, suggestion
+from simscen.loading.schema.messages import quoted, suggestion
 
 
 def command(

@@ -8,7 +8,7 @@ import typer
 from simscen.cli import completions
 from simscen.cli.diagnostics import harmless, print_text
 from simscen.core.errors import InvalidInput
-from simscen.loading.discovery import default_root, discover
+from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_variations

@@ -16,11 +16,11 @@ from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.problems import Problem
-from simscen.loading.criteria_file import LoadedCriteria, load_criteria
-from simscen.loading.discovery import default_root
-from simscen.loading.robotfile import load_robot_file
-from simscen.loading.tree import value_place
-from simscen.loading.worldfile import load_world_file
+from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
+from simscen.loading.files.discovery import default_root
+from simscen.loading.files.robotfile import load_robot_file
+from simscen.loading.files.worldfile import load_world_file
+from simscen.loading.yaml.tree import value_position
 from simscen.model.stack import StackSpec
 from simscen.record.foreign.sensed import Sensed, read_sensed
 from simscen.record.foreign.sensedrows import TICK_RATE
@@ -119,7 +119,7 @@ def _given(
 
 def _without_localizer(written: LoadedCriteria) -> Problem:
     """Another stack's localizer is its own affair."""
-    place = value_place(written.tree, ("stack",))
+    place = value_position(written.tree, ("stack",))
     hint = "name a file whose `stack` is simscen's own"
     return written.library.with_source([Problem(*place, "SC016", "this stack has no localizer of simscen's", hint)])[0]
 

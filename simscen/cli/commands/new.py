@@ -11,11 +11,11 @@ from simscen.cli.diagnostics import harmless, print_text
 from simscen.cli.shipped_scenarios import shipped_scenarios
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.version import PACKAGE
-from simscen.loading.discovery import BASE, SCENARIO, default_root
-from simscen.loading.document import DEFAULTS
-from simscen.loading.messages import quoted, suggestion
-from simscen.loading.scenario import try_variations, unusable_name
-from simscen.loading.source import reason
+from simscen.loading.files.discovery import BASE, SCENARIO, default_root
+from simscen.loading.scenario import is_unusable_name, try_variations
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.yaml.library import DEFAULTS_FILE
+from simscen.loading.yaml.textfile import os_error_reason
 
 
 def command(
@@ -37,9 +37,9 @@ def command(
     schemas in a folder `schemas` gets the line that editors look for. A file that is there is never overwritten.
     """
     last = name.rpartition("/")[2]
-    if unusable_name(next((last.removesuffix(suffix) for suffix in SCENARIO if last.endswith(suffix)), last)):
+    if is_unusable_name(next((last.removesuffix(suffix) for suffix in SCENARIO if last.endswith(suffix)), last)):
         raise UsageError(f"{name!r} is no name for a scenario")
-    partial = last == DEFAULTS or last.endswith(BASE)
+    partial = last == DEFAULTS_FILE or last.endswith(BASE)
     if partial and like:
         raise UsageError(f"{name!r} would be a base, which says only a part: --like copies whole scenarios")
     file = Path(name if partial or name.endswith(SCENARIO) else f"{name}{SCENARIO[0]}")
@@ -49,13 +49,13 @@ def command(
     except FileExistsError:
         raise UsageError(f"{file} is there already; choose another name") from None
     except (OSError, ValueError) as error:
-        why = reason(error) if isinstance(error, OSError) else "the name cannot be a path"
+        why = os_error_reason(error) if isinstance(error, OSError) else "the name cannot be a path"
         raise UsageError(f"cannot write {name!r}: {why}") from None
     try:
         written = _copy(like, file) if like else _starter(file, "base" if partial else "scenario")
     except OSError as error:
         file.unlink(missing_ok=True)
-        raise UsageError(f"cannot write {name!r}: {reason(error)}") from None
+        raise UsageError(f"cannot write {name!r}: {os_error_reason(error)}") from None
     except BaseException:
         file.unlink(missing_ok=True)
         raise
@@ -81,7 +81,7 @@ def _for_editors(file: Path, kind: str) -> str:
 
 
 def _copy(like: str, file: Path) -> list[Path]:
-    from simscen.loading.copying import copy_scenario
+    from simscen.loading.files.copying import copy_scenario
 
     source = _source(like)
     found = try_variations(source, default_root([source]))

@@ -13,7 +13,7 @@ import typer
 
 from simscen.cli.diagnostics import harmless, print_text
 from simscen.core.errors import Exit
-from simscen.spec.registry import GROUPS, PREFIX, BrokenPlugin, Entry, installed, strangers
+from simscen.spec.registry import GROUPS, PREFIX, BrokenPlugin, Entry, installed, unknown_groups
 
 INDENT = 6
 
@@ -43,7 +43,7 @@ def command(format_: Annotated[Format, typer.Option("--format", help="What to pr
 def _everything() -> list[Entry]:
     """By package; of a package kind by kind, in the order of the language."""
     found = [entry for kind in GROUPS for entry in installed(kind)]
-    return sorted([*found, *strangers()], key=lambda entry: (entry.distribution.lower(), entry.distribution))
+    return sorted([*found, *unknown_groups()], key=lambda entry: (entry.distribution.lower(), entry.distribution))
 
 
 def _row(entry: Entry) -> dict[str, Any]:

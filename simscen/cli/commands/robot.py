@@ -13,8 +13,8 @@ from simscen.cli.diagnostics import as_json as problems_as_json
 from simscen.cli.diagnostics import as_text, from_here, harmless, print_text
 from simscen.cli.session.output_files import save
 from simscen.core.errors import Exit, InvalidInput
-from simscen.loading.discovery import default_root
-from simscen.loading.robotfile import RobotFile, load_robot_file
+from simscen.loading.files.discovery import default_root
+from simscen.loading.files.robotfile import RobotFile, load_robot_file
 
 if TYPE_CHECKING:
     from simscen.run.robotcheck import Check, Checked

@@ -15,8 +15,8 @@ from simscen.cli.session.selection import Checks
 from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import Exit
 from simscen.core.problems import Problem
-from simscen.loading.anyfile import STACKS, kind_of, problems_of
-from simscen.loading.discovery import BASE, ROBOT, SCENARIO, STACK, WORLD, default_root, discover
+from simscen.loading.files.discovery import BASE, ROBOT, SCENARIO, STACK, WORLD, default_root, discover
+from simscen.loading.files.kinds import STACKS, check_file, file_kind
 
 
 class Format(str, Enum):
@@ -61,7 +61,7 @@ def command(
     checks = Checks(home, world_path or [], lenient, fast, picture, stacks=stacks, runs=bool(stack))
     checked = _Checked()
     for file in discover(paths, home, SCENARIO + WORLD + ROBOT + STACK + BASE):
-        kind = kind_of(file, home)
+        kind = file_kind(file, home)
         checked.add(kind, from_here(_problems(kind, file, checks), home))
     _PRINT[format_](checked)
     if checked.wrong:
@@ -73,7 +73,7 @@ def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
     if kind == "scenario":
         found = [problem for choice in checks.choices for problem in checks.scenario(file, choice)[1]]
         return list(dict.fromkeys(found))
-    found = problems_of(kind, file, checks.root, checks.world_path)
+    found = check_file(kind, file, checks.root, checks.world_path)
     if kind in (*STACKS, "base") or any(problem.severity == "error" for problem in found):
         return found
     built = checks.robot if kind == "robot" else checks.world

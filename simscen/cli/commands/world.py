@@ -15,12 +15,12 @@ from simscen.cli.session.output_files import save
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.core.world import World
-from simscen.loading.discovery import default_root
+from simscen.loading.files.discovery import default_root
+from simscen.loading.files.worldfile import load_world_file, world_text
 from simscen.loading.loaded import LoadedWorld
-from simscen.loading.worldfile import load_world_file, world_text
 from simscen.model.world import WorldSpec
 from simscen.run.outfolder import write_atomically
-from simscen.run.precheck.feasibility import notes_of
+from simscen.run.worldchecks.runner import world_reader_notes
 from simscen.run.worldsource import world_of
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def inspect(
         print(json.dumps(asdict(found), indent=2))
     else:
         print_text("\n".join([harmless(f"{found.name} · {path}"), *described(found, height, everything)]))
-        warnings = from_here(notes_of(built.world, source, home), home)
+        warnings = from_here(world_reader_notes(built.world, source, home), home)
         if warnings:
             print_text(as_text(warnings))
     if png is not None:

@@ -18,8 +18,8 @@ from simscen.core.sessionevents import Artifacts, RunFinished
 from simscen.core.trace import Trace
 from simscen.judge.multi_robot import combine_robots
 from simscen.judge.run_result import judge_run
-from simscen.loading.criteria_file import LoadedCriteria, load_criteria
-from simscen.loading.discovery import default_root
+from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
+from simscen.loading.files.discovery import default_root
 from simscen.loading.resolved import criteria_of_text
 from simscen.model.criteria_file import expectation_of
 from simscen.record.foreign.mcapfile import is_own

@@ -10,10 +10,10 @@ from simscen.core.result import RunResult
 from simscen.judge.multi_robot import combine_robots
 from simscen.judge.result_json import from_json
 from simscen.judge.run_result import judge_run
-from simscen.loading.messages import quoted
-from simscen.loading.paths import is_folder
+from simscen.loading.files.paths import is_folder
 from simscen.loading.resolved import criteria_of_text
-from simscen.loading.source import reason
+from simscen.loading.schema.messages import quoted
+from simscen.loading.yaml.textfile import os_error_reason
 from simscen.record.replay import Log
 
 WHOLE, BROKEN_OFF = "run.mcap", "run.partial.mcap"
@@ -28,7 +28,7 @@ def logs_of(paths: Sequence[Path]) -> list[Path]:
         try:
             path.lstat()
         except (OSError, ValueError) as error:
-            told = reason(error) if isinstance(error, OSError) else "no such file or directory"
+            told = os_error_reason(error) if isinstance(error, OSError) else "no such file or directory"
             raise InvalidInput([Problem(str(path), 0, 0, "SC800", told)]) from error
         inside = sorted(_logs(path), key=lambda log: log.parts) if is_folder(path) else [path]
         found.update(dict.fromkeys(inside))

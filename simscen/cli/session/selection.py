@@ -10,19 +10,19 @@ from simscen.cli.session.stacks import Stacks, stacks_of
 from simscen.core.errors import InvalidInput, NothingSelected, UsageError
 from simscen.core.filesread import files_read
 from simscen.core.problems import Problem
-from simscen.loading.discovery import default_root, discover
+from simscen.loading.files.discovery import default_root, discover
+from simscen.loading.files.robotfile import load_robot_file
+from simscen.loading.files.worldfile import load_world_file
 from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.messages import quoted, suggestion
-from simscen.loading.robotfile import load_robot_file
 from simscen.loading.scenario import try_variations
-from simscen.loading.stackchoice import StackChoice
-from simscen.loading.variations.telling import Found, told
-from simscen.loading.worldfile import load_world_file
-from simscen.run.precheck.feasibility import check, notes_of
-from simscen.run.precheck.worldchecks import misnamed
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.stacks.choice import StackChoice
+from simscen.loading.variations.problems import VariationProblems, merge_problems
 from simscen.run.robotproblems import problems_once_built
 from simscen.run.worldcache import WorldCache
+from simscen.run.worldchecks.runner import check_in_world, world_reader_notes
+from simscen.run.worldchecks.world_file import check_world_places
 from simscen.run.worldsource import world_of
 
 
@@ -67,16 +67,16 @@ def load_all(
         raise InvalidInput(from_here(problems, home))
     firsts = varied([stacked[0] for stacked in loaded.values()], wanted.variations)
     chosen = _shard(select(firsts, wanted.keyword, wanted.tags), *wanted.shard)
-    told = dict.fromkeys(warning for one in chosen for warning in warnings[one.id])
-    return [stacked for one in chosen for stacked in loaded[one.title]], from_here(told, home)
+    merge_problems = dict.fromkeys(warning for one in chosen for warning in warnings[one.id])
+    return [stacked for one in chosen for stacked in loaded[one.title]], from_here(merge_problems, home)
 
 
 def varied(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
     """Those that are variations of one of these names; all where none is named. Raises NothingSelected."""
     known = dict.fromkeys(one.variation for one in scenarios if one.variation)
     if missing := [name for name in names if name not in known]:
-        told = suggestion(missing[0], known) or "no scenario has variations"
-        raise NothingSelected(f"no variation is called {quoted(missing[0], 120)}; {told}")
+        merge_problems = suggestion(missing[0], known) or "no scenario has variations"
+        raise NothingSelected(f"no variation is called {quoted(missing[0], 120)}; {merge_problems}")
     return [one for one in scenarios if not names or one.variation in names]
 
 
@@ -124,8 +124,8 @@ class Checks:
         if isinstance(loaded, list):
             return (), loaded
         tried = [self._variation(one) for one in loaded]
-        problems = told(
-            [Found(one.variation, one.set_by, found) for one, (_, found) in zip(loaded, tried, strict=True)]
+        problems = merge_problems(
+            [VariationProblems(one.variation, one.set_by, found) for one, (_, found) in zip(loaded, tried, strict=True)]
         )
         usable = [one for one, _ in tried if one is not None]
         return (usable if len(usable) == len(tried) else ()), problems
@@ -149,7 +149,7 @@ class Checks:
             if self.fast:
                 return notes
             world = world_of(source, self.root, self.world_path, self.lenient)
-            return [*notes, *misnamed(world, source), *notes_of(world, source, self.root)]
+            return [*notes, *check_world_places(world, source), *world_reader_notes(world, source, self.root)]
         except InvalidInput as error:
             return error.problems
 
@@ -166,6 +166,6 @@ class Checks:
 def checked(scenario: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None) -> list[Problem]:
     """What only geometry can tell, or why its world cannot be used."""
     try:
-        return check(scenario, cache, pictures)
+        return check_in_world(scenario, cache, pictures)
     except InvalidInput as error:
         return error.problems

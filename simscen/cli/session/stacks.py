@@ -18,12 +18,12 @@ from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.externalcommand import ExternalCommand
 from simscen.core.problems import Problem
 from simscen.core.result import RunKey
-from simscen.loading.discovery import STACK, default_root
-from simscen.loading.externalstack import torn, undefined
+from simscen.loading.files.discovery import STACK, default_root
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.messages import quoted, suggestion
 from simscen.loading.scenario import load_scenario
-from simscen.loading.stackchoice import REFERENCE, StackChoice
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.stacks.choice import REFERENCE, StackChoice
+from simscen.loading.stacks.userconfig import conflicting_stacks, undefined_stack
 from simscen.model.anystack import ExternalStackSpec
 from simscen.spec.registry import entries, find
 
@@ -35,7 +35,7 @@ STACK_HELP = (
     "runs. "
 )
 if TYPE_CHECKING:
-    from simscen.loading.userconfig import UserConfig
+    from simscen.loading.stacks.userconfig import UserConfig
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 
@@ -53,7 +53,7 @@ class Stacks:
     @cached_property
     def config(self) -> UserConfig:
         """The user's own configuration. Raises InvalidInput."""
-        from simscen.loading.userconfig import load_config
+        from simscen.loading.stacks.userconfig import load_config
 
         return load_config(config_file())
 
@@ -65,7 +65,10 @@ class Stacks:
         if loaded.robots:
             tried = {name: self.with_command(view) for name, view in loaded.robots.items()}
             given = [choice.name for choice in self.chosen if choice.runs]
-            problems = [*(one for _, found in tried.values() for one in found), *torn(loaded, given, config_file())]
+            problems = [
+                *(one for _, found in tried.values() for one in found),
+                *conflicting_stacks(loaded, given, config_file()),
+            ]
             whole = replace(loaded, robots={name: view for name, (view, _) in tried.items()})
             return whole, list(dict.fromkeys(problems))
         stack = loaded.spec.stack
@@ -74,7 +77,7 @@ class Stacks:
         if (command := self.command(stack.external)) is not None:
             return replace(loaded, runs=command), []
         names = [*(choice.name for choice in self.chosen if choice.runs), *self.config.spec.stacks]
-        problem = undefined(loaded, names, self.config.file)
+        problem = undefined_stack(loaded, names, self.config.file)
         return loaded, [problem] if problem is not None else []
 
     def command(self, name: str) -> ExternalCommand | None:
@@ -138,7 +141,7 @@ def _choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -
     if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):
         return StackChoice(name, value, type=value)
     if value.endswith(STACK) or (value.endswith(YAML) and Path(value).is_file()):
-        from simscen.loading.stackfile import load_stack_file
+        from simscen.loading.stacks.stackfile import load_stack_file
 
         try:
             return load_stack_file(name, value, Path(value), root, world_path)
@@ -155,10 +158,10 @@ def _command(text: str, value: str, may_be_new: bool, stacks: Stacks) -> Externa
         names = [REFERENCE, *(entry.name for entry in entries("stack")), *stacks.config.spec.stacks]
         told = f"{quoted(value)} is neither a type of stack nor a name in {stacks.config.file}"
         raise UsageError(f"cannot read --stack {harmless(text)}: expected NAME=VALUE; {told}; {_near(value, names)}")
-    from simscen.loading.program import command_of
+    from simscen.loading.stacks.program import parse_command
 
     try:
-        return command_of(value, environment(), Path.cwd())
+        return parse_command(value, environment(), Path.cwd())
     except ValueError as error:
         raise UsageError(f"--stack {harmless(text)}: {harmless(str(error))}") from error
 

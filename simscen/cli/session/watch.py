@@ -19,7 +19,7 @@ from simscen.cli.session.selection import Selection
 from simscen.core.errors import Exit, InvalidInput, SimscenError, UsageError
 from simscen.core.problems import Problem
 from simscen.core.sessionevents import RunFinished, SessionEvent
-from simscen.loading.discovery import default_root, discover
+from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.filesof import files_of
 

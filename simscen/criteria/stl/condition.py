@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from simscen.criteria.trace_signals.catalog import SIGNALS, Signal, SignalName
 from simscen.spec.base import Spec
 from simscen.spec.bytype import BehaviorName
-from simscen.spec.orplace import PlaceOrPoint
+from simscen.spec.named_places import PlaceOrPoint
 from simscen.spec.quantities import UNITS, AnyQuantity, Duration, PositiveDuration, Quantity
 from simscen.spec.references import EventName, GoalName, HappeningName, MoverName, ObjectName, RegionName
 

@@ -7,17 +7,17 @@ from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 from simscen.core.problems import Problem
-from simscen.loading.messages import quoted
-from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, Place, at, child
-from simscen.loading.validation import check
-from simscen.loading.variations.naming import HINT, derived, flaw_of, keys_of, unique
-from simscen.loading.variations.paths import NoPath, Target, put, target_of
+from simscen.loading.schema.messages import quoted
+from simscen.loading.schema.validate import check
+from simscen.loading.variations.naming import NAME_HINT, derive_name, make_unique, name_error, short_names
+from simscen.loading.variations.paths import PathError, Target, resolve_path, set_value
+from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, child, node_at
 
 if TYPE_CHECKING:  # what most scenarios do not need is imported where it is
     from simscen.model.variations import Sampled, VariationBlock
 
 VARIATIONS = "variations"
-MOST_VALUES = 5_000_000
+MAX_TOTAL_VALUES = 5_000_000
 """Of all variations of a scenario together: each is looked at as a whole."""
 _SAID_OF_IT = frozenset({"description", "tags", "expected", "skip"})
 """What a variation may say that is no value it is run with: its name need not tell."""
@@ -45,11 +45,11 @@ class Variation:
     """A scenario with the values of `changes` put in; a file without variations is its only one, without a name."""
 
     name: str
-    tree: Fields = field(repr=False)
+    tree: MappingNode = field(repr=False)
     changes: tuple[Change, ...] = ()
 
     @property
-    def set_by(self) -> Mapping[Place, str]:
+    def set_by(self) -> Mapping[Position, str]:
         """The path that put a value there, by the place of the value and of each part of it."""
         return {
             place: change.target.path
@@ -58,20 +58,20 @@ class Variation:
         }
 
 
-def variations_of(tree: Fields) -> list[Variation] | list[Problem]:
+def expand_variations(tree: MappingNode) -> list[Variation] | list[Problem]:
     """All variations of a scenario, in order, or what is wrong with how they are said."""
     entry = tree.entries.get(VARIATIONS)
     if entry is None:
         return [Variation("", tree)]
     from simscen.model.variations import MOST, VariedSpec
 
-    own = Fields(tree.place, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
-    said = check(VariedSpec, Fields(tree.place, {VARIATIONS: entry}))
+    own = MappingNode(tree.place, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
+    said = check(VariedSpec, MappingNode(tree.place, {VARIATIONS: entry}))
     if isinstance(said, list):
         return said
     expansion = _Expansion(own)
     blocks = said.variations.blocks
-    nodes = entry.value.items if isinstance(entry.value, Items) else [entry.value]
+    nodes = entry.value.items if isinstance(entry.value, SequenceNode) else [entry.value]
     axes = [expansion.axes(block, node) for block, node in zip(blocks, nodes, strict=True)]
     if expansion.problems:
         return expansion.problems
@@ -79,8 +79,8 @@ def variations_of(tree: Fields) -> list[Variation] | list[Problem]:
         message = f"these are {number} variations; a scenario may have {MOST}"
         return [Problem(*entry.value.place, "SC017", message, "`sampled` draws some of many")]
     values = _size(own) + max((sum(max(map(_weight, axis)) for axis in block) for block in axes), default=0)
-    if number * values > MOST_VALUES:
-        message = f"{number} variations of up to {values} values are more than {MOST_VALUES} values in all"
+    if number * values > MAX_TOTAL_VALUES:
+        message = f"{number} variations of up to {values} values are more than {MAX_TOTAL_VALUES} values in all"
         return [Problem(*entry.value.place, "SC006", message)]
     options = [list(chosen) for block in axes for chosen in product(*block)]
     return expansion.named(options) if options else [Variation("", own)]
@@ -90,10 +90,10 @@ def variations_of(tree: Fields) -> list[Variation] | list[Problem]:
 class _Expansion:
     """Makes variations of `tree` and collects what is wrong."""
 
-    tree: Fields
+    tree: MappingNode
     problems: list[Problem] = field(default_factory=list)
     _targets: dict[str, Target] = field(default_factory=dict)
-    _names: dict[str, Place] = field(default_factory=dict)
+    _names: dict[str, Position] = field(default_factory=dict)
 
     def axes(self, block: "VariationBlock", node: Node) -> list[list[Option]]:
         """What is combined with each other: each path of a grid, and each of the other kinds as a whole."""
@@ -103,7 +103,7 @@ class _Expansion:
         if block.list_ is not None:
             found.append(self._list(child(node, "list")))
         if block.sampled is not None:
-            found.append(self._sampled(block.sampled, at(node, ("sampled", "values"))))
+            found.append(self._sampled(block.sampled, node_at(node, ("sampled", "values"))))
         self._require_apart(found)
         return found
 
@@ -115,15 +115,15 @@ class _Expansion:
         differ = {path for path in self._targets if any(one.get(path) != values[0].get(path) for one in values)}
         everything = list(self._targets.values())
         told = [target for target in everything if target.keys[0] not in _SAID_OF_IT] or everything
-        keys = keys_of([target for target in told if target.path in differ] or told)
+        keys = short_names([target for target in told if target.path in differ] or told)
         names = [self._name(options, keys, number) for number, options in enumerate(chosen, start=1)]
         given = [len(options) == 1 and bool(options[0].name) for options in chosen]
         variations = []
-        for options, name in zip(chosen, unique(names, given), strict=True):
+        for options, name in zip(chosen, make_unique(names, given), strict=True):
             changes = tuple(change for option in options for change in option.changes)
             tree = self.tree
             for change in changes:
-                tree = put(tree, change.target, change.value)
+                tree = set_value(tree, change.target, change.value)
             variations.append(Variation(name, tree, changes))
         return variations
 
@@ -133,17 +133,17 @@ class _Expansion:
             shown = [change for change in option.changes if change.target.path in keys]
             values = {change.target.path: change.value for change in shown}
             numbers = {change.target.path: change.number for change in shown}
-            parts.append(option.name or (derived(keys, values, numbers, number) if values else ""))
+            parts.append(option.name or (derive_name(keys, values, numbers, number) if values else ""))
         name = ",".join(part for part in parts if part)
-        return name if name and flaw_of(name) is None else f"variation-{number}"
+        return name if name and name_error(name) is None else f"variation-{number}"
 
     def _columns(self, node: Node | None, distinct: bool) -> list[list[Change]]:
         """The changes of each path."""
-        if not isinstance(node, Fields):
+        if not isinstance(node, MappingNode):
             return []
         found = []
         for path, entry in node.entries.items():
-            assert isinstance(entry.value, Items)
+            assert isinstance(entry.value, SequenceNode)
             if distinct:
                 self._refuse_equal(entry.value)
             if (target := self._target(path, entry)) is not None:
@@ -151,9 +151,11 @@ class _Expansion:
         return found
 
     def _pairs(self, node: Node | None) -> list[Option]:
-        assert isinstance(node, Fields)
+        assert isinstance(node, MappingNode)
         lengths = {
-            path: len(entry.value.items) for path, entry in node.entries.items() if isinstance(entry.value, Items)
+            path: len(entry.value.items)
+            for path, entry in node.entries.items()
+            if isinstance(entry.value, SequenceNode)
         }
         first, *others = lengths
         for path in others:
@@ -164,10 +166,10 @@ class _Expansion:
         return [Option(changes) for changes in zip(*self._columns(node, False), strict=True)]
 
     def _list(self, node: Node | None) -> list[Option]:
-        assert isinstance(node, Items)
+        assert isinstance(node, SequenceNode)
         found = []
         for number, item in enumerate(node.items, start=1):
-            assert isinstance(item, Fields)
+            assert isinstance(item, MappingNode)
             name = self._given_name(item)
             entries = [(path, entry) for path, entry in item.entries.items() if path != "name"]
             if not entries:
@@ -178,47 +180,50 @@ class _Expansion:
             found.append(Option(tuple(changes), name))
         return found
 
-    def _given_name(self, item: Fields) -> str:
+    def _given_name(self, item: MappingNode) -> str:
         entry = item.entries.get("name")
         if entry is None:
             return ""
         place, value = entry.value.place, entry.value.plain
         name = value if isinstance(value, str) else str(value) if isinstance(value, int | float) else ""
-        if (flaw := flaw_of(name)) is not None:
-            self._add(place, "SC017", flaw, HINT)
+        if (flaw := name_error(name)) is not None:
+            self._add(place, "SC017", flaw, NAME_HINT)
         first = self._names.setdefault(name.casefold(), place)
         if first != place:
             self._add(place, "SC033", f"two variations are called {quoted(name)} (the first at line {first.line})")
         return name
 
     def _sampled(self, sampled: "Sampled", node: Node) -> list[Option]:
-        from simscen.loading.variations.sampling import Pick, draws_of
+        from simscen.loading.variations.sampling import Pick, draw_values
 
-        assert isinstance(node, Fields)
+        assert isinstance(node, MappingNode)
         columns = []
         for path, entry in node.entries.items():
             target = self._target(path, entry)
             drawn = entry.value
             try:
-                values = draws_of(sampled, path)
+                values = draw_values(sampled, path)
             except ValueError as error:
                 self._add(drawn.place, "SC016", str(error))
                 continue
-            nodes = [at(drawn, ("choice", v.number)) if isinstance(v, Pick) else Leaf(drawn.place, v) for v in values]
+            nodes = [
+                node_at(drawn, ("choice", v.number)) if isinstance(v, Pick) else ScalarNode(drawn.place, v)
+                for v in values
+            ]
             if target is not None:
                 columns.append([Change(target, value, n) for n, value in enumerate(nodes, start=1)])
         return [Option(changes) for changes in zip(*columns, strict=True)]
 
     def _target(self, path: str, entry: Entry) -> Target | None:
         try:
-            target = target_of(path, entry.key, self.tree)
-        except NoPath as error:
+            target = resolve_path(path, entry.key, self.tree)
+        except PathError as error:
             self._add(entry.key, "SC030", str(error), error.hint)
             return None
         self._targets.setdefault(path, target)
         return target
 
-    def _refuse_equal(self, items: Items) -> None:
+    def _refuse_equal(self, items: SequenceNode) -> None:
         seen: list[object] = []
         for item in items.items:
             if item.plain in seen:
@@ -236,7 +241,7 @@ class _Expansion:
                     what = "change the same value" if same else "overlap: one is part of the other"
                     self._add(other.place, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
 
-    def _add(self, place: Place, code: str, message: str, hint: str = "") -> None:
+    def _add(self, place: Position, code: str, message: str, hint: str = "") -> None:
         problem = Problem(*place, code=code, message=message, hint=hint)
         if problem not in self.problems:
             self.problems.append(problem)
@@ -251,12 +256,12 @@ def _size(node: Node) -> int:
     return sum(1 for _ in _places(node))
 
 
-def _places(node: Node) -> Iterator[Place]:
+def _places(node: Node) -> Iterator[Position]:
     yield node.place
-    if isinstance(node, Fields):
+    if isinstance(node, MappingNode):
         for entry in node.entries.values():
             yield entry.key
             yield from _places(entry.value)
-    elif isinstance(node, Items):
+    elif isinstance(node, SequenceNode):
         for item in node.items:
             yield from _places(item)

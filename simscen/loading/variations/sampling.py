@@ -5,7 +5,7 @@ import math
 from typing import Any, NamedTuple
 
 from simscen.model.variations import Draw, Integer, LogUniform, Normal, OneOf, Sampled, Uniform
-from simscen.spec.amounts import Amount, together
+from simscen.spec.quantities import Amount, to_common_unit
 
 _DIGITS = 6
 
@@ -16,7 +16,7 @@ class Pick(NamedTuple):
     number: int
 
 
-def draws_of(sampled: Sampled, path: str) -> list[Any]:
+def draw_values(sampled: Sampled, path: str) -> list[Any]:
     """The values of one path, in the order of the variations. Raises ValueError for a range that is none."""
     return [_value(sampled.values[path], u) for u in _chances(sampled, path)]
 
@@ -58,7 +58,7 @@ def _value(draw: Draw, u: float) -> Any:
 
 
 def _ordered(ends: tuple[Amount, Amount]) -> tuple[tuple[float, float], str]:
-    (low, high), unit = together(ends)
+    (low, high), unit = to_common_unit(ends)
     if low > high:
         raise ValueError(f"the range ends before it begins: {low:g} is greater than {high:g}")
     return (low, high), unit
@@ -68,7 +68,7 @@ def _normal(normal: Normal, u: float) -> Any:
     from statistics import NormalDist  # slow to import, and seldom needed
 
     ends = [end for end in (normal.min, normal.max) if end is not None]
-    (mean, std, *bounds), unit = together((normal.mean, normal.std, *ends))
+    (mean, std, *bounds), unit = to_common_unit((normal.mean, normal.std, *ends))
     if std <= 0:
         raise ValueError("`std` must be greater than 0")
     spread = NormalDist(mean, std)

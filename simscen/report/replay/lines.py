@@ -7,7 +7,7 @@ from typing import Any
 from simscen.core.errors import InvalidInput
 from simscen.criteria.registry import verdict_names
 from simscen.loading.resolved import parts_of_text
-from simscen.loading.tree import Fields, Key, key_place
+from simscen.loading.yaml.tree import Key, MappingNode, key_position
 from simscen.model.scenario import ScenarioSpec
 
 
@@ -57,5 +57,5 @@ def _goal_names(spec: ScenarioSpec) -> list[str]:
     return names
 
 
-def _line(tree: Fields, *keys: Key) -> int:
-    return key_place(tree, keys).line
+def _line(tree: MappingNode, *keys: Key) -> int:
+    return key_position(tree, keys).line

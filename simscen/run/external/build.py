@@ -4,7 +4,7 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput
 from simscen.core.time import Clock
-from simscen.loading.externalstack import undefined
+from simscen.loading.stacks.userconfig import undefined_stack
 from simscen.model.anystack import ExternalStackSpec
 from simscen.run.external.hello import Ordered
 from simscen.run.external.stack import ExternalStack
@@ -23,7 +23,7 @@ def build_external(
     """
     command = prepared.loaded.runs
     if command is None:
-        raise InvalidInput([problem] if (problem := undefined(prepared.loaded)) else [])
+        raise InvalidInput([problem] if (problem := undefined_stack(prepared.loaded)) else [])
     ordered = Ordered(
         seed=seed,
         control_period=Clock(surroundings.tick_rate).period(spec.controller_frequency),

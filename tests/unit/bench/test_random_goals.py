@@ -14,8 +14,8 @@ from simscen.bench.navigation.random_goals import FAULTS, MOVABLE, ROOM, degrade
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Body, Box, Solid
 from simscen.core.world import BuiltWorld, World
+from simscen.loading.files.worldfile import load_world_file
 from simscen.loading.scenario import load_scenario
-from simscen.loading.worldfile import load_world_file
 from simscen.run.worldsource import world_of
 from simscen.worlds.build import build
 

@@ -9,11 +9,11 @@ from pydantic import BaseModel
 from simscen.actions.action import AnyAction
 from simscen.cli.catalog.topics import Topic, fields_of, kind_of, topics
 from simscen.criteria.registry import AnyCriterion
-from simscen.loading.compose import compose
+from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.checkers import GoalCheckerSpec
 from simscen.model.controllerspec import ControllerSpec
 from simscen.model.costmaps import Costmap
-from simscen.model.disturbance import FaultEntry
+from simscen.model.disturbances import FaultEntry
 from simscen.model.latency import Latency
 from simscen.model.localizers import Amcl, LocalizerSpec
 from simscen.model.planners import PlannerSpec
@@ -31,7 +31,7 @@ SINGLE = [topic for topic in WORDS if topic.name not in ("when", "faults", "pass
 
 def plain(text: str) -> Any:
     """As simscen reads it: PyYAML's own loader takes the key `off` for false."""
-    tree, problems = compose(text, "example")
+    tree, problems = parse_yaml(text, "example")
     assert tree is not None
     assert not problems
     return tree.plain

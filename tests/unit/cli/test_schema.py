@@ -9,7 +9,7 @@ import pytest
 
 from simscen.cli.catalog.generate import ROOT, outdated
 from simscen.cli.catalog.json_schema import MODELS, schema_of
-from simscen.loading.compose import compose
+from simscen.loading.yaml.parser import parse_yaml
 
 DIAGNOSTICS = ROOT / "tests/diagnostics"
 SHIPPED = {
@@ -29,7 +29,7 @@ def test_what_is_generated_is_what_the_code_says() -> None:
 
 def _plain(text: str) -> Any:
     """As simscen and editors read it: PyYAML's own loader takes the key `off` for false."""
-    tree, _ = compose(text, "f")
+    tree, _ = parse_yaml(text, "f")
     return tree and tree.plain
 
 

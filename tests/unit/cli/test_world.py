@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from simscen.core.grid import FREE, OCCUPIED
-from simscen.loading.worldfile import load_world_file
+from simscen.loading.files.worldfile import load_world_file
 from simscen.worlds.rosmap import load_grid
 
 ROOM = """\

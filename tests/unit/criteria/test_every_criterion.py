@@ -15,7 +15,7 @@ from simscen.core.verdict import Status
 from simscen.criteria.findings import InvalidTrace, at_least, at_most, counted
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.spec.ondemand import type_of
+from simscen.spec.lazy import annotation_of
 from simscen.testing.sketch import sketch, sketch_case
 
 CHOICES = AnyCriterion.choices()
@@ -40,7 +40,7 @@ CASE = {"goals": [{"name": "shelf", "pose": [2.5, 0.5, 0]}], "shortest": {"shelf
 
 
 def specification(kind):
-    return type_of(AnyCriterion.model_fields[CHOICES[kind]])
+    return annotation_of(AnyCriterion.model_fields[CHOICES[kind]])
 
 
 def example(kind):

@@ -17,7 +17,7 @@ from simscen.model.controllers import DynamicWindow
 from simscen.model.localizers import Amcl
 from simscen.model.robot import InertialUnit, SkidSteer
 from simscen.model.scenario import Physics, ScenarioSpec
-from simscen.spec.orplace import OrPlace
+from simscen.spec.named_places import OrPlace
 from simscen.spec.places import PoseSpec
 from simscen.spec.quantities import AnyQuantity, Quantity
 

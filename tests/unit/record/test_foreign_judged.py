@@ -30,7 +30,7 @@ from simscen.core.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
 from simscen.judge.required_evidence import required_evidence
-from simscen.loading.compose import compose
+from simscen.loading.yaml.parser import parse_yaml
 from simscen.record.foreign.read import read_foreign
 from simscen.record.foreign.wanted import Wanted
 
@@ -84,7 +84,7 @@ def _examples() -> list[Any]:
                 continue
             text = re.search(r"Example: `(.*)`$", inspect.getdoc(mark.load()) or "", re.MULTILINE)
             assert text, name
-            tree, problems = compose(text[1], name)
+            tree, problems = parse_yaml(text[1], name)
             assert tree is not None and not problems
             examples.append(pytest.param(tree.plain, id=name))
     return examples

@@ -4,7 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from simscen.core.errors import InvalidInput
-from simscen.loading.robotfile import load_robot_file
+from simscen.loading.files.robotfile import load_robot_file
 from simscen.model.robot import RobotSpec
 from simscen.run.worldsource import robot_of
 

@@ -10,7 +10,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry, Scan
 from simscen.faults.base import FaultSetting
-from simscen.model.disturbance import EventEntry, FaultEntry
+from simscen.model.disturbances import EventEntry, FaultEntry
 from simscen.run.commandlink import CommandLink
 from simscen.run.faultrig import FaultRig
 from simscen.run.streamnames import stream_names

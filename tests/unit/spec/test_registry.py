@@ -4,10 +4,10 @@ import sys
 import pytest
 
 import simscen.plugin
-from simscen.model.disturbance import FaultEntry
+from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import Sensor
 from simscen.spec.choice import Choice
-from simscen.spec.registry import GROUPS, BrokenPlugin, entries, find, installed, shipped, strangers
+from simscen.spec.registry import GROUPS, BrokenPlugin, entries, find, installed, shipped, unknown_groups
 from simscen.triggers.trigger import Trigger
 
 
@@ -85,7 +85,7 @@ def test_a_name_of_simscen_keeps_its_meaning_whoever_wants_it(packages, calm_mod
 
 def test_a_group_that_there_is_not_is_told(packages, calm_module) -> None:
     packages("calm", "1.0", {"criteria": {"calm": "calm:Calm"}}, calm=calm_module)
-    assert [entry.flaw for entry in strangers()] == ["there is no group `simscen.criteria`"]
+    assert [entry.flaw for entry in unknown_groups()] == ["there is no group `simscen.criteria`"]
 
 
 def test_what_a_module_prints_while_it_is_imported_does_not_get_into_the_output(packages, capsys, calm_module) -> None:
@@ -123,7 +123,7 @@ def test_an_installation_that_is_damaged_is_told_and_hides_no_other(packages, ca
     packages("wreck", "2.0", {})
     (site / "wreck-2.0.dist-info" / "entry_points.txt").write_bytes(text.encode("latin-1"))
     assert find("criterion", "calm").load().__name__ == "Calm"
-    told = [(stranger.distribution, stranger.flaw.partition(":")[0]) for stranger in strangers()]
+    told = [(stranger.distribution, stranger.flaw.partition(":")[0]) for stranger in unknown_groups()]
     assert told == ([("wreck", "its entry_points.txt is damaged")] if "simscen." in text else [])
 
 

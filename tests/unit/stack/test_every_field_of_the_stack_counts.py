@@ -154,7 +154,7 @@ ELSEWHERE = {
     "StackSpec.speed_zones": "tests/unit/run/test_filters.py",
     "StackSpec.keepout_mask": "tests/scenarios/test_masks.py",
     "StackSpec.speed_mask": "tests/scenarios/test_masks.py",
-    "StackSpec.nav2_params": "tests/unit/loading/test_nav2_params.py",
+    "StackSpec.nav2_params": "tests/unit/loading/nav2/test_nav2_parameters.py",
     "StackSpec.latency": "tests/unit/run/test_latency.py",  # `robot` is what the robot's file says
     "Recovery.clear_entirely": "tests/unit/stack/test_forgetting.py",
     "ClearCostmap.clear_entirely": "tests/unit/stack/behaviors/test_motions.py",

@@ -4,28 +4,30 @@ from pathlib import Path
 
 import pytest
 
-from simscen.loading.compose import compose
 from simscen.loading.scenario import load_scenario, try_variations
-from simscen.loading.tree import Fields
-from simscen.loading.variations.expand import Variation, variations_of
+from simscen.loading.variations.expand import Variation, expand_variations
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.tree import MappingNode
 
 BASE = "stack: {controller: {desired_linear_vel: 0.3}}\nrobot: {pose: {x: 1, y: 1}}\ngoals: [{pose: desk}]\n"
 
 
 def expanded(variations: str, base: str = BASE) -> list[Variation]:
-    tree, problems = compose(f"{base}variations:\n{variations}", "x")
-    assert isinstance(tree, Fields)
+    tree, problems = parse_yaml(f"{base}variations:\n{variations}", "x")
+    assert isinstance(tree, MappingNode)
     assert not problems
-    found = variations_of(tree)
+    found = expand_variations(tree)
     assert isinstance(found[0], Variation), found
     return found  # type: ignore[return-value]
 
 
 def wrong(variations: str) -> list[str]:
-    tree, _ = compose(f"{BASE}variations:\n{variations}", "x")
-    assert isinstance(tree, Fields)
+    tree, _ = parse_yaml(f"{BASE}variations:\n{variations}", "x")
+    assert isinstance(tree, MappingNode)
     return [
-        f"{found.line}:{found.col} {found.message}" for found in variations_of(tree) if not isinstance(found, Variation)
+        f"{found.line}:{found.col} {found.message}"
+        for found in expand_variations(tree)
+        if not isinstance(found, Variation)
     ]
 
 

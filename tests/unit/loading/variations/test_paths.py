@@ -2,9 +2,9 @@
 
 import pytest
 
-from simscen.loading.compose import compose
-from simscen.loading.tree import Fields, Leaf, Place, at
-from simscen.loading.variations.paths import NoPath, put, target_of
+from simscen.loading.variations.paths import PathError, resolve_path, set_value
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.tree import MappingNode, Position, ScalarNode, node_at
 
 TEXT = """\
 world: {objects: [{name: old cart, box: [1, 1, 1]}]}
@@ -13,13 +13,13 @@ goals: [{pose: sofa}, {name: the.end, pose: {x: 1, y: 2}}, desk]
 faults: [{sensor: lidar, noise: {std: 1}}, {sensor: lidar, off: {}}, {sensor: odom, name: drifts, bias: {x: 1}}]
 pass: [{collisions: {max: 0}}, {clearance: {min: 1}, id: near}, {stuck: 1}, {always: {}}, {always: {}}]
 """
-HERE = Place("x", 9, 9)
+HERE = Position("x", 9, 9)
 
 
 @pytest.fixture
-def tree() -> Fields:
-    found, _ = compose(TEXT, "x")
-    assert isinstance(found, Fields)
+def tree() -> MappingNode:
+    found, _ = parse_yaml(TEXT, "x")
+    assert isinstance(found, MappingNode)
     return found
 
 
@@ -46,15 +46,15 @@ def tree() -> Fields:
         ("stack.controller.desired_linear_vel", ("stack", "controller", "desired_linear_vel")),
     ],
 )
-def test_a_path_leads_to_the_value_that_a_user_means(tree: Fields, path: str, keys: tuple[str | int, ...]) -> None:
-    target = target_of(path, HERE, tree)
+def test_a_path_leads_to_the_value_that_a_user_means(tree: MappingNode, path: str, keys: tuple[str | int, ...]) -> None:
+    target = resolve_path(path, HERE, tree)
     assert target.keys == keys
-    value = Leaf(HERE, 7)
-    assert at(put(tree, target, value), keys) is value
+    value = ScalarNode(HERE, 7)
+    assert node_at(set_value(tree, target, value), keys) is value
 
 
-def test_what_was_not_written_stands_where_the_path_does(tree: Fields) -> None:
-    changed = put(tree, target_of("stack.controller.x", HERE, tree), Leaf(HERE, 7))
+def test_what_was_not_written_stands_where_the_path_does(tree: MappingNode) -> None:
+    changed = set_value(tree, resolve_path("stack.controller.x", HERE, tree), ScalarNode(HERE, 7))
     assert changed.plain["stack"] == {"controller": {"x": 7}}
     assert changed.entries["stack"].key == HERE
     assert {**changed.plain, "stack": None} == {**tree.plain, "stack": None}
@@ -79,17 +79,19 @@ def test_what_was_not_written_stands_where_the_path_does(tree: Fields) -> None:
         ("variations.grid", "a variation cannot change `variations`", "have no variations"),
     ],
 )
-def test_a_path_that_names_nothing_is_told_with_what_is_there(tree: Fields, path: str, told: str, hint: str) -> None:
-    with pytest.raises(NoPath) as raised:
-        target_of(path, HERE, tree)
+def test_a_path_that_names_nothing_is_told_with_what_is_there(
+    tree: MappingNode, path: str, told: str, hint: str
+) -> None:
+    with pytest.raises(PathError) as raised:
+        resolve_path(path, HERE, tree)
     assert told in str(raised.value)
     assert hint in raised.value.hint
     assert bool(hint) == bool(raised.value.hint)
 
 
 def test_values_in_another_file_are_said_to_be_there() -> None:
-    tree, _ = compose("world: room.world.yaml\n", "x")
-    assert isinstance(tree, Fields)
-    with pytest.raises(NoPath) as raised:
-        target_of("world.objects[0].box", HERE, tree)
+    tree, _ = parse_yaml("world: room.world.yaml\n", "x")
+    assert isinstance(tree, MappingNode)
+    with pytest.raises(PathError) as raised:
+        resolve_path("world.objects[0].box", HERE, tree)
     assert "values in another file cannot be varied" in raised.value.hint

@@ -6,20 +6,20 @@ from typing import Any
 
 import pytest
 
-from simscen.loading.variations.sampling import Pick, draws_of
+from simscen.loading.variations.sampling import Pick, draw_values
 from simscen.model.variations import Sampled
 
 
 def sampled(draw: dict[str, Any], count: int = 400, **more: Any) -> list[Any]:
-    return draws_of(Sampled.model_validate({"count": count, "values": {"x": draw}, **more}), "x")
+    return draw_values(Sampled.model_validate({"count": count, "values": {"x": draw}, **more}), "x")
 
 
 def test_more_draws_or_another_path_change_none_that_were_there() -> None:
     few, many = sampled({"uniform": [0, 1]}, 5), sampled({"uniform": [0, 1]}, 50)
     assert many[:5] == few
     two = Sampled.model_validate({"count": 5, "values": {"y": {"uniform": [0, 1]}, "x": {"uniform": [0, 1]}}})
-    assert draws_of(two, "x") == few
-    assert draws_of(two, "y") != few
+    assert draw_values(two, "x") == few
+    assert draw_values(two, "y") != few
 
 
 def test_another_seed_gives_other_draws() -> None:

@@ -15,7 +15,7 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry, Scan
 from simscen.core.world import BuiltWorld
-from simscen.loading.worldfile import load_world_file
+from simscen.loading.files.worldfile import load_world_file
 from simscen.model.localizers import Amcl
 from simscen.model.world import WorldSpec
 from simscen.run.worldsource import world_of

@@ -1,0 +1,1 @@
+"""Files that scenarios and commands name: paths, kinds, worlds, maps, robots."""

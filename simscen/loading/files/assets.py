@@ -1,0 +1,216 @@
+"""The files a scenario names: worlds, maps, robots."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel
+
+from simscen.core.problems import Problem
+from simscen.core.version import PACKAGE
+from simscen.loading.files.paths import PathProblem
+from simscen.loading.loaded import JudgedMask, LoadedMap, LoadedRobot, LoadedWorld
+from simscen.loading.places import resolve_places, unknown_places
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.schema.validate import check
+from simscen.loading.spec_walk import references
+from simscen.loading.yaml.library import Library
+from simscen.loading.yaml.textfile import read_text
+from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, key_position, node_at, value_position
+from simscen.model.robot import RobotSpec
+from simscen.model.rosmap import RosMapSpec
+from simscen.model.world import WorldSpec
+
+Model = TypeVar("Model", bound=BaseModel)
+Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)
+
+GAZEBO = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
+URDF = (".urdf", ".xacro")
+ROBOT = ".robot.yaml"
+
+
+@dataclass
+class Assets:
+    """Loads what a scenario names and collects what is wrong with it."""
+
+    library: Library
+    problems: list[Problem] = field(default_factory=list)
+
+    def world(self, written: ScalarNode) -> LoadedWorld | None:
+        """The world in the file that a scenario names."""
+        path = self._find(str(written.value), written.place)
+        return None if path is None else self._once(self.world_file, path)
+
+    def world_file(self, path: Path) -> LoadedWorld | None:
+        """The world in a file: SDF by suffix, a ROS map by its keys, else our own language."""
+        if path.name.endswith(GAZEBO):
+            return LoadedWorld(path.name.split(".")[0], path, sdf=path)
+        tree = self._tree(path)
+        if is_ros_map(tree):
+            loaded = self._ros_map(tree, path)
+            return LoadedWorld(path.stem, path, map=loaded) if loaded else None
+        spec = self._model(WorldSpec, tree)
+        return self.own_world(spec, tree, path) if spec and tree else None
+
+    def own_world(self, spec: WorldSpec, tree: Node, path: Path) -> LoadedWorld | None:
+        """A world in our own language, with the map or SDF that it builds on."""
+        before = len(self.problems)
+        loaded_map = sdf = None
+        if spec.map is not None:
+            place = value_position(tree, ("map",))
+            found = self._find(spec.map, place)
+            loaded_map = self.map_file(found) if found else None
+        if spec.sdf is not None:
+            sdf = self._find(spec.sdf, value_position(tree, ("sdf",)))
+        self.problems += unknown_places(spec, tree, spec.places)
+        spec = resolve_places(spec, spec.places)
+        name = spec.name or path.name.split(".")[0]
+        whole = tree if isinstance(tree, MappingNode) else None
+        return LoadedWorld(name, path, spec, loaded_map, sdf, whole) if len(self.problems) == before else None
+
+    def map(self, written: ScalarNode) -> LoadedMap | None:
+        """The ROS map in the file that a scenario names."""
+        path = self._find(str(written.value), written.place)
+        return None if path is None else self._once(self.map_file, path)
+
+    def map_file(self, path: Path) -> LoadedMap | None:
+        """The ROS map in a file."""
+        return self._ros_map(self._tree(path), path)
+
+    def robot(self, written: str, place: Position) -> LoadedRobot | None:
+        """A robot that ships with simscen, by its bare name, or that of a file."""
+        if "/" in written or written.endswith((*URDF, ".yaml", ".yml")):
+            path = self._find(written, place)
+            return None if path is None else self._once(self.robot_file, path)
+        shipped = shipped_robots()
+        if written in shipped:
+            return self._once(partial(self.robot_file, bundled=True), shipped[written])
+        hint = f"{suggestion(written, shipped)} (or the path of a *.robot.yaml or .urdf file)"
+        self._add(place, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
+        return None
+
+    def robot_file(self, path: Path, bundled: bool = False) -> LoadedRobot | None:
+        """The robot in a `*.robot.yaml` or `.urdf` file."""
+        name = path.name.split(".")[0]
+        if path.suffix in URDF:
+            text = read_text(path, self.library.fence.shown(path))
+            if isinstance(text, Problem) and text.message != "larger than 1 MiB":
+                self.problems.append(text)
+                return None
+            return LoadedRobot(name, path, urdf=path)
+        tree = self._tree(path)
+        spec = self._model(RobotSpec, tree)
+        if spec is None or tree is None:
+            return None
+        urdf = self._find(spec.urdf, value_position(tree, ("urdf",))) if spec.urdf else None
+        places = {package: value_position(tree, ("packages", package)) for package in spec.packages}
+        packages = {package: self._folder(spec.packages[package], place) for package, place in places.items()}
+        if (spec.urdf and urdf is None) or None in packages.values():
+            return None
+        body = tree if isinstance(tree, MappingNode) else None
+        found = {package: folder for package, folder in packages.items() if folder is not None}
+        return LoadedRobot(name, path, spec, urdf, bundled, body, found)
+
+    def _once(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
+        """What is in a file without a flaw is read once for all variations of a scenario."""
+        name = getattr(load, "func", load).__name__, path
+        if name in self.library.loaded:
+            known: Loaded = self.library.loaded[name]
+            return known
+        before = len(self.problems)
+        found = load(path)
+        if found is not None and len(self.problems) == before:
+            self.library.loaded[name] = found
+        return found
+
+    def _ros_map(self, tree: Node | None, path: Path) -> LoadedMap | None:
+        spec = self._model(RosMapSpec, tree)
+        if spec is None or tree is None:
+            return None
+        image = self._find(spec.image, value_position(tree, ("image",)))
+        return LoadedMap(path, spec, image, tuple(self.library.with_source(_unread(tree)))) if image else None
+
+    def _tree(self, path: Path) -> Node | None:
+        tree, problems = self.library.read(path)
+        self.problems += problems
+        return tree
+
+    def _model(self, model: type[Model], tree: Node | None) -> Model | None:
+        if tree is None:
+            return None
+        spec = check(model, tree)
+        if isinstance(spec, list):
+            self.problems += spec
+            return None
+        return spec
+
+    def _find(self, written: str, place: Position) -> Path | None:
+        found = self._existing(written, place)
+        if found is not None and not found.is_file():
+            self._add(place, "SC001", f"not a regular file: {quoted(written)}")
+            return None
+        return found
+
+    def _folder(self, written: str, place: Position) -> Path | None:
+        found = self._existing(written, place)
+        if found is not None and not found.is_dir():
+            self._add(place, "SC001", f"not a folder: {quoted(written)}")
+            return None
+        return found
+
+    def _existing(self, written: str, place: Position) -> Path | None:
+        found = self.library.fence.find(written, self.library.folder_of(place))
+        if isinstance(found, PathProblem):
+            self._add(place, found.code, found.message, found.hint)
+            return None
+        return found
+
+    def _add(self, place: Position, code: str, message: str, hint: str = "") -> None:
+        self.problems.append(Problem(*place, code=code, message=message, hint=hint))
+
+
+def is_ros_map(tree: Node | None) -> bool:
+    """Whether a YAML file is a map of map_server rather than a world of ours."""
+    return isinstance(tree, MappingNode) and "image" in tree.entries and "resolution" in tree.entries
+
+
+def _unread(tree: Node) -> list[Problem]:
+    """The keys that map_server does not read: its files are published with all sorts of them."""
+    if not isinstance(tree, MappingNode):
+        return []
+    unread = [key for key in tree.entries if key not in RosMapSpec.model_fields]
+    return [
+        Problem(
+            *key_position(tree, (key,)), "SC311", f"{quoted(key)} means nothing in a ROS map", _meant(key), "warning"
+        )
+        for key in unread
+    ]
+
+
+def _meant(key: str) -> str:
+    near = suggestion(key, RosMapSpec.model_fields)
+    return near if near.startswith("did you mean") else "it is ignored, as map_server ignores it"
+
+
+def shipped_robots() -> dict[str, Path]:
+    """The robots that ship with simscen, by name."""
+    folder = PACKAGE / "data" / "robots"
+    return {path.name.removesuffix(ROBOT): path for path in sorted(folder.glob(f"*{ROBOT}"))}
+
+
+# MERGED: The filter masks that criteria judge by.
+def load_judged_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, JudgedMask]:
+    """The masks that the criteria below `pass` name, by their files as written; what is wrong goes to `assets`.
+
+    A list is never merged with another, so all of them are written in one file, and one name is one mask.
+    """
+    found: dict[str, JudgedMask] = {}
+    for reference in references(spec):
+        node = node_at(tree, reference.keys)
+        if reference.to == "mask" and reference.keys[0] == "pass" and isinstance(node, ScalarNode):
+            loaded = assets.map(node)
+            if loaded is not None:
+                found.setdefault(reference.name, JudgedMask(reference.keys, loaded))
+    return found

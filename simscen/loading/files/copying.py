@@ -1,0 +1,99 @@
+"""Copy a scenario with the files that it needs, so that the copy stands alone."""
+
+import shutil
+from collections.abc import Iterator
+from os.path import commonpath, relpath
+from pathlib import Path
+
+from simscen.core.errors import UsageError
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.resolved import unexpanded_text
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
+
+_MODELINE = "# yaml-language-server:"
+_READABLE = (".yaml", ".yml")
+_SCATTERED = (".sdf", ".world", ".urdf", ".xacro")
+"""Files that name others in ways of their own: models, packages, meshes."""
+
+
+def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path]:
+    """Write a copy of a scenario to `target`, and what it needs into the folder of its name beside it.
+
+    Where `target` is in the scenario's own root, what it needs stays where it is, and only the paths are others. The
+    text is that of the file, comments and all; of one that extends others it is all of them merged. Returns the files
+    written. Raises UsageError where it needs what cannot be copied.
+    """
+    text, tree = _text_of(loaded)
+    named = {leaf: _file_of(leaf, loaded) for leaf in _leaves(tree)}
+    files = {leaf: file for leaf, file in named.items() if file is not None}
+    needed = sorted({one for file in files.values() for one in _needed(file)})
+    stays = root == loaded.root
+    home = Path(commonpath([file.parent for file in needed])) if needed else loaded.root
+    folder = target.parent / target.name.partition(".")[0]
+    copies = {} if stays else {file: folder / file.relative_to(home) for file in needed}
+    if taken := next((copy for copy in copies.values() if copy.exists()), None):
+        raise UsageError(f"{taken} is there already; choose another name")
+    for file, copy in copies.items():
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, copy)
+    for leaf, file in sorted(files.items(), key=lambda item: item[0].place, reverse=True):
+        text = _with_path(text, leaf, relpath(copies.get(file, file), target.parent))
+    target.write_text(text, encoding="utf-8")
+    return [target, *copies.values()]
+
+
+def _text_of(loaded: LoadedScenario) -> tuple[str, Node]:
+    """The text to copy, without the line that tells editors where the schema is, and its tree."""
+    lines = unexpanded_text(loaded).split("\n")
+    text = "\n".join(line for line in lines if not line.startswith(_MODELINE))
+    tree, _ = parse_yaml(text, loaded.path)
+    assert tree is not None
+    return text, tree
+
+
+def _leaves(node: Node | None) -> Iterator[ScalarNode]:
+    if isinstance(node, MappingNode):
+        for entry in node.entries.values():
+            yield from _leaves(entry.value)
+    elif isinstance(node, SequenceNode):
+        for item in node.items:
+            yield from _leaves(item)
+    elif isinstance(node, ScalarNode):
+        yield node
+
+
+def _file_of(leaf: ScalarNode, loaded: LoadedScenario) -> Path | None:
+    """The file that a text names, as seen from one of the files that the scenario is made of."""
+    return _named(leaf, {file.parent for file in loaded.files.values()})
+
+
+def _named(leaf: ScalarNode, folders: set[Path]) -> Path | None:
+    if not isinstance(leaf.value, str) or "." not in leaf.value or "\n" in leaf.value or len(leaf.value) > 4096:
+        return None
+    return next((file for folder in sorted(folders) if (file := (folder / leaf.value).resolve()).is_file()), None)
+
+
+def _needed(file: Path, known: frozenset[Path] = frozenset()) -> Iterator[Path]:
+    """A file, and what it names in turn."""
+    if file in known:
+        return
+    if file.name.endswith(_SCATTERED):
+        raise UsageError(f"{file.name} needs models and meshes that cannot be told: copy its folder yourself")
+    yield file
+    if file.name.endswith(_READABLE):
+        tree, _ = parse_yaml(file.read_text(encoding="utf-8"), file.name)
+        for leaf in _leaves(tree):
+            other = _named(leaf, {file.parent})
+            if other is not None:
+                yield from _needed(other, known | {file})
+
+
+def _with_path(text: str, leaf: ScalarNode, path: str) -> str:
+    """The text with another path where the leaf stands."""
+    lines = text.split("\n")
+    line, start = lines[leaf.place.line - 1], leaf.place.col - 1
+    quote = line[start] if line[start] in "'\"" else ""
+    end = start + len(quote) + len(str(leaf.value)) + len(quote)
+    lines[leaf.place.line - 1] = f"{line[:start]}{quote}{path}{quote}{line[end:]}"
+    return "\n".join(lines)

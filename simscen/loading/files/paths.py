@@ -1,0 +1,140 @@
+"""Paths inside files: relative, and inside the root or the folders that the command line allows."""
+
+import errno
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from simscen.core.problems import Problem
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.yaml.textfile import os_error_reason
+
+MODEL = "model://"
+
+_UNSPEAKABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+"""Control and bidirectional characters, and what stands for bytes that are not UTF-8 (PEP 383)."""
+
+
+@dataclass(frozen=True)
+class PathSandbox:
+    """Where a scenario may read from: `root`, and the folders of `--world-path`, searched in order."""
+
+    root: Path
+    world_path: tuple[Path, ...] = ()
+
+    @classmethod
+    def around(cls, root: Path, world_path: Sequence[Path] = ()) -> "PathSandbox":
+        """Folders as given, made absolute with symbolic links followed."""
+        return cls(_real(root), tuple(_real(folder) for folder in world_path))
+
+    def find(self, written: str, folder: Path) -> "Path | PathProblem":
+        """The existing file or folder that `written` means in a file that lies in `folder`.
+
+        A path is taken relative to `folder` first and must stay inside the root; `model://name/…` and bare relative
+        paths are then looked up in the folders of `--world-path`. Whether something outside exists is not told.
+        """
+        if refusal := _refused_form(written):
+            return refusal
+        if written.startswith(MODEL):
+            missing = PathProblem("SC023", f"{quoted(written)} is in no folder of --world-path", _world_path_hint(self))
+            return self._in_world_path(written.removeprefix(MODEL)) or missing
+        inside = _real(folder / written)
+        if self.holds(inside):
+            try:
+                inside.stat()
+            except OSError as error:
+                refusal = _unusable(error, written, inside)
+            else:
+                return inside
+        return self._in_world_path(written) or refusal or _outside(written)
+
+    def entered(self, path: Path) -> Path | Problem:
+        """The absolute path of a file that the command line names, with links in its folder followed, if inside."""
+        file = _real(path.parent) / path.name
+        if self.holds(file):
+            return _unspeakable(path, self.shown(file)) or file
+        return Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose one with --root")
+
+    def holds(self, path: Path) -> bool:
+        """Whether a file, with symbolic links followed, is inside the root or an allowed folder."""
+        real = _real(path)
+        return any(real.is_relative_to(allowed) for allowed in (self.root, *self.world_path))
+
+    def shown(self, path: Path) -> str:
+        """How messages name a file: relative to the root where it is inside."""
+        return path.relative_to(self.root).as_posix() if path.is_relative_to(self.root) else str(path)
+
+    def _in_world_path(self, written: str) -> Path | None:
+        if ".." in PurePosixPath(written).parts:
+            return None
+        candidates = ((folder, _real(folder / written)) for folder in self.world_path)
+        return next((found for folder, found in candidates if found.is_relative_to(folder) and exists(found)), None)
+
+
+def exists(path: Path) -> bool:
+    """Whether there is something; False for names that cannot be, where Path.exists raises."""
+    return os.path.exists(path)  # noqa: PTH110
+
+
+def is_folder(path: Path) -> bool:
+    """Whether it is a folder; False for names that cannot be, where Path.is_dir raises."""
+    return os.path.isdir(path)  # noqa: PTH112
+
+
+@dataclass(frozen=True)
+class PathProblem:
+    """Why a path in a file cannot be used."""
+
+    code: str
+    message: str
+    hint: str = ""
+
+
+def _refused_form(written: str) -> PathProblem | None:
+    if any(not c.isprintable() for c in written):
+        return PathProblem("SC017", f"control character in the path {quoted(written)}")
+    if written.startswith(("/", "~")) or (len(written) > 1 and written[1] == ":"):
+        return PathProblem("SC021", f"{quoted(written)} is an absolute path", "write it relative to this file")
+    if "://" in written and not written.startswith(MODEL):
+        return PathProblem("SC021", f"{quoted(written)} is a URL", "only relative paths and model://name are read")
+    return None
+
+
+def _unspeakable(path: Path, name: str) -> Problem | None:
+    """The name becomes the scenario's id, which folders, XML and people must be able to take."""
+    character = _UNSPEAKABLE.search(name)
+    if character is None:
+        return None
+    code = ord(character[0])
+    told = "its name is not valid UTF-8" if 0xD800 <= code < 0xE000 else f"control character U+{code:04X} in its name"
+    return Problem(str(path), 0, 0, "SC017", told, "rename it")
+
+
+def _real(path: Path) -> Path:
+    """With links followed, like Path.resolve, which however raises RuntimeError on a loop."""
+    return Path(os.path.realpath(path))
+
+
+def _outside(written: str) -> PathProblem:
+    hint = "choose the root with --root, or allow a folder with --world-path"
+    return PathProblem("SC020", f"{quoted(written)} is outside the scenario root", hint)
+
+
+def _unusable(error: OSError, written: str, path: Path) -> PathProblem:
+    code = "SC022" if error.errno == errno.ELOOP else "SC023"
+    return PathProblem(code, f"{os_error_reason(error)}: {quoted(written)}", _sibling(path))
+
+
+def _world_path_hint(fence: PathSandbox) -> str:
+    return "" if fence.world_path else "give the folder that holds it with --world-path"
+
+
+def _sibling(missing: Path) -> str:
+    try:
+        names = sorted(entry.name for entry in os.scandir(missing.parent))
+    except OSError:
+        return ""
+    hint = suggestion(missing.name, names)
+    return hint if hint.startswith("did") else ""

@@ -1,0 +1,67 @@
+"""World files of any kind, read on their own; and our own kind, written."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
+from simscen.loading.files.assets import Assets
+from simscen.loading.files.paths import PathSandbox
+from simscen.loading.loaded import LoadedWorld
+from simscen.loading.yaml.library import Library
+from simscen.loading.yaml.scalars import Dumper, to_yaml
+from simscen.model.world import WorldSpec
+
+
+def load_world_file(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedWorld:
+    """The world in a `*.world.yaml`, a ROS map or an SDF file. Raises InvalidInput with all that is wrong with it."""
+    library = Library(PathSandbox.around(root, world_path))
+    file = library.fence.entered(path)
+    if isinstance(file, Problem):
+        raise InvalidInput([file])
+    if not file.exists():
+        raise InvalidInput([Problem(str(path), 0, 0, "SC001", "no such file or directory")])
+    if file.is_dir():
+        raise InvalidInput([Problem(str(path), 0, 0, "SC001", "not a regular file")])
+    assets = Assets(library)
+    world = assets.world_file(file)
+    if world is None or assets.problems:
+        raise InvalidInput(library.with_source(sorted(assets.problems)))
+    return world
+
+
+def world_text(spec: WorldSpec) -> str:
+    """A world as the text of a `*.world.yaml`, without what is as it would be anyway."""
+    data = spec.model_dump(mode="json", exclude_defaults=True)
+    return to_yaml(_in_order(data), _Compact)
+
+
+def _in_order(value: Any) -> Any:
+    """The version and names first, as people write them."""
+    if isinstance(value, list):
+        return [_in_order(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    first = [key for key in ("simscen", "name") if key in value]
+    return {key: _in_order(value[key]) for key in dict.fromkeys((*first, *value))}
+
+
+class _Compact(Dumper):
+    """Writes a thing with its shape and pose on one line, but one line for each of a list of things."""
+
+
+def _list(dumper: yaml.SafeDumper, value: list[Any]) -> yaml.Node:
+    flat = not any(isinstance(item, dict) for item in value)
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", value, flow_style=flat)
+
+
+def _mapping(dumper: yaml.SafeDumper, value: dict[str, Any]) -> yaml.Node:
+    flat = any(not isinstance(item, dict | list) for item in value.values()) and "simscen" not in value
+    return dumper.represent_mapping("tag:yaml.org,2002:map", value, flow_style=flat)
+
+
+_Compact.add_representer(list, _list)
+_Compact.add_representer(dict, _mapping)

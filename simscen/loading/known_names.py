@@ -1,0 +1,134 @@
+"""What a scenario can refer to by name."""
+
+from collections.abc import Mapping
+
+from simscen.core.goalnames import in_loop
+from simscen.core.world import World
+from simscen.criteria.registry import verdict_names
+from simscen.loading.loaded import LoadedScenario
+from simscen.model.world import WorldSpec
+
+NOUNS = {
+    "place": "place of the world",
+    "region": "region of the world",
+    "door": "door of the world",
+    "object": "object of the world or of an event",
+    "movable": "movable object of the world or of an event",
+    "mover": "movable object of the world or of an event",
+    "goal": "goal",
+    "event": "event or mark",
+    "happening": "event, fault or mark",
+    "verdict": "criterion, event or fault",
+}
+
+Names = Mapping[str, list[str] | None]
+"""Kind of reference → the names there are, in the order of the files; None = only the importer of the world knows."""
+
+
+def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
+    """What there is to refer to. What an imported world holds is known once it has become a `world`."""
+    there = _of_files(loaded) if world is None else _of_world(loaded, world)
+    movable = there["movable"]
+    happening = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])
+    return {
+        **there,
+        "mover": None if movable is None else [*movable, *loaded.other_robots],
+        "goal": goal_names(loaded),
+        "event": _distinct(event_names(loaded), mark_names(loaded)),
+        "happening": _distinct(happening, mark_names(loaded)),
+        "verdict": None if loaded.other_robots else _distinct(verdict_names(loaded.spec.pass_), happening),
+    }
+
+
+def goal_names(loaded: LoadedScenario) -> list[str]:
+    """The goals of the scenario, then those that its events send."""
+    return own_goal_names(loaded) + _made(loaded, "new_goal")
+
+
+def own_goal_names(loaded: LoadedScenario) -> list[str]:
+    """The goals of the scenario, in every loop: as written, or after their place, or goal-1, goal-2, …"""
+    loops = range(1, loaded.spec.navigation.loops + 1)
+    return [in_loop(name, loop) for loop in loops for name in loaded.spec.goal_names]
+
+
+def event_names(loaded: LoadedScenario) -> list[str]:
+    """Names as written, or event-1, event-2, …; steps of stories after their event."""
+    return [step.name for step in loaded.spec.steps]
+
+
+def mark_names(loaded: LoadedScenario) -> list[str]:
+    """The marks that events set, in order."""
+    return _distinct(_made(loaded, "mark"))
+
+
+def _of_files(loaded: LoadedScenario) -> Names:
+    world = loaded.world.spec
+    imported = world is None or loaded.world.map is not None or loaded.world.sdf is not None
+    spawned = spawned_names(loaded)
+    return {
+        "place": list(world.places) if world else [],
+        "region": list(world.regions) if world else [],
+        "door": [door.name for door in world.doors] if world else [],
+        "object": None
+        if imported or world is None
+        else _distinct(_standing(world), spawned, list(loaded.other_robots)),
+        "movable": None if imported or world is None else _distinct(_moving(world), spawned),
+    }
+
+
+def _of_world(loaded: LoadedScenario, world: World) -> Names:
+    moving, spawned = [body.name for body in world.bodies], spawned_names(loaded)
+    return {
+        "place": list(world.places),
+        "region": list(world.regions),
+        "door": list(world.doors),
+        "object": _distinct(moving, [solid.name for solid in world.solids], spawned, list(loaded.other_robots)),
+        "movable": _distinct(moving, spawned),
+    }
+
+
+def world_object_names(loaded: LoadedScenario, world: World | None = None) -> list[str]:
+    """What the world holds under a name, as far as that is known."""
+    if world is not None:
+        return [*(body.name for body in world.bodies), *(solid.name for solid in world.solids)]
+    return _standing(loaded.world.spec) if loaded.world.spec is not None else []
+
+
+def spawned_names(loaded: LoadedScenario) -> list[str]:
+    """What events put into the world: things, and people, also those of crowds."""
+    return _made(loaded, "spawn") + pedestrian_names(loaded)
+
+
+def pedestrian_names(loaded: LoadedScenario) -> list[str]:
+    """Who events bring to walk by themselves, also those of crowds."""
+    crowds = [
+        action.chosen.names
+        for step in loaded.spec.steps
+        for action in step.actions
+        if action.kind == "crowd" and hasattr(action.chosen, "names")
+    ]
+    return _made(loaded, "pedestrian") + [name for crowd in crowds for name in crowd]
+
+
+def _made(loaded: LoadedScenario, kind: str) -> list[str]:
+    """The names that actions of one kind give to what they bring; a goal is that of the robot it is sent to."""
+    actions = [action for step in loaded.spec.steps for action in step.actions]
+    mine = [action for action in actions if kind != "new_goal" or loaded.concerns(action.robot)]
+    return [str(getattr(action.chosen, "name", "")) for action in mine if action.kind == kind]
+
+
+def _moving(world: WorldSpec) -> list[str]:
+    return [*(thing.name for thing in world.objects), *(door.name for door in world.doors)]
+
+
+def _standing(world: WorldSpec) -> list[str]:
+    return [
+        *_moving(world),
+        *(obstacle.name for obstacle in world.obstacles),
+        *(ramp.name for ramp in world.ramps),
+        *(wall.called(number) for number, wall in enumerate(world.walls, start=1)),
+    ]
+
+
+def _distinct(*names: list[str]) -> list[str]:
+    return list(dict.fromkeys(name for part in names for name in part))

@@ -1,0 +1,132 @@
+"""A scenario of several robots, as each of them sees it: a scenario of one robot."""
+
+from collections.abc import Iterator
+
+from simscen.core.problems import Problem
+from simscen.loading.stacks.choice import EXTERNAL, StackChoice, replace_stack
+from simscen.loading.yaml.library import merge_mappings
+from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child
+from simscen.model.scenario import RobotEntry
+
+ROBOT, ROBOTS, PASS, EXPECTED, STACK = "robot", "robots", "pass", "expected", "stack"
+OF_ONE = ("goals", "faults")
+"""What a scenario of one robot says at top level, and one of several says of each."""
+
+
+def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
+    """The scenario as each of its robots sees it, by name in order; empty where it has one robot.
+
+    Each part is where it is written, so that problems are told there. That the run is expected to fail is said of all.
+    """
+    robots = child(tree, ROBOTS)
+    entries = robots.entries if isinstance(robots, MappingNode) else {}
+    return {name: _of_one(tree, entries[name]) for name in sorted(entries)}
+
+
+def has_multiple_robots(tree: MappingNode) -> bool:
+    """Whether there are several robots, as far as they can be looked at."""
+    robots = child(tree, ROBOTS)
+    return isinstance(robots, MappingNode) and all(
+        isinstance(said.value, MappingNode) for said in robots.entries.values()
+    )
+
+
+def _of_one(tree: MappingNode, entry: Entry) -> MappingNode:
+    said, place = entry.value, entry.value.place
+    assert isinstance(said, MappingNode)
+    robot = {key: value for key, value in said.entries.items() if key in RobotEntry.model_fields}
+    own = {key: value for key, value in said.entries.items() if key not in robot and key != PASS}
+    whole = merge_mappings(MappingNode(tree.place, own), _without(tree, ROBOTS, EXPECTED))
+    criteria = SequenceNode(tree.place, (*_items(child(tree, PASS)), *_items(child(said, PASS))))
+    return MappingNode(
+        tree.place,
+        {**whole.entries, ROBOT: Entry(entry.key, MappingNode(place, robot)), PASS: Entry(entry.key, criteria)},
+    )
+
+
+def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
+    """A scenario with the chosen stack in place of its own; of several robots, in place of each one's.
+
+    A command whose name is that of the external stack of one of them says what that runs: the others keep theirs.
+    """
+    robots = child(tree, ROBOTS)
+    if robots is None:
+        return replace_stack(tree, choice)
+    if not isinstance(robots, MappingNode) or not has_multiple_robots(tree):
+        return tree  # which is a mistake that is told as such
+    each = split_by_robot(tree)
+    if choice.runs is not None and choice.name in map(external_stack_name, each.values()):
+        return tree
+    chosen = {name: replace_stack(part, choice) for name, part in each.items()}
+    if all(chosen[name] is part for name, part in each.items()):
+        return tree
+    own = {name: Entry(entry.key, _with(entry.value, chosen[name])) for name, entry in robots.entries.items()}
+    rest = _without(tree, STACK)
+    return MappingNode(
+        tree.place, {**rest.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.place, own))}
+    )
+
+
+def _with(said: Node, part: MappingNode) -> MappingNode:
+    """What is said of a robot, with the whole of its stack, as there is none of all any more."""
+    assert isinstance(said, MappingNode)
+    return MappingNode(said.place, said.entries | {key: entry for key, entry in part.entries.items() if key == STACK})
+
+
+def external_stack_name(tree: MappingNode) -> str | None:
+    """The name of the external stack of a scenario of one robot."""
+    stack = child(tree, STACK)
+    name = None if stack is None else child(stack, EXTERNAL)
+    return str(name.value) if isinstance(name, ScalarNode) else None
+
+
+def _items(node: Node | None) -> tuple[Node, ...]:
+    return node.items if isinstance(node, SequenceNode) else ()
+
+
+def _without(tree: MappingNode, *keys: str) -> MappingNode:
+    return MappingNode(tree.place, {key: entry for key, entry in tree.entries.items() if key not in keys})
+
+
+def missing_in_scenario(tree: MappingNode) -> list[Problem]:
+    """What a scenario lacks or says twice: one robot or several, and what must hold."""
+    return [*(_of_several(tree) if ROBOTS in tree.entries else _of_the_only(tree))]
+
+
+def missing_in_criteria(tree: MappingNode) -> list[Problem]:
+    """What a file lacks that need say no more than what must hold."""
+    return [*(_of_several(tree) if ROBOTS in tree.entries else _nothing_holds(tree))]
+
+
+def _of_the_only(tree: MappingNode) -> Iterator[Problem]:
+    if ROBOT not in tree.entries:
+        yield Problem(*tree.place, "SC010", f"missing key `{ROBOT}`")
+    yield from _nothing_holds(tree)
+
+
+def _nothing_holds(tree: MappingNode) -> Iterator[Problem]:
+    criteria = child(tree, PASS)
+    if criteria is None and ROBOTS not in tree.entries:
+        yield Problem(*tree.place, "SC010", f"missing key `{PASS}`")
+    if isinstance(criteria, SequenceNode) and not criteria.items:
+        yield Problem(*criteria.place, "SC017", "expected 1 or more values, got 0")
+
+
+def _of_several(tree: MappingNode) -> Iterator[Problem]:
+    if ROBOT in tree.entries:
+        hint = "one robot is `robot`, several are each under a name in `robots`"
+        yield Problem(*tree.entries[ROBOT].key, "SC016", "`robot` and `robots` exclude each other", hint)
+    for key in OF_ONE:
+        if key in tree.entries:
+            what = f"`{key}` are those of one robot, and here are several"
+            yield Problem(*tree.entries[key].key, "SC016", what, f"write them under the robot's name in `{ROBOTS}`")
+    yield from _nothing_holds(tree)
+    robots = child(tree, ROBOTS)
+    for name, entry in robots.entries.items() if isinstance(robots, MappingNode) else ():
+        if (
+            isinstance(entry.value, MappingNode)
+            and not _items(child(tree, PASS))
+            and not _items(child(entry.value, PASS))
+        ):
+            hint = "say what must hold for it, or at top level for each robot"
+            yield Problem(*entry.key, "SC010", f"missing key `{PASS}` in `{ROBOTS}.{name}`", hint)

@@ -1,0 +1,1 @@
+"""Translate Nav2 parameter files to parameters of the reference stack."""

@@ -1,0 +1,198 @@
+"""Nav2's costmaps: parameters of their own, and of the layers that they name."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from simscen.loading.nav2.mapping import (
+    EQUIVALENT_VALUES,
+    IGNORED_NAME_PARTS,
+    IGNORED_NODES,
+    IGNORED_PARAMETERS,
+    MOTION_MODELS,
+    OLD_NODE_NAMES,
+    SCENARIO_PARAMETERS,
+    Known,
+    Parameters,
+    Translation,
+    class_of,
+    strings,
+    translate_same_name,
+)
+from simscen.loading.nav2.plugins import controller_server, planner_server
+
+DEFAULT_LAYERS = {
+    "static_layer": "StaticLayer",
+    "obstacle_layer": "ObstacleLayer",
+    "inflation_layer": "InflationLayer",
+}
+"""Those of a costmap whose file names none."""
+OBSERVATION_LAYERS = ("ObstacleLayer", "VoxelLayer")
+
+
+def costmap(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
+    """The global costmap, or the local one."""
+    section = "local_costmap" if node == "local_costmap" else "costmap"
+    layers = _layers(parameters)
+    besides = {*layers, *strings(parameters.get("filters"))}
+    for name, value in parameters.items():
+        layer, _, rest = name.partition(".")
+        if not rest:
+            yield from _own(node, name, value, section, known[section])
+        elif layer in layers:
+            yield from _of_layer(node, name, parameters, layers, section, known)
+        elif layer not in besides:
+            besides.add(layer)
+            yield Translation(node, name, (), value, f"`plugins` does not name {layer}", covers=f"{layer}.")
+    for zones in strings(parameters.get("filters")):
+        yield Translation(node, "filters", (), None, covers=f"{zones}.")  # zones are the scenario's
+
+
+def _layers(parameters: Parameters) -> Mapping[str, str]:
+    if not isinstance(parameters.get("plugins"), list):
+        return DEFAULT_LAYERS
+    return {layer: class_of(parameters.get(f"{layer}.plugin", "")) for layer in strings(parameters["plugins"])}
+
+
+def _own(node: str, name: str, value: object, section: str, known: Sequence[str]) -> Iterator[Translation]:
+    if name == "rolling_window":
+        rolls = section == "local_costmap"
+        why = "" if bool(value) == rolls else "the local costmap always rolls, the global one with `map: none`"
+        yield Translation(node, name, (), value, why)
+    yield from translate_same_name(node, name, value, (section,), known)
+
+
+def _of_layer(
+    node: str, name: str, parameters: Parameters, layers: Mapping[str, str], section: str, known: Known
+) -> Iterator[Translation]:
+    layer, _, rest = name.partition(".")
+    value, kind, (source, _, last) = parameters[name], layers[layer], rest.rpartition(".")
+    sources = str(parameters.get(f"{layer}.observation_sources", source)).split()
+    if kind == "InflationLayer" or (kind in OBSERVATION_LAYERS and source and source in sources):
+        yield from translate_same_name(node, name, value, (section,), known[section], last)
+    elif kind == "DenoiseLayer":
+        yield from translate_same_name(node, name, value, (section, "denoise_layer"), known["denoise_layer"], last)
+
+
+# MERGED: Nav2's velocity smoother and collision monitor.
+def velocity_smoother(node: str, parameters: Parameters, _: Known) -> Iterator[Translation]:
+    """Limits ahead, sideways and of the turn rate; here sideways is as ahead, and backward as forward."""
+    for name, turning in (
+        ("max_velocity", "max_angular_velocity"),
+        ("max_accel", "max_angular_accel"),
+        ("max_decel", ""),
+    ):
+        limits = _axes(parameters.get(name))
+        for ours, limit in zip((name, turning), limits[::2], strict=True) if limits else ():
+            if ours and limit:
+                yield Translation(node, name, ("velocity_smoother", ours), abs(limit))
+        if limits and limits[1] and abs(limits[1]) != abs(limits[0]):
+            yield Translation(node, name, (), limits, "sideways is limited as ahead here")
+    least, most = _axes(parameters.get("min_velocity")), _axes(parameters.get("max_velocity"))
+    if least and most and all(low == -high or not low for low, high in zip(least, most, strict=True)):
+        yield Translation(node, "min_velocity", (), least)
+    elif least:
+        yield Translation(node, "min_velocity", (), least, "backward is limited as forward here")
+    faster, slower = _axes(parameters.get("max_accel")), _axes(parameters.get("max_decel"))
+    if faster and slower and abs(slower[2]) != abs(faster[2]):
+        yield Translation(node, "max_decel", (), slower, "turning slower is limited as turning faster here")
+
+
+def collision_monitor(node: str, parameters: Parameters, _: Known) -> Iterator[Translation]:
+    """Polygons that approach are here; those that stop, slow down or limit are not."""
+    if "source_timeout" in parameters:
+        yield Translation(node, "source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
+    on = parameters.get("enabled", True)
+    approaching = []
+    for polygon in strings(parameters.get("polygons")):
+        action = parameters.get(f"{polygon}.action_type")
+        if action != "approach":
+            why = f"there is no polygon that does {action} here, as {polygon} does"
+            yield Translation(node, "polygons", (), action, why, covers=f"{polygon}.")
+            continue
+        yield from (Translation(node, f"{polygon}.{said}", (), None) for said in ("action_type", "enabled"))
+        approaching.append(parameters.get(f"{polygon}.enabled", True))
+        yield from _approach(node, parameters, polygon)
+    on = on and (any(approaching) or not approaching)
+    for name in ("enabled", "polygons"):
+        if name in parameters:
+            yield Translation(node, name, ("collision_monitor", "enabled"), on)
+            break
+
+
+def _approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Translation]:
+    for theirs, ours, more in (
+        ("time_before_collision", "time_before_collision", 0),
+        ("max_points", "min_points", 1),  # Humble's: from one more on
+        ("min_points", "min_points", 0),
+    ):
+        value = parameters.get(f"{polygon}.{theirs}")
+        if value is not None:
+            value = value + more if isinstance(value, int) and not isinstance(value, bool) else value
+            yield Translation(node, f"{polygon}.{theirs}", ("collision_monitor", ours), value)
+
+
+def _axes(value: Any) -> list[float]:
+    """Ahead, sideways and turning; what is no list of three numbers is none, which is told as not understood."""
+    fits = isinstance(value, list) and len(value) == 3 and all(isinstance(one, int | float) for one in value)
+    return value if fits else []
+
+
+# MERGED: Which parameters of Nav2's nodes are parameters of the reference stack, too, and where they stand there.
+def translate(nodes: Mapping[str, Parameters], known: Known) -> Iterator[Translation]:
+    """What becomes of each parameter. `known` are our parameters by section, or by type of what is in it."""
+    for node, parameters in nodes.items():
+        reader = NODES.get(OLD_NODE_NAMES.get(node, node))
+        if reader is None:
+            continue
+        taken = list(reader(node, parameters, known))
+        yield from (one for one in taken if one.path or one.why)
+        told = {one.parameter for one in taken}
+        covered = tuple(one.covers for one in taken if one.covers)
+        for name, value in parameters.items():
+            if name not in told and not name.startswith(covered) and _matters(name, value):
+                yield Translation(node, name, (), value, SCENARIO_PARAMETERS.get(name.partition(".")[0], ""))
+
+
+def unknown_nodes(nodes: Mapping[str, Parameters]) -> list[str]:
+    """The nodes that nothing here is like, and that say something that matters."""
+    return [
+        node
+        for node, parameters in nodes.items()
+        if OLD_NODE_NAMES.get(node, node) not in NODES
+        and node not in IGNORED_NODES
+        and any(_matters(name, value) for name, value in parameters.items())
+    ]
+
+
+def _matters(parameter: str, value: object) -> bool:
+    last = parameter.rpartition(".")[2]
+    if last in IGNORED_PARAMETERS or any(part in last for part in IGNORED_NAME_PARTS):
+        return False
+    return last not in EQUIVALENT_VALUES or value not in EQUIVALENT_VALUES[last]
+
+
+def _amcl(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
+    for name, value in parameters.items():
+        if name == "robot_model_type":
+            model = MOTION_MODELS.get(class_of(value))
+            path = ("localizer", "robot_model") if model else ()
+            yield Translation(node, name, path, model, "" if model else f"there is no {value} here")
+        else:
+            yield from translate_same_name(node, name, value, ("localizer",), known["amcl"])
+
+
+def _behavior_server(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
+    for name, value in parameters.items():
+        yield from translate_same_name(node, name, value, ("recovery",), known["recovery"])
+
+
+NODES = {
+    "amcl": _amcl,
+    "controller_server": controller_server,
+    "planner_server": planner_server,
+    "local_costmap": costmap,
+    "global_costmap": costmap,
+    "behavior_server": _behavior_server,
+    "velocity_smoother": velocity_smoother,
+    "collision_monitor": collision_monitor,
+}

@@ -1,0 +1,94 @@
+"""A parameter file of Nav2, with the lines its parameters stand in."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from simscen.core.problems import Problem
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.textfile import read_text
+from simscen.loading.yaml.tree import MappingNode, Node, Position
+from simscen.ros2.nav2 import Offer, check
+
+PARAMETERS = "ros__parameters"
+EVERY_NODE = "**"
+
+
+@dataclass(frozen=True)
+class Nav2Parameters:
+    """Node → parameter with dots → value, and where each stands; `shown` is the file for people.
+
+    What `/**` says is said to every node of the file. `notes` are keys that stand there twice: the last counts, as in
+    ROS 2.
+    """
+
+    shown: str
+    nodes: Mapping[str, Mapping[str, Any]]
+    places: Mapping[tuple[str, str], Position]
+    text: str
+    notes: tuple[Problem, ...] = ()
+
+    def problems(self, offer: Offer) -> list[Problem]:
+        """What does not fit, in the order of the file."""
+        found = [
+            Problem(
+                *self.places[finding.node, finding.parameter],
+                code="SC340",
+                message=f"{finding.node}: {finding.message}",
+                severity="error" if finding.severe else "warning",
+            )
+            for finding in check(self.nodes, offer)
+        ]
+        lines = self.text.split("\n")
+        return [replace(problem, source=lines[problem.line - 1]) for problem in sorted(found)]
+
+
+def read_nav2_parameters(path: Path, shown: str = "") -> Nav2Parameters | list[Problem]:
+    """The parameters in `path`, or what is wrong with the file; `shown` is how problems name it, default: as it is."""
+    shown = shown or str(path)
+    text = read_text(path, shown)
+    if isinstance(text, Problem):
+        return [text]
+    tree, problems = parse_yaml(text, shown, last_wins=True)
+    notes = tuple(problem for problem in problems if problem.severity == "warning")
+    if len(notes) < len(problems) or tree is None:
+        return [problem for problem in problems if problem not in notes]
+    found = dict(_nodes(tree, ""))
+    if not found:
+        return [Problem(shown, 0, 0, "SC340", f"no parameters of nodes: there is no key {PARAMETERS} in it")]
+    nodes: dict[str, dict[str, Any]] = {}
+    places: dict[tuple[str, str], Position] = {}
+    everybodys = found.pop(EVERY_NODE, None)
+    for name, parameters in found.items() if found else ((EVERY_NODE, MappingNode(Position(shown, 0, 0), {})),):
+        nodes[name] = {}
+        for said in (everybodys, parameters):
+            for key, value in _flat(said, "") if said else ():
+                nodes[name][key] = value.plain
+                places[name, key] = value.place
+    return Nav2Parameters(shown, nodes, places, text, notes)
+
+
+def is_nav2_parameter_file(text: str, shown: str) -> bool:
+    """Whether it is a parameter file of Nav2, rather than one of ours."""
+    if PARAMETERS not in text:
+        return False
+    tree, _ = parse_yaml(text, shown, last_wins=True)
+    return isinstance(tree, MappingNode) and "simscen" not in tree.entries and any(_nodes(tree, ""))
+
+
+def _nodes(node: Node, name: str) -> Iterator[tuple[str, MappingNode]]:
+    """Every node of the file and its parameters; namespaces around it do not count."""
+    for key, entry in node.entries.items() if isinstance(node, MappingNode) else ():
+        if key == PARAMETERS and isinstance(entry.value, MappingNode):
+            yield name, entry.value
+        else:
+            yield from _nodes(entry.value, key.rpartition("/")[2])
+
+
+def _flat(fields: MappingNode, prefix: str) -> Iterator[tuple[str, Node]]:
+    for key, entry in fields.entries.items():
+        if isinstance(entry.value, MappingNode):
+            yield from _flat(entry.value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", entry.value

@@ -1,0 +1,111 @@
+"""The controller server and the planner server of Nav2: the first plug-in of each kind is the one that is here."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from simscen.loading.nav2.mapping import (
+    CONTROLLERS,
+    DWB_CRITICS,
+    DWB_CRITICS_WITHOUT_WEIGHT,
+    MPPI_CRITICS,
+    PLANNERS,
+    RENAMED_PARAMETERS,
+    Known,
+    Parameters,
+    Translation,
+    class_of,
+    parameters_below,
+    strings,
+    translate_same_name,
+)
+
+
+def controller_server(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
+    """Its checkers, and what drives."""
+    for name in ("controller_frequency", "failure_tolerance"):
+        if name in parameters:
+            yield Translation(node, name, (name,), parameters[name])
+    for kind, model in (("progress_checker", "progress_checker"), ("goal_checker", "simple")):
+        chosen = _first(parameters, kind, kind)
+        yield from _others(node, parameters, kind, chosen)
+        for key, value in parameters_below(parameters, chosen):
+            yield from translate_same_name(node, f"{chosen}.{key}", value, (kind,), known[model], key)
+    driver = _first(parameters, "controller", "FollowPath")
+    yield from _others(node, parameters, "controller", driver)
+    yield from _plugin(node, parameters, driver, "controller", CONTROLLERS, known)
+
+
+def planner_server(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
+    """What plans."""
+    planner = _first(parameters, "planner", "GridBased")
+    yield from _others(node, parameters, "planner", planner)
+    yield from _plugin(node, parameters, planner, "planner", PLANNERS, known)
+
+
+def _first(parameters: Parameters, kind: str, usual: str) -> str:
+    """The first plug-in of a kind; Humble and before have one progress checker, named without a list."""
+    named = parameters.get(f"{kind}_plugins", parameters.get(f"{kind}_plugin", usual))
+    return next(iter(strings(named)), "") if isinstance(named, list) else str(named)
+
+
+def _others(node: str, parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
+    listed = f"{kind}_plugins"
+    for other in strings(parameters.get(listed))[1:]:
+        yield Translation(
+            node, listed, (), None, f"there is one {kind} here, which is {chosen}, and no {other}", f"{other}."
+        )
+
+
+def _plugin(
+    node: str, parameters: Parameters, name: str, section: str, types: Mapping[str, str], known: Known
+) -> Iterator[Translation]:
+    """The plug-in of a server: what it is, then its parameters. A rotation shim's controller drives alone."""
+    inner = f"{name}.primary_controller"
+    shimmed = f"{inner}.plugin" in parameters
+    at = f"{inner}.plugin" if shimmed else inner if inner in parameters else f"{name}.plugin"
+    plugin = str(parameters.get(at, ""))
+    kind = types.get(class_of(plugin))
+    if kind is None:
+        if plugin:
+            why = f"there is no {plugin} here: the usual one is used"
+            yield Translation(node, at, (), plugin, why, covers=f"{name}.")
+        return
+    if at != f"{name}.plugin":
+        shim = parameters.get(f"{name}.plugin")
+        yield Translation(node, at, (section, "type"), kind, f"there is no {shim} here; {plugin} drives alone")
+    else:
+        yield Translation(node, at, (section, "type"), kind)
+    prefix = inner if shimmed else name
+    model = _motion_model(parameters, prefix) if kind == "mppi" else ""
+    for key, written in parameters_below(parameters, prefix):
+        own, value = RENAMED_PARAMETERS.get((kind, key), key), written
+        if key == "motion_model":
+            value = model
+        elif key.rpartition(".")[2] == "min_turning_r":
+            own = key if model != "Ackermann" else "min_turning_r"
+        elif key == "critics" and kind in ("mppi", "dwb"):
+            yield from _critics(node, f"{prefix}.{key}", written, kind)
+            continue
+        yield from translate_same_name(node, f"{prefix}.{key}", value, (section,), known[kind], own)
+
+
+def _motion_model(parameters: Parameters, prefix: str) -> str:
+    """MPPI's, which newer files call by the name under which its plug-in stands."""
+    written = parameters.get(f"{prefix}.motion_model", "DiffDrive")
+    return class_of(parameters.get(f"{prefix}.{written}.plugin", written)).removesuffix("MotionModel")
+
+
+def _critics(node: str, name: str, written: Any, kind: str) -> Iterator[Translation]:
+    """The critics that are asked: MPPI's by their list; DWB's that it does not name weigh nothing."""
+    said = strings(written)
+    here = MPPI_CRITICS if kind == "mppi" else (*DWB_CRITICS, *DWB_CRITICS_WITHOUT_WEIGHT)
+    called = {critic: class_of(critic).removesuffix("Critic") + ("Critic" if kind == "mppi" else "") for critic in said}
+    unknown = [critic for critic in said if called[critic] not in here]
+    kept = [called[critic] for critic in said if called[critic] in here]
+    if kind == "mppi" and kept:
+        yield Translation(node, name, ("controller", "critics"), kept)
+    for critic, weight in DWB_CRITICS.items() if kind == "dwb" and said else ():
+        if critic not in kept:
+            yield Translation(node, name, ("controller", weight), 0.0)
+    if unknown:
+        yield Translation(node, name, (), written, f"there is no {', '.join(unknown)} here")

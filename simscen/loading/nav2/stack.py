@@ -1,0 +1,151 @@
+"""`stack: {nav2_params: FILE}`: what a parameter file of Nav2 says, as if it stood in the scenario."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic import BaseModel
+
+from simscen.core.problems import Problem
+from simscen.loading.files.paths import PathProblem
+from simscen.loading.nav2.mapping import Known, Translation
+from simscen.loading.nav2.nodes import translate, unknown_nodes
+from simscen.loading.nav2.parameterfile import Nav2Parameters, read_nav2_parameters
+from simscen.loading.yaml.library import Library, merge_mappings
+from simscen.loading.yaml.tree import (
+    Entry,
+    MappingNode,
+    Node,
+    Position,
+    ScalarNode,
+    SequenceNode,
+    child,
+    value_position,
+)
+
+KEY, STACK, ROBOTS = "nav2_params", "stack", "robots"
+
+
+@dataclass
+class ExpandedTree:
+    """A tree with what its parameter files say, what is wrong with them, and what of them means nothing here."""
+
+    tree: MappingNode
+    problems: list[Problem] = field(default_factory=list)
+    notes: list[Problem] = field(default_factory=list)
+
+
+def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
+    """A scenario, or one of several robots, with the parameters that its stacks take from files of Nav2."""
+    taken = ExpandedTree(tree)
+    robots = child(tree, ROBOTS)
+    if isinstance(robots, MappingNode):
+        own = {name: Entry(said.key, _filled(said.value, library, taken)) for name, said in robots.entries.items()}
+        tree = MappingNode(
+            tree.place, {**tree.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.place, own))}
+        )
+    taken.tree = _filled(tree, library, taken)
+    return taken
+
+
+def _filled(said: Node, library: Library, taken: ExpandedTree) -> Any:
+    stack = child(said, STACK)
+    if not isinstance(said, MappingNode) or not isinstance(stack, MappingNode) or KEY not in stack.entries:
+        return said
+    filled = with_parameters(stack, library, taken)
+    return MappingNode(said.place, {**said.entries, STACK: Entry(said.entries[STACK].key, filled)})
+
+
+def with_parameters(stack: MappingNode, library: Library, taken: ExpandedTree) -> MappingNode:
+    """A `stack:` section over what its parameter file says, and that over Nav2's own defaults."""
+    written, place = stack.entries[KEY].value, value_position(stack, (KEY,))
+    if not isinstance(written, ScalarNode) or not isinstance(written.value, str):
+        return stack  # which the model tells
+    file = library.fence.find(written.value, library.folder_of(place))
+    if isinstance(file, PathProblem):
+        taken.problems.append(Problem(*place, file.code, file.message, file.hint))
+        return stack
+    shown = library.fence.shown(file)
+    parameters = read_nav2_parameters(file, shown)
+    if not isinstance(parameters, Nav2Parameters):
+        taken.problems += parameters
+        return stack
+    library.add({shown: parameters.text}, {shown: file})
+    profile = MappingNode(place, {"profile": Entry(place, ScalarNode(place, "nav2"))})
+    found_here = list(translate(parameters.nodes, _known()))
+    below = profile
+    for one in found_here:
+        if one.path:
+            below = merge_mappings(below, _nested(one, parameters))
+    taken.notes += sorted({*parameters.notes, *_notes(found_here, parameters)})
+    return merge_mappings(stack, below)
+
+
+def _nested(one: Translation, parameters: Nav2Parameters) -> MappingNode:
+    place = parameters.places[one.node, one.parameter]
+    node: Node = _node(one.value, place)
+    for key in reversed(one.path):
+        node = MappingNode(place, {key: Entry(place, node)})
+    assert isinstance(node, MappingNode)
+    return node
+
+
+def _node(value: Any, place: Position) -> Node:
+    if isinstance(value, list):
+        return SequenceNode(place, tuple(_node(item, place) for item in value))
+    return ScalarNode(place, value)
+
+
+def _notes(found_here: Sequence[Translation], parameters: Nav2Parameters) -> Iterator[Problem]:
+    """What of the file means nothing here: each with its reason, or all of a node at its first."""
+    for one in found_here:
+        if one.why:
+            yield _note(parameters.places[one.node, one.parameter], f"{one.node}: `{one.parameter}`: {one.why}")
+    used = {parameters.places[one.node, one.parameter] for one in found_here if one.path}
+    for node in parameters.nodes:
+        places = [
+            (parameters.places[node, one.parameter], one.parameter)
+            for one in found_here
+            if one.node == node
+            and not one.path
+            and not one.why
+            and parameters.places[node, one.parameter] not in used  # what every node is told concerns some
+        ]
+        if places:
+            told = ", ".join(f"{name} ({place.line})" for place, name in sorted(places))
+            yield _note(min(places)[0], f"{node}: nothing here is like {told}")
+    for node in unknown_nodes(parameters.nodes):
+        places_of = [place for (name, _), place in parameters.places.items() if name == node]
+        yield _note(min(places_of), f"nothing here is like the node {node}")
+
+
+def _note(place: Position, message: str) -> Problem:
+    return Problem(*place, code="SC341", message=message, hint="it is left out", severity="warning")
+
+
+def _known() -> Known:
+    """Our parameters, by the section that they are in, or by the type of what is in it; `a.b` is `b` in `a`."""
+    from simscen.model import checkers, controllers, costmaps, localizers, mppi, planners, recovery
+
+    models: dict[str, type[BaseModel]] = {
+        "amcl": localizers.Amcl,
+        "progress_checker": checkers.ProgressChecker,
+        "simple": checkers.SimpleGoalChecker,
+        "regulated_pure_pursuit": controllers.RegulatedPurePursuit,
+        "dwb": controllers.DynamicWindow,
+        "mppi": mppi.Mppi,
+        "navfn": planners.Navfn,
+        "smac_2d": planners.Smac2d,
+        "costmap": costmaps.Costmap,
+        "local_costmap": costmaps.LocalCostmap,
+        "denoise_layer": costmaps.DenoiseLayer,
+        "recovery": recovery.Recovery,
+    }
+    return {name: tuple(_names(model)) for name, model in models.items()}
+
+
+def _names(model: type[BaseModel]) -> Iterator[str]:
+    for name, about in model.model_fields.items():
+        yield name
+        if isinstance(about.annotation, type) and issubclass(about.annotation, BaseModel):
+            yield from (f"{name}.{part}" for part in about.annotation.model_fields)

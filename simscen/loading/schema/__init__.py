@@ -1,0 +1,1 @@
+"""Validate a YAML tree against a pydantic model and report every problem with its position."""

@@ -1,0 +1,132 @@
+"""What the models allow at a place, with what installed packages add: the keys that would have been right there.
+
+A pydantic `loc` mixes keys of the file with tags of unions. Both are followed here along the types, keeping every
+model that could be meant.
+"""
+
+from collections.abc import Iterable, Sequence
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, RootModel, Tag
+from pydantic.fields import FieldInfo
+
+from simscen.loading.yaml.tree import Key
+from simscen.spec.bytype import ByType, added
+from simscen.spec.choice import Choice
+from simscen.spec.lazy import LazySpec, annotation_of
+
+
+def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel]]:
+    """The models that a mapping at `loc` below `model` may be written for."""
+    candidates: list[Any] = [model]
+    for part in loc:
+        options = [option for candidate in candidates for option in _options(candidate)]
+        below = [kind for option in options for kind in _below(option, part)]
+        narrowed = [option for option in options if part in _tags(option)]
+        candidates = below or narrowed or candidates
+    found = [_bare(option) for candidate in candidates for option in _options(candidate)]
+    return list(dict.fromkeys(kind for kind in found if _is_model(kind) and not issubclass(kind, RootModel)))
+
+
+def types_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
+    """The values that `type` may have in a mapping at `loc`."""
+    return [str(value) for kind in models_at(model, loc) for value in _types(kind)]
+
+
+def keys_of(models: Iterable[type[BaseModel]]) -> list[str]:
+    """The keys that these models know, as they are written in YAML."""
+    keys = [field.alias or name for model in models for name, field in model.model_fields.items()]
+    return list(dict.fromkeys(keys))
+
+
+def needs_nothing(model: type[BaseModel]) -> bool:
+    """Whether `{}` is a complete specification."""
+    return not issubclass(model, RootModel | Choice) and not any(f.is_required() for f in model.model_fields.values())
+
+
+def field_type(model: type[BaseModel], key: str) -> Any:
+    """The declared type of the field that is written as `key`; None where there is none, or its package is broken."""
+    for name, field in model.model_fields.items():
+        if key in (field.alias, name):
+            return _type_of(field)
+    return None
+
+
+def _type_of(field: FieldInfo) -> Any:
+    from simscen.spec.registry import BrokenPlugin
+
+    if mark := next((mark for mark in field.metadata if isinstance(mark, ByType)), None):
+        return Annotated[field.annotation, mark]
+    try:
+        return annotation_of(field)
+    except BrokenPlugin:
+        return None
+
+
+def _options(kind: Any) -> list[Any]:
+    """The members of a union, tagged or not; any other type is its own only option."""
+    if mark := _by_type(kind):
+        return [*_options(mark.own), *(Annotated[model, Tag(name)] for name, model in added(mark.group))]
+    bare = _bare(kind)
+    if get_origin(bare) in (Union, UnionType):
+        return [option for member in get_args(bare) if member is not NoneType for option in _options(member)]
+    if _is_model(bare) and issubclass(bare, RootModel):
+        inner = _inner(bare)
+        holds_models = _is_model(inner) or get_origin(inner) in (Union, UnionType)
+        return _options(bare.model_fields["root"].annotation) if holds_models else [kind]
+    return [kind]
+
+
+def _inner(model: Any) -> Any:
+    return _bare(model.model_fields["root"].annotation)
+
+
+def _below(kind: Any, part: Key) -> list[Any]:
+    bare = _bare(kind)
+    if _is_model(bare) and isinstance(part, str):
+        below = field_type(bare, part)
+        return [] if below is None else [below]
+    if get_origin(bare) is list and isinstance(part, int):
+        return [get_args(bare)[0]]
+    if get_origin(bare) is dict and part not in _tags(kind):
+        return [get_args(bare)[1]]
+    return []
+
+
+def _tags(option: Any) -> set[str]:
+    """What pydantic may call this member of a union in a `loc`."""
+    tags = {meta.tag for meta in _metadata(option) if isinstance(meta, Tag)}
+    bare = _bare(option)
+    if _is_model(bare):
+        tags |= {bare.__name__, *(str(value) for value in _types(bare))}
+    return tags
+
+
+def _types(model: type[BaseModel]) -> tuple[Any, ...]:
+    field = model.model_fields.get("type")
+    return get_args(field.annotation) if field is not None and get_origin(field.annotation) is Literal else ()
+
+
+def _metadata(kind: Any) -> tuple[Any, ...]:
+    return tuple(get_args(kind)[1:]) if get_origin(kind) is Annotated else ()
+
+
+def _by_type(kind: Any) -> ByType | None:
+    return next((mark for mark in _metadata(kind) if isinstance(mark, ByType)), None)
+
+
+def _bare(kind: Any) -> Any:
+    while get_origin(kind) is Annotated:
+        kind = next((mark.load() for mark in _metadata(kind) if isinstance(mark, LazySpec)), get_args(kind)[0])
+    return _widened(kind) if _is_model(kind) and issubclass(kind, Choice) else kind
+
+
+def _widened(choice: type[Choice]) -> type[Choice]:
+    from simscen.spec.choice import widened  # only where something is wrong: nothing else looks for packages
+
+    return widened(choice)
+
+
+def _is_model(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)

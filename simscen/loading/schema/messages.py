@@ -1,0 +1,171 @@
+"""What pydantic found wrong, in the words of somebody who writes YAML."""
+
+import difflib
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from simscen.loading.yaml.textfile import lookalike_hint
+from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
+from simscen.spec.places import NAMESPACE
+
+_KINDS = {
+    "model_type": "a mapping",
+    "model_attributes_type": "a mapping",
+    "dict_type": "a mapping",
+    "list_type": "a list",
+    "string_type": "text",
+    "int_type": "an integer",
+    "int_from_float": "an integer",
+    "float_type": "a number",
+    "bool_type": "true or false",
+}
+_BOUNDS = {
+    "greater_than": ("greater than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+}
+MAX_LISTED_CHOICES = 40
+_NUMBER = re.compile(r"[-+]?\d+(\.\d*)?")
+_LEADING_ZERO = re.compile(r"[-+]?0\d")
+_TEXTS = {
+    "finite_number": ("SC013", "must be a finite number"),
+    "too_short": ("SC017", "expected {min_length} or more values, got {actual_length}"),
+    "too_long": ("SC017", "expected no more than {max_length} values"),
+    "string_too_short": ("SC017", "must not be empty"),
+    "string_too_long": ("SC017", "longer than {max_length} characters"),
+}
+
+
+class Message(NamedTuple):
+    """A stable code, what is wrong, and how to mend it."""
+
+    code: str
+    text: str
+    hint: str = ""
+
+
+def describe_node(node: Node) -> str:
+    """What stands there, as a message calls it."""
+    if isinstance(node, MappingNode):
+        return "a mapping"
+    if isinstance(node, SequenceNode):
+        return "a list"
+    value = node.value
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return f"the truth value {str(value).lower()}"
+    if isinstance(value, str):
+        return f"the text {quoted(value)}"
+    return f"the {'integer' if isinstance(value, int) else 'number'} {value}"
+
+
+def quoted(text: str, most: int = 60) -> str:
+    """User text inside a message: on one line, printable, not too long."""
+    short_value = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    return f"`{short_value if len(short_value) <= most else short_value[: most - 1] + '…'}`"
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """ "did you mean …" when something known is near; else a list of what is known."""
+    choices = list(known)
+    lowered = {choice.lower(): choice for choice in reversed(choices)}
+    near = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    if near:
+        return f"did you mean `{lowered[near[0]]}`?"
+    return f"expected one of: {_listed(choices)}" if choices else ""
+
+
+def _listed(choices: list[str]) -> str:
+    """The first ones, where there are too many to read: an imported world has hundreds of names."""
+    more = len(choices) - MAX_LISTED_CHOICES
+    return f"{', '.join(choices[:MAX_LISTED_CHOICES])}, and {more} more" if more > 1 else ", ".join(choices)
+
+
+def translate_error(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Message:
+    """What pydantic's error type `kind` on the value `node` means; `text` is pydantic's own message."""
+    if kind in _KINDS:
+        return Message("SC011", f"expected {_KINDS[kind]}, got {describe_node(node)}", _type_hint(kind, node))
+    if kind in _BOUNDS:
+        words, key = _BOUNDS[kind]
+        return Message("SC013", f"must be {words} {_number(context[key])}, got {short_value(node)}")
+    if kind in _TEXTS:
+        code, template = _TEXTS[kind]
+        return Message(code, template.format_map(context))
+    if kind == "literal_error":
+        word = str(node.value) if isinstance(node, ScalarNode) else ""
+        return Message(
+            "SC014",
+            f"{short_value(node)} is not one of the choices",
+            suggestion(word, _choices(str(context["expected"]))),
+        )
+    if kind == "value_error":
+        told = str(context["error"])
+        return (
+            Message("SC016", "nothing is chosen here", told)
+            if told.startswith("expected one of")
+            else Message("SC016", told)
+        )
+    if kind == "plugin":
+        return Message("SC019", str(context["problem"]), str(context["hint"]))
+    if kind == "quantity":
+        units = f"units: {context['units']}; a bare number is SI"
+        written = str(node.value) if isinstance(node, ScalarNode) else ""
+        return Message("SC015", str(context["problem"]), lookalike_hint(written) or _bare_number(node) or units)
+    if "names" in context:
+        hint = suggestion(str(context["value"]), str(context["names"]).split(", "))
+        return Message("SC014", f"{short_value(node)} is not one of the choices", hint)
+    is_name = kind == "string_pattern_mismatch"
+    return _bad_name(node, str(context["pattern"])) if is_name else Message("SC011", text[:1].lower() + text[1:])
+
+
+def _type_hint(kind: str, node: Node) -> str:
+    if kind == "string_type" and isinstance(node, ScalarNode) and node.value is not None:
+        return "put it in quotes"
+    if not isinstance(node, ScalarNode) or not isinstance(node.value, str):
+        return ""
+    if kind in ("int_type", "float_type"):
+        return _bare_number(node)
+    if odd := lookalike_hint(node.value):
+        return odd
+    if kind == "bool_type" and node.value.lower() in ("true", "false"):
+        return "remove the quotes"
+    if kind == "bool_type" and node.value.lower() in ("yes", "no", "on", "off", "y", "n"):
+        return f"write {'true' if node.value.lower() in ('yes', 'on', 'y') else 'false'}"
+    return ""
+
+
+def _bare_number(node: Node) -> str:
+    """How to make a number of a text that is one but for its quotes or its zeros."""
+    if not isinstance(node, ScalarNode) or not isinstance(node.value, str) or not _NUMBER.fullmatch(node.value):
+        return ""
+    return "remove the leading zero" if _LEADING_ZERO.match(node.value) else "remove the quotes"
+
+
+def short_value(node: Node) -> str:
+    """The value that stands there, short."""
+    if isinstance(node, ScalarNode) and node.value is not None:
+        return quoted(str(node.value).lower() if isinstance(node.value, bool) else str(node.value))
+    return describe_node(node)
+
+
+def _number(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _choices(expected: str) -> list[str]:
+    """Pydantic lists choices as "'a', 'b' or 'c'"."""
+    return [part.strip().strip("'") for part in expected.replace(" or ", ", ").split(",")]
+
+
+def _bad_name(node: Node, pattern: str) -> Message:
+    value = node.value if isinstance(node, ScalarNode) and isinstance(node.value, str) else ""
+    control = next((c for c in value if not c.isprintable()), None)
+    if control is not None:
+        return Message("SC017", f"control character U+{ord(control):04X} in {quoted(value)}", "remove it")
+    hint = "begin with a letter or `_`, then letters, digits, spaces, `_`, `.` and `-`"
+    if pattern == NAMESPACE:
+        hint = "it is a namespace in ROS, too: begin with a letter, then letters, digits, and single `_` between them"
+    return Message("SC017", f"{quoted(value)} cannot be a name here", hint)

@@ -1,0 +1,197 @@
+"""Validate a tree against a model: the model, or every problem at the line and column to mend."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from simscen.core.problems import Problem
+from simscen.loading.schema import common_mistakes, messages
+from simscen.loading.schema.lookup import keys_of, models_at, needs_nothing, types_at
+from simscen.loading.yaml import textfile
+from simscen.loading.yaml.tree import (
+    Key,
+    MappingNode,
+    Node,
+    Position,
+    ScalarNode,
+    SequenceNode,
+    child,
+    dotted_path,
+    existing_keys,
+    key_position,
+    node_at,
+    value_position,
+)
+from simscen.spec.choice import Choice
+from simscen.triggers.trigger import Test, Trigger
+
+Model = TypeVar("Model", bound=BaseModel)
+LANGUAGE_VERSION = 1
+
+
+Lacking = Callable[[MappingNode], list[Problem]]
+
+
+def check(model: type[Model], tree: Node, also: Lacking | None = None) -> Model | list[Problem]:
+    """The specification that `tree` holds, or all that is wrong with it; `also` looks for what no model tells."""
+    if not isinstance(tree, MappingNode):
+        return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")]
+    if problem := _other_version(tree):
+        return [problem]
+    empty = [_no_value(model, tree, loc) for loc in _empty(tree)]
+    more = also(tree) if also is not None else []
+    try:
+        spec = model.model_validate(tree.plain, by_alias=True, by_name=False)
+    except ValidationError as error:
+        told = error.errors(include_input=False, include_url=False)
+        found = [_translate(model, tree, dict(e)) for e in told if not _follows_from_empty(tree, dict(e))]
+        return _distinct([*empty, *more, *found])
+    return [*empty, *more] or spec
+
+
+def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
+    """All that is wrong with what `tree` says, whatever it leaves to the files that extend it.
+
+    These can add keys to its mappings, but nothing to what stands in its lists.
+    """
+    if not isinstance(tree, MappingNode):
+        return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")]
+    if problem := _other_version(tree):
+        return [problem]
+    empty = [_no_value(model, tree, loc) for loc in _empty(tree)]
+    try:
+        model.model_validate(tree.plain, by_alias=True, by_name=False)
+    except ValidationError as error:
+        told = [dict(found) for found in error.errors(include_input=False, include_url=False)]
+        said = [found for found in told if not _may_be_added(found) and not _follows_from_empty(tree, found)]
+        return _distinct([*empty, *(_translate(model, tree, found) for found in said)])
+    return empty
+
+
+def _may_be_added(error: dict[str, Any]) -> bool:
+    """Whether only a key is missing, in a mapping that is in no list."""
+    in_a_list = any(isinstance(part, int) for part in error["loc"])
+    return error["type"] in ("missing", "union_tag_not_found") and not in_a_list
+
+
+def _other_version(tree: MappingNode) -> Problem | None:
+    version = child(tree, "simscen")
+    if not isinstance(version, ScalarNode) or version.value == LANGUAGE_VERSION or isinstance(version.value, bool):
+        return None
+    if not isinstance(version.value, int):
+        return None
+    message = f"needs schema {version.value}; this version of simscen supports {LANGUAGE_VERSION}"
+    return _problem(version.place, "SC009", message)
+
+
+def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Problem:
+    loc: tuple[Key, ...] = error["loc"]
+    kind: str = error["type"]
+    if kind == "extra_forbidden":
+        return _unknown_key(model, tree, loc)
+    if kind == "missing":
+        return _missing_key(tree, loc)
+    if kind.startswith("union_tag"):
+        return _wrong_type(model, tree, loc, error)
+    if loc and loc[-1] == "[key]":
+        name = ScalarNode(tree.place, str(loc[-2]))
+        return _problem(
+            key_position(tree, loc), *messages.translate_error(kind, error.get("ctx", {}), name, error["msg"])
+        )
+    node = node_at(tree, loc)
+    message = messages.translate_error(kind, error.get("ctx", {}), node, error["msg"])
+    if not message.hint and kind in ("model_type", "model_attributes_type", "list_type"):
+        message = message._replace(hint=common_mistakes.hint_for_wrong_type(kind, model, loc, node))
+    return _problem(value_position(tree, loc), *message)
+
+
+def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:
+    key = str(loc[-1])
+    holder = dotted_path(existing_keys(tree, loc[:-1]))
+    where = f" in `{holder}`" if holder else ""
+    models = models_at(model, loc[:-1])
+    hint = messages.suggestion(key, keys_of(models))
+    if mended := textfile.lookalike_hint(key):
+        hint = mended
+    elif key in Trigger.modifiers and models == [Test]:
+        hint = f"`{key}` is of the whole trigger: it stands beside the `all`, `any` or `not` of `when`"
+    elif elsewhere := common_mistakes.hint_for_reserved_key(loc[:-1], key):
+        hint = elsewhere
+    elif not hint.startswith("did") and (belongs := common_mistakes.hint_for_misplaced_key(model, tree, loc[:-1], key)):
+        hint = belongs
+    elif not hint.startswith("did") and any(issubclass(one, Choice) and one.group for one in models):
+        hint = "; ".join(filter(None, (hint, "`simscen plugins` lists what installed packages add")))
+    return _problem(key_position(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
+
+
+def _missing_key(tree: Node, loc: tuple[Key, ...]) -> Problem:
+    holder = dotted_path(existing_keys(tree, loc[:-1]))
+    if isinstance(loc[-1], int):
+        return _problem(key_position(tree, loc[:-1]), "SC017", f"`{holder}` has too few values: none at [{loc[-1]}]")
+    where = f" in `{holder}`" if holder else ""
+    return _problem(key_position(tree, loc[:-1]), "SC010", f"missing key `{loc[-1]}`{where}")
+
+
+def _wrong_type(model: type[BaseModel], tree: Node, loc: tuple[Key, ...], error: dict[str, Any]) -> Problem:
+    """A union told apart by `type:` whose type is missing or unknown."""
+    node, types = node_at(tree, loc), types_at(model, loc)
+    if not isinstance(node, MappingNode):
+        return _problem(value_position(tree, loc), "SC011", f"expected a mapping, got {messages.describe_node(node)}")
+    if error["type"] == "union_tag_not_found":
+        message = f"missing key `type` in `{dotted_path(existing_keys(tree, loc))}`"
+        return _problem(key_position(tree, loc), "SC010", message, f"expected one of: {', '.join(types)}")
+    written = str(error["ctx"]["tag"])
+    message = f"{messages.quoted(written)} is not one of the choices"
+    return _problem(value_position(tree, (*loc, "type")), "SC014", message, messages.suggestion(written, types))
+
+
+def _empty(node: Node, loc: tuple[Key, ...] = ()) -> Iterator[tuple[Key, ...]]:
+    """Where nothing is written: `off:` where `off: {}` was meant, or a value that was forgotten."""
+    if isinstance(node, MappingNode):
+        for key, entry in node.entries.items():
+            yield from _empty(entry.value, (*loc, key))
+    elif isinstance(node, SequenceNode):
+        for index, item in enumerate(node.items):
+            yield from _empty(item, (*loc, index))
+    elif node.value is None:
+        yield loc
+
+
+def _no_value(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:
+    *holder, key = loc
+    if isinstance(key, int):
+        return _problem(
+            key_position(tree, loc), "SC018", f"item {key + 1} of `{dotted_path(holder)}` is empty", "remove it"
+        )
+    models = models_at(model, loc)
+    complete = models and all(needs_nothing(option) for option in models)
+    hint = f"write `{key}: {{}}`" if complete else "give it a value or remove the key"
+    return _problem(key_position(tree, loc), "SC018", f"{messages.quoted(key)} has no value", hint)
+
+
+def _follows_from_empty(tree: Node, error: dict[str, Any]) -> bool:
+    """Whether pydantic only says in its way that something is empty."""
+    node = node_at(tree, error["loc"])
+    if isinstance(node, ScalarNode):
+        return node.value is None
+    holds_nothing = isinstance(node, MappingNode) and any(e.value.plain is None for e in node.entries.values())
+    return holds_nothing and error["type"] == "value_error"
+
+
+def _distinct(problems: list[Problem]) -> list[Problem]:
+    """One problem for one mistake: members of a union complain at one place, and a misspelt key is also missing."""
+    places: dict[tuple[str, int, int, str], Problem] = {}
+    for problem in problems:
+        key = problem.code if problem.code == "SC010" else ""
+        places.setdefault((problem.path, problem.line, problem.col, key and problem.message), problem)
+    misspelt = {problem.hint for problem in problems if problem.code == "SC012"}
+    return [p for p in places.values() if not (p.code == "SC010" and p.hint == "" and _meant(p) in misspelt)]
+
+
+def _meant(missing: Problem) -> str:
+    return f"did you mean {missing.message.split()[2]}?"
+
+
+def _problem(place: Position, code: str, message: str, hint: str = "") -> Problem:
+    return Problem(place.path, place.line, place.col, code, message, hint)

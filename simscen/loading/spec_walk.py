@@ -1,0 +1,127 @@
+"""Find the names in a specification that refer to something else."""
+
+from collections.abc import Callable, Iterator
+from functools import cache
+from typing import Annotated, Any, NamedTuple, get_args, get_origin
+
+from pydantic import BaseModel, RootModel
+
+from simscen.loading.yaml.tree import Key
+from simscen.spec.named_places import OrPlace
+from simscen.spec.quantities import Quantity
+from simscen.spec.references import Refers
+
+
+class Reference(NamedTuple):
+    """A name at `keys` of a scenario that must name something, as its `mark` says."""
+
+    keys: tuple[Key, ...]
+    mark: Refers
+    name: str
+
+    @property
+    def to(self) -> str:
+        """The kind of what it names."""
+        return self.mark.to
+
+
+Concerns = Callable[[str | None], bool]
+
+
+def references(spec: BaseModel, keys: tuple[Key, ...] = (), concerns: Concerns | None = None) -> Iterator[Reference]:
+    """Every reference below `spec`, in the order of its fields; not in what is about a robot that does not concern."""
+    about = getattr(spec, "robot", None)
+    if concerns is not None and isinstance(about, str) and not concerns(about):
+        return
+    for name, key, mark in _fields_of(type(spec)):
+        below = keys if isinstance(spec, RootModel) else (*keys, key)
+        yield from _in_value(getattr(spec, name), mark, below, concerns)
+
+
+@cache
+def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, Refers | None]]:
+    """Each field with its key, and what a text in it refers to."""
+    found = []
+    for name, field in model.model_fields.items():
+        marks = [mark for mark in field.metadata if isinstance(mark, Refers)]
+        found.append((name, field.alias or name, marks[0] if marks else _mark(field.annotation)))
+    return found
+
+
+def _in_value(value: Any, mark: Refers | None, keys: tuple[Key, ...], concerns: Concerns | None) -> Iterator[Reference]:
+    if isinstance(value, BaseModel):
+        yield from references(value, keys, concerns)
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from _in_value(item, mark, (*keys, index), concerns)
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            yield from _in_value(item, mark, (*keys, key), concerns)
+    elif isinstance(value, str) and mark is not None and not (isinstance(mark, OrPlace) and value in mark.besides):
+        yield Reference(keys, mark, value)
+
+
+def _mark(kind: Any) -> Refers | None:
+    """What a text of this type refers to; unions and lists are searched."""
+    if get_origin(kind) is Annotated:
+        marks = [mark for mark in get_args(kind)[1:] if isinstance(mark, Refers)]
+        if marks:
+            return marks[0]
+        return _mark(get_args(kind)[0])
+    return next((found for member in get_args(kind) if (found := _mark(member))), None)
+
+
+# MERGED: Go through all of a specification, with where each part of it stands in the file.
+Keys = tuple[Key, ...]
+
+
+def walk(spec: Any, keys: Keys = (), concerns: Callable[[str], bool] | None = None) -> Iterator[tuple[Keys, BaseModel]]:
+    """Every mapping of a specification, itself included, in the order of its fields.
+
+    What says `robot:` and is about one that does not concern is passed over.
+    """
+    about = getattr(spec, "robot", None)
+    if concerns is not None and isinstance(about, str) and not concerns(about):
+        return
+    if isinstance(spec, RootModel):
+        yield from walk(spec.root, keys, concerns)
+    elif isinstance(spec, BaseModel):
+        yield keys, spec
+        for name, field in type(spec).model_fields.items():
+            yield from walk(getattr(spec, name), (*keys, field.alias or name), concerns)
+    elif isinstance(spec, list | tuple):
+        for index, item in enumerate(spec):
+            yield from walk(item, (*keys, index), concerns)
+    elif isinstance(spec, dict):
+        for key, item in spec.items():
+            yield from walk(item, (*keys, key), concerns)
+
+
+def quantities_of(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float]]:
+    """The numbers of one dimension in a specification."""
+    for keys, part in walk(spec):
+        for name, key in _measured(type(part), dimension):
+            if isinstance(value := getattr(part, name), int | float):
+                yield (*keys, key), value
+
+
+@cache
+def _measured(model: type[BaseModel], dimension: str) -> list[tuple[str, str]]:
+    """The fields that hold quantities of the dimension, with their keys."""
+    return [
+        (name, field.alias or name)
+        for name, field in model.model_fields.items()
+        if any(_has(mark, dimension) for mark in field.metadata) or _measures(field.annotation, dimension)
+    ]
+
+
+def _measures(kind: Any, dimension: str) -> bool:
+    """Whether a type, or a member of a union, is a quantity of the dimension."""
+    if get_origin(kind) is Annotated:
+        inner, *marks = get_args(kind)
+        return any(_has(mark, dimension) for mark in marks) or _measures(inner, dimension)
+    return any(_measures(member, dimension) for member in get_args(kind))
+
+
+def _has(mark: Any, dimension: str) -> bool:
+    return isinstance(mark, Quantity) and mark.dimension == dimension

@@ -1,0 +1,108 @@
+"""Read a `*.stack.yaml`: the parameters of a stack, for every scenario that is run with it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
+from simscen.loading.files.paths import PathSandbox
+from simscen.loading.nav2.parameterfile import is_nav2_parameter_file
+from simscen.loading.nav2.stack import KEY as NAV2_PARAMS
+from simscen.loading.nav2.stack import with_nav2_parameters
+from simscen.loading.schema.validate import check
+from simscen.loading.stacks.choice import SCENARIO_KEYS, StackChoice
+from simscen.loading.yaml.library import Library
+from simscen.loading.yaml.textfile import read_text
+from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, child, key_position
+from simscen.model.stackfile import StackFileSpec
+
+
+def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: Sequence[Path] = ()) -> StackChoice:
+    """The stack in `path`, which may lie outside `root`: whoever calls the command chooses it.
+
+    Raises InvalidInput with all that is wrong with it.
+    """
+    library = Library(PathSandbox.around(root, [*world_path, path.parent]))
+    found = read_stack_file(path, library)
+    if isinstance(found, list):
+        raise InvalidInput(found)
+    section, notes = found
+    return StackChoice(
+        name, value, "", path.absolute(), section, dict(library.texts), dict(library.files), notes=tuple(notes)
+    )
+
+
+def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Problem]] | list[Problem]:
+    """The `stack:` section of a stack file and what of it means nothing, or all that is wrong with the file.
+
+    A parameter file of Nav2 is taken for a stack file that names it.
+
+    What a parameter file of Nav2 says is part of the section, which names that file no more: it may lie where no
+    scenario can reach it.
+    """
+    file = library.fence.entered(path)
+    if isinstance(file, Problem):
+        return [file]
+    tree, problems = _read(file, library)
+    if problems or tree is None:
+        return library.with_source(problems)
+    notes: list[Problem] = []
+    if isinstance(tree, MappingNode):
+        taken = with_nav2_parameters(tree, library)
+        notes = library.with_source(taken.notes)
+        if taken.problems:
+            return library.with_source(sorted(taken.problems))
+        tree = taken.tree
+    spec = check(StackFileSpec, tree)
+    section = child(tree, "stack")
+    misplaced = _misplaced(section) if isinstance(section, MappingNode) else []
+    if isinstance(spec, list) or misplaced or not isinstance(section, MappingNode):
+        return library.with_source(sorted([*misplaced, *(spec if isinstance(spec, list) else [])]))
+    kept = {key: entry for key, entry in section.entries.items() if key != NAV2_PARAMS}
+    return MappingNode(section.place, kept), notes
+
+
+def _read(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:
+    """The tree of a stack file; of a parameter file of Nav2 that of one which names it."""
+    shown = library.fence.shown(file)
+    text = read_text(file, shown)
+    if isinstance(text, Problem) or not is_nav2_parameter_file(text, shown):
+        return library.read(file)
+    library.add({shown: text}, {shown: file})
+    here = Position(shown, 1, 1)
+
+    def fields(key: str, value: Node) -> dict[str, Entry]:
+        return {key: Entry(here, value)}
+
+    stack = MappingNode(here, fields(NAV2_PARAMS, ScalarNode(here, file.name)))
+    return MappingNode(here, {**fields("simscen", ScalarNode(here, 1)), **fields("stack", stack)}), []
+
+
+def _misplaced(section: MappingNode) -> list[Problem]:
+    """What belongs into a scenario: regions and masks are of a world, and a stack is to drive in many."""
+    hint = "write it under `stack:` of the scenario, where it holds for every stack"
+    return [
+        Problem(*key_position(section, (name,)), "SC016", f"`{name}` is the scenario's, not the stack's", hint)
+        for name in SCENARIO_KEYS
+        if name in section.entries
+    ]
+
+
+# MERGED: Parameters of a stack where a scenario is asked for: told as what they are, and what they are for.
+STACK_FILE_KIND, NAV2_FILE_KIND = "stack file", "parameter file of Nav2"
+_OF_A_STACK_FILE = frozenset({"simscen", "name", "description", "stack"})
+
+
+def recognize_stack_file(tree: Node | None, text: str, shown: str) -> str:
+    """STACK_FILE or PARAMETER_FILE, if it is one of them; "" = anything else."""
+    if is_nav2_parameter_file(text, shown):
+        return NAV2_FILE_KIND
+    keys = set(tree.entries) if isinstance(tree, MappingNode) else set()
+    return STACK_FILE_KIND if "stack" in keys <= _OF_A_STACK_FILE else ""
+
+
+def not_a_scenario(kind: str, shown: str) -> Problem:
+    """That a file of this kind is no scenario, and how scenarios are run with it."""
+    written = f", or name it in a scenario: `stack: {{nav2_params: {shown.rpartition('/')[2]}}}`"
+    hint = f"run scenarios with `--stack NAME={shown}`{written if kind == NAV2_FILE_KIND else ''}"
+    return Problem(shown, 0, 0, "SC025", f"a {kind}, and no scenario", hint)

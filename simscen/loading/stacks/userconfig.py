@@ -1,0 +1,96 @@
+"""Read the user's own configuration."""
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput
+from simscen.core.externalcommand import ExternalCommand
+from simscen.core.problems import Problem
+from simscen.loading.files.paths import PathSandbox, exists
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.multirobot import external_stack_name
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.schema.validate import check
+from simscen.loading.stacks.choice import EXTERNAL
+from simscen.loading.stacks.program import parse_command
+from simscen.loading.yaml.library import Library
+from simscen.loading.yaml.tree import MappingNode, value_position
+from simscen.model.anystack import ExternalStackSpec
+from simscen.model.userconfig import UserConfigSpec
+
+
+@dataclass(frozen=True)
+class UserConfig:
+    """A configuration with where it is written."""
+
+    file: Path
+    spec: UserConfigSpec
+    tree: MappingNode | None = field(repr=False, default=None)
+    library: Library | None = field(repr=False, default=None)
+
+    def command(self, name: str, environment: Mapping[str, str], folder: Path) -> ExternalCommand | None:
+        """What a stack's name runs, called from `folder` with this environment; None for a name that is not there.
+
+        Raises InvalidInput where it cannot be run.
+        """
+        if name not in self.spec.stacks:
+            return None
+        said = self.spec.stacks[name]
+        home = folder if said.cwd is None else Path(said.cwd).expanduser()
+        if not home.is_dir():
+            raise self._wrong((name, "cwd"), "there is no such folder", "")
+        try:
+            return parse_command(said.command, environment, home, said.env, (said.start_limit, said.answer_limit))
+        except ValueError as error:
+            hint = "" if said.cwd is None else f"it starts in {home}"
+            raise self._wrong((name, "command"), str(error), hint) from error
+
+    def _wrong(self, keys: tuple[str, str], message: str, hint: str) -> InvalidInput:
+        assert self.tree is not None and self.library is not None, "a stack that is not in a file"
+        place = value_position(self.tree, ("stacks", *keys))
+        problem = Problem(*place, code="SC061", message=message, hint=hint)
+        return InvalidInput(self.library.with_source([problem]))
+
+
+def load_config(file: Path) -> UserConfig:
+    """The configuration in `file`; an empty one where there is none. Raises InvalidInput with all that is wrong."""
+    if not exists(file):
+        return UserConfig(file, UserConfigSpec())
+    # Its root holds nothing, so that problems show where the file is: it is no part of a project.
+    library = Library(PathSandbox.around(Path(os.devnull), [file.parent]))
+    tree, problems = library.read(file)
+    spec = check(UserConfigSpec, tree) if tree is not None else []
+    if problems or isinstance(spec, list) or not isinstance(tree, MappingNode):
+        raise InvalidInput(library.with_source([*problems, *(spec if isinstance(spec, list) else [])]))
+    return UserConfig(file, spec, tree, library)
+
+
+# MERGED: Whether anybody says what the external stack of a scenario runs.
+def undefined_stack(loaded: LoadedScenario, known: Iterable[str] = (), config: Path | None = None) -> Problem | None:
+    """The problem of a scenario whose external stack has a name of which nobody says what it runs.
+
+    `known` are the names of which somebody does; `config` is the file that could say so.
+    """
+    stack = loaded.spec.stack
+    if not isinstance(stack, ExternalStackSpec) or loaded.runs is not None:
+        return None
+    name = stack.external
+    near = suggestion(name, known)
+    there = f", or under `stacks:` in {config}" if config is not None else ""
+    hint = near if near.startswith("did") else f"say so with --stack {name}='COMMAND'{there}"
+    message = f"nobody says what the stack {quoted(name)} runs"
+    return loaded.problem(("stack", EXTERNAL), "SC060", message, hint)
+
+
+def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config: Path) -> list[Problem]:
+    """The problem that several --stack, of which each is for a run of its own, say what robots of one run have.
+
+    `given` are the names of which the command line says what they run.
+    """
+    own = {name: view for view in loaded.robots.values() if (name := external_stack_name(view.tree)) is not None}
+    said = [name for name in given if name in own]
+    message = f"robots here have the stacks {' and '.join(map(quoted, said))}, but a run has one --stack"
+    hint = f"say what all but one of them run under `stacks:` in {config}"
+    return [own[said[1]].problem(("stack", EXTERNAL), "SC042", message, hint)] if len(said) > 1 else []

@@ -1,0 +1,38 @@
+"""What is wrong with the variations of a scenario, each problem once, with the variations that have it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from simscen.core.problems import Problem
+from simscen.loading.schema.messages import quoted
+from simscen.loading.yaml.tree import Position
+
+
+class VariationProblems(NamedTuple):
+    """The problems of one variation; `set_by` is the path that put a value there, by the value's place."""
+
+    name: str
+    set_by: Mapping[Position, str]
+    problems: Sequence[Problem]
+
+
+def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
+    """The problems of all; what all of them have and none has put there is said as of any scenario."""
+    if len(variations) == 1 and not variations[0].name:
+        return list(dict.fromkeys(variations[0].problems))
+    having: dict[Problem, list[VariationProblems]] = {}
+    for one in variations:
+        for problem in dict.fromkeys(one.problems):
+            having.setdefault(problem, []).append(one)
+    return sorted(_named(problem, those, len(variations)) for problem, those in having.items())
+
+
+def _named(problem: Problem, having: Sequence[VariationProblems], all_of_them: int) -> Problem:
+    path = having[0].set_by.get(Position(problem.path, problem.line, problem.col))
+    names = [one.name for one in having if one.name]
+    if not names or (path is None and len(names) == all_of_them):
+        return problem
+    several = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    where = "in all variations" if len(names) == all_of_them else f"in the variation {quoted(names[0])}{several}"
+    return replace(problem, message=f"{problem.message} ({f'{quoted(path)}, ' if path else ''}{where})")

@@ -1,0 +1,1 @@
+"""YAML files as trees whose nodes know their position in the file."""

@@ -1,0 +1,241 @@
+"""Compose a tree with positions from YAML events, within budgets.
+
+PyYAML's own constructors are not used: duplicate keys overwrite silently there, `!!int abc` and huge integers raise
+bare ValueErrors, alias bombs expand when they are walked, and libyaml's composer overflows the C stack at 30 000
+brackets. Its event parser has none of these: it is a state machine, and we stop reading at the first excess.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import yaml
+from yaml import events as ev
+
+from simscen.core.problems import Problem
+from simscen.loading.yaml.scalars import parse_scalar
+from simscen.loading.yaml.textfile import LOOKALIKES, describe_lookalike, find_lookalike
+from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode
+
+MAX_DEPTH = 40
+MAX_VALUES = 100_000
+
+# libyaml where PyYAML was built with it: ten times faster, the same events.
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _Refused(Exception):
+    """Reading cannot go on; the problem says why."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+
+
+def parse_yaml(text: str, path: str, *, last_wins: bool = False) -> tuple[Node | None, list[Problem]]:
+    """The only document of `text` as a tree, and every problem found; the tree is None where there is none.
+
+    With `last_wins` the last of two equal keys counts, which is worth a warning: so ROS 2 reads its files.
+    """
+    composer = _Composer(path, text, last_wins)
+    try:
+        root = composer.document()
+    except _Refused as refused:
+        return None, [*composer.problems, refused.problem]
+    return root, composer.problems
+
+
+@dataclass(frozen=True)
+class _Anchor:
+    """An anchored node with what it costs to repeat it."""
+
+    node: Node
+    values: int
+    depth: int
+
+
+@dataclass
+class _Composer:
+    path: str
+    text: str
+    last_wins: bool = False
+    problems: list[Problem] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._events = self._parse()
+        self._anchors: dict[str, _Anchor | None] = {}
+        self._values = 0
+
+    def document(self) -> Node | None:
+        """The first document; a second one is refused."""
+        next(self._events)  # the start of the stream
+        if isinstance(next(self._events), ev.StreamEndEvent):
+            raise _Refused(self._problem(None, "SC004", "the file is empty"))
+        start = next(self._events)
+        root, _ = self._node(start, 1)
+        next(self._events)  # the end of the document
+        after = next(self._events)
+        if not isinstance(after, ev.StreamEndEvent):
+            message = f"more than one YAML document (line {self._place(after).line})"
+            raise _Refused(self._problem(after, "SC004", message, "put each scenario into a file of its own"))
+        return root
+
+    def _parse(self) -> Iterator[ev.Event]:
+        try:
+            yield from yaml.parse(self.text, Loader=_Loader)
+        except yaml.MarkedYAMLError as error:
+            raise _Refused(self._syntax_problem(error)) from None
+        except yaml.YAMLError as error:
+            raise _Refused(self._problem(None, "SC003", str(error).splitlines()[0])) from None
+
+    def _node(self, event: ev.Event, depth: int) -> tuple[Node, int]:
+        """The node that begins with `event`, and how deep it is."""
+        if isinstance(event, ev.AliasEvent):
+            return self._alias(event, depth)
+        if depth > MAX_DEPTH:
+            raise _Refused(self._problem(event, "SC006", f"nested deeper than {MAX_DEPTH}"))
+        assert isinstance(event, ev.NodeEvent)
+        self._refuse_tag(event)
+        self._count(event, 1)
+        before = self._values
+        if event.anchor is not None:
+            self._anchors[event.anchor] = None
+        node, height = self._content(event, depth)
+        if event.anchor is not None:
+            self._anchors[event.anchor] = _Anchor(node, self._values - before + 1, height)
+        return node, height
+
+    def _content(self, event: ev.NodeEvent, depth: int) -> tuple[Node, int]:
+        if isinstance(event, ev.ScalarEvent):
+            return ScalarNode(self._place(event), self._scalar(event)), 0
+        if isinstance(event, ev.SequenceStartEvent):
+            return self._sequence(event, depth)
+        return self._mapping(event, depth)
+
+    def _scalar(self, event: ev.ScalarEvent) -> str | int | float | bool | None:
+        if not event.implicit[0]:
+            return str(event.value)
+        try:
+            return parse_scalar(event.value)
+        except ValueError as error:
+            self.problems.append(self._problem(event, "SC008", str(error)))
+            return 0
+
+    def _sequence(self, start: ev.Event, depth: int) -> tuple[Node, int]:
+        items, height = [], 0
+        while not isinstance(event := next(self._events), ev.SequenceEndEvent):
+            item, below = self._node(event, depth + 1)
+            items.append(item)
+            height = max(height, below)
+        return SequenceNode(self._place(start), tuple(items)), height + 1
+
+    def _mapping(self, start: ev.Event, depth: int) -> tuple[Node, int]:
+        entries: dict[str, Entry] = {}
+        merged: list[Node] = []
+        height = 0
+        while not isinstance(event := next(self._events), ev.MappingEndEvent):
+            key = self._key(event)
+            value, below = self._node(next(self._events), depth + 1)
+            height = max(height, below)
+            if key == "<<" and isinstance(value, MappingNode | SequenceNode):
+                merged.extend(value.items if isinstance(value, SequenceNode) else [value])
+                continue
+            if key in entries:
+                self._duplicate(event, key, entries[key].key)
+            if self.last_wins or key not in entries:
+                entries[key] = Entry(self._place(event), value)
+        return MappingNode(self._place(start), self._merge(start, entries, merged)), height + 1
+
+    def _merge(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
+        """Add what `<<:` brings; keys of the mapping itself win, then those of earlier aliases."""
+        for other in merged:
+            if not isinstance(other, MappingNode):
+                self.problems.append(self._problem(start, "SC003", "`<<` expects a mapping or a list of mappings"))
+                continue
+            entries = {**other.entries, **entries} if other.entries.keys() - entries.keys() else entries
+        return entries
+
+    def _key(self, event: ev.Event) -> str:
+        if not isinstance(event, ev.ScalarEvent):
+            raise _Refused(self._problem(event, "SC003", "a key must be text, not a list, a mapping or an alias"))
+        self._refuse_tag(event)
+        self._count(event, 1)
+        return str(event.value)
+
+    def _alias(self, event: ev.AliasEvent, depth: int) -> tuple[Node, int]:
+        if event.anchor not in self._anchors:
+            raise _Refused(self._problem(event, "SC006", f"alias `*{event.anchor}` has no anchor before it"))
+        anchor = self._anchors[event.anchor]
+        if anchor is None:
+            raise _Refused(self._problem(event, "SC006", f"alias `*{event.anchor}` contains itself"))
+        if depth + anchor.depth > MAX_DEPTH:
+            raise _Refused(self._problem(event, "SC006", f"nested deeper than {MAX_DEPTH}"))
+        self._count(event, anchor.values)
+        return anchor.node, anchor.depth
+
+    def _count(self, event: ev.Event, values: int) -> None:
+        self._values += values
+        if self._values > MAX_VALUES:
+            what = "aliases expand to" if isinstance(event, ev.AliasEvent) else "the file holds"
+            raise _Refused(self._problem(event, "SC006", f"{what} more than {MAX_VALUES} values"))
+
+    def _refuse_tag(self, event: ev.Event) -> None:
+        tag = getattr(event, "tag", None)
+        if tag is not None:
+            short = tag.replace("tag:yaml.org,2002:", "!!", 1)
+            self.problems.append(
+                self._problem(event, "SC005", f"tag `{short}` is not allowed", "remove it; a scenario is plain data")
+            )
+
+    def _duplicate(self, event: ev.Event, key: str, first: Position) -> None:
+        message = f"duplicate key `{key}` (first at {first.line}:{first.col})"
+        if self.last_wins:
+            twice = self._problem(event, "SC007", message, "this one counts, as in ROS 2")
+            self.problems.append(replace(twice, severity="warning"))
+        else:
+            self.problems.append(self._problem(event, "SC007", message, "remove one of the two"))
+
+    def _place(self, event: ev.Event) -> Position:
+        mark = event.start_mark
+        assert mark is not None
+        return Position(self.path, mark.line + 1, mark.column + 1)
+
+    def _problem(self, event: ev.Event | None, code: str, message: str, hint: str = "") -> Problem:
+        place = self._place(event) if event is not None else Position(self.path, 0, 0)
+        return Problem(*place, code=code, message=message, hint=hint)
+
+    def _syntax_problem(self, error: yaml.MarkedYAMLError) -> Problem:
+        mark = error.problem_mark or error.context_mark
+        if mark is None:
+            return self._problem(None, "SC003", error.problem or "cannot be read as YAML")
+        lines = self.text.split("\n")
+        line = lines[mark.line] if mark.line < len(lines) else ""
+        if line[mark.column : mark.column + 1] == "\t" or line[: len(line) - len(line.lstrip())].find("\t") >= 0:
+            col = line.find("\t") + 1
+            return Problem(self.path, mark.line + 1, col, "SC003", "tab character", "indent with spaces")
+        start = error.context_mark
+        if (odd := self._odd(lines, start.line if start else mark.line, mark.line)) is not None:
+            return odd
+        if start is not None and mark.index >= len(self.text.rstrip()) and start.index < mark.index:
+            what = (error.context or "this").removeprefix("while parsing a ").removeprefix("while scanning a ")
+            return Problem(self.path, start.line + 1, start.column + 1, "SC003", f"this {what} never ends")
+        message = error.problem or "cannot be read as YAML"
+        if start is not None and error.context and start.index != mark.index:
+            message += f" ({error.context} that begins at {start.line + 1}:{start.column + 1})"
+        if mark.line < len(lines):
+            return Problem(self.path, mark.line + 1, mark.column + 1, "SC003", message)
+        return Problem(self.path, len(lines), len(lines[-1]) + 1, "SC003", message)
+
+    def _odd(self, lines: list[str], first: int, last: int) -> Problem | None:
+        """A character in these lines that only looks like one of YAML's."""
+        for number in range(first, min(last + 1, len(lines))):
+            index = find_lookalike(lines[number].partition(" #")[0])
+            if index is not None:
+                character = lines[number][index]
+                return Problem(
+                    self.path,
+                    number + 1,
+                    index + 1,
+                    "SC003",
+                    describe_lookalike(character),
+                    f"write {LOOKALIKES[character][1]}",
+                )
+        return None

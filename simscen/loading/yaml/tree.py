@@ -1,0 +1,116 @@
+"""YAML as a tree that knows where each key and value stands."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+Scalar = str | int | float | bool | None
+
+
+class Position(NamedTuple):
+    """Where something stands: `line` and `col` count from 1."""
+
+    path: str
+    line: int
+    col: int
+
+
+@dataclass(frozen=True)
+class ScalarNode:
+    """A scalar."""
+
+    place: Position
+    value: Scalar
+
+    @property
+    def plain(self) -> Scalar:
+        """The value."""
+        return self.value
+
+
+@dataclass(frozen=True)
+class SequenceNode:
+    """A sequence."""
+
+    place: Position
+    items: tuple["Node", ...]
+
+    @property
+    def plain(self) -> list[Any]:
+        """As lists, mappings and scalars."""
+        return [item.plain for item in self.items]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A key of a mapping and what it holds."""
+
+    key: Position
+    value: "Node"
+
+
+@dataclass(frozen=True)
+class MappingNode:
+    """A mapping, in the order of the file."""
+
+    place: Position
+    entries: dict[str, Entry]
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        """As lists, mappings and scalars."""
+        return {key: entry.value.plain for key, entry in self.entries.items()}
+
+
+Node = ScalarNode | SequenceNode | MappingNode
+Key = str | int
+
+
+def child(node: Node, key: Key) -> Node | None:
+    """What stands under a key or index; None when nothing does."""
+    if isinstance(node, MappingNode):
+        entry = node.entries.get(str(key))
+        return entry.value if entry else None
+    if isinstance(node, SequenceNode) and isinstance(key, int) and 0 <= key < len(node.items):
+        return node.items[key]
+    return None
+
+
+def existing_keys(node: Node, loc: Sequence[Key]) -> tuple[Key, ...]:
+    """The parts of a pydantic `loc` that are in the tree; tags of unions and the like are not."""
+    return tuple(key for key, _ in _walk(node, loc))
+
+
+def key_position(node: Node, loc: Sequence[Key]) -> Position:
+    """Where the last key of `loc` stands: the key of a mapping, the item of a sequence, else the node itself."""
+    return [node.place, *(place for _, place in _walk(node, loc))][-1]
+
+
+def value_position(node: Node, loc: Sequence[Key]) -> Position:
+    """Where the value at `loc` stands; the key where the value is empty."""
+    found = node_at(node, loc)
+    if isinstance(found, ScalarNode) and found.value is None:
+        return key_position(node, loc)
+    return found.place
+
+
+def node_at(node: Node, loc: Sequence[Key]) -> Node:
+    """The deepest node on the way along `loc`."""
+    for part in loc:
+        node = child(node, part) or node
+    return node
+
+
+def _walk(node: Node, loc: Sequence[Key]) -> Iterator[tuple[Key, Position]]:
+    for part in loc:
+        below = child(node, part)
+        if below is None:
+            continue
+        yield part, node.entries[str(part)].key if isinstance(node, MappingNode) else below.place
+        node = below
+
+
+def dotted_path(keys: Sequence[Key]) -> str:
+    """How a message names a place in the file: `pass[0].goals_reached`."""
+    text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
+    return text.lstrip(".")

@@ -1,0 +1,277 @@
+"""`stack: {nav2_params: FILE}`: a user's own parameter file of Nav2."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.core.errors import InvalidInput
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.scenario import load_scenario
+from simscen.loading.stacks.stackfile import load_stack_file
+
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1, walls: [{name: room, points: [[0, 0], [6, 0], [6, 6], [0, 6], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 5}}]
+pass: [{goals_reached: {}}]
+"""
+PARAMS = """\
+amcl:
+  ros__parameters:
+    robot_model_type: "nav2_amcl::OmniMotionModel"
+    alpha1: 0.11
+    scan_topic: scan
+    save_pose_rate: 0.5
+controller_server:
+  ros__parameters:
+    controller_frequency: 30.0
+    controller_plugins: ["FollowPath"]
+    goal_checker_plugins: ["precise"]
+    precise: {plugin: "nav2_controller::SimpleGoalChecker", xy_goal_tolerance: 0.1, path_length_tolerance: 1.0}
+    FollowPath:
+      plugin: "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController"
+      max_linear_vel: 0.4
+      lookahead_dist: 0.7
+      min_distance_to_obstacle: 0.1
+planner_server:
+  ros__parameters:
+    planner_plugins: ["GridBased"]
+    GridBased: {plugin: "nav2_smac_planner::SmacPlanner2D", tolerance: 0.3}
+global_costmap:
+  global_costmap:
+    ros__parameters:
+      update_frequency: 2.0
+      plugins: ["static_layer", "front", "inflation_layer"]
+      front: {plugin: "nav2_costmap_2d::ObstacleLayer", scan: {obstacle_max_range: 4.0, topic: /scan}}
+      inflation_layer: {plugin: "nav2_costmap_2d::InflationLayer", inflation_radius: 0.4}
+local_costmap:
+  local_costmap:
+    ros__parameters: {width: 5, height: 4}
+velocity_smoother:
+  ros__parameters: {max_velocity: [0.3, 0.0, 1.0], max_decel: [-2.0, 0.0, -3.0]}
+collision_monitor:
+  ros__parameters:
+    polygons: [Stop, Approach]
+    Stop: {action_type: stop}
+    Approach: {action_type: approach, time_before_collision: 0.9, min_points: 3}
+behavior_server:
+  ros__parameters: {simulate_ahead_time: 1.5, cycle_frequency: 10.0}
+docking_server:
+  ros__parameters: {controller_frequency: 50.0}
+"""
+
+
+def loaded(folder: Path, stack: str, params: str = PARAMS, rest: str = "") -> LoadedScenario:
+    (folder / "nav2.yaml").write_text(params)
+    file = folder / "a.scenario.yaml"
+    file.write_text(f"{SCENARIO}{stack}\n{rest}")
+    return load_scenario(file, folder)
+
+
+def test_what_is_here_too_is_taken_and_what_the_file_leaves_out_is_nav2s(tmp_path: Path) -> None:
+    stack = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").spec.stack
+    assert (stack.localizer.robot_model, stack.localizer.alpha1, stack.localizer.alpha2) == ("omni", 0.11, 0.2)
+    assert stack.localizer.laser_model_type == "likelihood_field"
+    assert (stack.controller_frequency, stack.goal_checker.xy_goal_tolerance) == (30.0, 0.1)
+    assert stack.controller.type == "regulated_pure_pursuit"
+    assert (stack.controller.desired_linear_vel, stack.controller.lookahead_dist) == (0.4, 0.7)
+    assert (stack.planner.type, stack.planner.tolerance, stack.planner.replanning) == ("smac_2d", 0.3, "rate")
+    assert (stack.costmap.update_frequency, stack.costmap.obstacle_max_range) == (2.0, 4.0)
+    assert (stack.costmap.inflation_radius, stack.local_costmap.inflation_radius) == (0.4, 0.7)
+    assert (stack.local_costmap.width, stack.local_costmap.height) == (5.0, 4.0)
+    smoother, monitor = stack.velocity_smoother, stack.collision_monitor
+    assert (smoother.max_velocity, smoother.max_angular_velocity, smoother.max_decel) == (0.3, 1.0, 2.0)
+    assert (monitor.time_before_collision, monitor.min_points, monitor.source_timeout) == (0.9, 3, 1.0)
+    assert stack.recovery.simulate_ahead_time == 1.5
+
+
+def test_what_the_scenario_says_wins(tmp_path: Path) -> None:
+    said = (
+        "stack: {nav2_params: nav2.yaml, profile: simscen, controller: {lookahead_dist: 0.5}, failure_tolerance: 1 s}"
+    )
+    stack = loaded(tmp_path, said).spec.stack
+    assert (stack.controller.desired_linear_vel, stack.controller.lookahead_dist) == (0.4, 0.5)
+    assert stack.failure_tolerance == 1.0
+    assert stack.collision_monitor.source_timeout != 1.0  # of our own profile
+    other = loaded(tmp_path, "stack: {nav2_params: nav2.yaml, controller: {type: dwb}}").spec.stack
+    assert other.controller.type == "dwb"
+
+
+NOT_OURS = "precise.path_length_tolerance (12), FollowPath.min_distance_to_obstacle (17)"
+
+
+def test_what_has_no_counterpart_is_named_where_it_stands(tmp_path: Path) -> None:
+    notes = [str(note) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").notes]
+    told = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").notes]
+    assert all("SC341" in note for note in notes)
+    assert told == [
+        (12, f"controller_server: nothing here is like {NOT_OURS}"),
+        (36, "collision_monitor: `polygons`: there is no polygon that does stop here, as Stop does"),
+        (40, "behavior_server: nothing here is like cycle_frequency (40)"),
+        (42, "nothing here is like the node docking_server"),
+    ]
+
+
+def test_a_value_that_cannot_be_is_told_where_it_stands_in_the_file_of_nav2(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput) as wrong:
+        loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", PARAMS.replace("alpha1: 0.11", "alpha1: -1"))
+    assert [(p.path, p.line, p.col) for p in wrong.value.problems] == [("nav2.yaml", 4, 13)]
+
+
+@pytest.mark.parametrize(
+    ("named", "code", "line"), [("none.yaml", "SC023", 6), ("../out.yaml", "SC020", 6), ("a.scenario.yaml", "SC340", 0)]
+)
+def test_a_file_that_is_not_there_not_allowed_or_of_another_kind_is_told(
+    tmp_path: Path, named: str, code: str, line: int
+) -> None:
+    with pytest.raises(InvalidInput) as wrong:
+        loaded(tmp_path, f"stack: {{nav2_params: {named}}}")
+    assert [(p.code, p.line) for p in wrong.value.problems] == [(code, line)]
+
+
+def test_a_controller_that_is_not_here_leaves_the_usual_one_and_says_so(tmp_path: Path) -> None:
+    params = PARAMS.replace("nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController", "mine::Graceful")
+    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", params)
+    assert found.spec.stack.controller.type == "mppi"
+    assert "there is no mine::Graceful here: the usual one is used" in "".join(note.message for note in found.notes)
+
+
+def test_mppis_motion_model_is_found_by_the_name_of_its_plugin(tmp_path: Path) -> None:
+    params = """\
+controller_server:
+  ros__parameters:
+    controller_plugins: ["FollowPath"]
+    FollowPath:
+      plugin: "nav2_mppi_controller::MPPIController"
+      motion_model: "any"
+      any: {plugin: "mppi::OmniMotionModel"}
+      CostCritic: {cost_weight: 2.5}
+"""
+    stack = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", params).spec.stack
+    assert (stack.controller.motion_model, stack.controller.CostCritic.cost_weight) == ("Omni", 2.5)
+    assert stack.controller.CostCritic.consider_footprint is False
+
+
+def test_each_of_several_robots_may_have_a_file_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "nav2.yaml").write_text(PARAMS)
+    file = tmp_path / "two.scenario.yaml"
+    file.write_text(
+        SCENARIO.replace(
+            "robot: {pose: {x: 1, y: 1}}\ngoals: [{pose: {x: 5, y: 5}}]\n",
+            "robots:\n  a: {pose: {x: 1, y: 1}, goals: [{pose: {x: 5, y: 5}}], stack: {nav2_params: nav2.yaml}}\n"
+            "  b: {pose: {x: 1, y: 5}, goals: [{pose: {x: 5, y: 1}}]}\n",
+        )
+    )
+    found = load_scenario(file, tmp_path)
+    assert [found.robots[name].spec.stack.localizer.alpha1 for name in "ab"] == [0.11, 0.2]
+
+
+def test_a_stack_file_may_take_its_parameters_from_one(tmp_path: Path) -> None:
+    (tmp_path / "nav2.yaml").write_text(PARAMS)
+    (tmp_path / "ours.stack.yaml").write_text("simscen: 1\nstack: {nav2_params: nav2.yaml}\n")
+    choice = load_stack_file("ours", "ours.stack.yaml", tmp_path / "ours.stack.yaml", tmp_path)
+    assert choice.section is not None
+    assert choice.section.plain["controller"]["desired_linear_vel"] == 0.4
+    assert "docking_server" in "".join(note.message for note in choice.notes)
+
+
+def test_a_stack_file_elsewhere_has_its_parameters_beside_it(tmp_path: Path) -> None:
+    (tmp_path / "here").mkdir()
+    (tmp_path / "nav2.yaml").write_text(PARAMS)
+    (tmp_path / "ours.stack.yaml").write_text("simscen: 1\nstack: {nav2_params: nav2.yaml}\n")
+    file = tmp_path / "here" / "a.scenario.yaml"
+    file.write_text(SCENARIO)
+    choice = load_stack_file("ours", "ours.stack.yaml", tmp_path / "ours.stack.yaml", tmp_path / "here")
+    found = load_scenario(file, tmp_path / "here", choice=choice)
+    assert found.spec.stack.controller.desired_linear_vel == 0.4
+    assert any("docking_server" in note.message for note in found.notes)
+
+
+HUMBLE = """\
+/**:
+  ros__parameters: {use_sim_time: true, failure_tolerance: 0.7}
+amcl:
+  ros__parameters: {robot_model_type: "differential", set_initial_pose: true, max_beams: 30, max_beams: 40}
+/bot/controller_server:
+  ros__parameters:
+    progress_checker_plugin: "slow"
+    goal_checker_plugins: ["general_goal_checker", "precise"]
+    controller_plugins: ["FollowPath"]
+    slow: {plugin: "nav2_controller::SimpleProgressChecker", movement_time_allowance: 25.0}
+    general_goal_checker: {plugin: "nav2_controller::SimpleGoalChecker", yaw_goal_tolerance: 0.4}
+    precise: {plugin: "nav2_controller::SimpleGoalChecker", yaw_goal_tolerance: 0.1}
+    FollowPath:
+      plugin: "dwb_core::DWBLocalPlanner"
+      acc_lim_y: 0.0
+      decel_lim_y: 0.0
+      vy_samples: 0
+      critics: [RotateToGoal, Oscillation, BaseObstacle, ObstacleFootprint, PathDist, GoalDist, PreferForward]
+      PathDist.scale: 30.0
+global_costmap:
+  global_costmap:
+    ros__parameters:
+      robot_radius: 0.22
+      rolling_window: true
+      plugins: ["obstacle_layer"]
+      obstacle_layer:
+        plugin: "nav2_costmap_2d::ObstacleLayer"
+        observation_sources: scan
+        scan: {obstacle_max_range: 4.0, clearing: false}
+        old: {obstacle_max_range: 9.0}
+      static_layer: {plugin: "nav2_costmap_2d::StaticLayer"}
+recoveries_server:
+  ros__parameters: {simulate_ahead_time: 1.5}
+collision_monitor:
+  ros__parameters:
+    polygons: ["Near"]
+    Near: {action_type: "approach", enabled: false, max_points: 3}
+"""
+
+
+def test_a_file_of_humble_is_read_as_humble_meant_it(tmp_path: Path) -> None:
+    stack = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", HUMBLE).spec.stack
+    drives = stack.controller
+    assert (stack.localizer.robot_model, stack.localizer.max_beams) == ("differential", 40)
+    assert (stack.failure_tolerance, stack.progress_checker.movement_time_allowance) == (0.7, 25.0)
+    assert stack.goal_checker.yaw_goal_tolerance == 0.4
+    assert (drives.type, drives.acc_lim_y, drives.decel_lim_y, drives.vy_samples) == ("dwb", 0.0, 0.0, 0)
+    assert drives.base_obstacle_scale == 0.02
+    assert (drives.path_dist_scale, drives.path_align_scale, drives.goal_align_scale) == (30.0, 0.0, 0.0)
+    assert (stack.costmap.obstacle_max_range, stack.recovery.simulate_ahead_time) == (4.0, 1.5)
+    assert (stack.collision_monitor.enabled, stack.collision_monitor.min_points) == (False, 4)
+
+
+def test_every_parameter_that_changes_nothing_here_is_named_with_its_line(tmp_path: Path) -> None:
+    told = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", HUMBLE).notes]
+    assert told == [
+        (4, "amcl: `set_initial_pose`: the scenario says where the robot begins"),
+        (4, "duplicate key `max_beams` (first at 4:79)"),
+        (8, "controller_server: `goal_checker_plugins`: there is one goal_checker here, which is general_goal_checker,"
+         " and no precise"),
+        (18, "controller_server: `FollowPath.critics`: there is no PreferForward here"),
+        (23, "global_costmap: `robot_radius`: the robot's file says how large it is"),
+        (24, "global_costmap: `rolling_window`: the local costmap always rolls, the global one with `map: none`"),
+        (29, "global_costmap: nothing here is like obstacle_layer.scan.clearing (29),"
+         " obstacle_layer.old.obstacle_max_range (30)"),
+        (31, "global_costmap: `static_layer.plugin`: `plugins` does not name static_layer"),
+    ]  # fmt: skip
+
+
+def test_a_rotation_shim_leaves_its_controller_to_drive_alone(tmp_path: Path) -> None:
+    shimmed = """\
+controller_server:
+  ros__parameters:
+    FollowPath:
+      plugin: "nav2_rotation_shim_controller::RotationShimController"
+      primary_controller:
+        plugin: "nav2_mppi_controller::MPPIController"
+        motion_model: "Ackermann"
+        AckermannConstraints: {min_turning_r: 0.6}
+        critics: ["CostCritic", "GoalCritic", "MineCritic"]
+"""
+    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", shimmed)
+    drives = found.spec.stack.controller
+    assert (drives.type, drives.motion_model, drives.min_turning_r) == ("mppi", "Ackermann", 0.6)
+    assert drives.critics == ["CostCritic", "GoalCritic"]
+    assert [note.line for note in found.notes] == [6, 9]

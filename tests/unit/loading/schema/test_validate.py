@@ -1,0 +1,105 @@
+"""Positions and hints of single mistakes; whole files are in tests/diagnostics."""
+
+from pydantic import BaseModel
+
+from simscen.core.problems import Problem
+from simscen.loading.schema.validate import check
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.model.robot import RobotSpec
+from simscen.model.rosmap import RosMapSpec
+from simscen.model.scenario import ScenarioSpec
+from simscen.model.world import WorldSpec
+
+LIMITS = "limits: {linear: 1, angular: 1, linear_acceleration: 1, angular_acceleration: 1}\n"
+SCENARIO = "simscen: 1\nworld: w\nrobot: {pose: p}\npass: [{goals_reached: {}}]\n"
+
+
+def _problems(model: type[BaseModel], text: str) -> list[Problem]:
+    tree, problems = parse_yaml(text, "f")
+    assert tree is not None
+    assert not problems
+    found = check(model, tree)
+    return found if isinstance(found, list) else []
+
+
+def _told(model: type[BaseModel], text: str) -> list[tuple[int, int, str]]:
+    return [(p.line, p.col, p.message) for p in _problems(model, text)]
+
+
+def test_a_valid_scenario_becomes_its_model() -> None:
+    tree, _ = parse_yaml(SCENARIO + "faults: [{sensor: lidar, off: {}, for: 3 s}]\n", "f")
+    assert tree is not None
+    spec = check(ScenarioSpec, tree)
+    assert isinstance(spec, ScenarioSpec)
+    assert spec.faults[0].for_ == 3.0
+
+
+def test_names_of_fields_in_python_are_no_keys() -> None:
+    told = _told(ScenarioSpec, SCENARIO + "faults: [{sensor: lidar, off: {}, for_: 3 s}]\n")
+    assert told == [(5, 35, "unknown key `for_` in `faults[0]`")]
+
+
+def test_a_mistake_inside_one_member_of_a_union_is_told_about_that_member() -> None:
+    text = SCENARIO + "events:\n  - when: {time: 1}\n    do:\n      - {remove: {name: a}}\n      - {remove: {nam: b}}\n"
+    assert _told(ScenarioSpec, text) == [(9, 19, "unknown key `nam` in `events[0].do[1].remove`")]
+
+
+def test_a_type_may_be_left_out_where_there_is_a_default() -> None:
+    assert _told(ScenarioSpec, SCENARIO + "stack: {controller: {lookahead_dist: 1}}\n") == []
+    told = _told(ScenarioSpec, SCENARIO + "stack: {controller: {sim_time: 1}}\n")
+    assert told == [(5, 22, "unknown key `sim_time` in `stack.controller`")]
+
+
+def test_a_missing_type_lists_the_types() -> None:
+    problem = _problems(
+        RobotSpec,
+        "simscen: 1\nname: r\nurdf: a\nsensors: {}\ndrive: {wheel_radius: 1}\n" + LIMITS,
+    )[0]
+    assert problem.message == "missing key `type` in `drive`"
+    assert problem.hint == "expected one of: differential, skid_steer, ackermann, omnidirectional, mecanum"
+
+
+def test_a_mapping_may_be_expected_where_a_type_would_tell_which() -> None:
+    told = _told(ScenarioSpec, SCENARIO + "stack: {localizer: amcl}\n")
+    assert told == [(5, 20, "expected a mapping, got the text `amcl`")]
+
+
+def test_keys_of_names_are_checked_at_the_key() -> None:
+    told = _told(WorldSpec, "simscen: 1\nplaces:\n  ok: {x: 1, y: 2}\n  no/t: {x: 1, y: 2}\n")
+    assert told == [(4, 3, "`no/t` cannot be a name here")]
+
+
+def test_a_member_of_a_plain_union_is_told_once() -> None:
+    told = _told(RosMapSpec, "image: a\nresolution: 1\norigin: [0, 0, 0]\nnegate: maybe\n")
+    assert len(told) == 1
+    assert told[0][:2] == (4, 9)
+
+
+def test_nothing_is_ever_null() -> None:
+    text = SCENARIO + "name: ~\nmap: null\ngoals:\nfaults: [{sensor: lidar, off: }]\ntags: [a, ~]\n"
+    told = _problems(ScenarioSpec, text)
+    assert [(p.line, p.code) for p in told] == [(5, "SC018"), (6, "SC018"), (7, "SC018"), (8, "SC018"), (9, "SC018")]
+    assert told[3].hint == "write `off: {}`"
+
+
+def test_an_older_or_newer_version_is_all_that_is_told() -> None:
+    assert _told(ScenarioSpec, "simscen: 2\nnonsense: 1\n") == [
+        (1, 10, "needs schema 2; this version of simscen supports 1")
+    ]
+
+
+def test_control_characters_by_escape_are_refused_in_names() -> None:
+    told = _told(ScenarioSpec, SCENARIO + 'name: "\\x1b[31mred"\n')
+    assert told == [(5, 7, "control character U+001B in `\\x1b[31mred`")]
+
+
+def test_a_choice_without_a_key_lists_the_keys() -> None:
+    problem = _problems(ScenarioSpec, SCENARIO.replace("[{goals_reached: {}}]", "[{severity: warn}]"))[0]
+    assert (problem.line, problem.col, problem.message) == (4, 8, "nothing is chosen here")
+    assert problem.hint.startswith("expected one of: goals_reached, ")
+
+
+def test_a_bare_value_is_as_strict_as_any_other() -> None:
+    for written in ("true", "'5'", ".nan", "-1 s", "3 m"):
+        text = SCENARIO + f"events: [{{when: {{time: {written}}}, do: {{cancel_goal: {{}}}}}}]\n"
+        assert [(line, col) for line, col, _ in _told(ScenarioSpec, text)] == [(5, 24)], written

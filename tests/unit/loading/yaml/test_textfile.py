@@ -1,0 +1,95 @@
+import os
+import signal
+import socket
+from pathlib import Path
+
+import pytest
+
+from simscen.core.problems import Problem
+from simscen.loading.yaml.textfile import read_text
+
+
+def _problem(path: Path) -> Problem:
+    read = read_text(path, "shown.yaml")
+    assert isinstance(read, Problem)
+    assert read.path == "shown.yaml"
+    return read
+
+
+def _written(path: Path, raw: bytes) -> Path:
+    path.write_bytes(raw)
+    return path
+
+
+def test_reads_utf8_with_every_kind_of_line_break_and_a_byte_order_mark(tmp_path: Path) -> None:
+    file = _written(tmp_path / "a.yaml", b"\xef\xbb\xbfa: \xc3\xa9\r\nb: 1\rc: 2\n")
+    assert read_text(file, "a.yaml") == "a: é\nb: 1\nc: 2\n"
+
+
+def test_a_missing_file_is_told(tmp_path: Path) -> None:
+    assert _problem(tmp_path / "no.yaml").message == "no such file or directory"
+
+
+@pytest.mark.parametrize("kind", ["folder", "fifo", "device", "socket"])
+def test_refuses_what_is_not_a_regular_file_without_waiting_for_it(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "x.yaml"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "fifo":
+        os.mkfifo(path)
+    elif kind == "device":
+        path = Path("/dev/zero")
+    else:
+        socket.socket(socket.AF_UNIX).bind(str(path))
+    signal.signal(signal.SIGALRM, _waits)
+    signal.alarm(30)
+    try:
+        assert _problem(path).message == "not a regular file"
+    finally:
+        signal.alarm(0)
+
+
+def _waits(*_) -> None:
+    raise AssertionError("it waits for somebody who writes")
+
+
+def test_refuses_a_huge_file_without_reading_it_all(tmp_path: Path) -> None:
+    path = tmp_path / "big.yaml"
+    with path.open("wb") as file:
+        file.truncate(1 << 40)  # no memory holds it
+    assert _problem(path).message == "larger than 1 MiB"
+
+
+def test_a_file_of_exactly_one_mebibyte_is_read(tmp_path: Path) -> None:
+    assert isinstance(read_text(_written(tmp_path / "full.yaml", b"#" * (1 << 20)), "full.yaml"), str)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_a_file_that_may_not_be_read_is_told(tmp_path: Path) -> None:
+    path = _written(tmp_path / "secret.yaml", b"a: 1")
+    path.chmod(0)
+    assert _problem(path).message == "permission denied"
+
+
+def test_a_loop_of_symbolic_links_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").symlink_to(tmp_path / "b.yaml")
+    (tmp_path / "b.yaml").symlink_to(tmp_path / "a.yaml")
+    assert _problem(tmp_path / "a.yaml").message == "symbolic link loop"
+
+
+def test_a_byte_that_is_not_utf8_is_told_with_its_place(tmp_path: Path) -> None:
+    problem = _problem(_written(tmp_path / "latin1.yaml", b"a: 1\nname: caf" + b"\xe9\n"))
+    assert (problem.line, problem.col, problem.message) == (2, 10, "not valid UTF-8 at byte 14")
+
+
+def test_utf16_is_recognised(tmp_path: Path) -> None:
+    problem = _problem(_written(tmp_path / "utf16.yaml", "a: 1".encode("utf-16")))
+    assert "not valid UTF-8" in problem.message
+    assert "UTF-16" in problem.hint
+
+
+@pytest.mark.parametrize("character", ["\x00", "\x1b", "\x07", "\x7f", "\x85", "\u2028", "\u202e", "\u2066", "\ufffe"])
+def test_raw_control_characters_are_refused_at_their_place(tmp_path: Path, character: str) -> None:
+    problem = _problem(_written(tmp_path / "c.yaml", f"a: 1\nb: x{character}y\n".encode()))
+    assert (problem.line, problem.col) == (2, 5)
+    assert problem.message == f"control character U+{ord(character):04X}"
