@@ -1,28 +1,28 @@
-"""What a shell offers behind Tab. Everything is imported when it is asked for: no command waits for it."""
+"""Shell completion of arguments. Imports happen inside the functions, so that commands do not pay for them."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
 
 def scenarios(incomplete: str) -> list[str]:
-    """Scenario files and folders, as far as one of them is written."""
+    """Complete scenario files and folders."""
     from simscen.loading.files.discovery import SCENARIO
 
     return list(_files(incomplete, SCENARIO))
 
 
 def logs(incomplete: str) -> list[str]:
-    """Logs and folders."""
+    """Complete logs and folders."""
     return list(_files(incomplete, (".mcap",)))
 
 
 def files(incomplete: str) -> list[str]:
-    """Whatever is checked: files of the language and folders."""
+    """Complete YAML files and folders."""
     return list(_files(incomplete, (".yaml", ".yml")))
 
 
 def topics(incomplete: str) -> list[str]:
-    """What `explain` knows; keys of a topic once its name and a dot are written."""
+    """Complete topics of `explain`; after a name and a dot, the keys of that topic."""
     from simscen.cli.catalog.reference_topics import known_names
 
     names = known_names(keys="." in incomplete)
@@ -30,14 +30,14 @@ def topics(incomplete: str) -> list[str]:
 
 
 def shipped(incomplete: str) -> list[str]:
-    """The ids of shipped scenarios, and scenario files."""
+    """Complete ids of shipped scenarios and scenario files."""
     from simscen.cli.shipped_scenarios import shipped_scenarios
 
     return [*(name for name in shipped_scenarios() if name.startswith(incomplete)), *scenarios(incomplete)]
 
 
 def stacks(incomplete: str) -> list[str]:
-    """The names of stacks: simscen's own, those of packages, those of the user's configuration."""
+    """Complete names of stacks: shipped, installed, and configured by the user."""
     from simscen.cli.process import config_file
     from simscen.core.errors import SimscenError
     from simscen.loading.stacks.userconfig import load_config
@@ -45,16 +45,16 @@ def stacks(incomplete: str) -> list[str]:
 
     try:
         own = list(load_config(config_file()).spec.stacks)
-    except SimscenError:  # the command itself will say what is wrong with the file
+    except SimscenError:  # the command itself reports what is wrong with the file
         own = []
     names = dict.fromkeys([*(entry.name for entry in entries("stack")), *own])
     return [name for name in names if name.startswith(incomplete)]
 
 
 def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
-    """Folders with a slash behind them, and files with one of the suffixes, below the folder that is written."""
-    written, slash, start = incomplete.rpartition("/")
-    folder = Path(written + slash or ".").expanduser()
+    """Yield folders, with a slash appended, and files with one of the suffixes."""
+    parent, slash, start = incomplete.rpartition("/")
+    folder = Path(parent + slash or ".").expanduser()
     try:
         found = sorted(folder.iterdir())
     except OSError:
@@ -62,6 +62,6 @@ def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
     for path in found:
         if path.name.startswith(start) and (start.startswith(".") or not path.name.startswith(".")):
             if path.is_dir():
-                yield f"{written}{slash}{path.name}/"
+                yield f"{parent}{slash}{path.name}/"
             elif path.name.endswith(suffixes):
-                yield f"{written}{slash}{path.name}"
+                yield f"{parent}{slash}{path.name}"

@@ -1,4 +1,4 @@
-"""SIGINT, SIGTERM and SIGHUP end a session in good order; whoever cannot wait for that ends it at once."""
+"""Signal handling of a session: the first SIGINT, SIGTERM, or SIGHUP stops it cleanly, a second one kills it."""
 
 import os
 import signal
@@ -9,17 +9,17 @@ from types import FrameType
 
 from simscen.run.process.supervisor import Interrupted
 
-SAME_PRESS = 0.5
-"""Seconds in which a second signal is the first one told twice: by a wrapper that passes it on, or by a fast finger."""
+REPEATED_SIGNAL_S = 0.5
+"""Signals within this time count as one: wrappers forward a signal that the process has already received."""
 SHOW_CURSOR = b"\x1b[?25h"
 
 
 @contextmanager
 def signals_interrupt(clock: Callable[[], float] = time.monotonic) -> Iterator[None]:
-    """Raise Interrupted for the first of these signals, so that reports are written; a later one ends the process.
+    """Raise Interrupted on the first signal, so that reports are written; exit at once on a later one.
 
-    What the runs' processes do then is their parent's business: they end with it. The journal is whole, so that the
-    reports can still be made. A SIGHUP that is ignored, as under nohup, stays so.
+    Worker processes end with this process. The journal is complete at any time, so `simscen report` can still write the
+    reports. A SIGHUP that is ignored, as under nohup, stays ignored.
     """
     first: list[float] = []
 
@@ -27,14 +27,14 @@ def signals_interrupt(clock: Callable[[], float] = time.monotonic) -> Iterator[N
         if not first:
             first.append(clock())
             raise Interrupted(number)
-        if clock() - first[0] > SAME_PRESS:
-            end_at_once(number)
+        if clock() - first[0] > REPEATED_SIGNAL_S:
+            exit_at_once(number)
 
-    heeded = [signal.SIGINT, signal.SIGTERM]
+    handled = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        heeded.append(signal.SIGHUP)
-    before = {number: signal.getsignal(number) for number in heeded}
-    for number in heeded:
+        handled.append(signal.SIGHUP)
+    before = {number: signal.getsignal(number) for number in handled}
+    for number in handled:
         signal.signal(number, interrupt)
     try:
         yield
@@ -44,10 +44,9 @@ def signals_interrupt(clock: Callable[[], float] = time.monotonic) -> Iterator[N
                 signal.signal(number, handler)
 
 
-def end_at_once(number: int) -> None:
-    """Leave with the exit code of the signal, and the terminal with its cursor; nothing is waited for."""
+def exit_at_once(number: int) -> None:
+    """Restore the cursor and exit with the exit code of the signal, without waiting for anything."""
     if os.isatty(1):
         os.write(1, SHOW_CURSOR + b"\n")
-    told = b"simscen: ended at once, without reports: `simscen report` makes them from the journal\n"
-    os.write(2, told)
+    os.write(2, b"simscen: stopped without reports; run `simscen report` to write them from the journal\n")
     os._exit(128 + number)

@@ -1,6 +1,6 @@
-"""Import a library when it is first used, for commands that may end without using it.
+"""Lazy imports: modules that are loaded when one of their attributes is first used.
 
-importlib.util.LazyLoader does not serve: on Python 3.11 and before, a second `import numpy` already loads it.
+importlib.util.LazyLoader is no alternative: up to Python 3.11, a second `import numpy` already loads the module.
 """
 
 import importlib.util
@@ -9,11 +9,11 @@ from types import ModuleType
 from typing import Any
 
 
-class _Later(ModuleType):
-    """Stands for a module until the first look at one of its attributes."""
+class _LazyModule(ModuleType):
+    """Placeholder of a module that is replaced by the real one on the first attribute access."""
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__") and name != "__path__":  # the import system asks; __path__ only for a submodule
+        if name.startswith("__") and name != "__path__":  # requested by the import system; __path__ for submodules
             raise AttributeError(name)
         if sys.modules.get(self.__name__) is self:
             del sys.modules[self.__name__]
@@ -24,28 +24,28 @@ class _Later(ModuleType):
 
 
 def import_lazily(name: str, *functions: str) -> None:
-    """Let `import name` cost nothing from now on, until something of it is used.
+    """Make `import name` free until an attribute of the module is used.
 
-    `from name import function` counts as use, except for `functions`: those only when they are called.
+    `from name import function` counts as use, except for the given `functions`, which load the module when called.
     """
     if name in sys.modules:
         return
-    module = _Later(name)
+    module = _LazyModule(name)
     if functions:
         spec = importlib.util.find_spec(name)
-        module.__path__ = (spec and spec.submodule_search_locations) or []  # `from name import` looks at it
+        module.__path__ = (spec and spec.submodule_search_locations) or []  # `from name import` needs it
     for function in functions:
-        setattr(module, function, _called_later(name, function))
+        setattr(module, function, _lazy_function(name, function))
     sys.modules[name] = module
     parent, _, child = name.rpartition(".")
     if parent:
         setattr(sys.modules[parent], child, module)
 
 
-def _called_later(module: str, function: str) -> Any:
-    def call(*arguments: Any, **named: Any) -> Any:
-        if isinstance(sys.modules[module], _Later):
+def _lazy_function(module: str, function: str) -> Any:
+    def call(*arguments: Any, **keywords: Any) -> Any:
+        if isinstance(sys.modules[module], _LazyModule):
             del sys.modules[module]
-        return getattr(importlib.import_module(module), function)(*arguments, **named)
+        return getattr(importlib.import_module(module), function)(*arguments, **keywords)
 
     return call

@@ -1,4 +1,4 @@
-"""`simscen`: finds the command, and is the one place where errors become exit codes."""
+"""The `simscen` command group: dispatch to commands and conversion of errors into exit codes."""
 
 import gc
 import importlib.util
@@ -11,57 +11,65 @@ import typer
 from typer.core import TyperGroup
 
 from simscen.cli.lazy_import import import_lazily
-from simscen.cli.process import COMPLETE, NO_ROOM, PLUGINS, flushed, occupy_descriptors, output_lost, require_folder
+from simscen.cli.process import (
+    COMPLETION_VARIABLE,
+    OUTPUT_LOST_ERRNOS,
+    PYDANTIC_PLUGINS_VARIABLE,
+    flush_output,
+    occupy_descriptors,
+    report_lost_output,
+    require_folder,
+)
 from simscen.core.errors import Exit, InvalidInput, SimscenError
 
 COMMANDS = {
     "run": "Run scenarios and report what passed.",
-    "validate": "Check scenario, world, robot and stack files without running anything.",
-    "list": "List the scenarios that a selection means.",
-    "judge": "Judge recorded runs, without simulating them.",
-    "report": "Write the reports of an output folder anew.",
-    "plot": "Draw a recorded run.",
-    "replay": "Make a page that plays a recorded run, or two side by side.",
-    "localize": "Run a recorded drive through the localizer alone.",
-    "log": "Mend logs, and lay out what viewers show of them.",
+    "validate": "Check scenario, world, robot, and stack files without running anything.",
+    "list": "List the scenarios that a selection matches.",
+    "judge": "Evaluate criteria on recorded runs without simulating them.",
+    "report": "Write the reports of an output folder again.",
+    "plot": "Draw a recorded run as a picture.",
+    "replay": "Write a page that plays a recorded run, or two runs side by side.",
+    "localize": "Run a localizer on a recorded drive.",
+    "log": "Recover damaged logs and write layouts for viewers.",
     "new": "Write a commented scenario to start from.",
-    "explain": "Explain a word of the language, a key, a signal, a metric, a component or a code.",
+    "explain": "Explain a key, criterion, fault, signal, metric, component, or code.",
     "schema": "Print or write the JSON Schemas that editors use.",
-    "completion": "Print the script that lets a shell complete commands, options, scenario files and names.",
-    "plugins": "List the types that installed packages add to the language and to the stack.",
-    "world": "Inspect, convert and export worlds.",
-    "robot": "Drive a robot once and compare command, odometry and truth.",
-    "ros2": "Stand for a ROS 2 graph, or Nav2, as the stack of a run.",
-    "bench": "Measure how fast simscen runs here.",
+    "completion": "Print the shell completion script.",
+    "plugins": "List the types that installed packages add.",
+    "world": "Inspect, convert, and export worlds.",
+    "robot": "Drive a robot and compare command, odometry, and truth.",
+    "ros2": "Connect a ROS 2 graph, such as Nav2, as the stack of a run.",
+    "bench": "Measure speed, navigation, and localization.",
     "doctor": "Check that this installation can run scenarios.",
 }
-"""Command → what it does. `simscen.cli.commands.<command>` has a function `command`, or an `app` with commands of its own."""
+"""Command name and help. `simscen.cli.commands.<name>` has a function `command`, or an `app` with subcommands."""
 
 
-LIGHT = frozenset({"validate", "list", "schema", "explain", "new", "completion"})
-"""Commands that must answer at once. Numpy is a quarter of their start; few of them compute anything."""
+LIGHT_COMMANDS = frozenset({"validate", "list", "schema", "explain", "new", "completion"})
+"""Commands that must start fast. They import NumPy lazily, which is a quarter of their startup time."""
 
 
 def is_light(arguments: Sequence[str]) -> bool:
-    """Whether a command line asks for a light command, or only for help or the version."""
-    return not arguments or arguments[0] in LIGHT or arguments[0].startswith("-")
+    """Return whether the command line needs only a light command, the help, or the version."""
+    return not arguments or arguments[0] in LIGHT_COMMANDS or arguments[0].startswith("-")
 
 
-class Commands(TyperGroup):
-    """Imports a command's module when it is called: `validate` must not wait for pybullet."""
+class CommandGroup(TyperGroup):
+    """Command group that imports the module of a command when it is called, so that `validate` never loads PyBullet."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Those that are there, in the order of COMMANDS."""
+        """Return the names of the available commands in the order of COMMANDS."""
         return [name for name in COMMANDS if importlib.util.find_spec(_module(name))]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """The command itself; its module is imported now."""
+        """Import the module of a command and return the command, or None if it does not exist."""
         if cmd_name not in COMMANDS or not importlib.util.find_spec(_module(cmd_name)):
             return None
-        if cmd_name in LIGHT or cmd_name == "run":
+        if cmd_name in LIGHT_COMMANDS or cmd_name == "run":
             import_lazily("numpy")
         module = importlib.import_module(_module(cmd_name))
-        gc.freeze()  # what is imported stays: it need never be looked through for garbage
+        gc.freeze()  # imported modules live until the end, so the garbage collector need not scan them
         gc.enable()
         app = getattr(module, "app", None)
         if app is None:
@@ -72,13 +80,13 @@ class Commands(TyperGroup):
         return command
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """The table of `--help`, without importing any command."""
+        """Write the table of commands for `--help` without importing any command."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, COMMANDS[name]) for name in self.list_commands(ctx)])
 
 
 app = typer.Typer(
-    cls=Commands,
+    cls=CommandGroup,
     name="simscen",
     rich_markup_mode=None,
     add_completion=False,
@@ -99,37 +107,36 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def _simscen(
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print it.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Declarative, deterministic scenario tests for mobile-robot navigation."""
 
 
 def main() -> None:
-    """Run the command line. Every foreseen error is told in words; its exit code says who can mend it."""
+    """Run the command line and exit. Expected errors are printed without a traceback and set the exit code."""
     occupy_descriptors()
-    # Plug-ins of pydantic that happen to be installed could change what is valid; looking for them costs 12 ms, too,
-    # and so does what it imports to look for them.
-    os.environ[PLUGINS] = "__all__"
+    # Pydantic plug-ins of other packages could change what is valid, and looking for them costs 12 ms.
+    os.environ[PYDANTIC_PLUGINS_VARIABLE] = "__all__"
     import_lazily("importlib.metadata", "entry_points")
-    if COMPLETE in os.environ:
+    if COMPLETION_VARIABLE in os.environ:
         from typer.completion import completion_init  # type: ignore[attr-defined]
 
         completion_init()
-    sys.exit(flushed(_called()))
+    sys.exit(flush_output(_run_command()))
 
 
-def _called() -> int:
-    """Call the command: its exit code, or that of the error which it ends with."""
+def _run_command() -> int:
+    """Run the command and return its exit code, or that of the error that ended it."""
     try:
         try:
             if sys.argv[1:2] and not sys.argv[1].startswith("-"):
                 require_folder()
             app()
         except SimscenError as error:
-            return _told(error)
+            return _print_error(error)
     except SystemExit as end:
-        if isinstance(end.__context__, BrokenPipeError):  # where output is not buffered, click meets it first: 1
+        if isinstance(end.__context__, BrokenPipeError):  # click turns it into exit code 1 if output is unbuffered
             return Exit.INCOMPLETE
         return end.code if isinstance(end.code, int) else Exit.PASSED
     except KeyboardInterrupt:
@@ -137,29 +144,32 @@ def _called() -> int:
     except BrokenPipeError:
         return Exit.INCOMPLETE
     except OSError as error:
-        return output_lost(error) if error.errno in NO_ROOM and not error.filename else _internal()
+        lost = error.errno in OUTPUT_LOST_ERRNOS and not error.filename
+        return report_lost_output(error) if lost else _print_internal_error()
     except Exception:
-        return _internal()
+        return _print_internal_error()
     return Exit.PASSED
 
 
-def _told(error: SimscenError) -> Exit:
+def _print_error(error: SimscenError) -> Exit:
     if isinstance(error, InvalidInput):
         from simscen.cli.diagnostics import as_text, print_text
 
         print_text(as_text(error.problems), sys.stderr)
     else:
-        from simscen.cli.diagnostics import harmless, print_text
+        from simscen.cli.diagnostics import escaped, print_text
 
-        print_text(f"simscen: {harmless(str(error))}", sys.stderr)
+        print_text(f"simscen: {escaped(str(error))}", sys.stderr)
     return error.exit
 
 
-def _internal() -> Exit:
+def _print_internal_error() -> Exit:
     import traceback
 
     traceback.print_exc()
-    print("simscen: internal error; this is a bug in simscen, please report it with the lines above", file=sys.stderr)
+    print(
+        "simscen: internal error: this is a bug in simscen; please report it with the traceback above", file=sys.stderr
+    )
     return Exit.INTERNAL
 
 

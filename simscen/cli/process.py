@@ -1,4 +1,4 @@
-"""What a process finds around it may be missing: its standard descriptors, its folder, room for what it prints."""
+"""Environment of the simscen process: standard streams, working directory, variables, user configuration."""
 
 import errno
 import os
@@ -9,14 +9,20 @@ from pathlib import Path
 
 from simscen.core.errors import Exit, UsageError
 
-NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO})
-"""What a stream says that takes no more; EIO is a terminal that has gone."""
+OUTPUT_LOST_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO})
+"""Errors of a stream that accepts no more output: disk full, quota exceeded, terminal closed."""
+
+PYDANTIC_PLUGINS_VARIABLE = "PYDANTIC_DISABLE_PLUGINS"
+COMPLETION_VARIABLE = "_SIMSCEN_COMPLETE"
+"""Variable by which a shell asks click for completions."""
+_PYDANTIC_PLUGINS_AT_START = os.environ.get(PYDANTIC_PLUGINS_VARIABLE)
+"""The caller's value; `simscen` overrides it for its own process."""
 
 
 def occupy_descriptors() -> None:
-    """Give standard streams that were closed (`simscen run . >&-`) to /dev/null.
+    """Redirect closed standard streams (`simscen run . >&-`) to /dev/null.
 
-    Otherwise the next file that is opened, the journal perhaps, would get the descriptor, and what a library prints.
+    Otherwise the next opened file, for example the journal, would get the descriptor and everything printed to it.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
@@ -28,47 +34,46 @@ def occupy_descriptors() -> None:
 
 
 def require_folder() -> None:
-    """Raise UsageError when the working folder has been deleted: nothing could be named from here."""
+    """Raise UsageError if the working directory has been deleted."""
     try:
         Path.cwd()
     except FileNotFoundError:
-        raise UsageError("the working folder no longer exists") from None
+        raise UsageError("the working directory no longer exists") from None
 
 
-def output_lost(error: OSError) -> Exit:
-    """Tell why nothing more can be printed, if stderr at least takes it; later flushes shall not fail on it again."""
-    _to_nowhere(1)
+def report_lost_output(error: OSError) -> Exit:
+    """Print to stderr why stdout accepts no more output, and discard all further output."""
+    _discard_output(1)
     try:
         print(f"simscen: cannot write the output: {error.strerror}", file=sys.stderr, flush=True)
     except OSError:
-        _to_nowhere(2)
+        _discard_output(2)
     return Exit.INCOMPLETE
 
 
-def flushed(code: Exit | int) -> Exit | int:
-    """The exit code, or that of output that is lost now that the last of it is written."""
+def flush_output(code: Exit | int) -> Exit | int:
+    """Flush stdout and stderr, and return the exit code: `code`, or INCOMPLETE if output was lost."""
     try:
         sys.stdout.flush()
         sys.stderr.flush()
-    except BrokenPipeError:  # the reader has gone (`simscen list | head`): nobody is left to tell
-        _to_nowhere(1)
-        _to_nowhere(2)
+    except BrokenPipeError:  # the reader has closed the pipe, as in `simscen list | head`
+        _discard_output(1)
+        _discard_output(2)
         return code or Exit.INCOMPLETE
     except OSError as error:
-        return max(code, output_lost(error))
+        return max(code, report_lost_output(error))
     return code
 
 
-def _to_nowhere(descriptor: int) -> None:
+def _discard_output(descriptor: int) -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, descriptor)
     os.close(nowhere)
 
 
-# MERGED: Keeps what engines print on file descriptor 1 out of the command's own output.
 @contextmanager
 def engine_output_on_stderr() -> Iterator[None]:
-    """Bullet prints warnings from C on descriptor 1; send them to standard error meanwhile."""
+    """Redirect file descriptor 1 to stderr, because Bullet prints warnings from C to stdout."""
     sys.stdout.flush()
     saved = os.dup(1)
     os.dup2(2, 1)
@@ -80,21 +85,15 @@ def engine_output_on_stderr() -> Iterator[None]:
         os.close(saved)
 
 
-# MERGED: The environment that simscen was called with, and where the user's own configuration lies in it.
-PLUGINS = "PYDANTIC_DISABLE_PLUGINS"
-COMPLETE = "_SIMSCEN_COMPLETE"
-"""By this variable a shell says that it wants to know what may be typed next; the name is click's."""
-_AT_START = os.environ.get(PLUGINS)
-"""As the caller had it: `simscen` sets it for itself before anything else."""
-
-
-def environment() -> dict[str, str]:
-    """The variables that the user has: what is started for them shall meet them as in their shell."""
-    variables = {name: value for name, value in os.environ.items() if name != PLUGINS}
-    return variables if _AT_START is None else {**variables, PLUGINS: _AT_START}
+def caller_environment() -> dict[str, str]:
+    """Return the environment variables as the caller of simscen set them, for programs started on their behalf."""
+    variables = {name: value for name, value in os.environ.items() if name != PYDANTIC_PLUGINS_VARIABLE}
+    if _PYDANTIC_PLUGINS_AT_START is not None:
+        variables[PYDANTIC_PLUGINS_VARIABLE] = _PYDANTIC_PLUGINS_AT_START
+    return variables
 
 
 def config_file() -> Path:
-    """$XDG_CONFIG_HOME/simscen/config.yaml; ~/.config where that is not an absolute folder (XDG Base Directory)."""
+    """Return the user's configuration file: simscen/config.yaml in $XDG_CONFIG_HOME or ~/.config."""
     home = Path(os.environ.get("XDG_CONFIG_HOME", ""))
     return (home if home.is_absolute() else Path("~/.config").expanduser()) / "simscen" / "config.yaml"

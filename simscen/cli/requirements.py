@@ -1,10 +1,10 @@
-"""Whether the installed packages are those that simscen was made for: others end in errors that name no reason."""
+"""Check of the installed packages against the requirements of simscen."""
 
 import re
 from collections.abc import Iterator
 
-TYPER = (0, 20)
-"""The oldest typer that understands our options whatever click is installed, as in pyproject.toml."""
+MIN_TYPER = (0, 20)
+"""The oldest typer version that works with every version of click, as in pyproject.toml."""
 
 _COMPARE = {
     ">=": lambda have, want: have >= want,
@@ -15,27 +15,27 @@ _COMPARE = {
 _CLAUSE = re.compile(r"(>=|<|==|!=)\s*([\w.]+)")
 
 
-def unmet() -> list[str]:
-    """What is missing or of a version that simscen does not work with, one sentence each."""
+def unmet_requirements() -> list[str]:
+    """Return a message for each package that is missing or has an unsupported version."""
     from importlib.metadata import PackageNotFoundError, requires
 
     try:
         needed = requires("simscen") or []
-    except PackageNotFoundError:  # run from a folder of sources: nothing says what it needs
+    except PackageNotFoundError:  # run from a source folder without package metadata
         return []
-    return [told for each in needed if "extra ==" not in each for told in _unmet(each)]
+    return [message for each in needed if "extra ==" not in each for message in _unmet(each)]
 
 
 def unmet_typer() -> list[str]:
-    """The same of typer alone, without the 20 ms that it takes to look into the others."""
+    """Return a message if typer is too old; checking all packages takes 20 ms longer."""
     from typer import __version__
 
-    wanted = f">={'.'.join(map(str, TYPER))}"
-    return [] if _numbers(__version__) >= TYPER else [_told("typer", __version__, wanted)]
+    wanted = f">={'.'.join(map(str, MIN_TYPER))}"
+    return [] if _version_numbers(__version__) >= MIN_TYPER else [_mismatch("typer", __version__, wanted)]
 
 
 def _unmet(requirement: str) -> Iterator[str]:
-    """For a requirement as pip writes it into metadata, e.g. `numpy<3,>=1.26`."""
+    """Yield a message if a requirement of package metadata, such as `numpy<3,>=1.26`, is not met."""
     from importlib.metadata import PackageNotFoundError, version
 
     name = re.split(r"[\s<>=!;\[(]", requirement, maxsplit=1)[0]
@@ -45,17 +45,18 @@ def _unmet(requirement: str) -> Iterator[str]:
     except PackageNotFoundError:
         yield f"{name} is not installed: pip install {name!r}"
         return
-    if not all(_COMPARE[sign](_numbers(have), _numbers(want)) for sign, want in _CLAUSE.findall(wanted)):
-        yield _told(name, have, wanted.strip())
+    numbers = _version_numbers(have)
+    if not all(_COMPARE[sign](numbers, _version_numbers(want)) for sign, want in _CLAUSE.findall(wanted)):
+        yield _mismatch(name, have, wanted.strip())
 
 
-def _told(name: str, have: str, wanted: str) -> str:
+def _mismatch(name: str, have: str, wanted: str) -> str:
     wanted = ",".join(sorted(wanted.split(","), reverse=True))
-    return f"{name} {have} is installed, and simscen needs {name}{wanted}: pip install '{name}{wanted}'"
+    return f"{name} {have} is installed, but simscen needs {name}{wanted}: pip install '{name}{wanted}'"
 
 
-def _numbers(version: str) -> tuple[int, ...]:
-    """Comparable: the numbers of a version without zeros at its end; 2.17.7.post6 is newer than 2.17.7."""
+def _version_numbers(version: str) -> tuple[int, ...]:
+    """Return the numbers of a version for comparison, without trailing zeros; 2.17.7.post6 is newer than 2.17.7."""
     numbers = [int(number) for number in re.findall(r"\d+", version.split("+", maxsplit=1)[0])]
     while numbers and numbers[-1] == 0:
         numbers.pop()

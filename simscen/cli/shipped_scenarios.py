@@ -1,4 +1,4 @@
-"""The scenarios that ship with simscen: beside its package in a checkout, within it where it is installed."""
+"""Location of the shipped scenarios: beside the package in a checkout, inside the package when installed."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ _PLACES = (PACKAGE / "data" / "library", PACKAGE.parent)
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """Name → file, e.g. "navigation/goal"; none where they were left out of the installation."""
+    """Return the files by id, such as "navigation/goal"; empty if the installation does not contain them."""
     home = next((place / "scenarios" for place in _PLACES if (place / "scenarios").is_dir()), None)
     if home is None:
         return {}

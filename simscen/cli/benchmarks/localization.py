@@ -34,7 +34,7 @@ def command(
     first: Annotated[int, typer.Option(min=1, max=1_000_000, help="The number of the first one.")] = 1,
     only: Annotated[list[str] | None, typer.Option(help="Part of the name of parameters; repeatable.")] = None,
     workers: Annotated[int | None, typer.Option("--workers", "-j", min=1, max=256, help="Default: all cores.")] = None,
-    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
 ) -> None:
     """Measure how well AMCL knows where the robot is, on generated logs.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from simscen.cli.diagnostics import as_text as problems_as_text
-from simscen.cli.diagnostics import from_here, harmless, print_text
+from simscen.cli.diagnostics import escaped, from_here, print_text
 from simscen.core.errors import Exit, NothingSelected
 from simscen.report.look import look_of
 
@@ -61,7 +61,7 @@ def command(
     resume: Annotated[
         Path | None, typer.Option(help="Go on in this output folder: only runs that have no verdict yet.")
     ] = None,
-    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
 ) -> None:
     """Measure how well the reference stack drives, and print one line for each experiment.
 
@@ -105,7 +105,7 @@ def command(
     print_text(as_json(rows, pairs) if format_ is Format.JSON else as_text(rows, pairs, columns))
     if stopped:
         count = f"{sum(len(driven(runs)) for runs in trials)} of {sum(map(len, trials))} runs"
-        print_text(f"simscen: interrupted: {count}; go on with --resume {harmless(str(folder))}", sys.stderr)
+        print_text(f"simscen: interrupted: {count}; go on with --resume {escaped(str(folder))}", sys.stderr)
         sys.exit(stopped)
     if any(row.tally.errors for row in rows):
         sys.exit(Exit.INCOMPLETE)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def growth_command(
-    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Runs of each; the median counts.")] = 3,
     compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
 ) -> None:
@@ -95,7 +95,7 @@ def suite_command(
     jobs: Annotated[
         int | None, typer.Option("--jobs", "-j", min=1, max=256, help="Runs at a time; default: one for each core.")
     ] = None,
-    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
     compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
 ) -> None:
     """Measure how fast a suite of scenarios is run on all cores.

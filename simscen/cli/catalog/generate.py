@@ -1,4 +1,4 @@
-"""Write what is generated from the code, or check that it is up to date: `python -m simscen.cli.catalog.generate [--check]`."""
+"""Generator of schemas and reference pages: `python -m simscen.cli.catalog.generate [--check]`."""
 
 import sys
 from pathlib import Path

@@ -27,11 +27,11 @@ app.command("localization")(localization.command)
 @app.callback(invoke_without_command=True)
 def command(
     ctx: typer.Context,
-    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Runs of the patrol; the median counts.")] = 5,
     compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
 ) -> None:
-    """Measure how fast simscen runs here.
+    """Measure speed, navigation, and localization.
 
     A patrol of 60 s with everything on (240 Hz physics, 360 beams at 10 Hz, 500 to 2000 particles, full MCAP log) on
     one core: times real time, as a multiple of what PyBullet alone takes to step and scan as often, and what share each

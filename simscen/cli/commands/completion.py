@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 
 from simscen.cli.diagnostics import print_text
-from simscen.cli.process import COMPLETE
+from simscen.cli.process import COMPLETION_VARIABLE
 
 
 class Shell(str, Enum):
-    """Shells that can complete what is typed."""
+    """Supported shells."""
 
     BASH = "bash"
     ZSH = "zsh"
@@ -18,12 +18,12 @@ class Shell(str, Enum):
     POWERSHELL = "powershell"
 
 
-def command(shell: Annotated[Shell, typer.Argument(help="For which shell.")] = Shell.BASH) -> None:
-    """Print the script that lets a shell complete commands, options, scenario files and names.
+def command(shell: Annotated[Shell, typer.Argument(help="The shell.")] = Shell.BASH) -> None:
+    """Print the shell completion script for commands, options, scenario files, and names.
 
-    For bash put `eval "$(simscen completion bash)"` into ~/.bashrc, for zsh the same with `zsh` into ~/.zshrc after
-    `compinit`; for fish write it to ~/.config/fish/completions/simscen.fish.
+    bash: add `eval "$(simscen completion bash)"` to ~/.bashrc. zsh: add `eval "$(simscen completion zsh)"` to ~/.zshrc
+    after `compinit`. fish: write the script to ~/.config/fish/completions/simscen.fish.
     """
     from typer.completion import get_completion_script  # type: ignore[attr-defined]
 
-    print_text(get_completion_script(prog_name="simscen", complete_var=COMPLETE, shell=shell.value).strip())
+    print_text(get_completion_script(prog_name="simscen", complete_var=COMPLETION_VARIABLE, shell=shell.value).strip())

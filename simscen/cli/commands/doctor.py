@@ -12,8 +12,8 @@ from functools import partial
 from pathlib import Path
 
 from simscen.cli import installation
-from simscen.cli.diagnostics import harmless, print_text
-from simscen.cli.installation import Ill
+from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.installation import CheckFailed
 from simscen.core.errors import Exit, InvalidInput, SimscenError
 
 SCENARIO = """\
@@ -26,8 +26,7 @@ pass: [{collisions: {max: 0}}]
 """
 
 INDENT = 15
-SLOWEST = 1.0
-"""Times real time: below that, campaigns take longer than the drives they stand for."""
+MIN_REAL_TIME_FACTOR = 1.0
 
 Check = tuple[str, Callable[[], str]]
 
@@ -35,96 +34,97 @@ Check = tuple[str, Callable[[], str]]
 def command() -> None:
     """Check that this installation can run scenarios.
 
-    Python, packages and their versions, what Linux must offer, limits of memory and files, room on the disk; where
-    worlds are cached; one second of a real run, twice, whose logs must be equal; and the speed of a patrol, beside
-    PyBullet alone. Also what your own configuration says that the names of external stacks run, and whether these
-    programs are there. What is not well is told with what helps. Exit code 0: all is well; 3: something is not.
+    Checks Python, the packages and their versions, Linux features, limits of memory and files, disk space, the world
+    cache, and the external stacks in your configuration. Then runs one simulated second twice, compares the logs, and
+    measures the speed of a patrol. For each failed check, it prints what to do.
+
+    Exit code 0: all checks passed; 3: a check failed.
     """
-    well = True
+    passed = True
     for name, check in checks():
         try:
-            sign, told = "✓", check()
-        except Ill as ill:
-            well, sign, told = False, "✗", str(ill)
-        print_text(_line(sign, name, harmless(told)))
+            sign, result = "✓", check()
+        except CheckFailed as failure:
+            passed, sign, result = False, "✗", str(failure)
+        print_text(_line(sign, name, escaped(result)))
         sys.stdout.flush()
-    sys.exit(Exit.PASSED if well else Exit.INCOMPLETE)
+    sys.exit(Exit.PASSED if passed else Exit.INCOMPLETE)
 
 
 def checks() -> Iterator[Check]:
-    """Name and check, in the order in which they are done; a check returns what it found or raises Ill."""
+    """Yield name and function of each check in order; a function returns its result or raises CheckFailed."""
     yield "python", installation.python
     yield "packages", installation.packages
     yield "processor", installation.processor
     yield "fork", installation.fork
     yield "pidfd", installation.pidfd
-    yield "limits", installation.limits
+    yield "limits", installation.resource_limits
     yield "shared", installation.shared_memory
     yield "temporary", partial(installation.writable, Path(tempfile.gettempdir()))
-    yield "here", partial(installation.room, Path.cwd())
+    yield "here", partial(installation.disk_space, Path.cwd())
     yield "cache", cache
     yield "stacks", stacks
     yield "run", run_twice
     yield "speed", speed
 
 
-def _line(sign: str, name: str, told: str) -> str:
-    """One check within the width of the terminal."""
+def _line(sign: str, name: str, result: str) -> str:
+    """Return the result of one check, wrapped to the width of the terminal."""
     width = max(40, shutil.get_terminal_size((80, 24)).columns)
     first = f"  {sign} {name:10} "
     wrapper = textwrap.TextWrapper(width, first, " " * INDENT, break_long_words=False, break_on_hyphens=False)
-    return wrapper.fill(told)
+    return wrapper.fill(result)
 
 
 def cache() -> str:
-    """Where maps and shortest ways of worlds are kept between sessions, and how much of them."""
+    """Check the cache of maps and shortest paths, and return its folder and size."""
     from simscen.run.keptfiles import MOST_BYTES, VARIABLE, cache_folder, is_own, used
 
     folder = cache_folder(os.environ)
     if folder is None:
-        return f"nothing is kept between sessions ({VARIABLE})"
+        return f"disabled by {VARIABLE}"
     if not folder.exists():
-        return f"{folder}: nothing there yet"
+        return f"{folder}: empty"
     if not is_own(folder):
-        told = f"{folder} is not used: it is no folder of yours, or others may write to it"
-        raise Ill(f"{told}; delete it, or name another with {VARIABLE}")
+        reason = f"{folder} is not used: it does not belong to you, or other users may write to it"
+        raise CheckFailed(f"{reason}; delete it, or set {VARIABLE} to another folder")
     count, size = used(folder)
-    return f"{folder}: {count} files, {size / 1e6:.1f} MB of at most {MOST_BYTES / 1e6:.0f}; to be deleted at any time"
+    return f"{folder}: {count} files, {size / 1e6:.1f} MB of at most {MOST_BYTES / 1e6:.0f}; safe to delete"
 
 
 def stacks() -> str:
-    """What the names of external stacks run, by the user's own configuration."""
-    from simscen.cli.process import config_file, environment
+    """Check the external stacks in the user's configuration, and return their commands."""
+    from simscen.cli.process import caller_environment, config_file
     from simscen.loading.stacks.userconfig import load_config
 
     try:
         config = load_config(config_file())
-        commands = {name: config.command(name, environment(), Path.cwd()) for name in config.spec.stacks}
+        commands = {name: config.command(name, caller_environment(), Path.cwd()) for name in config.spec.stacks}
     except InvalidInput as error:
-        raise Ill(str(error)) from error
+        raise CheckFailed(str(error)) from error
     if config.tree is None:
-        return f"no {config.file}, so --stack alone says what external stacks run"
-    told = ", ".join(f"{name} = {shlex.join(command.argv)}" for name, command in commands.items() if command)
-    return f"{config.file}: {told or 'no stacks'}"
+        return f"{config.file} does not exist; define external stacks with --stack"
+    listed = ", ".join(f"{name} = {shlex.join(command.argv)}" for name, command in commands.items() if command)
+    return f"{config.file}: {listed or 'no stacks'}"
 
 
 def speed() -> str:
-    """A patrol with everything on, beside PyBullet alone: what differs from other machines is the processor's share."""
+    """Check that a patrol runs faster than real time, and return its speed."""
     from simscen.cli.process import engine_output_on_stderr
 
     with engine_output_on_stderr():
         from simscen.bench.speed import run_speed
 
         patrol = run_speed.measure_patrol(1)
-    ratio = f"{patrol.cpu / patrol.bare:.1f} times what PyBullet alone takes"
-    told = f"{patrol.factor:.0f} times real time on one core, {ratio}"
-    if patrol.factor < SLOWEST:
-        raise Ill(f"{told}; use a faster processor, or one that other containers leave alone")
-    return told
+    ratio = f"{patrol.cpu / patrol.bare:.1f} times the cost of PyBullet alone"
+    result = f"{patrol.factor:.0f} times real time on one core, {ratio}"
+    if patrol.factor < MIN_REAL_TIME_FACTOR:
+        raise CheckFailed(f"{result}; use a faster processor, or one that is not shared with other containers")
+    return result
 
 
 def run_twice() -> str:
-    """A second of a real run passes, and its log is the same when it is run again."""
+    """Check that one simulated second passes twice with equal logs."""
     from simscen.cli.session.run_session import WARM_PROCESS
     from simscen.core.result import Outcome
     from simscen.loading.scenario import load_scenario
@@ -138,10 +138,10 @@ def run_twice() -> str:
             jobs = plan([load_scenario(folder / "doctor.scenario.yaml", folder)], options, folder / "out")
             answers, _ = run_session(jobs, options, WARM_PROCESS, lambda _: None)
         except SimscenError as error:
-            raise Ill(str(error)) from error
+            raise CheckFailed(str(error)) from error
         for answer in answers:
             if answer.outcome is not Outcome.PASSED:
                 broken = answer.result.error
-                raise Ill(broken.message if broken else "a robot in an empty room hit something")
+                raise CheckFailed(broken.message if broken else "the robot collided in an empty room")
         log = Path(answers[0].artifacts.mcap).read_bytes()
     return f"1 s simulated twice, equal logs: sha256 {hashlib.sha256(log).hexdigest()[:16]}"

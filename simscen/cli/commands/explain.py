@@ -18,17 +18,17 @@ from simscen.loading.schema.messages import quoted, suggestion
 
 def command(
     name: Annotated[
-        str, typer.Argument(help="What to explain; nothing = list what there is.", autocompletion=completions.topics)
+        str, typer.Argument(help="The name to explain; default: list all names.", autocompletion=completions.topics)
     ] = "",
     page: Annotated[
-        bool, typer.Option("--page", help="Print the reference of the language, with what is installed, as Markdown.")
+        bool, typer.Option("--page", help="Print the language reference, including installed types, as Markdown.")
     ] = False,
 ) -> None:
-    """Explain a word of the language, a key, a signal, a metric, a component or a code.
+    """Explain a key, criterion, fault, signal, metric, component, or code.
 
-    For example `simscen explain stopped_within`, `explain amcl`, `explain amcl.update_min_a`, `explain goals.pose`,
-    `explain GOAL_OCCUPIED` or its number 206, `explain crashed`, `explain "exit 3"`, `explain SC012`. Where a name
-    means several things, all are explained; `simscen explain trigger.localization_error` picks one.
+    Examples: `simscen explain stopped_within`, `explain amcl`, `explain amcl.update_min_a`, `explain goals.pose`,
+    `explain GOAL_OCCUPIED` or its number 206, `explain crashed`, `explain "exit 3"`, `explain SC012`. If a name has
+    several meanings, all are explained; `simscen explain trigger.localization_error` selects one.
     """
     if page:
         from simscen.cli.catalog.language_page import language_page
@@ -43,13 +43,13 @@ def command(
 
 
 def explained(name: str, width: int = 100) -> str:
-    """All that a name means. Raises UsageError where nothing is called so."""
+    """Return the explanation of everything called `name`. Raises UsageError if there is nothing."""
     if name.upper() in CODES:
         return f"{name.upper()}\n{_wrapped(CODES[name.upper()], width, '  ')}"
-    return "\n\n".join(_explained(topic, width) for topic in _called(name))
+    return "\n\n".join(_explained(topic, width) for topic in _topics_named(name))
 
 
-def _called(name: str) -> list[Topic]:
+def _topics_named(name: str) -> list[Topic]:
     known = everything()
     lowered = name.lower()
     found = [topic for topic in known if lowered in (name.lower() for name in _names(topic))]
@@ -57,8 +57,7 @@ def _called(name: str) -> list[Topic]:
     if not found:
         hint = suggestion(name, [*known_names(), *(known_names(keys=True) if "." in name else _bare_keys(known))])
         raise UsageError(
-            f"nothing is called {quoted(name)}; "
-            + (hint if hint.startswith("did") else "`simscen explain` lists what there is")
+            f"unknown name {quoted(name)}; " + (hint if hint.startswith("did") else "run `simscen explain` for a list")
         )
     return found
 
@@ -77,7 +76,7 @@ def _overview(width: int) -> str:
         groups.setdefault(topic.group, []).append(topic.name)
     lines = [f"{group}:\n{_wrapped(', '.join(names), width, '  ')}" for group, names in groups.items()]
     return "\n".join(
-        [*lines, "", "`simscen explain NAME` tells more, also of keys (`amcl.update_min_a`) and of problems (SC012)."]
+        [*lines, "", "Run `simscen explain NAME` for details, also for keys (`amcl.update_min_a`) and codes (SC012)."]
     )
 
 
@@ -104,7 +103,7 @@ def _paragraphs(text: str, width: int) -> str:
 
 
 def _lines(paragraph: str, width: int) -> str:
-    """A paragraph; headings such as "When it fails:" begin a line of their own."""
+    """Return a wrapped paragraph; headings such as "When it fails:" start a new line."""
     items: list[str] = []
     for line in paragraph.splitlines():
         if line.startswith(" ") and items:

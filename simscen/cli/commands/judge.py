@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.judging import Judging, runs_without_log
 from simscen.cli.session.logs import logs_of
 from simscen.cli.session.output_files import verdict
@@ -24,7 +24,7 @@ from simscen.report.results import as_document, in_order
 
 
 class Time(str, Enum):
-    """Which time of a message counts."""
+    """Time stamp of a message that counts."""
 
     HEADER = "header"
     LOG = "log"
@@ -34,41 +34,43 @@ def command(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="Logs (run.mcap, *.mcap, rosbag2 folders), or folders to search for them.",
+            help="Logs (run.mcap, *.mcap, rosbag2 folders), or folders to search for logs.",
             autocompletion=completions.logs,
         ),
     ],
-    scenario: Annotated[
-        Path | None, typer.Option(help="Judge by the criteria of this file; `pass:` is all that it needs.")
-    ] = None,
+    scenario: Annotated[Path | None, typer.Option(help="Use the criteria of this file; it needs only `pass:`.")] = None,
     truth: Annotated[
         str | None,
-        typer.Option(help="What counts as the truth in a log of others: a topic, or two frames as map:base_link."),
+        typer.Option(help="Ground truth in a foreign log: a topic, or two frames such as map:base_link."),
     ] = None,
     topic: Annotated[
         list[str] | None,
-        typer.Option(help="NAME=TOPIC: what a standard topic is called, e.g. odom=/my/odom; repeatable."),
+        typer.Option(help="NAME=TOPIC: other name of a standard topic, e.g. odom=/my/odom; repeatable."),
     ] = None,
     time: Annotated[
-        Time, typer.Option(help="Which time of the messages of others counts: their headers', or that of logging.")
+        Time, typer.Option(help="Time stamps to use in a foreign log: of the message headers, or of logging.")
     ] = Time.HEADER,
-    tick_rate: Annotated[int, typer.Option(min=1, max=10_000, help="Ticks a second for logs of others.")] = 1000,
+    tick_rate: Annotated[int, typer.Option(min=1, max=10_000, help="Ticks per second for foreign logs.")] = 1000,
     same_frame: Annotated[
-        bool, typer.Option("--same-frame", help="The truth's frame is the map's, although it is called otherwise.")
+        bool,
+        typer.Option("--same-frame", help="Treat the frame of the truth as the map frame although its name differs."),
     ] = False,
-    root: Annotated[Path | None, typer.Option(help="Files that the scenario names stay in this folder.")] = None,
-    world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print result.json, of several logs results.json.")] = False,
+    root: Annotated[
+        Path | None, typer.Option(help="Root folder; the scenario may only refer to files below it.")
+    ] = None,
+    world_path: Annotated[
+        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
+    ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print result.json; for several logs, results.json.")] = False,
 ) -> None:
-    """Judge recorded runs, without simulating them.
+    """Evaluate criteria on recorded runs without simulating them.
 
-    A log of simscen holds the truth, the goals and the scenario, so nothing else is needed; with --scenario other
-    criteria and bounds can be tried on it. In a folder every log is judged. The logs of real robots, with the standard
-    topics of ROS 2, need --scenario, and --truth for whatever asks where the robot truly was; a criterion that the log
-    does not decide is inconclusive, never passed.
+    A log written by simscen contains the truth, the goals, and the scenario. Use --scenario to try other criteria. In a
+    folder, every log is judged. Logs of real robots with the standard ROS 2 topics need --scenario, and --truth for
+    criteria that use the true pose. A criterion that the log does not decide is inconclusive, never passed.
 
-    Exit code 0: all hold; 1: one fails or is inconclusive; 2: not a usable log or scenario; 3: one could not be judged,
-    or one of several logs cannot be used; 5: no logs found.
+    Exit code 0: all criteria hold; 1: one fails or is inconclusive; 2: a log or scenario is unusable; 3: a log could
+    not be judged, or one of several logs is unusable; 5: no logs found.
     """
     wanted = wanted_of(truth, topic or [], time, tick_rate, same_frame)
     files = logs_of(logs)
@@ -76,9 +78,9 @@ def command(
     lost = runs_without_log(logs)
     runs = [*((str(file), judging.judged(file, alone=len(files) + len(lost) == 1)) for file in files), *lost]
     if wanted != Wanted() and not judging.foreign:
-        judging.notes.append("logs of simscen hold their own truth and times: options for those of others do nothing")
+        judging.notes.append("logs of simscen contain truth and times; options for foreign logs have no effect")
     for note in judging.notes:
-        print_text(f"note: {harmless(note)}", sys.stderr)
+        print_text(f"note: {escaped(note)}", sys.stderr)
     if json_:
         options = _options(wanted, scenario, root, world_path or [])
         print(_document([run for _, run in runs], options), end="")
@@ -88,7 +90,7 @@ def command(
 
 
 def wanted_of(truth: str | None, topic: list[str], time: Time, tick_rate: int, same_frame: bool) -> Wanted:
-    """How to read a log of others, from the options that say so. Raises UsageError."""
+    """Return how to read a foreign log according to the command-line options. Raises UsageError."""
     clock: Clock = "log" if time is Time.LOG else "header"
     wanted = Wanted(truth, _topics(topic), tick_rate, clock, same_frame)
     _check_truth(wanted)
@@ -108,7 +110,7 @@ def _print(runs: list[tuple[str, RunFinished]], one_scenario: bool) -> None:
 
 
 def _document(runs: list[RunFinished], options: list[str]) -> str:
-    """result.json of one log, results.json of several; `again` judges the log again instead of simulating its run."""
+    """Return result.json for one log, results.json for several; `again` is the command that judges the log again."""
     document = {**result_data(runs[0].result)} if len(runs) == 1 else as_document(runs)
     logs = [run.artifacts.mcap for run in in_order(runs)]
     for log, data in zip(logs, document.get("runs", [document]), strict=True):
@@ -118,7 +120,7 @@ def _document(runs: list[RunFinished], options: list[str]) -> str:
 
 
 def _options(wanted: Wanted, scenario: Path | None, root: Path | None, world_path: list[Path]) -> list[str]:
-    """How this command was called, as far as it matters."""
+    """Return the options of this command that affect the result."""
     given = {"--scenario": scenario, "--truth": wanted.truth, "--root": root}
     several = [("--topic", f"{name}={topic}") for name, topic in wanted.topics.items()]
     several += [("--world-path", str(folder)) for folder in world_path]
@@ -130,23 +132,23 @@ def _options(wanted: Wanted, scenario: Path | None, root: Path | None, world_pat
 
 
 def _check_truth(wanted: Wanted) -> None:
-    """Raise UsageError for a truth that is none."""
+    """Raise UsageError if --truth is malformed or names the belief."""
     if wanted.truth is None:
         return
     if not wanted.truth.startswith("/") and not (wanted.frames and all(wanted.frames)):
-        told = f"expected a /topic, or two frames as map:base_link, got {harmless(wanted.truth) or 'nothing'}"
-        raise UsageError(f"cannot read --truth: {told}")
+        expected = "expected a /topic, or two frames such as map:base_link"
+        raise UsageError(f"cannot read --truth: {expected}, got {escaped(wanted.truth) or 'nothing'}")
     if wanted.truth == wanted.topic("amcl_pose"):
-        raise UsageError(f"--truth {harmless(wanted.truth)} is what the robot believes: every belief would be right")
+        raise UsageError(f"--truth {escaped(wanted.truth)} is the belief of the robot; name an independent source")
 
 
 def _topics(written: list[str]) -> dict[str, str]:
-    """The names of topics by what they stand for. Raises UsageError."""
+    """Return the topics by standard name. Raises UsageError."""
     found = {}
     for text in written:
         name, equals, topic = text.partition("=")
         if not equals or name not in TOPICS or not topic.startswith("/"):
             known = ", ".join(TOPICS)
-            raise UsageError(f"cannot read --topic {harmless(text)}: expected NAME=/TOPIC with one of {known}")
+            raise UsageError(f"cannot read --topic {escaped(text)}: expected NAME=/TOPIC with one of {known}")
         found[name] = topic
     return found

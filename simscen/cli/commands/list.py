@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.diagnostics import escaped, print_text
 from simscen.core.errors import InvalidInput
 from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.keywords import select
@@ -19,15 +19,19 @@ def command(
     paths: Annotated[
         list[Path], typer.Argument(help="Scenario files, or folders to search.", autocompletion=completions.scenarios)
     ],
-    keyword: Annotated[str, typer.Option("-k", help="Parts of ids with and, or, not, as in pytest.")] = "",
-    tag: Annotated[list[str] | None, typer.Option(help="Only scenarios with this tag; repeatable.")] = None,
-    root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
-    world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+    keyword: Annotated[
+        str, typer.Option("-k", help='Select ids by an expression, as in pytest: "faults and not slip".')
+    ] = "",
+    tag: Annotated[list[str] | None, typer.Option(help="Select scenarios with this tag; repeatable.")] = None,
+    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
+    world_path: Annotated[
+        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
+    ] = None,
 ) -> None:
-    """List the scenarios that a selection means.
+    """List the scenarios that a selection matches.
 
-    One line each, also for each variation: id, name, tags, the external stack that it names, and why it is skipped or
-    expected to fail. Exit code 0; 2 if a scenario is invalid; 5 if nothing is selected.
+    Prints one line for each scenario and variation: id, name, tags, external stack, and why it is skipped or expected
+    to fail. Exit code 0: listed; 2: a scenario is invalid; 5: nothing is selected.
     """
     home = root if root is not None else default_root(paths)
     tried = [try_variations(file, home, world_path or ()) for file in discover(paths, home)]
@@ -36,11 +40,11 @@ def command(
     chosen = select([one for found in tried if isinstance(found, tuple) for one in found], keyword, tag or ())
     width = max(len(scenario.title) for scenario in chosen)
     for scenario in chosen:
-        about = f"{scenario.spec.name or ''} {_tags(scenario)} {_stack(scenario)} {_excuse(scenario)}"
-        print_text(f"{harmless(scenario.title):{width}}  {harmless(about)}".rstrip())
+        details = f"{scenario.spec.name or ''} {_tags(scenario)} {_stack(scenario)} {_expectation(scenario)}"
+        print_text(f"{escaped(scenario.title):{width}}  {escaped(details)}".rstrip())
 
 
-def _excuse(scenario: LoadedScenario) -> str:
+def _expectation(scenario: LoadedScenario) -> str:
     spec = scenario.spec
     if spec.skip is not None:
         return f"(skipped: {spec.skip})"

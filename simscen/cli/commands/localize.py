@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from simscen.bench.localization.recorded_drive import Errors, Localized, errors_of, localize
-from simscen.cli.diagnostics import from_here, harmless, print_text
+from simscen.cli.diagnostics import escaped, from_here, print_text
 from simscen.cli.session.output_files import save
 from simscen.core.belief import Estimate
 from simscen.core.chance import LARGEST_SEED
@@ -29,40 +29,40 @@ from simscen.stack.protocols import RobotModel, Surroundings
 
 def command(
     log: Annotated[Path, typer.Argument(help="An MCAP file, a rosbag2 folder, a CARMEN .log or a .csv.")],
-    map_: Annotated[Path, typer.Option("--map", help="The ROS map (yaml) that the robot has.")],
-    robot: Annotated[str, typer.Option(help="A robot file, or the name of one that ships.")],
+    map_: Annotated[Path, typer.Option("--map", help="The ROS map (yaml) of the robot.")],
+    robot: Annotated[str, typer.Option(help="A robot file, or the name of a shipped robot.")],
     scenario: Annotated[
-        Path | None, typer.Option(help="Take the `stack:` of this file; `pass:` is all else that it needs.")
+        Path | None, typer.Option(help="Use the `stack:` of this file; otherwise it needs only `pass:`.")
     ] = None,
     reference: Annotated[
         str | None,
         typer.Option(
-            help="The topic of the reference pose, or two frames of /tf as map:base_link; default: what the log itself "
-            "calls the truth."
+            help="Topic of the reference pose, or two /tf frames such as map:base_link; default: the truth in the log."
         ),
     ] = None,
     odom: Annotated[
-        str, typer.Option(help="The topic of the odometry, or two frames of /tf as odom:base_link.")
+        str, typer.Option(help="Topic of the odometry, or two frames of /tf such as odom:base_link.")
     ] = "/odom",
-    scan: Annotated[str, typer.Option(help="The topic of the scans.")] = "/scan",
+    scan: Annotated[str, typer.Option(help="Topic of the scans.")] = "/scan",
     start: Annotated[
         str | None,
-        typer.Option(help="X,Y,YAW in m and rad, or unknown; default: where the reference begins, else /initialpose."),
+        typer.Option(help="X,Y,YAW in m and rad, or `unknown`; default: first reference pose, else /initialpose."),
     ] = None,
-    lost: Annotated[float, typer.Option(min=0.01, help="Metres off from which on the robot is lost.")] = 1.0,
-    seed: Annotated[int, typer.Option(min=1, max=LARGEST_SEED, help="Of the localizer's chance.")] = 1,
-    picture: Annotated[Path | None, typer.Option(help="Draw map, belief and reference (png).")] = None,
-    root: Annotated[Path | None, typer.Option(help="Files that the others name stay in this folder.")] = None,
+    lost: Annotated[float, typer.Option(min=0.01, help="Error in meters above which the robot counts as lost.")] = 1.0,
+    seed: Annotated[int, typer.Option(min=1, max=LARGEST_SEED, help="Seed of the localizer.")] = 1,
+    picture: Annotated[Path | None, typer.Option(help="Draw map, belief, and reference into this file (png).")] = None,
+    root: Annotated[
+        Path | None, typer.Option(help="Root folder; the other files may only refer to files below it.")
+    ] = None,
     json_: Annotated[bool, typer.Option("--json", help="Print JSON: the figures and the error over time.")] = False,
 ) -> None:
-    """Run a recorded drive through the localizer alone, and compare its belief with a reference.
+    """Run a localizer on a recorded drive and compare its belief with a reference.
 
-    This is how AMCL's parameters are tried on a building of one's own: no engine, the same log, another --scenario. The
-    same log and seed give the same figures. A CSV file has rows `odom,TIME,X,Y,YAW`,
-    `scan,TIME,ANGLE_MIN,ANGLE_INCREMENT,RANGE_MIN,RANGE_MAX,R0,R1,…`, `truth,TIME,X,Y,YAW` and, before the scans,
-    `mount,X,Y,YAW` of the lidar on the robot.
+    Use this to tune AMCL for your own building: nothing is simulated, and the same log and seed give the same figures.
+    A CSV file has the rows `odom,TIME,X,Y,YAW`, `scan,TIME,ANGLE_MIN,ANGLE_INCREMENT,RANGE_MIN,RANGE_MAX,R0,R1,…`,
+    `truth,TIME,X,Y,YAW`, and, before the scans, `mount,X,Y,YAW` for the pose of the lidar on the robot.
 
-    Exit code 0: the log went through, whatever the figures; 2: something cannot be used.
+    Exit code 0: the log was processed, whatever the figures; 2: an input is unusable.
     """
     sensed = read_sensed(log, odom, scan, reference)
     spec, grid, model = _given(scenario, map_, robot, root)
@@ -71,16 +71,16 @@ def command(
     localized = localize(sensed, spec, Surroundings(model, grid, TICK_RATE), estimate, seed)
     errors = errors_of(localized, sensed, lost)
     for note in sensed.notes:
-        print_text(f"note: {harmless(note)}", sys.stderr)
+        print_text(f"note: {escaped(note)}", sys.stderr)
     if picture is not None:
         _draw(grid, localized, sensed, picture, [log, map_])
     each = localized.cpu * 1e3 / max(1, localized.scans)
-    print_text(f"{each:.2f} ms of processor time per scan", sys.stderr)
+    print_text(f"{each:.2f} ms of CPU time per scan", sys.stderr)
     if json_:
         print(json.dumps(_document(localized, errors, seed), sort_keys=True, indent=2, allow_nan=False))
     else:
         for line in _lines(localized, errors, lost):
-            print_text(harmless(line))
+            print_text(escaped(line))
 
 
 def _given(
@@ -106,7 +106,7 @@ def _given(
         raise InvalidInput(from_here(error.problems, home)) from error
     if world.map is None:
         raise InvalidInput(
-            [Problem(str(map_), 0, 0, "SC320", "not a ROS map", "`simscen world --help` tells how to make one")]
+            [Problem(str(map_), 0, 0, "SC320", "not a ROS map", "see `simscen world --help` for how to make one")]
         )
     home = root if root is not None else (default_root([Path(robot)]) if Path(robot).exists() else Path.cwd())
     try:
@@ -118,28 +118,28 @@ def _given(
 
 
 def _without_localizer(written: LoadedCriteria) -> Problem:
-    """Another stack's localizer is its own affair."""
+    """Return the problem that the stack of a file is not simscen's own."""
     place = value_position(written.tree, ("stack",))
     hint = "name a file whose `stack` is simscen's own"
-    return written.library.with_source([Problem(*place, "SC016", "this stack has no localizer of simscen's", hint)])[0]
+    return written.library.with_source([Problem(*place, "SC016", "this stack has no simscen localizer", hint)])[0]
 
 
 def _estimate(start: str | None, sensed: Sensed) -> Estimate:
-    """Where the localizer is told to begin. Raises UsageError where nobody says."""
+    """Return the initial estimate. Raises UsageError if neither the option nor the log gives one."""
     if start == "unknown":
         return Estimate(None)
     if start is None:
         if len(sensed.truth):
             return Estimate(Pose2(*sensed.truth[0].tolist()))
         if sensed.told is None:
-            raise UsageError("the log has no reference pose to begin with: say --start X,Y,YAW or --start unknown")
+            raise UsageError("the log has no initial pose; use --start X,Y,YAW or --start unknown")
         return Estimate(sensed.told)
     try:
         x, y, yaw = (float(part) for part in start.split(","))
     except ValueError as error:
-        raise UsageError(f"cannot read --start {harmless(start)}: expected X,Y,YAW or unknown") from error
+        raise UsageError(f"cannot read --start {escaped(start)}: expected X,Y,YAW or unknown") from error
     if not all(abs(value) < 1e6 for value in (x, y, yaw)):
-        raise UsageError(f"cannot read --start {harmless(start)}: no place is there")
+        raise UsageError(f"cannot read --start {escaped(start)}: the values are out of range")
     return Estimate(Pose2(x, y, yaw))
 
 
@@ -152,12 +152,12 @@ def _draw(grid: OccupancyGrid, localized: Localized, sensed: Sensed, picture: Pa
 def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str]:
     x, y, yaw = localized.poses[-1].tolist()
     seconds = localized.times[-1] - localized.times[0]
-    lines = [f"{localized.scans} scans in {seconds:.1f} s; at the end it is believed at ({x:.2f}, {y:.2f}, {yaw:.3f})"]
+    lines = [f"{localized.scans} scans in {seconds:.1f} s; final belief ({x:.2f}, {y:.2f}, {yaw:.3f})"]
     if errors is None:
         return [*lines, "no reference to compare with"]
     figures = errors.figures()
-    told = ", ".join(f"{name} {figures[name]:.3f} m" for name in ("median", "rmse", "max", "final"))
-    lines += [f"error: {told}", f"heading: rmse {figures['yaw_rmse']:.4f} rad"]
+    listed = ", ".join(f"{name} {figures[name]:.3f} m" for name in ("median", "rmse", "max", "final"))
+    lines += [f"error: {listed}", f"heading: rmse {figures['yaw_rmse']:.4f} rad"]
     for one in errors.lost:
         end = "to the end" if one.until is None else f"to {one.until:.1f} s"
         lines.append(f"lost (more than {lost:g} m off) from {one.since:.1f} s {end}")

@@ -1,4 +1,4 @@
-"""`simscen log`: what is done with logs themselves."""
+"""`simscen log`: recovery of damaged logs and layouts for viewers."""
 
 import shlex
 import sys
@@ -8,31 +8,30 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.output_files import save
 from simscen.core.errors import UsageError
-from simscen.record.recover import recover as make_whole
+from simscen.record.recover import recover as recover_log
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
 
 
 @app.callback()
 def _log() -> None:
-    """Mend logs, and lay out what viewers show of them."""
+    """Recover damaged logs and write layouts for viewers."""
 
 
 @app.command()
 def recover(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="The run.partial.mcap of a run that broke off.")],
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="The run.partial.mcap of an aborted run.")],
 ) -> None:
-    """Make a log that was cut off whole, so that every MCAP reader opens it.
+    """Repair a truncated log in place, so that every MCAP reader can open it.
 
-    What was written up to the cut is kept, in the same file; the run stays one that broke off. `simscen run` does the
-    same for runs that crash, so that this is for logs that simscen itself could not finish: it was killed, or the disk
-    was full. Exit code 0; 2: not a log; 3: there is no room for it.
+    The run still counts as aborted. `simscen run` repairs the logs of crashed runs by itself; use this command if
+    simscen was killed or the disk was full. Exit code 0: the log is complete; 2: not a log; 3: the disk is full.
     """
     name = shlex.quote(str(log))
-    print_text(harmless(f"{name}: made whole" if make_whole(log) else f"{name}: nothing to mend, it is whole"))
+    print_text(escaped(f"{name}: recovered" if recover_log(log) else f"{name}: complete, nothing to recover"))
 
 
 @app.command()
@@ -41,30 +40,32 @@ def layout(
         Path | None,
         typer.Argument(
             metavar="LOG",
-            help="A log, whose robots and lidars are then in the layout; else those of most logs are.",
+            help="Include the robots and lidars of this log; default: the usual names.",
             autocompletion=completions.logs,
         ),
     ] = None,
-    rviz: Annotated[bool, typer.Option("--rviz", help="RViz's configuration; it is the same for all logs.")] = False,
-    out: Annotated[Path | None, typer.Option(help="The file; else it is printed.")] = None,
+    rviz: Annotated[
+        bool, typer.Option("--rviz", help="Write an RViz configuration; it is the same for all logs.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="Output file; default: standard output.")] = None,
 ) -> None:
-    """Print or write the layout with which Foxglove and Lichtblick show logs, or RViz's.
+    """Print or write a layout for Foxglove and Lichtblick, or a configuration for RViz.
 
-    Truth and belief from above, with particles, scans, plans, costmaps, things and zones; plots of speed and clearance;
-    and what happened. Import it there: Layouts, "Import from file…". Exit code 0; 2: not a usable log, or the file
-    cannot be written.
+    The layout shows truth and belief from above with particles, scans, plans, costmaps, obstacles, and zones, plots of
+    speed and clearance, and the events. In Foxglove, choose Layouts, "Import from file…". Exit code 0: written; 2: the
+    log is unusable, or the file cannot be written.
     """
     from simscen.record.replay import read_log
     from simscen.report.viewers import foxglove_layout, rviz_config
 
     if rviz and log is not None:
-        raise UsageError("--rviz takes no log: RViz's configuration is the same for all")
+        raise UsageError("--rviz takes no log: the RViz configuration is the same for all logs")
     text = rviz_config() if rviz else foxglove_layout(read_log(log, looks=True) if log else None)
     if out is None:
         print(text, end="", file=sys.stdout)
     else:
         save(out, lambda path: _write(path, text), [log] if log else [])
-        print_text(harmless(str(out)))
+        print_text(escaped(str(out)))
 
 
 def _write(path: Path, text: str) -> None:

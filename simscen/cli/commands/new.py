@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.shipped_scenarios import shipped_scenarios
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.version import PACKAGE
@@ -19,35 +19,35 @@ from simscen.loading.yaml.textfile import os_error_reason
 
 
 def command(
-    name: Annotated[str, typer.Argument(help="A name or path, e.g. `aisle` for aisle.scenario.yaml.")],
+    name: Annotated[str, typer.Argument(help="Name or path, e.g. `aisle` for aisle.scenario.yaml.")],
     like: Annotated[
         str,
         typer.Option(
             metavar="SCENARIO",
-            help="Copy this scenario, with what it needs: a file, or the name of a shipped one.",
+            help="Copy this scenario and the files it needs: a file, or the name of a shipped scenario.",
             autocompletion=completions.shipped,
         ),
     ] = "",
 ) -> None:
     """Write a commented scenario to start from.
 
-    It is valid and passes as it is. With `--like`, it is a copy of another scenario: the worlds, maps and robots that
-    it names are copied into a folder of its name beside it, unless they are in the same project, and its paths lead
-    there. A name that ends in .base.yaml, or defaults.yaml, is a base, which scenarios extend. A project that has the
-    schemas in a folder `schemas` gets the line that editors look for. A file that is there is never overwritten.
+    The scenario is valid and passes. With --like, it is a copy of another scenario; worlds, maps, and robots outside of
+    the project are copied into a folder beside it. A name that ends in .base.yaml, or defaults.yaml, creates a base
+    file for scenarios to extend. If the project has a folder `schemas`, the file refers to the schema for editors.
+    Existing files are never overwritten.
     """
     last = name.rpartition("/")[2]
     if is_unusable_name(next((last.removesuffix(suffix) for suffix in SCENARIO if last.endswith(suffix)), last)):
-        raise UsageError(f"{name!r} is no name for a scenario")
+        raise UsageError(f"{name!r} is not a valid scenario name")
     partial = last == DEFAULTS_FILE or last.endswith(BASE)
     if partial and like:
-        raise UsageError(f"{name!r} would be a base, which says only a part: --like copies whole scenarios")
+        raise UsageError(f"{name!r} is a base file; --like copies only scenarios")
     file = Path(name if partial or name.endswith(SCENARIO) else f"{name}{SCENARIO[0]}")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.open("x").close()
     except FileExistsError:
-        raise UsageError(f"{file} is there already; choose another name") from None
+        raise UsageError(f"{file} already exists; choose another name") from None
     except (OSError, ValueError) as error:
         why = os_error_reason(error) if isinstance(error, OSError) else "the name cannot be a path"
         raise UsageError(f"cannot write {name!r}: {why}") from None
@@ -60,19 +60,19 @@ def command(
         file.unlink(missing_ok=True)
         raise
     for other in written[1:]:
-        print_text(f"{harmless(str(other))} is written, too")
+        print_text(f"wrote {escaped(str(other))}")
     verb = "validate" if partial else "run"
-    print_text(f"{harmless(str(file))} is written; try: simscen {verb} {harmless(str(file))}")
+    print_text(f"wrote {escaped(str(file))}; try: simscen {verb} {escaped(str(file))}")
 
 
 def _starter(file: Path, kind: str) -> list[Path]:
     text = (PACKAGE / "data" / f"starter.{kind}.yaml").read_text(encoding="utf-8")
-    file.write_text(_for_editors(file, kind) + text, encoding="utf-8")
+    file.write_text(_schema_comment(file, kind) + text, encoding="utf-8")
     return [file]
 
 
-def _for_editors(file: Path, kind: str) -> str:
-    """The line that tells editors where the schema is, if the project has it in a folder `schemas` above the file."""
+def _schema_comment(file: Path, kind: str) -> str:
+    """Return the comment that points editors to the schema, or "" if no folder `schemas` above the file has it."""
     home = file.absolute().parent
     root = default_root([file])
     above = [folder for folder in (home, *home.parents) if folder.is_relative_to(root)]
@@ -87,12 +87,11 @@ def _copy(like: str, file: Path) -> list[Path]:
     found = try_variations(source, default_root([source]))
     if isinstance(found, list):
         raise InvalidInput(found)
-    return copy_scenario(found[-1], file, default_root([file]))  # the last one knows the files of all
+    return copy_scenario(found[-1], file, default_root([file]))  # the last variation lists the files of all
 
 
 def _source(like: str) -> Path:
-    """The scenario that is meant. Raises UsageError."""
-
+    """Return the file of the scenario `like`. Raises UsageError."""
     if Path(like).is_file():
         return Path(like)
     shipped = shipped_scenarios()
@@ -101,6 +100,6 @@ def _source(like: str) -> Path:
         return means[0]
     if means:
         names = [name for name, path in shipped.items() if path in means]
-        raise UsageError(f"several shipped scenarios are called {quoted(like)}: {', '.join(names)}")
+        raise UsageError(f"{quoted(like)} is ambiguous; shipped scenarios: {', '.join(names)}")
     hint = suggestion(like, shipped)
-    raise UsageError(f"there is no file and no shipped scenario {quoted(like)}" + (f"; {hint}" if hint else ""))
+    raise UsageError(f"no file and no shipped scenario is called {quoted(like)}" + (f"; {hint}" if hint else ""))

@@ -6,8 +6,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from simscen.cli.diagnostics import harmless, print_text
-from simscen.cli.session.logs import log_file, said_of
+from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.session.logs import log_file, recorded_result
 from simscen.cli.session.output_files import save
 from simscen.core.geometry import Pose2
 from simscen.core.grid import UNKNOWN, OccupancyGrid
@@ -17,19 +17,19 @@ from simscen.record.sceneryfile import scenery_of
 
 def command(
     run: Annotated[Path, typer.Argument(help="The folder of a run, or its run.mcap.")],
-    out: Annotated[Path | None, typer.Option(help="The picture (png); default: map.png beside the log.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Output file (png); default: map.png beside the log.")] = None,
 ) -> None:
-    """Draw a recorded run from its log alone.
+    """Draw a recorded run as a picture.
 
-    The map, zones, the true way, the belief, the plans, goals, doors, people, faults, and where each criterion was
-    violated, in the world as it was. A log that broke off (run.partial.mcap) is drawn as far as it goes. Exit code 0;
-    2: not a usable log, or the picture cannot be written.
+    The picture shows the map, zones, true path, belief, plans, goals, doors, pedestrians, faults, and the places where
+    criteria were violated. A truncated log (run.partial.mcap) is drawn up to its end. Exit code 0: drawn; 2: the log is
+    unusable, or the picture cannot be written.
     """
     file = log_file(run)
     log = read_run(file)
     picture = out or file.with_name("map.png")
     _draw(log, file, picture)
-    print_text(harmless(str(picture)))
+    print_text(escaped(str(picture)))
 
 
 def _draw(log: Log, file: Path, picture: Path) -> None:
@@ -38,15 +38,15 @@ def _draw(log: Log, file: Path, picture: Path) -> None:
 
     try:
         scenery = scenery_of(log.about)
-        map_ = scenery.map.grid if scenery.map else log.about.map or _nothing(log)
+        map_ = scenery.map.grid if scenery.map else log.about.map or _unknown_map(log)
     except ValueError as error:
         raise invalid(file, "SC802", f"the log is damaged: {error}") from error
-    scene = Scene(log.trace, log.about.case, map_, said_of(log, file), scenery)
+    scene = Scene(log.trace, log.about.case, map_, recorded_result(log, file), scenery)
     robots = {name: (one.trace, one.about.case) for name, one in log.robots.items()}
     save(picture, lambda path: write_picture(with_robots(scene, robots), path), [file])
 
 
-def _nothing(log: Log) -> OccupancyGrid:
-    """One unknown cell where the robot started, for a robot without a map."""
+def _unknown_map(log: Log) -> OccupancyGrid:
+    """Return a map of one unknown cell at the start of the robot, for a robot without a map."""
     start = log.about.case.start
     return OccupancyGrid(np.full((1, 1), UNKNOWN, dtype=np.int8), 0.05, Pose2(start.x, start.y))

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.diagnostics import escaped, print_text
 from simscen.core.errors import Exit
 from simscen.spec.registry import GROUPS, PREFIX, BrokenPlugin, Entry, installed, unknown_groups
 
@@ -19,20 +19,19 @@ INDENT = 6
 
 
 class Format(str, Enum):
-    """What to print."""
+    """Output formats."""
 
     TEXT = "text"
     JSON = "json"
 
 
-def command(format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT) -> None:
-    """List the types that installed packages add to the language and to the stack.
+def command(format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT) -> None:
+    """List the types that installed packages add.
 
-    Package by package: the kind, the name that files use, the class, and the first sentence of its documentation; of
-    one that cannot be used, why. Each is imported to be listed, as it is when a file uses it. Exit code 0: all can be
-    used; 3: one cannot.
+    Lists for each package the kind, the name used in files, the class, and the first sentence of its documentation, or
+    why the type cannot be used. The command imports each type. Exit code 0: all types are usable; 3: one is not.
     """
-    listed = [_row(entry) for entry in _everything()]
+    listed = [_row(entry) for entry in _entries_by_package()]
     if format_ is Format.JSON:
         print(json.dumps({"plugins": listed}, indent=2, ensure_ascii=False))
     else:
@@ -40,8 +39,8 @@ def command(format_: Annotated[Format, typer.Option("--format", help="What to pr
     sys.exit(Exit.INCOMPLETE if any(row["broken"] for row in listed) else Exit.PASSED)
 
 
-def _everything() -> list[Entry]:
-    """By package; of a package kind by kind, in the order of the language."""
+def _entries_by_package() -> list[Entry]:
+    """Return the installed entries sorted by package; within a package, in the order of GROUPS."""
     found = [entry for kind in GROUPS for entry in installed(kind)]
     return sorted([*found, *unknown_groups()], key=lambda entry: (entry.distribution.lower(), entry.distribution))
 
@@ -71,12 +70,12 @@ def _first_sentence(text: str) -> str:
 
 def _text(listed: list[dict[str, Any]]) -> str:
     if not listed:
-        return f"no installed package adds anything: none has entry points in a group `{PREFIX}…`"
+        return f"no plug-ins: no installed package has entry points in a group `{PREFIX}…`"
     lines = []
     for (package, version, folder), rows in groupby(
         listed, lambda row: (row["package"], row["version"], row["folder"])
     ):
-        lines.append(harmless(f"{package} {version} ({folder})".replace("  ", " ")))
+        lines.append(escaped(f"{package} {version} ({folder})".replace("  ", " ")))
         lines += [line for row in rows for line in _lines(row)]
     return "\n".join(lines)
 
@@ -84,8 +83,8 @@ def _text(listed: list[dict[str, Any]]) -> str:
 def _lines(row: dict[str, Any]) -> list[str]:
     width = max(40, min(100, shutil.get_terminal_size().columns))
     sign = "✗" if row["broken"] else "✓"
-    told = f"cannot be used: {row['broken']}" if row["broken"] else row["text"]
-    head = "  " + harmless(f"{sign} {row['kind']} {row['name']} ({row['class']})")
-    more = [harmless(text) for text in (told, row["hint"]) if text]
+    text = f"cannot be used: {row['broken']}" if row["broken"] else row["text"]
+    head = "  " + escaped(f"{sign} {row['kind']} {row['name']} ({row['class']})")
+    more = [escaped(each) for each in (text, row["hint"]) if each]
     wrapped = [textwrap.wrap(text, width, initial_indent=" " * INDENT, subsequent_indent=" " * INDENT) for text in more]
     return [head, *(line for lines in wrapped for line in lines)]

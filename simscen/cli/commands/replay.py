@@ -9,7 +9,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.commands.judge import Time, wanted_of
-from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.judging import Judging
 from simscen.cli.session.logs import LOGS, logs_of
 from simscen.cli.session.output_files import save
@@ -21,59 +21,61 @@ PAGE = "replay.html"
 def command(
     runs: Annotated[
         list[Path],
-        typer.Argument(help="Logs, folders of runs, or folders to search for them.", autocompletion=completions.logs),
+        typer.Argument(help="Logs, or folders to search for logs.", autocompletion=completions.logs),
     ],
     against: Annotated[
-        Path | None, typer.Option(help="Another run to show beside it: another seed, or another stack.")
+        Path | None, typer.Option(help="Show this run beside it, for example another seed or stack.")
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="The page; default: replay.html beside run.mcap, NAME.replay.html beside any other."),
+        typer.Option(help="Output file; default: replay.html beside run.mcap, NAME.replay.html beside other logs."),
     ] = None,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
-    scenario: Annotated[
-        Path | None, typer.Option(help="Judge by the criteria of this file, as `simscen judge` does.")
-    ] = None,
-    truth: Annotated[str | None, typer.Option(help="Of a log of others: as of `simscen judge`.")] = None,
+    scenario: Annotated[Path | None, typer.Option(help="Use the criteria of this file, as in `simscen judge`.")] = None,
+    truth: Annotated[str | None, typer.Option(help="Ground truth in a foreign log, as in `simscen judge`.")] = None,
     topic: Annotated[
-        list[str] | None, typer.Option(help="NAME=TOPIC, of a log of others: as of `simscen judge`; repeatable.")
+        list[str] | None, typer.Option(help="NAME=TOPIC in a foreign log, as in `simscen judge`; repeatable.")
     ] = None,
-    time: Annotated[Time, typer.Option(help="Of a log of others: as of `simscen judge`.")] = Time.HEADER,
-    tick_rate: Annotated[int, typer.Option(min=1, max=10_000, help="Ticks a second for logs of others.")] = 1000,
+    time: Annotated[Time, typer.Option(help="Time stamps in a foreign log, as in `simscen judge`.")] = Time.HEADER,
+    tick_rate: Annotated[int, typer.Option(min=1, max=10_000, help="Ticks per second for foreign logs.")] = 1000,
     same_frame: Annotated[
-        bool, typer.Option("--same-frame", help="The truth's frame is the map's, although it is called otherwise.")
+        bool,
+        typer.Option("--same-frame", help="Treat the frame of the truth as the map frame although its name differs."),
     ] = False,
-    root: Annotated[Path | None, typer.Option(help="Files that the scenario names stay in this folder.")] = None,
-    world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+    root: Annotated[
+        Path | None, typer.Option(help="Root folder; the scenario may only refer to files below it.")
+    ] = None,
+    world_path: Annotated[
+        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
+    ] = None,
 ) -> None:
-    """Make a page that plays a recorded run, or two side by side.
+    """Write a page that plays a recorded run, or two runs side by side.
 
-    From the log alone it shows what the robot saw, believed and did at any moment, what happened when, how each signal
-    went, and how the criteria came out, with the scenario's text beside it; of a run that failed, the moment at which
-    it did. One file that needs no network: send it, or keep it with the log. Logs of real robots are shown as far as
-    they hold the data.
+    The page shows what the robot saw, believed, and did at any time, the events, the signals, the verdicts, and the
+    text of the scenario. It opens at the time of the failure. It is a single file that needs no network. Logs of real
+    robots are shown as far as they contain the data.
 
-    Exit code 0; 2: not a usable log, or the page cannot be written; 5: no logs found.
+    Exit code 0: written; 2: a log is unusable, or the page cannot be written; 5: no logs found.
     """
     files = logs_of(runs)
     if len(files) > 1 and (against is not None or out is not None):
         option = "--against" if against is not None else "--out"
-        raise UsageError(f"{option} is for one run, and there are {len(files)}")
+        raise UsageError(f"{option} takes one run, but {len(files)} were found")
     judging = Judging(wanted_of(truth, topic or [], time, tick_rate, same_frame), scenario, root, world_path or [])
     others = [] if against is None else logs_of([against])
     if len(others) > 1:
-        raise UsageError(f"--against is for one run, and there are {len(others)} in {harmless(str(against))}")
+        raise UsageError(f"--against takes one run, but {escaped(str(against))} contains {len(others)}")
     for file in files:
         page = out or file.with_name(PAGE if file.name in LOGS else f"{file.stem}.{PAGE}")
-        _make(judging, [file, *others], page)
-        print_text(harmless(str(page)))
+        _write(judging, [file, *others], page)
+        print_text(escaped(str(page)))
         if open_:
             webbrowser.open(page.resolve().as_uri())
     for note in judging.notes:
-        print_text(f"note: {harmless(note)}", sys.stderr)
+        print_text(f"note: {escaped(note)}", sys.stderr)
 
 
-def _make(judging: Judging, files: list[Path], page: Path) -> None:
+def _write(judging: Judging, files: list[Path], page: Path) -> None:
     from simscen.report.replay import write_replay
 
     shown = [judging.shown(file) for file in files]

@@ -21,18 +21,19 @@ from simscen.report.rebuild import read_journal
 
 def command(
     folder: Annotated[Path, typer.Argument(help="The output folder of `simscen run`.")],
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here, and nothing else.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write only JUnit XML, to this file.")] = None,
     junit_family: Annotated[
-        JunitFamily, typer.Option(help="xunit2 leaves out what Jenkins' schema forbids.")
+        JunitFamily, typer.Option(help="xunit2 omits what the schema of Jenkins forbids.")
     ] = JunitFamily.SIMSCEN,
-    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
 ) -> None:
-    """Write the reports of an output folder anew from its journal; with --junit only that file, and the folder stays.
+    """Write the reports of an output folder again from its journal.
 
-    Every run that was planned is in results.json and junit.xml, also when simscen itself was killed: a run that had
-    begun is then an error of type `interrupted`, one that had not `not-run`. Nothing is simulated or judged again.
+    The reports contain every planned run, even if simscen was killed: a started run is then an error of type
+    `interrupted`, one that was not started `not-run`. Nothing is simulated or judged again. With --junit, the folder is
+    not changed.
 
-    Exit code as of `simscen run`: 0: all passed; 1: a criterion failed; 2: not an output folder, or still in use; 3: a
+    Exit code as for `simscen run`: 0: all passed; 1: a criterion failed; 2: not an output folder, or still in use; 3: a
     run was not completed.
     """
     past = read_journal(folder)
@@ -59,7 +60,7 @@ def command(
 
 
 def _by_stack(answers: Sequence[RunFinished]) -> dict[str, list[RunResult]]:
-    """The results of each stack, in the order of the first of each; second runs are no more evidence."""
+    """Return the results by stack in order of appearance, without the second runs of --check-determinism."""
     found: dict[str, list[RunResult]] = {}
     for answer in answers:
         if not answer.key.repeats:

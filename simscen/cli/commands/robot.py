@@ -1,4 +1,4 @@
-"""`simscen robot`: does a robot drive as its file says?"""
+"""`simscen robot`: check of a robot by test drives."""
 
 import math
 import sys
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from simscen.cli.diagnostics import as_json as problems_as_json
-from simscen.cli.diagnostics import as_text, from_here, harmless, print_text
+from simscen.cli.diagnostics import as_text, escaped, from_here, print_text
 from simscen.cli.session.output_files import save
 from simscen.core.errors import Exit, InvalidInput
 from simscen.loading.files.discovery import default_root
@@ -26,26 +26,26 @@ app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=T
 
 @app.callback()
 def _robot() -> None:
-    """Drive a robot once and compare command, odometry and truth."""
+    """Drive a robot and compare command, odometry, and truth."""
 
 
 @app.command()
 def check(
     robot: Annotated[str, typer.Argument(help="A *.robot.yaml, .urdf or .xacro file, or the name of a shipped robot.")],
-    picture: Annotated[Path | None, typer.Option(help="Draw the ways that were driven (png).")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw the driven paths into this file (png).")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
-    root: Annotated[Path | None, typer.Option(help="Files that the robot names stay in this folder.")] = None,
+    root: Annotated[Path | None, typer.Option(help="Root folder; the robot may only refer to files below it.")] = None,
     world_path: Annotated[
-        list[Path] | None, typer.Option(help="Folder with ROS packages or models; repeatable.")
+        list[Path] | None, typer.Option(help="Additional folder with ROS packages or models; repeatable.")
     ] = None,
 ) -> None:
-    """Drive a robot once in an empty world, and compare what it was told, what its encoders say and what is true.
+    """Drive a robot in an empty world and compare command, odometry, and truth.
 
-    It rests for a second, drives 2 m straight, turns once on the spot (a car: its smallest circle), drives a square,
-    and sideways if it can. Odometry is without noise: what differs is slip, skidding and wrong dimensions. Dimensions
-    that differ from those of the URDF, and wheels and casters that it draws off the ground, are warnings.
+    The robot rests for a second, drives 2 m straight, turns once on the spot (a car: on its smallest circle), drives a
+    square, and moves sideways if it can. The odometry has no noise, so differences come from slip, skidding, and wrong
+    dimensions. Dimensions that differ from the URDF, and wheels or casters off the ground, are warnings.
 
-    Exit code 0: every check held; 1: one did not; 2: the robot cannot be used.
+    Exit code 0: all checks passed; 1: a check failed; 2: the robot is unusable.
     """
     file = load_robot_file(robot, root or default_root([Path(robot)]), world_path or ())
     home = file.library.fence.root
@@ -72,7 +72,7 @@ def _checked(file: RobotFile, named: str, picture: Path | None, as_json: bool) -
     if as_json:
         print(problems_as_json(notes, **as_data(body, checked)))
     else:
-        print_text("\n".join([harmless(f"{body.name} · {named}"), *as_table(body, checked)]))
+        print_text("\n".join([escaped(f"{body.name} · {named}"), *as_table(body, checked)]))
         if notes:
             print_text(as_text(notes))
     if picture is not None:
@@ -84,9 +84,8 @@ def _checked(file: RobotFile, named: str, picture: Path | None, as_json: bool) -
     return checked.failed
 
 
-# MERGED: What a robot did when it was driven once, as a table and as JSON.
 def as_table(body: "RobotBody", checked: "Checked") -> Iterator[str]:
-    """At most 80 columns: what was driven, then every check with its figure and its limit."""
+    """Yield lines of at most 80 columns: the test drives, then every check with its value and limit."""
     drive = body.drive.type.replace("_", " ")
     yield f"  {drive}, {body.mass:.4g} kg, {len(body.wheels)} wheels"
     slope, step = checked.climb
@@ -102,7 +101,7 @@ def as_table(body: "RobotBody", checked: "Checked") -> Iterator[str]:
     yield (
         f"{checked.failed} of {len(checked.checks)} checks failed"
         if checked.failed
-        else (f"all {len(checked.checks)} checks held")
+        else f"all {len(checked.checks)} checks passed"
     )
 
 
@@ -116,12 +115,12 @@ def _row(trial: "Trial") -> str:
 
 def _line(check: "Check") -> str:
     verdict = "ok" if check.held else "FAILED"
-    told = f"  {verdict:7} {check.name:36} {check.value:9.3f}, at most {check.limit:.3g} {check.unit}"
-    return told if check.held or not check.advice else f"{told}\n          {check.advice}"
+    line = f"  {verdict:7} {check.name:36} {check.value:9.3f}, at most {check.limit:.3g} {check.unit}"
+    return line if check.held or not check.advice else f"{line}\n          {check.advice}"
 
 
 def as_data(body: "RobotBody", checked: "Checked") -> dict[str, Any]:
-    """All figures, angles in rad and lengths in m as far as no unit is beside them; ways without their poses."""
+    """Return all values as JSON data; angles in rad and lengths in m unless a unit is given."""
     return {
         "robot": body.name,
         "drive": body.drive.type,
@@ -143,4 +142,4 @@ def _motion(motion: "Motion") -> dict[str, Any]:
 
 
 def _degrees(angle: float) -> float:
-    return round(math.degrees(angle), 1) + 0.0  # no minus before a zero
+    return round(math.degrees(angle), 1) + 0.0  # turns -0.0 into 0.0

@@ -92,7 +92,7 @@ def command(
     ] = 0,
     wall_time: Annotated[bool, typer.Option(help="Accept nodes that do not use sim time.")] = False,
 ) -> None:
-    """Stand for a ROS 2 graph, or Nav2, as the stack of a run.
+    """Connect a ROS 2 graph, such as Nav2, as the stack of a run.
 
     Say `simscen run SCENARIO --stack mine='simscen ros2 --launch "ros2 launch …"'`. It runs under your own ROS Python,
     whichever distribution and RMW that is, and needs nothing there but rclpy. Sensors, /tf, /map and /clock go out,

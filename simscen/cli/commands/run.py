@@ -23,21 +23,21 @@ def command(
         list[Path], typer.Argument(help="Scenario files, or folders to search.", autocompletion=completions.scenarios)
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Output folder, new or empty; default: simscen-out/<run-id>.")
+        Path | None, typer.Option(help="New or empty output folder; default: simscen-out/<session id>.")
     ] = None,
     workers: Annotated[
-        int | None, typer.Option("-j", "--jobs", min=1, max=256, help="Runs at a time; default: one for each core.")
+        int | None, typer.Option("-j", "--jobs", min=1, max=256, help="Number of parallel runs; default: one per core.")
     ] = None,
     seed: Annotated[
         int | None, typer.Option(min=1, max=2**32 - 1, help="Use this seed instead of each scenario's own.")
     ] = None,
     repeat: Annotated[
-        int, typer.Option(min=1, max=100_000, help="Run each scenario with this many seeds in a row.")
+        int, typer.Option(min=1, max=100_000, help="Run each scenario with this many consecutive seeds.")
     ] = 1,
     keyword: Annotated[
-        str, typer.Option("-k", help='Only ids and variations that match, e.g. "faults and not slip".')
+        str, typer.Option("-k", help='Select ids and variations by an expression, e.g. "faults and not slip".')
     ] = "",
-    tag: Annotated[list[str] | None, typer.Option(help="Only scenarios with this tag; repeatable.")] = None,
+    tag: Annotated[list[str] | None, typer.Option(help="Select scenarios with this tag; repeatable.")] = None,
     fail_fast: Annotated[
         bool, typer.Option("--fail-fast", "-x", help="Stop after the first run that does not pass.")
     ] = False,
@@ -45,30 +45,31 @@ def command(
         bool,
         typer.Option(
             "--check-determinism",
-            help="Run everything twice and compare the logs, byte for byte; with the output folder of an earlier "
-            "session behind it, as --check-against.",
+            help="Run everything twice and compare the logs byte for byte; followed by the output folder of an earlier "
+            "session, the same as --check-against.",
         ),
     ] = False,
     check_against: Annotated[
         Path | None,
-        typer.Option(help="Compare with this output folder of another session or machine."),
+        typer.Option(help="Compare the logs with this output folder of another session or machine."),
     ] = None,
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here as well.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
     junit_family: Annotated[
-        JunitFamily, typer.Option(help="xunit2 leaves out what Jenkins' schema forbids.")
+        JunitFamily, typer.Option(help="xunit2 omits what the schema of Jenkins forbids.")
     ] = JunitFamily.SIMSCEN,
-    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
-    wall_limit: Annotated[float, typer.Option(min=1, help="Seconds of wall time that one run may take.")] = 300.0,
+    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
+    wall_limit: Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")] = 300.0,
     resume: Annotated[
-        Path | None, typer.Option(help="Go on in this output folder: only what has no verdict yet, or has changed.")
+        Path | None, typer.Option(help="Continue in this output folder: run what has no verdict yet or has changed.")
     ] = None,
-    shard: Annotated[str, typer.Option(help="i/n: only every n-th scenario, from the i-th on.")] = "1/1",
+    shard: Annotated[str, typer.Option(help="i/n: run every n-th scenario, starting with the i-th.")] = "1/1",
     stack: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
             autocompletion=completions.stacks,
-            help=STACK_HELP + "Repeatable: each scenario runs with each, and the first is compared with the others.",
+            help=STACK_HELP
+            + "Repeatable: each scenario runs with each stack, and the first is compared with the others.",
         ),
     ] = None,
     last_failed: Annotated[
@@ -76,40 +77,42 @@ def command(
         typer.Option(
             "--last-failed",
             "--lf",
-            help="Only what failed when it was run last, by the sessions in simscen-out, or beside --out; everything, "
-            "where nothing did.",
+            help="Run what failed the last time, according to the sessions in simscen-out or beside --out; if nothing "
+            "failed, run everything.",
         ),
     ] = False,
     durations: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="List the N slowest runs in the end; 0 = all.")
+        int | None, typer.Option(min=0, metavar="N", help="List the N slowest runs at the end; 0 = all.")
     ] = None,
     watch: Annotated[
-        bool, typer.Option("--watch", help="Stay, and run again what a saved file touches; keys are told then.")
+        bool, typer.Option("--watch", help="Watch for changes and rerun affected scenarios (press h for keys).")
     ] = False,
     open_: Annotated[
-        bool, typer.Option("--open", help="Open the report in a browser, where it follows the runs as they end.")
+        bool, typer.Option("--open", help="Open the report in a browser and update it as runs finish.")
     ] = False,
     variation: Annotated[
-        list[str] | None, typer.Option(help="Only the variation of exactly this name; repeatable.")
+        list[str] | None, typer.Option(help="Select the variation with exactly this name; repeatable.")
     ] = None,
-    root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
-    world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
+    world_path: Annotated[
+        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
+    ] = None,
     replay: Annotated[
-        Replays, typer.Option(help="Which runs get replay.html, a page that plays them; see `simscen replay`.")
+        Replays, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")
     ] = Replays.FAILED,
     lenient: Annotated[
-        bool, typer.Option("--lenient", help="Leave out what of an SDF world cannot be used, with a warning.")
+        bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")
     ] = False,
 ) -> None:
     """Run scenarios and report what passed.
 
-    Everything is validated first; with one bad file nothing is run. Each run leaves its MCAP log, a picture and its
-    verdicts in the output folder, and one that failed a page that plays it, beside results.json and junit.xml. Should
-    simscen itself be killed, `simscen report` makes these from the journal, and --resume goes on where it stopped.
+    All files are validated first; if one is invalid, nothing runs. The output folder receives results.json, junit.xml,
+    report.html, and for each run an MCAP log, a picture, the verdicts, and, if it failed, a replay page. If simscen is
+    killed, `simscen report` writes the reports from the journal, and --resume continues the session.
 
-    Exit code 0: all passed, or failed as expected; 1: a criterion failed, or held although it was expected to fail; 2:
-    an invalid scenario or an unusable output folder (nothing was run); 3: a run could not be completed; 5: nothing
-    selected, or everything skipped; 129, 130 and 143: interrupted.
+    Exit code 0: all runs passed or failed as expected; 1: a criterion failed, or held although it was expected to fail;
+    2: an invalid scenario or an unusable output folder (nothing was run); 3: a run could not be completed; 5: nothing
+    selected, or everything skipped; 129, 130, and 143: interrupted.
     """
     if check_determinism and (earlier := [path for path in paths if (path / NAME).is_file()]):
         paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.output_files import save
 from simscen.core.version import PACKAGE
 from simscen.spec.registry import GROUPS, installed
@@ -24,13 +24,13 @@ class Kind(str, Enum):
 
 
 def command(
-    kind: Annotated[Kind, typer.Argument(help="Of which kind of file.")] = Kind.SCENARIO,
-    write: Annotated[Path | None, typer.Option(help="Write all of them into this folder instead.")] = None,
+    kind: Annotated[Kind, typer.Argument(help="Kind of file.")] = Kind.SCENARIO,
+    write: Annotated[Path | None, typer.Option(help="Write all schemas into this folder.")] = None,
 ) -> None:
     """Print or write the JSON Schemas that editors use.
 
-    Put `# yaml-language-server: $schema=<path>/scenario.schema.json` on the first line of a scenario to get completion
-    and checks while typing. What installed packages add is in them, too.
+    For completion and checks while typing, put `# yaml-language-server: $schema=<path>/scenario.schema.json` on the
+    first line of a scenario. The schemas include the types of installed packages.
     """
     if write is None:
         print_text(text_of(kind.value).rstrip())
@@ -39,13 +39,13 @@ def command(
         text = text_of(each.value)
         file = write / f"{each.value}.schema.json"
         save(file, lambda path, text=text: path.write_text(text, encoding="utf-8"))  # type: ignore[misc]
-        print_text(harmless(str(file)))
+        print_text(escaped(str(file)))
 
 
 def text_of(kind: str) -> str:
-    """The schema, with what installed packages add; where they add nothing, as it was generated for this version.
+    """Return a schema including the types of installed packages.
 
-    Making it anew imports every model.
+    Without such types, the shipped schema is returned, because generating one imports every model.
     """
     if any(installed(group) for group in GROUPS):
         from simscen.cli.catalog.json_schema import as_text, schema_of

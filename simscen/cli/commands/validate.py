@@ -20,7 +20,7 @@ from simscen.loading.files.kinds import STACKS, check_file, file_kind
 
 
 class Format(str, Enum):
-    """How problems are printed."""
+    """Output formats of problems."""
 
     TEXT = "text"
     JSON = "json"
@@ -29,32 +29,32 @@ class Format(str, Enum):
 
 def command(
     paths: Annotated[list[Path], typer.Argument(help="Files, or folders to search.", autocompletion=completions.files)],
-    format_: Annotated[Format, typer.Option("--format", help="How to print problems.")] = Format.TEXT,
+    format_: Annotated[Format, typer.Option("--format", help="Output format of problems.")] = Format.TEXT,
     stack: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="Check scenarios with this stack, as `simscen run` does. Repeatable."),
+        typer.Option(metavar="NAME=VALUE", help="Check scenarios with this stack, as in `simscen run`; repeatable."),
     ] = None,
-    root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
-    world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
+    world_path: Annotated[
+        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
+    ] = None,
     lenient: Annotated[
-        bool, typer.Option("--lenient", help="What of an SDF world cannot be used is a warning, not an error.")
+        bool, typer.Option("--lenient", help="Report unsupported parts of SDF worlds as warnings instead of errors.")
     ] = False,
-    fast: Annotated[
-        bool, typer.Option("--fast", help="Leave out whatever needs a world or robot to be built.")
-    ] = False,
+    fast: Annotated[bool, typer.Option("--fast", help="Skip checks that need the world or robot to be built.")] = False,
     picture: Annotated[
-        Path | None, typer.Option(help="Folder for a picture of each scenario whose geometry is wrong.")
+        Path | None, typer.Option(help="Write a picture of each scenario with a geometric problem into this folder.")
     ] = None,
 ) -> None:
-    """Check scenario, world, robot and stack files without running anything.
+    """Check scenario, world, robot, and stack files without running anything.
 
-    Every problem of every file is listed with its line. Folders are searched for *.scenario.yaml, *.world.yaml,
-    *.robot.yaml, *.stack.yaml and *.base.yaml. A parameter file of Nav2 is checked as a stack, and what of it means
-    nothing here is listed. Of a base, which is there to be extended, and of a defaults.yaml what is there is checked,
-    and nothing is missing. Scenarios are looked at in their worlds: is the robot free at its start and goals, can it
-    get there in time, can all events happen, can all criteria hold and fail?
+    Lists every problem with file, line, and column. Folders are searched for *.scenario.yaml, *.world.yaml,
+    *.robot.yaml, *.stack.yaml, and *.base.yaml. A Nav2 parameter file is checked as a stack; parameters without meaning
+    here are listed. Base files and defaults.yaml may be incomplete. Scenarios are also checked in their worlds: whether
+    the robot is free at its start and goals, can arrive in time, and whether all events can take place and all criteria
+    can hold and fail.
 
-    Exit code 0: all are valid; 2: some are not; 5: there are none.
+    Exit code 0: all files are valid; 2: a file is invalid; 5: no files found.
     """
     home = root if root is not None else default_root(paths)
     stacks = stacks_of(stack or [], home, world_path or [])
@@ -69,7 +69,7 @@ def command(
 
 
 def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
-    """What the text tells; where that is nothing, what building it tells, which needs numpy."""
+    """Return the problems of the text; if there are no errors, also those of building the world or robot."""
     if kind == "scenario":
         found = [problem for choice in checks.choices for problem in checks.scenario(file, choice)[1]]
         return list(dict.fromkeys(found))
@@ -82,7 +82,7 @@ def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
 
 @dataclass
 class _Checked:
-    """How many files of each kind were read, and what was wrong."""
+    """Count of files by kind, and their problems."""
 
     kinds: Counter[str] = field(default_factory=Counter)
     problems: list[Problem] = field(default_factory=list)

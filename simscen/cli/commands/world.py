@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from pydantic import ValidationError
 
-from simscen.cli.diagnostics import as_text, from_here, harmless, print_text
+from simscen.cli.diagnostics import as_text, escaped, from_here, print_text
 from simscen.cli.session.output_files import save
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
@@ -29,16 +29,16 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
 
 File = Annotated[Path, typer.Argument(metavar="WORLD", help="A *.world.yaml, a ROS map (yaml), an SDF or .world file.")]
-Root = Annotated[Path | None, typer.Option(help="Files that the world names stay in this folder.")]
-WorldPath = Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")]
-Lenient = Annotated[bool, typer.Option("--lenient", help="Leave out what of SDF cannot be used, with a warning.")]
+Root = Annotated[Path | None, typer.Option(help="Root folder; the world may only refer to files below it.")]
+WorldPath = Annotated[list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")]
+Lenient = Annotated[bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")]
 Height = Annotated[float, typer.Option(min=0.0, max=100.0, help="Height of the lidar in metres.")]
 LIDAR_HEIGHT = 0.2
 
 
 @app.callback()
 def _world() -> None:
-    """Inspect, convert and export worlds."""
+    """Inspect, convert, and export worlds."""
 
 
 @app.command()
@@ -66,7 +66,7 @@ def inspect(
     if as_json:
         print(json.dumps(asdict(found), indent=2))
     else:
-        print_text("\n".join([harmless(f"{found.name} · {path}"), *described(found, height, everything)]))
+        print_text("\n".join([escaped(f"{found.name} · {path}"), *described(found, height, everything)]))
         warnings = from_here(world_reader_notes(built.world, source, home), home)
         if warnings:
             print_text(as_text(warnings))
@@ -99,7 +99,7 @@ def export(
     grid = build(_built(source, home, world_path or [], lenient), height, resolution).map
     save(map_, lambda file: save_map(grid, file), [path])
     rows, columns = grid.shape
-    print_text(f"{harmless(str(map_))}: {columns} x {rows} cells of {grid.resolution:g} m")
+    print_text(f"{escaped(str(map_))}: {columns} x {rows} cells of {grid.resolution:g} m")
 
 
 @app.command()
@@ -125,9 +125,9 @@ def convert(
     write = world_text(spec).encode()
     save(out, lambda file: write_atomically(file, write), [path])
     for change in changes:
-        print_text(f"changed: {harmless(change)}")
+        print_text(f"changed: {escaped(change)}")
     things = len(spec.walls) + len(spec.obstacles) + len(spec.objects) + len(spec.doors)
-    print_text(f"{harmless(str(out))}: {things} walls, obstacles, objects and doors; {len(changes)} changed")
+    print_text(f"{escaped(str(out))}: {things} walls, obstacles, objects and doors; {len(changes)} changed")
 
 
 def _converted(
@@ -182,13 +182,13 @@ def described(found: "Inspection", height: float, everything: bool) -> Iterator[
     yield from _items("objects", found.bodies, len(found.bodies))
     for title, names in (("places", found.places), ("regions", found.regions)):
         if names:
-            yield f"  {title:9} {harmless(', '.join(names))}"
+            yield f"  {title:9} {escaped(', '.join(names))}"
 
 
 def _items(title: str, items: "Sequence[Item]", most: int) -> Iterator[str]:
     if items:
         yield f"  {title}"
-    width = max((min(len(harmless(item.name)), LONGEST) for item in items[:most]), default=0)
+    width = max((min(len(escaped(item.name)), LONGEST) for item in items[:most]), default=0)
     yield from (f"    {_item(item, width)}" for item in items[:most])
     if len(items) > most:
         yield f"    … and {len(items) - most} more (--all lists them)"
@@ -196,7 +196,7 @@ def _items(title: str, items: "Sequence[Item]", most: int) -> Iterator[str]:
 
 def _item(item: "Item", width: int) -> str:
     x0, y0, z0, x1, y1, z1 = item.extent
-    name = harmless(item.name)
+    name = escaped(item.name)
     shown = name if len(name) <= LONGEST else f"…{name[1 - LONGEST :]}"
     where = f"x {x0:.2f} … {x1:.2f}  y {y0:.2f} … {y1:.2f}  z {z0:.2f} … {z1:.2f}"
     mass = "" if item.mass is None else f"  {item.mass:g} kg" if item.mass else "  cannot be pushed"

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.cli.diagnostics import from_here
-from simscen.cli.session.logs import BROKEN_OFF, WHOLE, said_of
+from simscen.cli.session.logs import BROKEN_OFF, WHOLE, recorded_result
 from simscen.core.case import Case
 from simscen.core.errors import InvalidInput
 from simscen.core.evidence import Coverage, Evidence
@@ -70,7 +70,7 @@ class Judging:
         """
         if _may_be_own(log) and is_own(log):
             read = read_run(log, looks=True)
-            return read, said_of(read, log) if self._criteria is None else self._own(log).result
+            return read, recorded_result(read, log) if self._criteria is None else self._own(log).result
         self.foreign += 1
         if self._criteria is None:
             told, case = read_foreign(log, self._wanted, looks=True), Case(Pose2(0.0, 0.0), ())

@@ -70,7 +70,7 @@ def log_file(run: Path) -> Path:
     return found[0]
 
 
-def said_of(log: Log, file: Path) -> RunResult:
+def recorded_result(log: Log, file: Path) -> RunResult:
     """What the run said of itself; for one that broke off, what its criteria say of what there is."""
     if log.result:
         return from_json(log.result)

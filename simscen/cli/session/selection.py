@@ -1,11 +1,11 @@
-"""From paths on the command line to scenarios that can run."""
+"""Selection, loading, and validation of the scenarios given on the command line."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 
-from simscen.cli.diagnostics import from_here, harmless
+from simscen.cli.diagnostics import escaped, from_here
 from simscen.cli.session.stacks import Stacks, stacks_of
 from simscen.core.errors import InvalidInput, NothingSelected, UsageError
 from simscen.core.filesread import files_read
@@ -28,9 +28,9 @@ from simscen.run.worldsource import world_of
 
 @dataclass(frozen=True)
 class Selection:
-    """Which scenarios a command is about: `keyword` and `tags` as for pytest, `shard` as (i, n) from (1, n).
+    """Filter of scenarios: `keyword` and `tags` as in pytest, `shard` (i, n) with 1 <= i <= n.
 
-    `variations` are names of those that are meant, of all scenarios; () = whatever they are called.
+    `variations` are names of variations; () selects all.
     """
 
     keyword: str = ""
@@ -47,9 +47,9 @@ def load_all(
     wanted: Selection,
     stacks: Sequence[str] = (),
 ) -> tuple[list[LoadedScenario], list[Problem]]:
-    """The selected scenarios, all of them valid, each variation with every one of `stacks`, and warnings about them.
+    """Return the selected scenarios, each variation with each of `stacks`, and warnings about them.
 
-    Raises InvalidInput with every problem of every file, selected or not, and NothingSelected.
+    Raises InvalidInput with the problems of all files, whether selected or not, and NothingSelected.
     """
     home = root if root is not None else default_root(paths)
     checks = Checks(home, world_path, lenient, stacks=stacks_of(stacks, home, world_path))
@@ -65,31 +65,31 @@ def load_all(
         problems.update(dict.fromkeys(found))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(from_here(problems, home))
-    firsts = varied([stacked[0] for stacked in loaded.values()], wanted.variations)
+    firsts = select_variations([stacked[0] for stacked in loaded.values()], wanted.variations)
     chosen = _shard(select(firsts, wanted.keyword, wanted.tags), *wanted.shard)
-    merge_problems = dict.fromkeys(warning for one in chosen for warning in warnings[one.id])
-    return [stacked for one in chosen for stacked in loaded[one.title]], from_here(merge_problems, home)
+    relevant = dict.fromkeys(warning for one in chosen for warning in warnings[one.id])
+    return [stacked for one in chosen for stacked in loaded[one.title]], from_here(relevant, home)
 
 
-def varied(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
-    """Those that are variations of one of these names; all where none is named. Raises NothingSelected."""
+def select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
+    """Return the variations with one of these names; all if there are no names. Raises NothingSelected."""
     known = dict.fromkeys(one.variation for one in scenarios if one.variation)
     if missing := [name for name in names if name not in known]:
-        merge_problems = suggestion(missing[0], known) or "no scenario has variations"
-        raise NothingSelected(f"no variation is called {quoted(missing[0], 120)}; {merge_problems}")
+        hint = suggestion(missing[0], known) or "no scenario has variations"
+        raise NothingSelected(f"no variation is called {quoted(missing[0], 120)}; {hint}")
     return [one for one in scenarios if not names or one.variation in names]
 
 
 def shard_of(text: str) -> tuple[int, int]:
-    """`i/n` as numbers. Raises UsageError."""
+    """Parse `i/n`. Raises UsageError."""
     number, slash, count = text.partition("/")
     if slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count):
         return int(number), int(count)
-    raise UsageError(f"cannot read --shard {harmless(text)}: expected i/n with 1 <= i <= n, e.g. 2/4")
+    raise UsageError(f"cannot read --shard {escaped(text)}: expected i/n with 1 <= i <= n, e.g. 2/4")
 
 
 def _shard(scenarios: list[LoadedScenario], number: int, count: int) -> list[LoadedScenario]:
-    """Every n-th scenario, so that folders with slow ones are spread over all shards."""
+    """Return every n-th scenario, so that folders with slow scenarios are spread over all shards."""
     share = scenarios[number - 1 :: count]
     if not share:
         raise NothingSelected(f"shard {number}/{count} of {len(scenarios)} scenarios is empty")
@@ -98,10 +98,10 @@ def _shard(scenarios: list[LoadedScenario], number: int, count: int) -> list[Loa
 
 @dataclass(frozen=True)
 class Checks:
-    """Looks at files for all that can be wrong with them; with `fast`, for nothing that geometry is needed for.
+    """Validation of files; with `fast`, without checks that need geometry.
 
-    Into the folder `pictures` goes a picture of each scenario that geometry finds something wrong with. Unless `runs`,
-    it is no mistake that nobody here says what an external stack is: others may.
+    Pictures of scenarios with geometric problems are written to the folder `pictures`. An external stack without a
+    command is an error if `runs`, otherwise a warning.
     """
 
     root: Path
@@ -115,11 +115,11 @@ class Checks:
 
     @property
     def choices(self) -> Sequence[StackChoice | None]:
-        """The stacks to look at each scenario with; None = its own."""
+        """The stacks to check each scenario with; None = the scenario's own."""
         return self.stacks.chosen or (None,)
 
     def scenario(self, file: Path, choice: StackChoice | None = None) -> tuple[Sequence[LoadedScenario], list[Problem]]:
-        """The variations of a scenario, none where one is unusable, and its problems: usable ones have no errors."""
+        """Return the variations of a scenario, or none if one of them is unusable, and the problems."""
         loaded = try_variations(file, self.root, self.world_path, choice)
         if isinstance(loaded, list):
             return (), loaded
@@ -131,18 +131,18 @@ class Checks:
         return (usable if len(usable) == len(tried) else ()), problems
 
     def _variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
-        loaded, nobody = self.stacks.with_command(loaded.having(lenient=self.lenient))
-        if nobody and self.runs:
-            return None, [*loaded.notes, *nobody]
+        loaded, undefined = self.stacks.with_command(loaded.having(lenient=self.lenient))
+        if undefined and self.runs:
+            return None, [*loaded.notes, *undefined]
         with files_read() as read:
             problems = [*loaded.notes, *([] if self.fast else checked(loaded, self.cache, self.pictures))]
-        problems += [replace(problem, severity="warning") for problem in nobody]
+        problems += [replace(problem, severity="warning") for problem in undefined]
         loaded = loaded.having(read=tuple(sorted(read)))
         usable = not any(problem.severity == "error" for problem in problems)
         return (loaded if usable else None), list(dict.fromkeys(problems))
 
     def world(self, file: Path) -> list[Problem]:
-        """What only building a world can tell, or why it cannot be used."""
+        """Return the problems that are found by building a world."""
         try:
             source = load_world_file(file, self.root, self.world_path)
             notes = list(source.map.notes) if source.map else []
@@ -154,7 +154,7 @@ class Checks:
             return error.problems
 
     def robot(self, file: Path) -> list[Problem]:
-        """What only building a robot can tell, or why it cannot be used."""
+        """Return the problems that are found by building a robot."""
         if self.fast:
             return []
         try:
@@ -164,7 +164,7 @@ class Checks:
 
 
 def checked(scenario: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None) -> list[Problem]:
-    """What only geometry can tell, or why its world cannot be used."""
+    """Return the problems that are found by building the world of a scenario."""
     try:
         return check_in_world(scenario, cache, pictures)
     except InvalidInput as error:

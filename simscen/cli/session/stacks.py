@@ -1,6 +1,6 @@
-"""What `--stack NAME=VALUE` and the user's own configuration say of stacks.
+"""Stacks chosen with `--stack NAME=VALUE` and defined in the user's configuration.
 
-Light commands load this, so what reads configurations and looks for programs is imported where it is needed.
+Light commands import this module, so it imports the readers of configurations and programs inside functions.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simscen.cli.diagnostics import from_here, harmless
-from simscen.cli.process import config_file, environment
+from simscen.cli.diagnostics import escaped, from_here
+from simscen.cli.process import caller_environment, config_file
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.externalcommand import ExternalCommand
 from simscen.core.problems import Problem
@@ -30,9 +30,8 @@ from simscen.spec.registry import entries, find
 YAML = (".yaml", ".yml")
 STACK_HELP = (
     "Run every scenario with this stack instead of its own: a command that speaks the stack protocol, a *.stack.yaml "
-    "file, a parameter file of Nav2, `reference`, another type of stack, or a name in the user's configuration. Of "
-    "several robots, it drives each; NAME='COMMAND' where a robot's stack is `external: NAME` only says what that "
-    "runs. "
+    "file, a Nav2 parameter file, `reference`, another type of stack, or a name in your configuration. With several "
+    "robots, it drives each; if a robot's stack is `external: NAME`, NAME='COMMAND' only defines its command. "
 )
 if TYPE_CHECKING:
     from simscen.loading.stacks.userconfig import UserConfig
@@ -42,9 +41,9 @@ _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 
 @dataclass
 class Stacks:
-    """The stacks that were `chosen` with --stack, in their order, and what the names of external ones run.
+    """Stacks `chosen` with --stack, in order, and the commands of external stacks.
 
-    The configuration is read when a name asks for it. Nothing is looked for on the network or in a scenario's folder.
+    The user's configuration is read when a name requires it. The folder of the scenario is never searched.
     """
 
     chosen: Sequence[StackChoice] = ()
@@ -52,15 +51,15 @@ class Stacks:
 
     @cached_property
     def config(self) -> UserConfig:
-        """The user's own configuration. Raises InvalidInput."""
+        """The user's configuration. Raises InvalidInput."""
         from simscen.loading.stacks.userconfig import load_config
 
         return load_config(config_file())
 
     def with_command(self, loaded: LoadedScenario) -> tuple[LoadedScenario, list[Problem]]:
-        """The scenario with what its external stacks run, or with the problems that nobody says so.
+        """Return the scenario with the commands of its external stacks, and problems for stacks without a command.
 
-        Raises InvalidInput for a configuration that says it wrongly.
+        Raises InvalidInput if the configuration is invalid.
         """
         if loaded.robots:
             tried = {name: self.with_command(view) for name, view in loaded.robots.items()}
@@ -81,15 +80,15 @@ class Stacks:
         return loaded, [problem] if problem is not None else []
 
     def command(self, name: str) -> ExternalCommand | None:
-        """What an external stack's name runs: as --stack says, else as the configuration does."""
+        """Return the command of an external stack as defined by --stack, else by the configuration."""
         if name not in self._commands:
             given = next((choice.runs for choice in self.chosen if choice.name == name and choice.runs), None)
-            self._commands[name] = given or self.config.command(name, environment(), Path.cwd())
+            self._commands[name] = given or self.config.command(name, caller_environment(), Path.cwd())
         return self._commands[name]
 
 
 def commands_of(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str, object]]:
-    """What the external stacks of scenarios run, by name: nothing of the environment, which may hold secrets."""
+    """Return the commands of the scenarios' external stacks by name, without environment variables (secrets)."""
     stacks = ((view.spec.stack, view.runs) for loaded in scenarios for view in loaded.each.values())
     found = {stack.external: runs for stack, runs in stacks if isinstance(stack, ExternalStackSpec) and runs}
     return {
@@ -101,9 +100,9 @@ def commands_of(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str, obje
 def load_with(
     stack: str | None, file: Path, root: Path | None, world_path: Sequence[Path], variation: str = ""
 ) -> LoadedScenario:
-    """A scenario or one of its variations, with the stack that a `--stack` means or its own, ready to be prepared.
+    """Load a scenario or one of its variations with the stack of a `--stack` option or its own.
 
-    Raises InvalidInput, and UsageError where it has no such variation or none is named.
+    Raises InvalidInput, and UsageError if the variation does not exist or is not named.
     """
     home = root or default_root([file])
     stacks = stacks_of([] if stack is None else [stack], home, world_path)
@@ -115,17 +114,17 @@ def load_with(
 
 
 def stacks_of(written: Sequence[str], root: Path, world_path: Sequence[Path] = ()) -> Stacks:
-    """What was given as --stack.
+    """Parse the values of --stack.
 
-    Raises UsageError for what cannot be read, cannot be run or has the name of another, InvalidInput for a stack file
-    or a configuration that is wrong.
+    Raises UsageError for a malformed value, a missing program, or a duplicate name, and InvalidInput for an invalid
+    stack file or configuration.
     """
     stacks = Stacks()
     choices: dict[str, StackChoice] = {}
     for text in written:
         choice = _choice(text, root, world_path, stacks)
         if choice.name.casefold() in choices:
-            raise UsageError(f"--stack {harmless(text)}: there is another stack of that name; give it its own")
+            raise UsageError(f"--stack {escaped(text)}: the name is already used; choose another")
         choices[choice.name.casefold()] = choice
     return Stacks(tuple(choices.values()))
 
@@ -133,10 +132,10 @@ def stacks_of(written: Sequence[str], root: Path, world_path: Sequence[Path] = (
 def _choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -> StackChoice:
     name, equals, value = text.partition("=")
     if not _NAME.fullmatch(name):
-        hint = "a name has letters, digits, `_`, `.` and `-`"
-        raise UsageError(f"cannot read --stack {harmless(text)}: expected NAME=VALUE; {hint}")
+        hint = "a name consists of letters, digits, `_`, `.`, and `-`"
+        raise UsageError(f"cannot read --stack {escaped(text)}: expected NAME=VALUE; {hint}")
     if RunKey("", 1, stack_name=name.casefold()).repeats:
-        raise UsageError(f"--stack {harmless(text)}: no stack may be called {quoted(name)}; it names second runs")
+        raise UsageError(f"--stack {escaped(text)}: the name {quoted(name)} is reserved for second runs")
     value = value if equals else name
     if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):
         return StackChoice(name, value, type=value)
@@ -151,20 +150,17 @@ def _choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -
 
 
 def _command(text: str, value: str, may_be_new: bool, stacks: Stacks) -> ExternalCommand:
-    """A name in the configuration, or a command."""
+    """Return the command of a name in the configuration, or the command written in the option."""
     if _NAME.fullmatch(value) and (known := stacks.command(value)) is not None:
         return known
     if not may_be_new:
         names = [REFERENCE, *(entry.name for entry in entries("stack")), *stacks.config.spec.stacks]
-        told = f"{quoted(value)} is neither a type of stack nor a name in {stacks.config.file}"
-        raise UsageError(f"cannot read --stack {harmless(text)}: expected NAME=VALUE; {told}; {_near(value, names)}")
+        reason = f"{quoted(value)} is neither a stack type nor a name in {stacks.config.file}"
+        hint = suggestion(value, dict.fromkeys(names))
+        raise UsageError(f"cannot read --stack {escaped(text)}: expected NAME=VALUE; {reason}; {hint}")
     from simscen.loading.stacks.program import parse_command
 
     try:
-        return parse_command(value, environment(), Path.cwd())
+        return parse_command(value, caller_environment(), Path.cwd())
     except ValueError as error:
-        raise UsageError(f"--stack {harmless(text)}: {harmless(str(error))}") from error
-
-
-def _near(word: str, names: Sequence[str]) -> str:
-    return suggestion(word, dict.fromkeys(names))
+        raise UsageError(f"--stack {escaped(text)}: {escaped(str(error))}") from error

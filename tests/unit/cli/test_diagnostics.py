@@ -2,7 +2,7 @@ import io
 
 import pytest
 
-from simscen.cli.diagnostics import as_github, as_text, harmless, print_text
+from simscen.cli.diagnostics import as_github, as_text, escaped, print_text
 from simscen.core.problems import Problem
 
 
@@ -61,7 +61,7 @@ def test_a_problem_without_a_line_is_one_line() -> None:
     "text", ["::error::x", "  ::set-output name=a::b", "##[error]x", "a\n::error::b", "\x1b[31m", "\u202e"]
 )
 def test_foreign_text_is_not_obeyed(text: str) -> None:
-    shown = harmless(text)
+    shown = escaped(text)
     assert not shown.lstrip().startswith("::")
     assert "##[" not in shown
     assert "\n" not in shown

@@ -44,14 +44,14 @@ def test_one_ill_thing_is_told_and_the_rest_is_checked(simscen, quick, monkeypat
 
 
 def test_the_cache_of_worlds_is_told_and_one_of_others_is_ill(tmp_path: Path, monkeypatch) -> None:
-    assert doctor.cache() == "nothing is kept between sessions (SIMSCEN_CACHE_DIR)"
+    assert doctor.cache() == "disabled by SIMSCEN_CACHE_DIR"
     monkeypatch.setenv("SIMSCEN_CACHE_DIR", str(tmp_path))
     folder = cache_folder(os.environ)
-    assert doctor.cache() == f"{folder}: nothing there yet"
+    assert doctor.cache() == f"{folder}: empty"
     KeptFiles(folder).put("a" * 64, bytes(99_968))
     assert doctor.cache() == f"{folder}: 1 files, 0.1 MB of at most 256; to be deleted at any time"
     folder.chmod(0o777)
-    with pytest.raises(installation.Ill, match="others may write to it"):
+    with pytest.raises(installation.CheckFailed, match="others may write to it"):
         doctor.cache()
 
 
@@ -60,9 +60,9 @@ def test_speed_is_that_of_a_patrol_beside_pybullet(monkeypatch) -> None:
         return run_speed.Patrol(60.0, cpu, {"physics": 1.0}, bare, (cpu,), (bare,), {"physics": (1.0,)})
 
     monkeypatch.setattr(run_speed, "measure_patrol", lambda _: patrol(2.0, 0.5))
-    assert doctor.speed() == "30 times real time on one core, 4.0 times what PyBullet alone takes"
+    assert doctor.speed() == "30 times real time on one core, 4.0 times the cost of PyBullet alone"
     monkeypatch.setattr(run_speed, "measure_patrol", lambda _: patrol(90.0, 20.0))
-    with pytest.raises(installation.Ill, match="a faster processor"):
+    with pytest.raises(installation.CheckFailed, match="a faster processor"):
         doctor.speed()
 
 
@@ -77,27 +77,27 @@ def test_speed_is_that_of_a_patrol_beside_pybullet(monkeypatch) -> None:
 def test_limits_that_are_too_tight_are_told_with_what_helps(monkeypatch, what, value, told) -> None:
     real = resource.getrlimit
     monkeypatch.setattr(resource, "getrlimit", lambda asked: (value, value) if asked == what else real(asked))
-    with pytest.raises(installation.Ill, match=re.escape(told)):
-        installation.limits()
+    with pytest.raises(installation.CheckFailed, match=re.escape(told)):
+        installation.resource_limits()
 
 
 def test_the_memory_of_a_container_counts(monkeypatch) -> None:
     monkeypatch.setattr(installation, "_cgroup_memory", lambda: 300 << 20)
-    with pytest.raises(installation.Ill, match="a run gets 300 MiB of memory"):
-        installation.limits()
+    with pytest.raises(installation.CheckFailed, match="a run gets 300 MiB of memory"):
+        installation.resource_limits()
 
 
 def test_packages_that_do_not_fit_are_ill(monkeypatch) -> None:
-    monkeypatch.setattr(installation, "unmet", lambda: ["numpy 1.0 is installed"])
-    with pytest.raises(installation.Ill, match=r"numpy 1\.0 is installed"):
+    monkeypatch.setattr(installation, "unmet_requirements", lambda: ["numpy 1.0 is installed"])
+    with pytest.raises(installation.CheckFailed, match=r"numpy 1\.0 is installed"):
         installation.packages()
 
 
 def test_other_pythons_and_missing_packages_are_ill(monkeypatch) -> None:
-    with pytest.raises(installation.Ill, match="pip install no-such-package"):
+    with pytest.raises(installation.CheckFailed, match="pip install no-such-package"):
         installation._version("no-such-package")
     monkeypatch.setattr(sys, "version_info", (3, 12, 1))
-    with pytest.raises(installation.Ill, match=r"needs 3\.10 or 3\.11"):
+    with pytest.raises(installation.CheckFailed, match=r"needs Python 3\.10 or 3\.11"):
         installation.python()
 
 
@@ -106,25 +106,25 @@ def test_a_sandbox_without_pidfd_is_ill(monkeypatch) -> None:
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "pidfd_open", refused)
-    with pytest.raises(installation.Ill, match="Operation not permitted"):
+    with pytest.raises(installation.CheckFailed, match="Operation not permitted"):
         installation.pidfd()
 
 
 def test_a_folder_that_takes_no_files_is_ill(tmp_path) -> None:
-    with pytest.raises(installation.Ill, match="cannot write in"):
+    with pytest.raises(installation.CheckFailed, match="cannot write in"):
         installation.writable(tmp_path / "nowhere")
 
 
 def test_it_tells_what_the_names_of_stacks_run_and_what_of_that_is_not_there(monkeypatch, tmp_path: Path) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     file = tmp_path / "simscen/config.yaml"
-    assert doctor.stacks() == f"no {file}, so --stack alone says what external stacks run"
+    assert doctor.stacks() == f"{file} does not exist; define external stacks with --stack"
     file.parent.mkdir()
     file.write_text("stacks: {mine: {command: sh -c 'exit 0'}, other: {command: sh}}\n")
     assert doctor.stacks() == f"{file}: mine = sh -c 'exit 0', other = sh"
     file.write_text("stacks:\n  mine: {command: ./gone}\n")
-    with pytest.raises(installation.Ill, match=r"config\.yaml:2:19: no such file or directory: `\./gone`"):
+    with pytest.raises(installation.CheckFailed, match=r"config\.yaml:2:19: no such file or directory: `\./gone`"):
         doctor.stacks()
     file.write_text("stacks: [mine]\n")
-    with pytest.raises(installation.Ill, match=r"config\.yaml:1:9: expected a mapping, got a list"):
+    with pytest.raises(installation.CheckFailed, match=r"config\.yaml:1:9: expected a mapping, got a list"):
         doctor.stacks()

@@ -58,7 +58,7 @@ def test_no_robot_is_without_reverse_so_that_none_is_told_to_do_what_it_cannot()
         Limits.model_validate({**base, "reverse": 0.0})
 
 
-@pytest.mark.parametrize(("name", "hint"), [("collision_s", "did you mean"), ("zzzzzz", "lists what there is")])
+@pytest.mark.parametrize(("name", "hint"), [("collision_s", "did you mean"), ("zzzzzz", "for a list")])
 def test_an_unknown_name_is_a_usage_error(simscen, name: str, hint: str) -> None:
     ended = simscen("explain", name)
     assert ended.code == 2

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.process import config_file, environment
+from simscen.cli.process import caller_environment, config_file
 from simscen.cli.session.selection import Selection, load_all
 from simscen.core.errors import UsageError
 from simscen.run.digest import digest
@@ -74,7 +74,7 @@ def test_a_file_that_names_a_stack_of_others_is_valid_with_a_warning(simscen, pr
         ("mine='unclosed", "cannot be read as a command: no closing quotation"),
         ("mine=", "names no program"),
         ("mine=''", "names no program"),
-        ("mein", "`mein` is neither a type of stack nor a name in"),
+        ("mein", "`mein` is neither a stack type nor a name in"),
         ("refrence", "did you mean `reference`?"),
     ],
 )
@@ -144,8 +144,8 @@ def test_the_users_environment_is_as_simscen_was_called_with(simscen, project: P
     monkeypatch.delenv("PYDANTIC_DISABLE_PLUGINS", raising=False)
     monkeypatch.setenv("SOME_SECRET", "x")
     simscen("list", ".")
-    assert "PYDANTIC_DISABLE_PLUGINS" not in environment()
-    assert environment()["SOME_SECRET"] == "x"
+    assert "PYDANTIC_DISABLE_PLUGINS" not in caller_environment()
+    assert caller_environment()["SOME_SECRET"] == "x"
 
 
 def test_the_configuration_is_where_xdg_says(monkeypatch, tmp_path: Path) -> None:

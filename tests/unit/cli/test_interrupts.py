@@ -27,7 +27,7 @@ def ended(times, second="SIGINT"):
 def test_the_second_ends_it_at_once_and_says_how_to_get_the_reports():
     done = ended([0.0, 3.0])
     assert (done.returncode, done.stdout) == (130, "interrupted by 2\n")
-    assert done.stderr.startswith("simscen: ended at once, without reports: `simscen report` makes them")
+    assert done.stderr.startswith("simscen: stopped without reports; run `simscen report`")
     assert ended([0.0, 3.0], "SIGTERM").returncode == 143
 
 

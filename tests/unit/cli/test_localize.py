@@ -26,7 +26,7 @@ def test_a_drive_on_slipping_wheels_is_followed_in_every_format(simscen, tmp_pat
     assert found["error"]["max"] < 0.2
     assert found["error"]["rmse"] < 0.1
     assert found["lost"] == []
-    assert "ms of processor time per scan" in ended.err
+    assert "ms of CPU time per scan" in ended.err
     assert (tmp_path / "way.png").stat().st_size > 1000
     assert simscen("localize", log, *GIVEN, "--json").out == ended.out
 

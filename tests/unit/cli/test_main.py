@@ -10,7 +10,7 @@ from simscen.core.errors import NothingSelected, UsageError
 def test_help_lists_the_commands_without_importing_them(simscen) -> None:
     ended = simscen("--help")
     assert ended.code == 0
-    assert "validate Check scenario, world, robot and stack files without running anything." in " ".join(
+    assert "validate Check scenario, world, robot, and stack files without running anything." in " ".join(
         ended.out.split()
     )
 

@@ -15,7 +15,7 @@ def test_never_overwrites(simscen, tmp_path: Path) -> None:
     (tmp_path / "mine.scenario.yaml").write_text("precious")
     ended = simscen("new", "mine")
     assert ended.code == 2
-    assert "mine.scenario.yaml is there already" in ended.err
+    assert "mine.scenario.yaml already exists" in ended.err
     assert (tmp_path / "mine.scenario.yaml").read_text() == "precious"
 
 
@@ -50,7 +50,7 @@ def test_a_copy_within_a_project_names_the_same_files_and_keeps_comments(simscen
 
 @pytest.mark.parametrize(
     ("like", "told"),
-    [("outdated_mop", "did you mean `navigation/outdated_map`"), ("cart_crossing", "several shipped scenarios")],
+    [("outdated_mop", "did you mean `navigation/outdated_map`"), ("cart_crossing", "is ambiguous")],
 )
 def test_a_scenario_to_copy_that_is_not_there_or_not_the_only_one_is_told(simscen, like: str, told: str) -> None:
     ended = simscen("new", "mine", "--like", like)

@@ -41,4 +41,4 @@ def test_every_exit_code_is_explained() -> None:
 
 def test_names_with_stars_and_brackets_stay_what_they_are() -> None:
     assert r"\*.scenario.yaml" in section("validate", dict(calls())["validate"])
-    assert r"simscen-out/\<run-id>" in section("run", dict(calls())["run"])
+    assert r"simscen-out/\<session id>" in section("run", dict(calls())["run"])

@@ -24,7 +24,7 @@ class Hello(Spec, Criterion):
 def test_nothing_installed_is_said_in_words(simscen) -> None:
     done = simscen("plugins")
     assert (done.code, done.err) == (0, "")
-    assert done.out == "no installed package adds anything: none has entry points in a group `simscen.…`\n"
+    assert done.out == "no plug-ins: no installed package has entry points in a group `simscen.…`\n"
 
 
 def test_every_type_is_listed_with_its_package_and_its_first_sentence(simscen, yardwork) -> None:
@@ -99,4 +99,4 @@ def test_a_check_of_its_own_that_breaks_down_is_a_problem_of_the_file(simscen, p
 def test_a_folder_of_scenarios_is_never_code(simscen, packages, tmp_path, monkeypatch) -> None:
     monkeypatch.syspath_prepend(str(tmp_path))  # as `python -m` does with the working directory
     packages.lay(tmp_path, "hello", "1.0", {"criterion": {"hello": "hello:Hello"}}, hello="raise SystemExit('it ran')")
-    assert simscen("plugins").out.startswith("no installed package adds anything")
+    assert simscen("plugins").out.startswith("no plug-ins")

@@ -79,7 +79,7 @@ def test_what_is_no_log_is_told(simscen, arguments: tuple[str, ...], code: int, 
 
 def test_one_page_cannot_be_that_of_several_runs(simscen, out: Path) -> None:
     ended = simscen("replay", str(out), "--out", "page.html")
-    assert ended.code == 2 and "--out is for one run, and there are 2" in ended.err
+    assert ended.code == 2 and "--out takes one run, but 2 were found" in ended.err
 
 
 def test_the_log_is_not_overwritten(simscen, out: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from simscen.cli import installation
+from simscen.cli import requirements
 from simscen.cli.start import start
 
 PYPROJECT = (Path(__file__).parents[3] / "pyproject.toml").read_text()
@@ -31,8 +31,8 @@ def installed(monkeypatch):
 
 
 def test_this_installation_has_what_it_needs() -> None:
-    assert installation.unmet() == []
-    assert installation.unmet_typer() == []
+    assert requirements.unmet_requirements() == []
+    assert requirements.unmet_typer() == []
 
 
 @pytest.mark.parametrize(
@@ -54,13 +54,13 @@ def test_this_installation_has_what_it_needs() -> None:
 )
 def test_versions_are_compared(installed, need, version, fits) -> None:
     installed([need], numpy=version)
-    assert (installation.unmet() == []) is fits
+    assert (requirements.unmet_requirements() == []) is fits
 
 
 def test_what_is_wrong_is_told_with_what_helps(installed) -> None:
     installed(["typer<1,>=0.20", "ompl>=2"], typer="0.12.5")
-    assert installation.unmet() == [
-        "typer 0.12.5 is installed, and simscen needs typer>=0.20,<1: pip install 'typer>=0.20,<1'",
+    assert requirements.unmet_requirements() == [
+        "typer 0.12.5 is installed, but simscen needs typer>=0.20,<1: pip install 'typer>=0.20,<1'",
         "ompl is not installed: pip install 'ompl'",
     ]
 
@@ -72,7 +72,7 @@ def test_a_run_that_cannot_work_is_not_begun(installed, monkeypatch, capsys) -> 
         start()
     assert end.value.code == 3
     assert capsys.readouterr().err == (
-        "simscen: this installation does not work: pybullet 3.2.6 is installed, and simscen needs pybullet>=3.2.7: "
+        "simscen: this installation does not work: pybullet 3.2.6 is installed, but simscen needs pybullet>=3.2.7: "
         "pip install 'pybullet>=3.2.7'\n"
     )
 
@@ -84,12 +84,12 @@ def test_a_typer_that_misreads_options_reads_none(monkeypatch, capsys, command) 
     with pytest.raises(SystemExit) as end:
         start()
     assert end.value.code == 3
-    assert "typer 0.12.5 is installed, and simscen needs typer>=0.20" in capsys.readouterr().err
+    assert "typer 0.12.5 is installed, but simscen needs typer>=0.20" in capsys.readouterr().err
 
 
 def test_the_oldest_typer_is_that_of_pyproject() -> None:
     (oldest,) = re.findall(r'"typer>=([\d.]+),', PYPROJECT)
-    assert tuple(map(int, oldest.split("."))) == installation.TYPER
+    assert tuple(map(int, oldest.split("."))) == requirements.MIN_TYPER
 
 
 def test_every_dependency_has_bounds_that_are_read() -> None:

@@ -3,8 +3,8 @@ import sys
 
 LATER = """
 import sys
-from simscen.cli.lazy_import import import_later
-import_later("{name}")
+from simscen.cli.lazy_import import import_lazily
+import_lazily("{name}")
 import {name} as early
 assert "{probe}" not in sys.modules
 {use}
@@ -32,7 +32,7 @@ def test_a_library_that_is_there_already_stays() -> None:
         [
             sys.executable,
             "-c",
-            "import json; from simscen.cli.lazy_import import import_later as l; l('json'); json.dumps(1)",
+            "import json; from simscen.cli.lazy_import import import_lazily as l; l('json'); json.dumps(1)",
         ],
         check=True,
     )
@@ -41,8 +41,8 @@ def test_a_library_that_is_there_already_stays() -> None:
 def test_a_function_can_be_imported_without_the_library_until_it_is_called() -> None:
     code = """
 import sys
-from simscen.cli.lazy_import import import_later
-import_later("importlib.metadata", "entry_points")
+from simscen.cli.lazy_import import import_lazily
+import_lazily("importlib.metadata", "entry_points")
 from importlib.metadata import entry_points
 import importlib
 assert "email" not in sys.modules
@@ -55,8 +55,8 @@ from importlib.metadata import distribution
 
 def test_another_name_of_such_a_library_brings_all_of_it() -> None:
     code = """
-from simscen.cli.lazy_import import import_later
-import_later("importlib.metadata", "entry_points")
+from simscen.cli.lazy_import import import_lazily
+import_lazily("importlib.metadata", "entry_points")
 import importlib.metadata
 from importlib.metadata import entry_points
 assert importlib.metadata.version("simscen") and entry_points(group="console_scripts").names
