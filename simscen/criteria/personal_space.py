@@ -11,7 +11,7 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, undecided
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, pedestrian_gap
 from simscen.criteria.trace_signals.ground_truth import speed
-from simscen.criteria.trace_signals.readers import SignalUnavailable
+from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.spec.base import Spec
 from simscen.spec.quantities import NonNegativeLength
 

@@ -13,7 +13,7 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, undecided
 from simscen.criteria.trace_signals.catalog import SignalName, read_signal
 from simscen.criteria.trace_signals.ground_truth import speed
-from simscen.criteria.trace_signals.readers import SignalUnavailable
+from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.criteria.trace_signals.sparc_ldlj import MOVED_SPEED_M_S, ldlj, sparc
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAcceleration, PositiveJerk

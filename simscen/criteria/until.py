@@ -1,54 +1,45 @@
-"""`until`: something holds until something else does."""
+"""`until`: a condition is true until another one is."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from simscen.core.verdict import Finding
-from simscen.criteria.stl import condition
-from simscen.criteria.stl import description as words
-from simscen.criteria.stl.condition import Condition, Release
-from simscen.criteria.stl.criterion import TemporalCriterion, temporal_finding
-from simscen.criteria.stl.robustness import robustness, until_robustness
+from simscen.criteria.stl.condition import Condition, Release, until_horizon
+from simscen.criteria.stl.criterion import TemporalCriterion
+from simscen.criteria.stl.description import describe_until
+from simscen.criteria.stl.robustness import EvaluationContext, until_robustness
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.criteria.stl.robustness import Robustness
 
 
 class Until(Release, TemporalCriterion):
-    """A condition held from the start until another one came true, and that came true in time.
+    """A condition was true from the start until another one became true, and that happened in time.
 
     What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the best
-        release: the lesser of how well it held and how well `hold` held at every sample before it.
-    When it fails: `release` did not hold in the window, or `hold` was broken before it did.
-    Why this: order matters: not to move before the map is there is neither always nor eventually.
-    Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, in discrete time.
+        release: the lesser of the margins of `release` there and of `hold` at every sample before it.
+    When it fails: `release` was not true in the window, or `hold` was false before it was.
+    Why this: order matters. Not to move before the map is there can be said neither with always nor with eventually.
+    Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.
 
-    Inconclusive when the window goes on after the end of the run, with `hold` unbroken and nothing released.
+    Inconclusive if the window goes on after the end of the run, with `hold` true so far and no release.
 
     Example: `until: {hold: {signal: speed, op: "<=", value: 0.01 m/s}, release: {signal: localized}, within: 5 s}`
     """
 
     def compared(self) -> list[Condition]:
-        """Every comparison in it."""
+        """Return every comparison in both conditions."""
         return [*self.hold.comparisons(), *self.release.comparisons()]
+
+    def formula(self) -> str:
+        """Return the condition in words."""
+        return describe_until(self.hold, self.release, self)
 
     @property
     def horizon(self) -> float:
-        """The first moment at which it may be released."""
-        return condition.until_horizon(self.release, self)
+        """Seconds until the first moment at which the release counts."""
+        return until_horizon(self.release, self)
 
-    def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """The moment of the best release, or of what broke the hold before it."""
-        return [
-            temporal_finding(
-                trace,
-                case,
-                words.describe_until(self.hold, self.release, self),
-                self.compared(),
-                lambda scene: until_robustness(
-                    robustness(self.hold, scene), robustness(self.release, scene), scene.window(self), scene
-                ),
-            )
-        ]
+    def evaluate(self, context: EvaluationContext) -> Robustness:
+        """Return the robustness, decided by the best release or by what broke `hold` before it."""
+        return until_robustness(self.hold, self.release, self, context)

@@ -37,5 +37,5 @@ def test_the_robustness_is_that_of_rtamt_where_the_trace_is_long_enough(formula,
     spec.spec = f"out = {as_rtamt(formula)}"
     spec.parse()
     theirs = spec.evaluate({"time": list(range(length)), "p": p, "q": q})[0][1]
-    ours = robustness(validated(formula), EvaluationContext.of(run(p, q), CASE, over=True))
+    ours = robustness(validated(formula), EvaluationContext(run(p, q), CASE, over=True))
     assert ours.low[0] == ours.high[0] == pytest.approx(theirs, abs=1e-12)

@@ -115,14 +115,18 @@ def kind(signal: Signal) -> str:
 def text_of(signal: Signal) -> str:
     """What it is, its unit, and what it is about."""
     return (
-        f"{signal.text}\n\nIt is a {kind(signal)}.{_keys(signal)}" if not signal.asks else signal.text + _keys(signal)
+        f"{signal.text}\n\nIt is a {kind(signal)}.{_keys(signal)}"
+        if not signal.is_boolean
+        else signal.text + _keys(signal)
     )
 
 
 def example(name: str, signal: Signal) -> str:
     """A condition that uses it."""
-    about = "".join(f", {key}: {_EXAMPLES[key]}" for key in (*signal.about[:1], *signal.perhaps))
-    bound = "" if signal.asks else f', op: "<=", value: 1.5 {signal.unit}'.rstrip()
+    about = "".join(
+        f", {key}: {_EXAMPLES[key]}" for key in (*signal.required_arguments[:1], *signal.optional_arguments)
+    )
+    bound = "" if signal.is_boolean else f', op: "<=", value: 1.5 {signal.unit}'.rstrip()
     return f"{{signal: {name}{about}{bound}}}"
 
 
@@ -138,8 +142,10 @@ _EXAMPLES = {
 
 
 def _keys(signal: Signal) -> str:
-    needed = f" Needs {' or '.join(f'`{key}`' for key in signal.about)}." if signal.about else ""
-    return needed + "".join(f" May name one: `{key}`." for key in signal.perhaps)
+    needed = (
+        f" Needs {' or '.join(f'`{key}`' for key in signal.required_arguments)}." if signal.required_arguments else ""
+    )
+    return needed + "".join(f" May name one: `{key}`." for key in signal.optional_arguments)
 
 
 def signals_page() -> str:
@@ -154,7 +160,7 @@ def signals_page() -> str:
 
 
 def _cell(signal: Signal) -> str:
-    names = [f"`{key}`" for key in signal.about] + [f"(`{key}`)" for key in signal.perhaps]
+    names = [f"`{key}`" for key in signal.required_arguments] + [f"(`{key}`)" for key in signal.optional_arguments]
     return " or ".join(names)
 
 

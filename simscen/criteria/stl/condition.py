@@ -1,4 +1,4 @@
-"""Conditions: comparisons of signals, combined by logic and by time, as a user writes them."""
+"""Conditions as a user writes them: comparisons of signals, combined by logic and by time."""
 
 from __future__ import annotations
 
@@ -16,55 +16,55 @@ from simscen.spec.references import EventName, GoalName, HappeningName, MoverNam
 
 Op = Literal[">=", ">", "<=", "<"]
 OPERATORS = ("signal", "all", "any", "not_", "always", "eventually", "until", "whenever")
-SIGNAL_ARGUMENTS = ("object", "point", "goal", "region", "fault", "event", "recovery", "with_")
+ARGUMENT_KEYS = ("object", "point", "goal", "region", "fault", "event", "recovery", "with_")
 
 
 class Condition(Spec):
-    """Something that holds or does not at each moment of a run: a signal against a bound, or conditions combined.
+    """A statement that is true or false at each moment of a run: a signal compared with a bound, or a combination.
 
-    Exactly one of signal, all, any, not, always, eventually, until, whenever; the other keys belong to a signal.
+    Takes exactly one of signal, all, any, not, always, eventually, until, whenever; the other keys belong to a signal.
     """
 
     signal: SignalName | None = None
     """A named signal; `simscen explain signals` lists them."""
     op: Op | None = None
-    """How it compares with `value`; left out for a signal that is yes or no."""
+    """How the signal compares with `value`; left out for a yes-or-no signal."""
     value: Annotated[float, AnyQuantity()] | None = None
     """The bound, with a unit of the signal's dimension or in SI."""
     scale: Annotated[float, AnyQuantity()] | None = None
-    """How much of it weighs as much as one scale of another signal; the margin then counts in scales."""
+    """The amount that counts as much as one scale of another signal; the margin is then in scales."""
     object: MoverName | None = None
-    """What `distance_to` is measured to: a thing that can move."""
+    """Movable object to which `distance_to` is measured."""
     point: PlaceOrPoint | None = None
-    """What `distance_to` is measured to: x and y in metres, or a place by name."""
+    """Point to which `distance_to` is measured: x and y in meters, or a place by name."""
     goal: GoalName | None = None
-    """The goal that `distance_to` or `goal_active` is about."""
+    """Goal of `distance_to` or `goal_active`."""
     region: RegionName | None = None
-    """The region that `in_region` is about."""
+    """Region of `in_region`."""
     fault: HappeningName | None = None
-    """The fault that `fault_active` or `started` is about, e.g. `lidar.off`."""
+    """Fault of `fault_active` or `started`, e.g. `lidar.off`."""
     event: EventName | None = None
-    """The event that `event_active` or `started` is about."""
+    """Event of `event_active` or `started`."""
     recovery: BehaviorName | None = None
-    """The recovery that `recovery_active` is about."""
+    """Recovery of `recovery_active`."""
     with_: ObjectName | None = Field(default=None, alias="with")
-    """The thing that `in_collision` is about."""
+    """Object of `in_collision`."""
     all: Annotated[list[Condition], Field(min_length=1, max_length=50)] | None = None
-    """Holds while all of these do."""
+    """True while all of these are true."""
     any: Annotated[list[Condition], Field(min_length=1, max_length=50)] | None = None
-    """Holds while at least one of these does."""
+    """True while at least one of these is true."""
     not_: Condition | None = Field(default=None, alias="not")
-    """Holds while this does not."""
+    """True while this is false."""
     always: Windowed | None = None
-    """Holds when this does at every moment of the window from now on."""
+    """True if this is true at every moment of the window from now on."""
     eventually: Windowed | None = None
-    """Holds when this does at some moment of the window from now on."""
+    """True if this is true at some moment of the window from now on."""
     until: Release | None = None
-    """Holds when `hold` does from now on until `release` does."""
+    """True if `hold` is true from now on until `release` is."""
     whenever: Condition | None = None
-    """With `then` beside it: holds when, from now on, `then` does at every moment at which this does."""
+    """With `then`: true if, from now on, `then` is true whenever this is. Undecided if this never is."""
     then: Condition | None = None
-    """What must hold whenever `whenever` does."""
+    """Condition that must be true whenever `whenever` is."""
 
     @field_validator("op", mode="before")
     @classmethod
@@ -96,47 +96,47 @@ class Condition(Spec):
         return self
 
     def _no_keys_of_a_signal(self, shape: str) -> None:
-        wrong = [name for name in ("op", "value", "scale", *SIGNAL_ARGUMENTS) if getattr(self, name) is not None]
+        wrong = [name for name in ("op", "value", "scale", *ARGUMENT_KEYS) if getattr(self, name) is not None]
         if wrong:
             raise ValueError(f"`{wrong[0].rstrip('_')}` belongs to a signal, not to `{shape}`")
 
     @property
-    def measured(self) -> Signal:
-        """The signal that it compares. Raises AssertionError for conditions combined."""
+    def definition(self) -> Signal:
+        """The signal that it compares. Raises AssertionError for a combination."""
         assert self.signal is not None
         return SIGNALS[self.signal]
 
     @property
-    def about(self) -> dict[str, Any]:
-        """What the signal is about, by key."""
-        return {name.rstrip("_"): told for name in SIGNAL_ARGUMENTS if (told := getattr(self, name)) is not None}
+    def arguments(self) -> dict[str, Any]:
+        """The arguments of the signal, by key."""
+        return {name.rstrip("_"): value for name in ARGUMENT_KEYS if (value := getattr(self, name)) is not None}
 
     def comparisons(self) -> Iterator[Condition]:
-        """Every comparison of a signal in it, in the order it is written."""
+        """Yield each comparison of a signal, in the order in which it is written."""
         if self.signal is not None:
             yield self
         for part in self.parts():
             yield from part.comparisons()
 
     def parts(self) -> list[Condition]:
-        """The conditions it is made of."""
+        """Return the operands."""
         until = () if self.until is None else (self.until.hold, self.until.release)
         single = (self.not_, self.always, self.eventually, *until, self.whenever, self.then)
         return [*(self.all or ()), *(self.any or ()), *(part for part in single if part is not None)]
 
 
 class Window(Spec):
-    """A stretch of time ahead; without any key, all that is left of the run."""
+    """Interval of time from each moment on; without any key, the rest of the run."""
 
     within: PositiveDuration | None = None
-    """From now until so many seconds ahead."""
+    """From now until this many seconds ahead."""
     after: PositiveDuration | None = None
-    """From so many seconds ahead to the end of the run."""
+    """From this many seconds ahead to the end of the run."""
     between: Annotated[list[Duration], Field(min_length=2, max_length=2)] | None = None
-    """From so many seconds ahead to so many."""
+    """From the first to the second number of seconds ahead."""
 
     @model_validator(mode="after")
-    def _one_stretch(self) -> Window:
+    def _check_interval(self) -> Window:
         given = [name for name in ("within", "after", "between") if getattr(self, name) is not None]
         if len(given) > 1:
             raise ValueError(f"only one of {', '.join(given)} may be given here")
@@ -145,41 +145,41 @@ class Window(Spec):
         return self
 
     @property
-    def stretch(self) -> tuple[float, float | None]:
-        """Its begin and its end in seconds ahead; None = the end of the run."""
+    def interval(self) -> tuple[float, float | None]:
+        """Begin and end in seconds ahead; an end of None is the end of the run."""
         if self.between is not None:
             return self.between[0], self.between[1]
         return self.after or 0.0, self.within
 
 
 class Windowed(Window, Condition):
-    """A condition and the stretch of time in which it is looked at."""
+    """A condition, and the interval of time in which it is evaluated."""
 
 
 class Release(Window):
-    """`hold` must hold until `release` does, and `release` must do so in the window."""
+    """`hold` must be true until `release` is, and `release` must become true in the window."""
 
     hold: Condition
-    """What must hold up to the moment before the release."""
+    """Condition that must be true up to the moment before the release."""
     release: Condition
-    """What ends that."""
+    """Condition that ends the wait."""
 
 
 def _dimension_of(value: Any) -> str:
-    """The quantity whose unit a text ends with; "" for none."""
+    """Return the dimension of the unit at the end of a text; "" for none."""
     unit = str(value).split(maxsplit=1)[-1]
     return next((dimension for dimension, units in UNITS.items() if unit in units), "")
 
 
 def _check_signal(condition: Condition, name: str, signal: Signal) -> None:
-    """Raise ValueError for a comparison that does not fit its signal, or that no run can decide either way."""
-    about = condition.about
-    unknown = [key for key in about if key not in (*signal.about, *signal.perhaps)]
+    """Raise ValueError if a comparison does not fit its signal, or if every run would decide it in the same way."""
+    arguments = condition.arguments
+    unknown = [key for key in arguments if key not in (*signal.required_arguments, *signal.optional_arguments)]
     if unknown:
-        raise ValueError(f"`{name}` is not about `{unknown[0]}`")
-    if signal.about and len(about) != 1:
-        raise ValueError(f"`{name}` needs exactly one of: {', '.join(signal.about)}")
-    if signal.asks:
+        raise ValueError(f"`{name}` takes no `{unknown[0]}`")
+    if signal.required_arguments and len(arguments) != 1:
+        raise ValueError(f"`{name}` needs exactly one of: {', '.join(signal.required_arguments)}")
+    if signal.is_boolean:
         plain = condition.op is None and condition.value is None
         if condition.scale is not None or not (plain or (condition.op == ">=" and condition.value == 1)):
             raise ValueError(f"`{name}` is yes or no: write it alone, or below `not`")
@@ -192,7 +192,7 @@ def _check_signal(condition: Condition, name: str, signal: Signal) -> None:
 
 
 def _check_decidable(op: Op, value: float, name: str, signal: Signal) -> None:
-    least, most, unit = signal.least, signal.most, f" {signal.unit}".rstrip()
+    least, most, unit = signal.minimum, signal.maximum, f" {signal.unit}".rstrip()
     never_below = {">=": value <= least, ">": value < least, "<": value <= least, "<=": value < least}[op]
     never_above = {"<=": value >= most, "<": value > most, ">": value >= most, ">=": value > most}[op]
     if never_below or never_above:
@@ -202,14 +202,13 @@ def _check_decidable(op: Op, value: float, name: str, signal: Signal) -> None:
 
 
 for _model in (Condition, Windowed, Release):
-    _model.model_rebuild()  # they name each other, and the criteria made of them are in other modules
+    _model.model_rebuild()  # they refer to each other, and criteria in other modules derive from them
 
 
-# MERGED: How far ahead of a moment a condition must look before it can be decided.
 def decision_horizon(condition: Condition, holds: bool = True) -> float:
-    """The least seconds after which it can be known that it holds, or does not.
+    """Return the least number of seconds after which it can be known that a condition holds, or does not.
 
-    A window without an end is decided by the end of the run, whenever that is.
+    A window without an end is decided by the end of the run and adds nothing.
     """
     if condition.all is not None or condition.any is not None:
         every = (condition.all is not None) == holds
@@ -227,12 +226,12 @@ def decision_horizon(condition: Condition, holds: bool = True) -> float:
 
 
 def window_horizon(operator: str, part: Condition, window: Window, holds: bool = True) -> float:
-    """Of always or eventually: all of the window, or its first moment."""
-    begin, end = window.stretch
+    """Return the horizon of `always` or `eventually`: the whole window, or its first moment."""
+    begin, end = window.interval
     whole = (operator == "always") == holds
     return (begin if not whole or end is None else end) + decision_horizon(part, holds)
 
 
 def until_horizon(release: Condition, window: Window) -> float:
-    """Of a release in a window: its first moment."""
-    return window.stretch[0] + decision_horizon(release)
+    """Return the horizon of a release in a window: its first moment."""
+    return window.interval[0] + decision_horizon(release)

@@ -1,4 +1,4 @@
-"""Conditions in words, for people who read a verdict."""
+"""Conditions in words, as verdicts show them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _OPPOSITE: dict[Op, Op] = {">=": "<", ">": "<=", "<=": ">", "<": ">="}
 
 
 def describe(condition: Condition) -> str:
-    """All of it: "whenever localization_error > 0.5 m, then eventually within 5 s localization_error ≤ 0.3 m"."""
+    """Return all of it, e.g. "whenever localization_error > 0.5 m, then eventually within 5 s speed < 1 m/s"."""
     if condition.signal is not None:
         return f"{describe_signal(condition)} {_bound(condition)}".rstrip()
     if condition.all is not None:
@@ -36,22 +36,22 @@ def describe(condition: Condition) -> str:
 
 
 def describe_windowed(operator: str, part: Condition, window: Window) -> str:
-    """Always or eventually, in a window."""
+    """Return `always` or `eventually` in a window, in words."""
     return f"{' '.join(filter(None, (operator, describe_window(window))))} {_grouped(part)}"
 
 
 def describe_until(hold: Condition, release: Condition, window: Window) -> str:
-    """Hold until release, in a window."""
+    """Return `hold` until `release` in a window, in words."""
     return " ".join(filter(None, (_grouped(hold), "until", describe_window(window), _grouped(release))))
 
 
 def describe_response(premise: Condition, answer: Condition) -> str:
-    """Whenever the premise holds, the answer."""
+    """Return "whenever …, then …"."""
     return f"whenever {describe(premise)}, then {describe(answer)}"
 
 
 def describe_window(window: Window) -> str:
-    """A window; "" for all that is left of the run."""
+    """Return a window in words; "" for the rest of the run."""
     if window.between is not None:
         return f"between {window.between[0]:g} s and {window.between[1]:g} s"
     if window.after is not None:
@@ -60,16 +60,16 @@ def describe_window(window: Window) -> str:
 
 
 def describe_signal(condition: Condition) -> str:
-    """The signal and what it is about: "distance_to cart"."""
-    about = " ".join(str(told) for told in condition.about.values())
-    return f"{condition.signal} {about}".rstrip()
+    """Return the signal and its arguments: "distance_to cart"."""
+    arguments = " ".join(str(value) for value in condition.arguments.values())
+    return f"{condition.signal} {arguments}".rstrip()
 
 
 def describe_value(witness: Witness) -> str:
-    """The deciding value."""
+    """Return the deciding value with its unit."""
     comparison = witness.comparison
-    signal = comparison.measured
-    if signal.asks:
+    signal = comparison.definition
+    if signal.is_boolean:
         return "yes" if witness.value else "no"
     assert comparison.value is not None
     if math.isinf(witness.value):
@@ -78,10 +78,10 @@ def describe_value(witness: Witness) -> str:
 
 
 def describe_limit(witness: Witness) -> str:
-    """What it had to be."""
+    """Return the bound that the deciding value had to keep."""
     comparison = witness.comparison
-    signal = comparison.measured
-    if signal.asks:
+    signal = comparison.definition
+    if signal.is_boolean:
         return "no" if witness.negated else "yes"
     assert comparison.value is not None and comparison.op is not None
     op = _OPPOSITE[comparison.op] if witness.negated else comparison.op
@@ -90,13 +90,13 @@ def describe_limit(witness: Witness) -> str:
 
 
 def _bound(condition: Condition) -> str:
-    signal = condition.measured
-    if signal.asks:
+    signal = condition.definition
+    if signal.is_boolean:
         return ""
     assert condition.op is not None and condition.value is not None
     return f"{_SIGNS[condition.op]} {condition.value:g} {signal.unit}".rstrip()
 
 
 def _grouped(condition: Condition) -> str:
-    """In brackets unless it is a single comparison."""
+    """Return the condition in words, in parentheses unless it is a single comparison."""
     return describe(condition) if condition.signal is not None else f"({describe(condition)})"

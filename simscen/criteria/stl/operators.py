@@ -1,90 +1,121 @@
-"""Temporal operators on robustness signals: how well a condition holds over a window, at every sample, in O(n).
+"""Temporal operators on robustness values, sampled at any times: how well a condition holds over a window.
 
-The quantitative semantics of Donzé and Maler 2010 in discrete time, as rtamt has it: always is the least, eventually
-the greatest value in the window, until the best of its releases. Where rtamt passes vacuously beyond the end of a
-trace, each operator here is evaluated twice, with the worst and with the best continuation (Deshmukh et al. 2017,
-robust online monitoring): the truth lies between, and as long as the two disagree nothing is decided.
+The semantics is the quantitative one of Donzé and Maler 2010, over samples: `always` is the least and `eventually` the
+greatest value of the samples in the window, `until` the best of its releases. Where rtamt passes vacuously beyond the
+end of a trace, each operator is evaluated twice, with the worst and with the best continuation of the trace (Deshmukh
+et al. 2017, robust online monitoring). The truth lies between the two; while their signs differ, nothing is decided.
+
+Samples need not be evenly spaced. A window without a sample takes the newest sample before its end (sample and hold).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from simscen.core.geometry import Array
 
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
-class SampleWindow(NamedTuple):
-    """From `first` to `last` samples ahead, both included; None = to the end of the run."""
+    from simscen.core.samples import Ticks
 
-    first: int
-    last: int | None
+    Indices = npt.NDArray[np.int64]
+    Flags = npt.NDArray[np.bool_]
 
 
 class Continuation(NamedTuple):
-    """What is taken for granted beyond the last sample: `worst` or `best`, and whether the run is over there.
+    """Assumption about what follows the last sample.
 
-    Of a run that is over, a window without an end closes at its last sample; of a log that was cut off it does not.
+    `beyond` is the value assumed there: the worst or the best. `over` says that the run ended there: then a window
+    without an end closes at the last sample. In a truncated log it does not.
     """
 
     beyond: float
     over: bool
 
 
+@dataclass(frozen=True, eq=False)
+class SampleWindow:
+    """Window of each sample as an inclusive range of sample indices.
+
+    `first` is the number of samples where the window begins after the last one. `exceeds` is True where the window
+    reaches beyond the last sample. `unbounded` windows last to the end of the run.
+    """
+
+    first: Indices
+    last: Indices
+    exceeds: Flags
+    unbounded: bool
+
+    @classmethod
+    def over(cls, ticks: Ticks, period: int, begin: int, end: int | None) -> SampleWindow:
+        """Return the windows from `begin` to `end` ticks after each sample; `period` is the usual spacing in ticks."""
+        count = len(ticks)
+        first = np.searchsorted(ticks, ticks + begin, side="left")
+        if end is None:
+            return cls(first, np.full(count, count - 1), np.zeros(count, dtype=bool), True)
+        last = np.searchsorted(ticks, ticks + end, side="right") - 1
+        # The next sample would come one period after the last one.
+        exceeds = ticks + end >= ticks[-1:] + period
+        held = (last < first) & (first < count)
+        return cls(np.where(held, last, first), last, exceeds, False)
+
+
 def always(values: Array, window: SampleWindow, ahead: Continuation) -> Array:
-    """The least value in the window of each sample."""
+    """Return the least value in the window of each sample."""
     return -eventually(-values, window, Continuation(-ahead.beyond, ahead.over))
 
 
 def eventually(values: Array, window: SampleWindow, ahead: Continuation) -> Array:
-    """The greatest value in the window of each sample."""
-    if window.last is None and ahead.over:
-        return _shifted(np.maximum.accumulate(values[::-1])[::-1], window.first, ahead.beyond)
-    first = min(window.first, len(values))
-    last = len(values) if window.last is None else min(window.last, len(values))
-    return _greatest(np.concatenate((values, np.full(last, ahead.beyond))), first, last - first + 1, len(values))
+    """Return the greatest value in the window of each sample."""
+    greatest = _range_maximum(values, window.first, window.last)
+    open_end = window.exceeds | (window.unbounded and not ahead.over) | (window.first >= len(values))
+    values_in_window: Array = np.where(open_end, np.maximum(greatest, ahead.beyond), greatest)
+    return values_in_window
 
 
 def until(hold: Array, release: Array, window: SampleWindow, ahead: Continuation) -> Array:
-    """How well `hold` holds from each sample on until `release` does, in its window.
+    """Return how well `hold` holds from each sample on until `release` does, in its window.
 
-    By an identity that needs no look at every pair of samples: something releases in the window, `hold` holds up to
-    the window, and from there it is released at some time, be it after the window.
+    By an identity that needs no search over pairs of samples: `release` holds somewhere in the window, `hold` holds up
+    to the window, and from there on `hold` holds until `release` does, even if that is after the window.
     """
-    released = _shifted(_unbounded(hold, release, window, ahead), window.first, ahead.beyond)
-    if window.first > 0:
-        released = np.minimum(released, always(hold, SampleWindow(0, window.first - 1), ahead))
-    if window.last is not None:
-        released = np.minimum(released, eventually(release, window, ahead))
-    return released
+    count = len(hold)
+    follows = np.append(_unbounded_until(hold, release, window, ahead), ahead.beyond)
+    before = -_range_maximum(-hold, np.arange(count), np.minimum(window.first, count) - 1)
+    robustness = np.minimum(follows[np.minimum(window.first, count)], before)
+    return robustness if window.unbounded else np.minimum(robustness, eventually(release, window, ahead))
 
 
-def _unbounded(hold: Array, release: Array, window: SampleWindow, ahead: Continuation) -> Array:
+def _unbounded_until(hold: Array, release: Array, window: SampleWindow, ahead: Continuation) -> Array:
     """From the last sample backwards: released now, or held now and released later."""
-    later = -math.inf if window.last is None and ahead.over else ahead.beyond
+    later = -math.inf if window.unbounded and ahead.over else ahead.beyond
     answers = []
-    for held, freed in np.column_stack((hold, release))[::-1].tolist():
-        later = max(freed, min(held, later))
+    for holds, releases in np.column_stack((hold, release))[::-1].tolist():
+        later = max(releases, min(holds, later))
         answers.append(later)
     return np.array(answers[::-1])
 
 
-def _shifted(values: Array, by: int, beyond: float) -> Array:
-    """The value `by` samples ahead."""
-    by = min(by, len(values))
-    return np.concatenate((values[by:], np.full(by, beyond)))
+def _range_maximum(values: Array, first: Indices, last: Indices) -> Array:
+    """Return the greatest of values[first[k]] … values[last[k]] for each k; -inf for an empty range.
 
-
-def _greatest(values: Array, first: int, width: int, count: int) -> Array:
-    """The greatest of `width` values from `first` + k on, for k < `count`: three passes, whatever the width.
-
-    A window reaches over the border of at most two blocks of its width: what is left of the one and the beginning of
-    the other. (van Herk 1992; Gil and Werman 1993.)
+    By a sparse table: level j holds the greatest of 2^j values from each index on, and two overlapping ranges of that
+    length cover any other range.
     """
-    blocks = np.pad(values, (0, -len(values) % width)).reshape(-1, width)  # what is added is in no window
-    begun = np.maximum.accumulate(blocks, axis=1).ravel()
-    left = np.maximum.accumulate(blocks[:, ::-1], axis=1)[:, ::-1].ravel()
-    greatest: Array = np.maximum(left[first : first + count], begun[first + width - 1 : first + width - 1 + count])
-    return greatest
+    widths = last - first + 1
+    found = np.full(len(first), -np.inf)
+    level, table = 0, np.asarray(values, dtype=np.float64)
+    while True:
+        length = 1 << level
+        fits = (widths >= length) & (widths < 2 * length)
+        if fits.any():
+            found[fits] = np.maximum(table[first[fits]], table[last[fits] - length + 1])
+        if not (widths >= 2 * length).any():
+            return found
+        table = np.maximum(table[:-length], table[length:])
+        level += 1

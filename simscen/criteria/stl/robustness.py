@@ -1,18 +1,17 @@
-"""What a condition is worth on a run: how well it holds at each sample, and which moment decides that.
+"""Robustness of a condition on a run: how well it holds at each sample, and which moment decides that.
 
-Every comparison becomes its distance to the bound, positive where it holds. Where the two are equal, the distance is
-the smallest number with the right sign, so that `>=` and `>`, and with `not` also `<` and `<=`, keep their difference
-and the sign alone is the verdict. Yes or no is infinitely far from its bound: it decides, and leaves the margin to
-others.
+The robustness of a comparison is the distance of its signal to the bound, positive where the comparison holds. Where
+signal and bound are equal, it is the smallest number with the right sign, so that `>=` and `>` differ and the sign
+alone is the verdict. A yes-or-no signal is infinitely far from its bound: it decides, and leaves the margin to others.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import cached_property, reduce
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -21,15 +20,16 @@ from simscen.core.geometry import Array
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.stl import operators
 from simscen.criteria.stl.condition import Condition, Window
-from simscen.criteria.stl.operators import Continuation
+from simscen.criteria.stl.operators import Continuation, SampleWindow
 from simscen.criteria.trace_signals.catalog import read_signal
+from simscen.criteria.trace_signals.sampling import usual_period
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
 TIE_MARGIN = sys.float_info.min
-"""Stands for a distance of zero, with the sign of the answer."""
+"""Robustness of a signal that equals its bound, with the sign of the verdict."""
 
 BROKEN, DUE = "what had to hold until then was broken", "the answer was due"
 
@@ -40,7 +40,7 @@ Bound = Literal["low", "high"]
 class Witness:
     """The comparison that decides, the sample at which it does, and the signal there; `negated` below a `not`.
 
-    `notes` are other samples that belong to the story, with what was there.
+    `notes` name other samples that explain the verdict.
     """
 
     comparison: Condition
@@ -49,25 +49,38 @@ class Witness:
     negated: bool = False
     notes: tuple[tuple[str, int], ...] = ()
 
-    def noting(self, what: str, sample: int) -> Witness:
-        """The same with one more note."""
+    def with_note(self, what: str, sample: int) -> Witness:
+        """Return a copy with one more note in front."""
         return replace(self, notes=((what, sample), *self.notes))
 
 
 @dataclass(frozen=True, eq=False)
 class Robustness:
-    """How well a condition holds at each sample: from `low`, if what is not known is as bad as can be, to `high`."""
+    """Interval of the robustness at each sample, over all ways in which the run could have gone on.
+
+    `low` assumes that what is not known is as bad as can be, `high` as good as can be. The verdict is known where both
+    have the same sign.
+    """
 
     low: Array
     high: Array
 
-    def side(self, side: Bound) -> Array:
-        """One of the two."""
-        return self.low if side == "low" else self.high
+    def bound(self, bound: Bound) -> Array:
+        """Return `low` or `high`."""
+        return self.low if bound == "low" else self.high
 
-    def witness(self, sample: int, side: Bound) -> Witness:
-        """What decides the value at a sample that is known."""
+    def witness(self, sample: int, bound: Bound) -> Witness:
+        """Return what decides the value at a sample where it is known."""
         raise NotImplementedError
+
+    def parts(self) -> Sequence[Robustness]:
+        """Return the robustness of each operand."""
+        return ()
+
+    def untested(self) -> Iterator[ResponseRobustness]:
+        """Yield each `whenever` in it whose premise never held."""
+        for part in self.parts():
+            yield from part.untested()
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +88,7 @@ class _ComparisonRobustness(Robustness):
     comparison: Condition
     values: Array
 
-    def witness(self, sample: int, side: Bound) -> Witness:
+    def witness(self, sample: int, bound: Bound) -> Witness:
         return Witness(self.comparison, sample, float(self.values[sample]))
 
 
@@ -83,179 +96,265 @@ class _ComparisonRobustness(Robustness):
 class _NegationRobustness(Robustness):
     part: Robustness
 
-    def witness(self, sample: int, side: Bound) -> Witness:
-        found = self.part.witness(sample, "high" if side == "low" else "low")
+    def witness(self, sample: int, bound: Bound) -> Witness:
+        found = self.part.witness(sample, "high" if bound == "low" else "low")
         return replace(found, negated=not found.negated)
+
+    def parts(self) -> Sequence[Robustness]:
+        return (self.part,)
 
 
 @dataclass(frozen=True, eq=False)
 class _BooleanRobustness(Robustness):
-    parts: Sequence[Robustness]
+    operands: Sequence[Robustness]
 
-    def witness(self, sample: int, side: Bound) -> Witness:
-        decides = next(part for part in self.parts if part.side(side)[sample] == self.side(side)[sample])
-        return decides.witness(sample, side)
+    def witness(self, sample: int, bound: Bound) -> Witness:
+        decides = next(part for part in self.operands if part.bound(bound)[sample] == self.bound(bound)[sample])
+        return decides.witness(sample, bound)
+
+    def parts(self) -> Sequence[Robustness]:
+        return self.operands
 
 
 @dataclass(frozen=True, eq=False)
 class _WindowRobustness(Robustness):
-    """Always or eventually: the first sample of the window that has the value decides."""
+    """Robustness of `always` or `eventually`: the first sample of the window with its value decides."""
 
     part: Robustness
-    window: operators.SampleWindow
+    window: SampleWindow
 
-    def witness(self, sample: int, side: Bound) -> Witness:
-        return self.part.witness(_first(self.part.side(side), self.side(side)[sample], sample, self.window), side)
+    def witness(self, sample: int, bound: Bound) -> Witness:
+        at = _first_equal(self.part.bound(bound), self.bound(bound)[sample], sample, self.window)
+        return self.part.witness(at, bound)
+
+    def parts(self) -> Sequence[Robustness]:
+        return (self.part,)
 
 
 @dataclass(frozen=True, eq=False)
 class _UntilRobustness(Robustness):
     hold: Robustness
     release: Robustness
-    window: operators.SampleWindow
+    window: SampleWindow
 
-    def witness(self, sample: int, side: Bound) -> Witness:
-        """The best release, or what breaks the hold before it."""
-        held, freed = self.hold.side(side)[sample:], self.release.side(side)[sample:]
-        before = np.concatenate(([math.inf], np.minimum.accumulate(held)[:-1]))
-        best = np.minimum(before, freed)
-        end = None if self.window.last is None else self.window.last + 1
-        at = self.window.first + int(np.argmax(best[self.window.first : end]))
-        if freed[at] <= before[at]:
-            decides = self.release.witness(sample + at, side)
+    def witness(self, sample: int, bound: Bound) -> Witness:
+        """Return the best release, or what breaks the hold before it."""
+        end = int(self.window.last[sample]) + 1
+        first = int(self.window.first[sample]) - sample
+        hold, release = self.hold.bound(bound)[sample:end], self.release.bound(bound)[sample:end]
+        before = np.concatenate(([math.inf], np.minimum.accumulate(hold)[:-1]))
+        best = np.minimum(before, release)
+        if first >= len(best):  # the window begins after the run, and `hold` was broken within it
+            at, value = len(best), float(hold.min())
         else:
-            decides = self.hold.witness(sample + int(np.argmin(held[:at])), side)
-        broken = np.flatnonzero(np.signbit(held[:end]))
-        return decides.noting(BROKEN, sample + int(broken[0])) if np.signbit(best[at]) and len(broken) else decides
+            at = first + int(np.argmax(best[first:]))
+            value = float(best[at])
+        if at < len(best) and release[at] <= before[at]:
+            decides = self.release.witness(sample + at, bound)
+        else:
+            decides = self.hold.witness(sample + int(np.argmin(hold[:at])), bound)
+        broken = np.flatnonzero(np.signbit(hold))
+        violated = np.signbit(value) and len(broken)
+        return decides.with_note(BROKEN, sample + int(broken[0])) if violated else decides
+
+    def parts(self) -> Sequence[Robustness]:
+        return (self.hold, self.release)
 
 
 @dataclass(frozen=True, eq=False)
-class _ResponseRobustness(Robustness):
-    """Always: the premise does not hold or the response does."""
+class ResponseRobustness(Robustness):
+    """Robustness of `whenever … then`: always, the premise does not hold or the answer does.
 
-    part: Robustness
-    window: operators.SampleWindow
+    `reach` is the slice of samples at which the premise counts. A response whose premise never surely held there has
+    tested nothing: it does not pass, unless `required` is False.
+    """
 
-    def witness(self, sample: int, side: Bound) -> Witness:
-        at = _first(self.part.side(side), self.side(side)[sample], sample, self.window)
-        return self.part.witness(at, side).noting(DUE, at)
+    premise: Robustness
+    answer: Robustness
+    implied: Robustness
+    window: SampleWindow
+    condition: Condition
+    reach: slice
+    required: bool = True
+
+    @property
+    def tested(self) -> bool:
+        """True if the premise surely held at some sample."""
+        return bool((self.premise.low[self.reach] > 0).any())
+
+    @property
+    def may_have_held(self) -> bool:
+        """True if the premise may have held at some sample, depending on how the run would have gone on."""
+        return bool((self.premise.high[self.reach] > 0).any())
+
+    def witness(self, sample: int, bound: Bound) -> Witness:
+        """Return what decides the worst answer, and when it was due."""
+        at = _first_equal(self.implied.bound(bound), self.bound(bound)[sample], sample, self.window)
+        return self.implied.witness(at, bound).with_note(DUE, at)
+
+    def parts(self) -> Sequence[Robustness]:
+        """Return premise and answer."""
+        return (self.premise, self.answer)
+
+    def untested(self) -> Iterator[ResponseRobustness]:
+        """Yield itself and each nested `whenever` whose premise never surely held."""
+        if self.required and not self.tested:
+            yield self
+        yield from super().untested()
 
 
 @dataclass(frozen=True, eq=False)
 class EvaluationContext:
-    """A run as formulas see it: samples of the truth, `period` ticks apart."""
+    """A run on which conditions are evaluated: at each sample of the truth, whenever that was.
+
+    `over` says that the run came to its end; a truncated log did not.
+    """
 
     trace: Trace
     case: Case
-    period: int
     over: bool
 
-    @classmethod
-    def of(cls, trace: Trace, case: Case, over: bool) -> EvaluationContext:
-        """Raises InvalidTrace when the samples are not evenly spaced."""
-        steps = np.diff(trace.truth.ticks)
-        if len(steps) and (steps != steps[0]).any():
-            at = trace.seconds(int(trace.truth.ticks[int(np.argmax(steps != steps[0]))]))
-            raise InvalidTrace(f"the samples of the truth are not evenly spaced after t = {at:.2f} s")
-        return cls(trace, case, int(steps[0]) if len(steps) else 1, over)
+    @cached_property
+    def period(self) -> int:
+        """The usual spacing of samples in ticks: the median."""
+        return usual_period(self.trace.truth.ticks)
 
-    def window(self, window: Window) -> operators.SampleWindow:
-        """In samples. Raises InvalidTrace when there is none in it."""
-        begin, end = window.stretch
-        first = -(-round(begin * self.trace.tick_rate) // self.period)
-        last = None if end is None else round(end * self.trace.tick_rate) // self.period
-        if last is not None and last < max(first, 1):
-            apart = self.trace.seconds(self.period)
-            raise InvalidTrace(f"the window up to {end:g} s ahead holds no sample: they are {apart:g} s apart")
-        return operators.SampleWindow(first, last)
+    def window(self, window: Window) -> SampleWindow:
+        """Return a window as ranges of samples. Raises InvalidTrace if it is shorter than the spacing of samples."""
+        start, end = window.interval
+        rate, last = self.trace.tick_rate, None
+        if end is not None:
+            last = round(end * rate)
+            first_sample, last_sample = -(-round(start * rate) // self.period), last // self.period
+            if last_sample < max(first_sample, 1):
+                spacing = self.trace.seconds(self.period)
+                raise InvalidTrace(f"the window up to {end:g} s ahead holds no sample: they are {spacing:g} s apart")
+        return SampleWindow.over(self.trace.truth.ticks, self.period, round(start * rate), last)
+
+    @cached_property
+    def rest_of_run(self) -> SampleWindow:
+        """From each sample to the end of the run."""
+        return SampleWindow.over(self.trace.truth.ticks, self.period, 0, None)
 
 
-def robustness(condition: Condition, scene: EvaluationContext) -> Robustness:
-    """The value of a condition at each sample. Raises Unavailable or InvalidTrace for its signals."""
+def robustness(condition: Condition, context: EvaluationContext, begin: int = 0) -> Robustness:
+    """Return the robustness of a condition at each sample.
+
+    `begin` is the first sample at which it counts. Raises SignalUnavailable or InvalidTrace for its signals.
+    """
     if condition.signal is not None:
-        return _compared(condition, scene)
+        return _compare(condition, context)
     if condition.not_ is not None:
-        part = robustness(condition.not_, scene)
+        part = robustness(condition.not_, context, begin)
         return _NegationRobustness(-part.high, -part.low, part)
     if condition.all is not None:
-        return _combined([robustness(part, scene) for part in condition.all], "all")
+        return _combine([robustness(part, context, begin) for part in condition.all], "all")
     if condition.any is not None:
-        return _combined([robustness(part, scene) for part in condition.any], "any")
+        return _combine([robustness(part, context, begin) for part in condition.any], "any")
     if condition.always is not None:
-        return windowed_robustness(robustness(condition.always, scene), scene.window(condition.always), scene, "always")
+        return windowed_robustness("always", condition.always, condition.always, context, begin)
     if condition.eventually is not None:
-        return windowed_robustness(
-            robustness(condition.eventually, scene), scene.window(condition.eventually), scene, "eventually"
-        )
+        return windowed_robustness("eventually", condition.eventually, condition.eventually, context, begin)
     if condition.until is not None:
         until = condition.until
-        return until_robustness(
-            robustness(until.hold, scene), robustness(until.release, scene), scene.window(until), scene
-        )
+        return until_robustness(until.hold, until.release, until, context, begin)
     assert condition.whenever is not None and condition.then is not None
-    return response_robustness(
-        robustness(condition.whenever, scene), robustness(condition.then, scene), operators.SampleWindow(0, None), scene
-    )
+    return response_robustness(condition.whenever, condition.then, None, context, begin)
 
 
 def windowed_robustness(
-    part: Robustness,
-    window: operators.SampleWindow,
-    scene: EvaluationContext,
     operator: Literal["always", "eventually"],
+    condition: Condition,
+    window: Window,
+    context: EvaluationContext,
+    begin: int = 0,
 ) -> Robustness:
-    """Always or eventually in a window."""
-    over = operators.always if operator == "always" else operators.eventually
-    low, high = (over(part.side(side), window, ahead) for side, ahead in _continuations(scene))
-    return _WindowRobustness(low, high, part, window)
+    """Return the robustness of `condition` always or eventually in a window."""
+    samples = context.window(window)
+    return _windowed(operator, robustness(condition, context, _start(samples, begin)), samples, context)
 
 
 def until_robustness(
-    hold: Robustness, release: Robustness, window: operators.SampleWindow, scene: EvaluationContext
+    hold: Condition, release: Condition, window: Window, context: EvaluationContext, begin: int = 0
 ) -> Robustness:
-    """`hold` until `release` in a window."""
-    sides = _continuations(scene)
-    low, high = (operators.until(hold.side(side), release.side(side), window, ahead) for side, ahead in sides)
-    return _UntilRobustness(low, high, hold, release, window)
+    """Return the robustness of `hold` until `release` in a window."""
+    samples = context.window(window)
+    holds, releases = robustness(hold, context, begin), robustness(release, context, _start(samples, begin))
+    low, high = (
+        operators.until(holds.bound(bound), releases.bound(bound), samples, ahead)
+        for bound, ahead in _continuations(context)
+    )
+    return _UntilRobustness(low, high, holds, releases, samples)
 
 
 def response_robustness(
-    premise: Robustness, answer: Robustness, window: operators.SampleWindow, scene: EvaluationContext
+    premise: Condition,
+    answer: Condition,
+    window: Window | None,
+    context: EvaluationContext,
+    begin: int = 0,
+    required: bool = True,
+) -> ResponseRobustness:
+    """Return the robustness of: whenever `premise` holds in the window, `answer` does.
+
+    If the premise never surely holds although it is `required` to, `low` is -inf: then nothing was tested.
+    """
+    samples = context.rest_of_run if window is None else context.window(window)
+    start = _start(samples, begin)
+    held, answered = robustness(premise, context, start), robustness(answer, context, start)
+    implied = _combine([_NegationRobustness(-held.high, -held.low, held), answered], "any")
+    always = _windowed("always", implied, samples, context)
+    # A nested response is evaluated at every later sample as well; one at the start of the run only there.
+    end = None if window is None or samples.unbounded or not len(samples.last) else int(samples.last[begin]) + 1
+    found = ResponseRobustness(
+        always.low, always.high, held, answered, implied, samples, premise, slice(start, end), required
+    )
+    return replace(found, low=np.full_like(found.low, -math.inf)) if required and not found.tested else found
+
+
+def _windowed(
+    operator: Literal["always", "eventually"], part: Robustness, window: SampleWindow, context: EvaluationContext
 ) -> Robustness:
-    """Whenever `premise` holds in the window, `answer` does."""
-    implied = _combined([_NegationRobustness(-premise.high, -premise.low, premise), answer], "any")
-    always = windowed_robustness(implied, window, scene, "always")
-    return _ResponseRobustness(always.low, always.high, implied, window)
+    over = operators.always if operator == "always" else operators.eventually
+    low, high = (over(part.bound(bound), window, ahead) for bound, ahead in _continuations(context))
+    return _WindowRobustness(low, high, part, window)
 
 
-def _continuations(scene: EvaluationContext) -> list[tuple[Bound, Continuation]]:
-    return [("low", Continuation(-math.inf, scene.over)), ("high", Continuation(math.inf, scene.over))]
+def _start(window: SampleWindow, begin: int) -> int:
+    """Return the first sample of the window of sample `begin`; beyond the run it is the number of samples."""
+    return int(window.first[begin]) if begin < len(window.first) else len(window.first)
 
 
-def _combined(parts: Sequence[Robustness], how: Literal["all", "any"]) -> Robustness:
+def _continuations(context: EvaluationContext) -> list[tuple[Bound, Continuation]]:
+    return [("low", Continuation(-math.inf, context.over)), ("high", Continuation(math.inf, context.over))]
+
+
+def _combine(parts: Sequence[Robustness], how: Literal["all", "any"]) -> Robustness:
     pick = np.minimum if how == "all" else np.maximum
     low, high = reduce(pick, [part.low for part in parts]), reduce(pick, [part.high for part in parts])
     return _BooleanRobustness(low, high, parts)
 
 
-def _compared(condition: Condition, scene: EvaluationContext) -> Robustness:
+def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
     assert condition.signal is not None
-    values = read_signal(condition.signal, scene.trace, scene.case, condition.about)
+    trace = context.trace
+    values = read_signal(condition.signal, trace, context.case, condition.arguments)
     if np.isnan(values).any():
-        at = scene.trace.seconds(int(scene.trace.truth.ticks[int(np.argmax(np.isnan(values)))]))
+        at = trace.seconds(int(trace.truth.ticks[int(np.argmax(np.isnan(values)))]))
         raise InvalidTrace(f"{condition.signal} is not a number at t = {at:.2f} s")
-    if condition.measured.asks:
-        sure = np.where(values, math.inf, -math.inf)
-        return _ComparisonRobustness(sure, sure, condition, values)
+    if condition.definition.is_boolean:
+        certain = np.where(values, math.inf, -math.inf)
+        return _ComparisonRobustness(certain, certain, condition, values)
     distances = _distances(condition, values)
     if condition.signal != "clearance":
         return _ComparisonRobustness(distances, distances, condition, values)
-    further = _distances(condition, np.where(values >= scene.case.clearance_range, math.inf, values))
-    return _ComparisonRobustness(np.minimum(distances, further), np.maximum(distances, further), condition, values)
+    # Clearance was searched only to a range; beyond it, the true distance may be anything larger.
+    farther = _distances(condition, np.where(values >= context.case.clearance_range, math.inf, values))
+    return _ComparisonRobustness(np.minimum(distances, farther), np.maximum(distances, farther), condition, values)
 
 
 def _distances(condition: Condition, values: Array) -> Array:
-    """To the bound, in scales where there is one; positive where the comparison holds."""
+    """Return the distances to the bound, divided by `scale` if given; positive where the comparison holds."""
     assert condition.value is not None
     above = condition.op in (">=", ">")
     distances = (values - condition.value if above else condition.value - values) / (condition.scale or 1.0)
@@ -264,7 +363,7 @@ def _distances(condition: Condition, values: Array) -> Array:
     return signed
 
 
-def _first(values: Array, wanted: float, sample: int, window: operators.SampleWindow) -> int:
-    """The first sample from the window's begin on that has a value; one in the window has it."""
-    begin = sample + window.first
+def _first_equal(values: Array, wanted: float, sample: int, window: SampleWindow) -> int:
+    """Return the first sample of the window of `sample` with a value that occurs in it."""
+    begin = int(window.first[sample])
     return begin + int(np.argmax(values[begin:] == wanted))

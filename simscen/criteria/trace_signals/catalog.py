@@ -1,18 +1,17 @@
-"""The named signals of a run: what temporal criteria speak of, and `simscen explain signals` lists."""
+"""The named signals of a run: what temporal criteria compare, and `simscen explain signals` lists."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from simscen.core.evidence import Evidence
 from simscen.core.geometry import Array
-from simscen.criteria.trace_signals import distances
-from simscen.criteria.trace_signals import distances as places
-from simscen.criteria.trace_signals import readers as values
+from simscen.criteria.trace_signals import distances, readers
 from simscen.criteria.trace_signals.ground_truth import BELIEF_TIMEOUT_S
+from simscen.criteria.trace_signals.sampling import SignalArguments, SignalQuery
 from simscen.spec.quantities import UNITS
 
 if TYPE_CHECKING:
@@ -35,164 +34,242 @@ NUMBER = "number"
 
 @dataclass(frozen=True)
 class Signal:
-    """A quantity at every truth sample of a run.
+    """Definition of a quantity that has a value at each sample of the truth.
 
-    `dimension` is one of spec.quantities.UNITS, "number", or "yes or no". Its values lie between `least` and `most`,
-    both possible. `about` are keys of which exactly one must name what it is about, `perhaps` such as may.
+    `dimension` is one of spec.quantities.UNITS, "number", or "yes or no". `read` returns the values of a run.
+    `evidence` is what a log must hold besides the truth, which is the clock. Values lie between `minimum` and
+    `maximum`, both possible. Exactly one of `required_arguments` must be given; `optional_arguments` may be.
     """
 
     text: str
     dimension: str
-    read: Callable[[values.SignalQuery], Array]
-    least: float = 0.0
-    most: float = math.inf
-    about: tuple[str, ...] = ()
-    perhaps: tuple[str, ...] = ()
+    read: Callable[[SignalQuery], Array]
+    evidence: Set[Evidence] = frozenset()
+    minimum: float = 0.0
+    maximum: float = math.inf
+    required_arguments: tuple[str, ...] = ()
+    optional_arguments: tuple[str, ...] = ()
 
     @property
     def unit(self) -> str:
-        """The SI unit; "" for a plain number and for yes or no."""
+        """The SI unit; "" for a plain number and for a yes-or-no signal."""
         return next(iter(UNITS[self.dimension])) if self.dimension in UNITS else ""
 
     @property
-    def asks(self) -> bool:
-        """Whether its answer is yes or no."""
+    def is_boolean(self) -> bool:
+        """True for a yes-or-no signal."""
         return self.dimension == YES_OR_NO
-
-
-def _yes_or_no(
-    text: str, read_signal: Callable[[values.SignalQuery], Array], about: tuple[str, ...] = (), *perhaps: str
-) -> Signal:
-    return Signal(text, YES_OR_NO, read_signal, 0.0, 1.0, about, perhaps)
 
 
 SIGNALS: dict[SignalName, Signal] = {
     "clearance": Signal(
-        "True distance from the robot's hull to the nearest solid surface; negative by how far they overlap.",
-        "length", values.clearance, -1.0,
+        "True distance from the robot's hull to the nearest solid surface; negative by the depth of an overlap.",
+        "length",
+        readers.clearance,
+        {Evidence.CLEARANCE},
+        minimum=-1.0,
     ),
-    "speed": Signal("True speed over ground, in any direction.", "speed", values.ground_speed),
+    "speed": Signal("True speed over ground, in any direction.", "speed", readers.ground_speed, {Evidence.VELOCITY}),
     "forward_speed": Signal(
-        "True speed along the robot's own x axis; negative backwards.", "speed", values.forward_speed, -math.inf
+        "True speed along the robot's x axis; negative backwards.",
+        "speed",
+        readers.forward_speed,
+        {Evidence.VELOCITY},
+        minimum=-math.inf,
     ),
-    "turn_rate": Signal("True turn rate, either way.", "angular speed", values.turn_rate),
-    "yaw_rate": Signal("True turn rate; positive to the left.", "angular speed", values.yaw_rate, -math.inf),
+    "turn_rate": Signal("Magnitude of the true turn rate.", "angular speed", readers.turn_rate, {Evidence.VELOCITY}),
+    "yaw_rate": Signal(
+        "True turn rate; positive to the left.",
+        "angular speed",
+        readers.yaw_rate,
+        {Evidence.VELOCITY},
+        minimum=-math.inf,
+    ),
     "acceleration": Signal(
-        "Change of the true speed over ground since the sample before, by time; negative while braking.",
-        "acceleration", values.acceleration, -math.inf,
+        "Change of the true speed over ground since the sample before, divided by the time; negative while braking.",
+        "acceleration",
+        readers.acceleration,
+        {Evidence.VELOCITY},
+        minimum=-math.inf,
     ),
     "angular_acceleration": Signal(
-        "Change of the true yaw rate since the sample before, by time.",
-        "angular acceleration", values.angular_acceleration, -math.inf,
+        "Change of the true yaw rate since the sample before, divided by the time.",
+        "angular acceleration",
+        readers.angular_acceleration,
+        {Evidence.VELOCITY},
+        minimum=-math.inf,
     ),
     "jerk": Signal(
-        "Second difference of the true speed over ground, by time squared; without its sign.", "jerk", values.jerk
+        "Magnitude of the second difference of the true speed over ground, divided by the time squared.",
+        "jerk",
+        readers.jerk,
+        {Evidence.VELOCITY},
     ),
-    "travelled": Signal("The true way driven so far, in moves of at least 1 cm.", "length", values.travelled),
-    "time": Signal("Simulated time since the start.", "duration", values.time),
+    "travelled": Signal(
+        "True distance driven so far, in moves of at least 1 cm.", "length", readers.travelled, frozenset()
+    ),
+    "time": Signal("Simulated time since the start.", "duration", readers.time, frozenset()),
     "goal_distance": Signal(
-        "True distance to the goal the robot was given last, as the crow flies; to the first before it is accepted.",
-        "length", values.goal_distance,
+        "True straight-line distance to the goal accepted last; to the first goal before any is accepted.",
+        "length",
+        readers.goal_distance,
+        {Evidence.ALIGNMENT, Evidence.NAVIGATION},
     ),
     "goal_heading_error": Signal(
-        "Angle between the true heading and that goal's.", "angle", values.goal_heading_error, 0.0, math.pi
+        "Angle between the true heading and that of the goal of goal_distance.",
+        "angle",
+        readers.goal_heading_error,
+        {Evidence.ALIGNMENT, Evidence.NAVIGATION},
+        maximum=math.pi,
     ),
     "distance_remaining": Signal(
-        "Length of the newest plan from where the robot believes to be; before the first plan, the goal_distance.",
-        "length", places.distance_remaining,
+        "Length of the newest plan from the believed position on; before the first plan, the goal_distance.",
+        "length",
+        distances.distance_remaining,
+        {Evidence.ALIGNMENT, Evidence.PLANS, Evidence.BELIEF, Evidence.NAVIGATION},
     ),
     "plan_deviation": Signal(
         "True distance to the nearest point of the newest plan; 0 before the first plan.",
-        "length", places.plan_deviation,
+        "length",
+        distances.plan_deviation,
+        {Evidence.ALIGNMENT, Evidence.PLANS},
     ),
     "distance_to": Signal(
-        "True distance from the robot's centre to a point, a goal, or the origin of an object; infinite while the "
-        "object is not there.",
-        "length", places.distance_to, about=("object", "point", "goal"),
+        "True distance from the robot's center to a point, a goal, or the origin of an object; infinite while"
+        " the object is absent.",
+        "length",
+        distances.distance_to,
+        {Evidence.ALIGNMENT},
+        required_arguments=("object", "point", "goal"),
     ),
     "person_distance": Signal(
-        "True gap between the robot's footprint and the body of the nearest pedestrian; infinite while nobody is "
-        "there.",
-        "length", distances.person_distance,
+        "True gap between the robot's footprint and the body of the nearest pedestrian; infinite while there is none.",
+        "length",
+        distances.person_distance,
+        {Evidence.ALIGNMENT, Evidence.OBJECTS, Evidence.FOOTPRINT},
     ),
     "localization_error": Signal(
-        "Distance between believed and true position when the newest belief came; against the truth of now once that "
-        "is over 1 s old. Not aligned.",
-        "length", values.localization_error,
+        "Distance between the newest believed position and the true one of the same time; once the belief is "
+        "over 1 s old, the true one of now. Not aligned.",
+        "length",
+        readers.localization_error,
+        {Evidence.ALIGNMENT, Evidence.BELIEF},
     ),
     "localization_yaw_error": Signal(
-        "Angle between believed and true heading, likewise.", "angle", values.localization_yaw_error, 0.0, math.pi
+        "Angle between believed and true heading, at the same times.",
+        "angle",
+        readers.localization_yaw_error,
+        {Evidence.ALIGNMENT, Evidence.BELIEF},
+        maximum=math.pi,
     ),
     "position_std": Signal(
-        "What the robot believes its position error to be: the standard deviation along the worst direction.",
-        "length", values.position_std,
+        "Standard deviation of the believed position along its worst direction.",
+        "length",
+        readers.position_std,
+        {Evidence.BELIEF, Evidence.COVARIANCE},
     ),
-    "yaw_std": Signal("What the robot believes its heading error to be.", "angle", values.yaw_std),
+    "yaw_std": Signal(
+        "Standard deviation of the believed heading.", "angle", readers.yaw_std, {Evidence.BELIEF, Evidence.COVARIANCE}
+    ),
     "nees": Signal(
-        "Squared pose error measured by the believed covariance, 3 on average when that is right; infinite when it is "
-        "singular.",
-        NUMBER, values.nees,
+        "Normalized estimation error squared of the belief: 3 on average if its covariance is right; infinite"
+        " if that is singular.",
+        NUMBER,
+        readers.nees,
+        {Evidence.ALIGNMENT, Evidence.BELIEF, Evidence.COVARIANCE},
     ),
-    "belief_age": Signal("Time since the newest belief.", "duration", values.belief_age),
-    "scan_age": Signal("Time since the stack last received a scan.", "duration", values.scan_age),
-    "command_speed": Signal("Speed that the stack commands, in any direction.", "speed", values.command_speed),
-    "command_turn_rate": Signal("Turn rate that the stack commands, either way.", "angular speed",
-                                values.command_turn_rate),
-    "collision_count": Signal("Contacts begun so far.", NUMBER, values.collision_count),
-    "replan_count": Signal("Plans made so far for another reason than a new goal.", NUMBER, values.replan_count),
-    "recovery_count": Signal("Recoveries begun so far.", NUMBER, values.recovery_count),
-    "localized": _yes_or_no(
-        f"The newest belief is at most {BELIEF_TIMEOUT_S:g} s old and its position_std at most {values.LOCALIZED_STD_M:g} m.",
-        values.localized,
+    "belief_age": Signal("Time since the newest belief.", "duration", readers.belief_age, {Evidence.BELIEF}),
+    "scan_age": Signal("Time since the stack last received a scan.", "duration", readers.scan_age, {Evidence.SCANS}),
+    "command_speed": Signal(
+        "Magnitude of the speed that the stack commands.", "speed", readers.command_speed, {Evidence.COMMANDS}
     ),
-    "in_region": _yes_or_no("The robot's centre is truly in a region of the world.", values.in_region, ("region",)),
-    "in_collision": _yes_or_no("The robot touches something, or this thing.", values.in_collision, (), "with"),
-    "goal_active": _yes_or_no("The robot drives to a goal, or to this one.", values.goal_active, (), "goal"),
-    "recovery_active": _yes_or_no("A recovery is under way, or this one.", values.recovery_active, (), "recovery"),
-    "fault_active": _yes_or_no("The fault is at work.", values.is_active, ("fault",)),
-    "event_active": _yes_or_no(
-        "The event has begun and not ended; one without an end goes on to the end of the run.",
-        values.is_active, ("event",),
+    "command_turn_rate": Signal(
+        "Magnitude of the turn rate that the stack commands.",
+        "angular speed",
+        readers.command_turn_rate,
+        {Evidence.COMMANDS},
     ),
-    "started": _yes_or_no(
-        "The fault or event has begun just now: at the one sample after each start.",
-        values.has_just_started, ("fault", "event"),
+    "collision_count": Signal("Contacts begun so far.", NUMBER, readers.collision_count, {Evidence.CONTACTS}),
+    "replan_count": Signal(
+        "Plans made so far for another reason than a new goal.", NUMBER, readers.replan_count, {Evidence.PLANNING}
     ),
-}  # fmt: skip
+    "recovery_count": Signal("Recoveries begun so far.", NUMBER, readers.recovery_count, {Evidence.RECOVERIES}),
+    "localized": Signal(
+        f"The newest belief is at most {BELIEF_TIMEOUT_S:g} s old and its position_std at most "
+        f"{readers.LOCALIZED_STD_M:g} m.",
+        YES_OR_NO,
+        readers.localized,
+        {Evidence.BELIEF, Evidence.COVARIANCE},
+        maximum=1.0,
+    ),
+    "in_region": Signal(
+        "The robot's center is truly in a region of the world.",
+        YES_OR_NO,
+        readers.in_region,
+        {Evidence.ALIGNMENT},
+        maximum=1.0,
+        required_arguments=("region",),
+    ),
+    "in_collision": Signal(
+        "The robot touches something, or the named object.",
+        YES_OR_NO,
+        readers.in_collision,
+        {Evidence.CONTACTS},
+        maximum=1.0,
+        optional_arguments=("with",),
+    ),
+    "goal_active": Signal(
+        "The robot drives to a goal, or to the named one.",
+        YES_OR_NO,
+        readers.goal_active,
+        {Evidence.NAVIGATION},
+        maximum=1.0,
+        optional_arguments=("goal",),
+    ),
+    "recovery_active": Signal(
+        "A recovery is running, or the named one.",
+        YES_OR_NO,
+        readers.recovery_active,
+        {Evidence.RECOVERIES},
+        maximum=1.0,
+        optional_arguments=("recovery",),
+    ),
+    "fault_active": Signal(
+        "The fault is active.",
+        YES_OR_NO,
+        readers.is_active,
+        {Evidence.DISTURBANCES},
+        maximum=1.0,
+        required_arguments=("fault",),
+    ),
+    "event_active": Signal(
+        "The event has begun and not ended; one without an end lasts to the end of the run.",
+        YES_OR_NO,
+        readers.is_active,
+        {Evidence.DISTURBANCES},
+        maximum=1.0,
+        required_arguments=("event",),
+    ),
+    "started": Signal(
+        "The fault or event has just begun: true at the one sample after each start.",
+        YES_OR_NO,
+        readers.has_just_started,
+        {Evidence.DISTURBANCES},
+        maximum=1.0,
+        required_arguments=("fault", "event"),
+    ),
+}
 """Every signal by name, in the order of the reference."""
 
 
-_TRUTH, _VELOCITY, _BELIEF, _GOALS = Evidence.TRUTH, Evidence.VELOCITY, Evidence.BELIEF, Evidence.NAVIGATION
-
-_EVIDENCE: dict[SignalName, frozenset[Evidence]] = {
-    "clearance": frozenset({Evidence.CLEARANCE}),
-    **dict.fromkeys(("speed", "forward_speed", "turn_rate", "yaw_rate"), frozenset({_VELOCITY})),
-    **dict.fromkeys(("acceleration", "angular_acceleration", "jerk"), frozenset({_VELOCITY})),
-    **dict.fromkeys(("travelled", "time"), frozenset()),
-    "scan_age": frozenset({Evidence.SCANS}),
-    **dict.fromkeys(("command_speed", "command_turn_rate"), frozenset({Evidence.COMMANDS})),
-    **dict.fromkeys(("goal_distance", "goal_heading_error"), frozenset({Evidence.ALIGNMENT, _GOALS})),
-    "distance_remaining": frozenset({Evidence.ALIGNMENT, Evidence.PLANS, _BELIEF, _GOALS}),
-    "plan_deviation": frozenset({Evidence.ALIGNMENT, Evidence.PLANS}),
-    **dict.fromkeys(("distance_to", "in_region"), frozenset({Evidence.ALIGNMENT})),
-    **dict.fromkeys(("localization_error", "localization_yaw_error"), frozenset({Evidence.ALIGNMENT, _BELIEF})),
-    "person_distance": frozenset({Evidence.ALIGNMENT, Evidence.OBJECTS, Evidence.FOOTPRINT}),
-    "nees": frozenset({Evidence.ALIGNMENT, _BELIEF, Evidence.COVARIANCE}),
-    **dict.fromkeys(("position_std", "yaw_std", "localized"), frozenset({_BELIEF, Evidence.COVARIANCE})),
-    "belief_age": frozenset({_BELIEF}),
-    **dict.fromkeys(("collision_count", "in_collision"), frozenset({Evidence.CONTACTS})),
-    "replan_count": frozenset({Evidence.PLANNING}),
-    **dict.fromkeys(("recovery_count", "recovery_active"), frozenset({Evidence.RECOVERIES})),
-    "goal_active": frozenset({_GOALS}),
-    **dict.fromkeys(("fault_active", "event_active", "started"), frozenset({Evidence.DISTURBANCES})),
-}
-
-
 def signal_evidence(name: SignalName) -> frozenset[Evidence]:
-    """What a log must hold for the signal to be known; the truth is its clock."""
-    return _EVIDENCE[name] | {_TRUTH}
+    """Return what a log must hold for a signal to be known; the truth is the clock of every signal."""
+    return frozenset({*SIGNALS[name].evidence, Evidence.TRUTH})
 
 
-def read_signal(name: SignalName, trace: Trace, case: Case, of: values.SignalArguments) -> Array:
-    """The signal at each truth sample. Raises Unavailable, or InvalidTrace when it is not a number somewhere."""
-    return SIGNALS[name].read(values.SignalQuery(trace, case, of))
+def read_signal(name: SignalName, trace: Trace, case: Case, arguments: SignalArguments) -> Array:
+    """Return a signal at each sample of the truth.
+
+    Raises SignalUnavailable if the trace does not hold what it is made of, InvalidTrace if that is not finite.
+    """
+    return SIGNALS[name].read(SignalQuery(trace, case, arguments))

@@ -13,7 +13,8 @@ from simscen.core.geometry import Array, wrap_array
 from simscen.core.samples import Ticks
 from simscen.core.separation import separation
 from simscen.criteria.trace_signals.ground_truth import check_samples
-from simscen.criteria.trace_signals.readers import SignalQuery, SignalUnavailable, goal_distance, poses_of
+from simscen.criteria.trace_signals.readers import goal_distance, poses_of
+from simscen.criteria.trace_signals.sampling import SignalQuery, SignalUnavailable
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
@@ -27,14 +28,14 @@ _TINY = sys.float_info.min
 """Square metres; stands for the square of a step of no length, to divide by."""
 
 
-def distance_to(asked: SignalQuery) -> Array:
+def distance_to(query: SignalQuery) -> Array:
     """From the centre of the robot to a point, to a goal of the scenario, or to the origin of a thing that moves."""
-    poses, point, goal = poses_of(asked.trace), asked.of.get("point"), asked.of.get("goal")
+    poses, point, goal = poses_of(query.trace), query.arguments.get("point"), query.arguments.get("goal")
     if isinstance(point, Sequence):
         return np.hypot(poses[:, 0] - float(point[0]), poses[:, 1] - float(point[1]))
     if goal is None:
-        return _to_object(asked.trace, str(asked.of["object"]), poses)
-    goals = {known.name: known.pose for known in asked.case.every_goal}
+        return _to_object(query.trace, str(query.arguments["object"]), poses)
+    goals = {known.name: known.pose for known in query.case.every_goal}
     if goal not in goals:
         raise SignalUnavailable(f"the scenario has no goal `{goal}`")
     pose = goals[str(goal)]
@@ -79,23 +80,23 @@ def is_present(trace: Trace, name: str) -> Array:
     return present
 
 
-def distance_remaining(asked: SignalQuery) -> Array:
+def distance_remaining(query: SignalQuery) -> Array:
     """Along the newest plan from where the robot believes to be; before the first plan, as the crow flies in truth."""
-    belief, clock = check_samples(asked.trace.belief, "the belief", asked.trace), asked.trace.truth.ticks
+    belief, clock = check_samples(query.trace.belief, "the belief", query.trace), query.trace.truth.ticks
     if not len(belief):
         raise SignalUnavailable("no belief was recorded")
     believed = belief.at(clock)[:, :2]
-    left = goal_distance(asked)
-    for first, last, points in _plans(asked.trace, clock):
+    left = goal_distance(query)
+    for first, last, points in _plans(query.trace, clock):
         left[first:last] = _along(believed[first:last], points)[1]
     return left
 
 
-def plan_deviation(asked: SignalQuery) -> Array:
+def plan_deviation(query: SignalQuery) -> Array:
     """From the true position to the nearest point of the newest plan; none before the first plan."""
-    poses = poses_of(asked.trace)
+    poses = poses_of(query.trace)
     off = np.zeros(len(poses))
-    plans = _plans(asked.trace, asked.trace.truth.ticks)
+    plans = _plans(query.trace, query.trace.truth.ticks)
     if not plans:
         raise SignalUnavailable("no plan was recorded")
     for first, last, points in plans:
@@ -169,9 +170,9 @@ def pedestrian_gap(trace: Trace, case: Case) -> Array:
     return nearest
 
 
-def person_distance(asked: SignalQuery) -> Array:
+def person_distance(query: SignalQuery) -> Array:
     """The same as a signal."""
-    return pedestrian_gap(asked.trace, asked.case)
+    return pedestrian_gap(query.trace, query.case)
 
 
 def _gap(poses: Array, places: Array, case: Case) -> Array:

@@ -125,10 +125,13 @@ def drive(trace: Trace) -> Drive:
     return Drive(poses.ticks[kept], np.cumsum(lengths))
 
 
-def teleport_samples(trace: Trace) -> list[int]:
-    """The truth samples before which the robot was set down elsewhere, which is neither driving nor braking."""
+def teleport_samples(trace: Trace, ticks: Ticks | None = None) -> list[int]:
+    """Return the indices of the samples before which the robot was set down elsewhere.
+
+    Such a step is neither driving nor braking. `ticks` are the samples' ticks; by default those of the truth.
+    """
     placed = sorted({event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)})
-    samples: list[int] = np.searchsorted(trace.truth.ticks, placed, side="right").tolist()
+    samples: list[int] = np.searchsorted(trace.truth.ticks if ticks is None else ticks, placed, side="right").tolist()
     return samples
 
 

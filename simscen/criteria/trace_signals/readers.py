@@ -1,13 +1,8 @@
-"""What the named signals read off a trace: one value for each truth sample, the clock of every temporal criterion.
-
-What is published more rarely (belief, command, scans) is held from when it came until the next one comes, and its
-first value holds before it. What happens between two samples counts at the sample that follows it.
-"""
+"""How each named signal is read from a trace, sampled as `sampling` says."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +11,6 @@ from simscen.core.events import EventKind
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.goalnames import named
 from simscen.core.samples import Samples, Ticks
-from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.timeline import spans
 from simscen.criteria.trace_signals.ground_truth import (
     BELIEF_TIMEOUT_S,
@@ -31,171 +25,162 @@ from simscen.criteria.trace_signals.ground_truth import (
 from simscen.criteria.trace_signals.ground_truth import clearance as hull_clearance
 from simscen.criteria.trace_signals.ground_truth import turn_rate as unsigned_turn_rate
 from simscen.criteria.trace_signals.nees import nees_samples
+from simscen.criteria.trace_signals.sampling import (
+    SignalArguments,
+    SignalQuery,
+    SignalUnavailable,
+    evenly_spaced,
+    hold,
+    sample_ticks,
+)
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
-SignalArguments = Mapping[str, object]
-"""What a signal is about: object, point, goal, region, fault, event, recovery or with, as the condition names it."""
-
-
-@dataclass(frozen=True, eq=False)
-class SignalQuery:
-    """A run, and what about it is asked."""
-
-    trace: Trace
-    case: Case
-    of: SignalArguments
-
-
 LOCALIZED_STD_M = 0.5
-"""Metres; a robot whose position has a larger standard deviation does not know where it is (Nav2's at the start)."""
+"""A robot whose position has a larger standard deviation is not localized; Nav2 starts with this value."""
 
 
-class SignalUnavailable(ValueError):
-    """The trace does not hold what a signal is made of: nothing can be decided, and the text says why."""
+def clearance(query: SignalQuery) -> Array:
+    """Return the distance to the nearest surface; infinite where nothing is near."""
+    return hold(query.trace, hull_clearance(query.trace), "clearance")[:, 0]
 
 
-def clearance(asked: SignalQuery) -> Array:
-    """Infinite where nothing is near."""
-    return _held(asked.trace, hull_clearance(asked.trace), "clearance")[:, 0]
+def ground_speed(query: SignalQuery) -> Array:
+    """Return the true speed over ground."""
+    return hold(query.trace, speed(query.trace), "velocity")[:, 0]
 
 
-def ground_speed(asked: SignalQuery) -> Array:
-    """Over ground."""
-    return _held(asked.trace, speed(asked.trace), "velocity")[:, 0]
+def forward_speed(query: SignalQuery) -> Array:
+    """Return the true speed along the robot's x axis."""
+    return _velocity(query.trace)[:, 0]
 
 
-def forward_speed(asked: SignalQuery) -> Array:
-    """Along the robot's own x axis."""
-    return _velocity(asked.trace)[:, 0]
+def turn_rate(query: SignalQuery) -> Array:
+    """Return the magnitude of the true turn rate."""
+    return hold(query.trace, unsigned_turn_rate(query.trace), "velocity")[:, 0]
 
 
-def turn_rate(asked: SignalQuery) -> Array:
-    """Without its sign."""
-    return _held(asked.trace, unsigned_turn_rate(asked.trace), "velocity")[:, 0]
+def yaw_rate(query: SignalQuery) -> Array:
+    """Return the true turn rate."""
+    return _velocity(query.trace)[:, 2]
 
 
-def yaw_rate(asked: SignalQuery) -> Array:
-    """With its sign."""
-    return _velocity(asked.trace)[:, 2]
+def acceleration(query: SignalQuery) -> Array:
+    """Return the change of the speed over ground since the sample before, by time."""
+    return _differences(query.trace, ground_speed(query), 1)
 
 
-def acceleration(asked: SignalQuery) -> Array:
-    """Of the speed over ground, from the sample before."""
-    return _changes(asked.trace, ground_speed(asked), 1)
+def angular_acceleration(query: SignalQuery) -> Array:
+    """Return the change of the yaw rate since the sample before, by time."""
+    return _differences(query.trace, yaw_rate(query), 1)
 
 
-def angular_acceleration(asked: SignalQuery) -> Array:
-    """Of the yaw rate, from the sample before."""
-    return _changes(asked.trace, yaw_rate(asked), 1)
+def jerk(query: SignalQuery) -> Array:
+    """Return |v[k+1] - 2 v[k] + v[k-1]| / dt^2 of the speed over ground."""
+    return np.abs(_differences(query.trace, ground_speed(query), 2))
 
 
-def jerk(asked: SignalQuery) -> Array:
-    """(v[k+1] - 2 v[k] + v[k-1]) / dt^2 of the speed over ground, without its sign."""
-    return np.abs(_changes(asked.trace, ground_speed(asked), 2))
+def localization_error(query: SignalQuery) -> Array:
+    """Return the distance between believed and true position."""
+    return hold(query.trace, pose_error(query.trace), "belief")[:, 0]
 
 
-def localization_error(asked: SignalQuery) -> Array:
-    """Distance between believed and true position."""
-    return _held(asked.trace, pose_error(asked.trace), "belief")[:, 0]
+def localization_yaw_error(query: SignalQuery) -> Array:
+    """Return the angle between believed and true heading."""
+    return hold(query.trace, pose_error(query.trace), "belief")[:, 1]
 
 
-def localization_yaw_error(asked: SignalQuery) -> Array:
-    """Angle between believed and true heading."""
-    return _held(asked.trace, pose_error(asked.trace), "belief")[:, 1]
-
-
-def position_std(asked: SignalQuery) -> Array:
-    """The root of the larger eigenvalue of the covariance of x and y."""
-    xx, xy, _, yy, _, _ = _covariance(asked.trace).T
+def position_std(query: SignalQuery) -> Array:
+    """Return the root of the larger eigenvalue of the covariance of x and y."""
+    xx, xy, _, yy, _, _ = _covariance(query.trace).T
     spread = np.hypot((xx - yy) / 2, xy)
     std: Array = np.sqrt(np.maximum((xx + yy) / 2 + spread, 0.0))
     return std
 
 
-def yaw_std(asked: SignalQuery) -> Array:
-    """The root of the variance of the heading."""
-    return np.sqrt(np.maximum(_covariance(asked.trace)[:, 5], 0.0))
+def yaw_std(query: SignalQuery) -> Array:
+    """Return the root of the variance of the heading."""
+    return np.sqrt(np.maximum(_covariance(query.trace)[:, 5], 0.0))
 
 
-def nees(asked: SignalQuery) -> Array:
-    """Infinite where the covariance is singular."""
-    return _held(asked.trace, nees_samples(asked.trace), "covariance")[:, 0]
+def nees(query: SignalQuery) -> Array:
+    """Return the NEES of the belief; infinite where the covariance is singular."""
+    return hold(query.trace, nees_samples(query.trace), "covariance")[:, 0]
 
 
-def belief_age(asked: SignalQuery) -> Array:
-    """Since the newest belief came."""
-    return _age(asked.trace, asked.trace.belief.ticks)
+def belief_age(query: SignalQuery) -> Array:
+    """Return the time since the newest belief came."""
+    return _age(query.trace, query.trace.belief.ticks)
 
 
-def scan_age(asked: SignalQuery) -> Array:
-    """Since the newest scan came."""
-    return _age(asked.trace, asked.trace.scans)
+def scan_age(query: SignalQuery) -> Array:
+    """Return the time since the newest scan came."""
+    return _age(query.trace, query.trace.scans)
 
 
-def localized(asked: SignalQuery) -> Array:
-    """There is a fresh belief, and it is a sure one."""
-    if not len(asked.trace.belief):
-        return np.zeros(len(_clock(asked.trace)))
-    begun = _clock(asked.trace) >= asked.trace.belief.ticks[0]
-    fresh = belief_age(asked) <= BELIEF_TIMEOUT_S
-    return _truths(begun & fresh & (position_std(asked) <= LOCALIZED_STD_M))
+def localized(query: SignalQuery) -> Array:
+    """Return whether there is a recent belief with a small standard deviation."""
+    if not len(query.trace.belief):
+        return np.zeros(len(sample_ticks(query.trace)))
+    begun = sample_ticks(query.trace) >= query.trace.belief.ticks[0]
+    fresh = belief_age(query) <= BELIEF_TIMEOUT_S
+    return _as_numbers(begun & fresh & (position_std(query) <= LOCALIZED_STD_M))
 
 
-def goal_distance(asked: SignalQuery) -> Array:
-    """From the true position."""
-    goals, poses = _current_goals(asked.trace, asked.case), poses_of(asked.trace)
+def goal_distance(query: SignalQuery) -> Array:
+    """Return the true distance to the current goal."""
+    goals, poses = _current_goals(query.trace, query.case), poses_of(query.trace)
     return np.hypot(poses[:, 0] - goals[:, 0], poses[:, 1] - goals[:, 1])
 
 
-def goal_heading_error(asked: SignalQuery) -> Array:
-    """From the true heading."""
-    return np.abs(wrap_array(poses_of(asked.trace)[:, 2] - _current_goals(asked.trace, asked.case)[:, 2]))
+def goal_heading_error(query: SignalQuery) -> Array:
+    """Return the angle between the true heading and that of the current goal."""
+    return np.abs(wrap_array(poses_of(query.trace)[:, 2] - _current_goals(query.trace, query.case)[:, 2]))
 
 
-def travelled(asked: SignalQuery) -> Array:
-    """As path_length measures it."""
-    way, clock = drive(asked.trace), _clock(asked.trace)
+def travelled(query: SignalQuery) -> Array:
+    """Return the distance driven so far, as path_length measures it."""
+    way, clock = drive(query.trace), sample_ticks(query.trace)
     return way.travelled[np.searchsorted(way.ticks, clock, side="right") - 1]
 
 
-def time(asked: SignalQuery) -> Array:
-    """Simulated."""
-    return _clock(asked.trace) / asked.trace.tick_rate
+def time(query: SignalQuery) -> Array:
+    """Return the simulated time."""
+    return sample_ticks(query.trace) / query.trace.tick_rate
 
 
-def command_speed(asked: SignalQuery) -> Array:
-    """As sent to the wheels; none before the first command."""
-    command = _commanded(asked.trace)
+def command_speed(query: SignalQuery) -> Array:
+    """Return the commanded speed; 0 before the first command."""
+    command = _commanded(query.trace)
     return np.hypot(command[:, 0], command[:, 1])
 
 
-def command_turn_rate(asked: SignalQuery) -> Array:
-    """As sent to the wheels, without its sign."""
-    return np.abs(_commanded(asked.trace)[:, 2])
+def command_turn_rate(query: SignalQuery) -> Array:
+    """Return the magnitude of the commanded turn rate; 0 before the first command."""
+    return np.abs(_commanded(query.trace)[:, 2])
 
 
-def in_region(asked: SignalQuery) -> Array:
-    """The robot's centre is inside."""
-    name = str(asked.of["region"])
-    if name not in asked.case.regions:
+def in_region(query: SignalQuery) -> Array:
+    """Return whether the robot's center is inside the region."""
+    name = str(query.arguments["region"])
+    if name not in query.case.regions:
         raise SignalUnavailable(f"the world has no region `{name}`")
-    return _truths(
-        points_in_polygon(poses_of(asked.trace)[:, :2], np.array(asked.case.regions[name], dtype=np.float64))
+    return _as_numbers(
+        points_in_polygon(poses_of(query.trace)[:, :2], np.array(query.case.regions[name], dtype=np.float64))
     )
 
 
-def in_collision(asked: SignalQuery) -> Array:
-    """Between the begin and the end of a contact."""
-    return _truths(
-        _between(asked.trace, EventKind.COLLISION_STARTED, (EventKind.COLLISION_ENDED,), asked.of.get("with"))
+def in_collision(query: SignalQuery) -> Array:
+    """Return whether a contact lasts."""
+    return _as_numbers(
+        _between(query.trace, EventKind.COLLISION_STARTED, (EventKind.COLLISION_ENDED,), query.arguments.get("with"))
     )
 
 
-def goal_active(asked: SignalQuery) -> Array:
-    """From acceptance to the report that ends it."""
+def goal_active(query: SignalQuery) -> Array:
+    """Return whether a goal is active: from its acceptance to the report that ends it."""
     ends = (
         EventKind.GOAL_REACHED,
         EventKind.GOAL_PASSED,
@@ -204,48 +189,48 @@ def goal_active(asked: SignalQuery) -> Array:
         EventKind.NAVIGATION_ENDED,
         EventKind.GOAL_ACCEPTED,
     )
-    return _truths(_between(asked.trace, EventKind.GOAL_ACCEPTED, ends, asked.of.get("goal")))
+    return _as_numbers(_between(query.trace, EventKind.GOAL_ACCEPTED, ends, query.arguments.get("goal")))
 
 
-def recovery_active(asked: SignalQuery) -> Array:
-    """Between its begin and its end."""
-    return _truths(
-        _between(asked.trace, EventKind.RECOVERY_STARTED, (EventKind.RECOVERY_ENDED,), asked.of.get("recovery"))
+def recovery_active(query: SignalQuery) -> Array:
+    """Return whether a recovery lasts."""
+    return _as_numbers(
+        _between(query.trace, EventKind.RECOVERY_STARTED, (EventKind.RECOVERY_ENDED,), query.arguments.get("recovery"))
     )
 
 
-def is_active(asked: SignalQuery) -> Array:
-    """While the fault or event lasts."""
-    stretches = [(span.start, span.end + (not span.lasting)) for span in spans(asked.trace, _happening(asked.of))]
-    return _truths(_stretches(asked.trace, stretches))
+def is_active(query: SignalQuery) -> Array:
+    """Return whether the fault or event lasts."""
+    intervals = [(span.start, span.end + (not span.lasting)) for span in spans(query.trace, _label(query.arguments))]
+    return _as_numbers(_flags(query.trace, intervals))
 
 
-def has_just_started(asked: SignalQuery) -> Array:
-    """At the one sample that follows each start."""
-    starts = [(span.start, span.start) for span in spans(asked.trace, _happening(asked.of))]
-    return _truths(_stretches(asked.trace, starts))
+def has_just_started(query: SignalQuery) -> Array:
+    """Return whether this is the sample that follows a start of the fault or event."""
+    starts = [(span.start, span.start) for span in spans(query.trace, _label(query.arguments))]
+    return _as_numbers(_flags(query.trace, starts))
 
 
-def collision_count(asked: SignalQuery) -> Array:
-    """Contacts that began."""
-    return _count(asked.trace, [event.tick for event in asked.trace.of_kind(EventKind.COLLISION_STARTED)])
+def collision_count(query: SignalQuery) -> Array:
+    """Return the number of contacts begun so far."""
+    return _count(query.trace, [event.tick for event in query.trace.of_kind(EventKind.COLLISION_STARTED)])
 
 
-def replan_count(asked: SignalQuery) -> Array:
-    """Plans made for another reason than a new goal."""
-    plans = asked.trace.of_kind(EventKind.PLAN_MADE)
-    return _count(asked.trace, [event.tick for event in plans if event.data.get("reason", "goal") != "goal"])
+def replan_count(query: SignalQuery) -> Array:
+    """Return the number of plans so far that were made for another reason than a new goal."""
+    plans = query.trace.of_kind(EventKind.PLAN_MADE)
+    return _count(query.trace, [event.tick for event in plans if event.data.get("reason", "goal") != "goal"])
 
 
-def recovery_count(asked: SignalQuery) -> Array:
-    """Recoveries that began."""
-    return _count(asked.trace, [event.tick for event in asked.trace.of_kind(EventKind.RECOVERY_STARTED)])
+def recovery_count(query: SignalQuery) -> Array:
+    """Return the number of recoveries begun so far."""
+    return _count(query.trace, [event.tick for event in query.trace.of_kind(EventKind.RECOVERY_STARTED)])
 
 
 def points_in_polygon(points: Array, corners: Array) -> Flags:
-    """Whether each of `points` (n, 2) is inside a polygon (m, 2), by the number of edges a ray to the right crosses.
+    """Return whether each of `points` (n, 2) is inside a polygon (m, 2), by counting the edges that a ray crosses.
 
-    Of its border, left and below belong to it: of regions side by side, each place is in one.
+    The left and the lower border belong to the polygon, so that each point is in one of two adjacent regions.
     """
     x, y = points[:, :1], points[:, 1:]
     others = np.roll(corners, 1, axis=0)
@@ -256,67 +241,59 @@ def points_in_polygon(points: Array, corners: Array) -> Flags:
     return odd
 
 
-def _clock(trace: Trace) -> Ticks:
-    if not len(trace.truth):
-        raise SignalUnavailable("the true pose was not recorded")
-    return trace.truth.ticks
-
-
 def poses_of(trace: Trace) -> Array:
-    """x, y, yaw of the robot at each truth sample."""
-    _clock(trace)
+    """Return x, y, yaw of the robot at each truth sample, (n, 3)."""
+    sample_ticks(trace)
     return truth(trace).values
 
 
-def _held(trace: Trace, samples: Samples, what: str) -> Array:
-    """The newest value at each truth sample."""
-    clock = _clock(trace)
-    if not len(samples):
-        raise SignalUnavailable(f"no {what} was recorded")
-    return samples.at(clock)
-
-
 def _velocity(trace: Trace) -> Array:
-    return _held(trace, check_samples(trace.velocity, "the true velocity", trace), "velocity")
+    return hold(trace, check_samples(trace.velocity, "the true velocity", trace), "velocity")
 
 
 def _covariance(trace: Trace) -> Array:
     belief = check_samples(trace.belief, "the belief", trace)
     if not len(belief) or belief.values.shape[1] < 9:
         raise SignalUnavailable("no covariance of the belief was recorded")
-    return _held(trace, belief, "belief")[:, 3:]
+    return hold(trace, belief, "belief")[:, 3:]
 
 
 def _commanded(trace: Trace) -> Array:
-    clock, command = _clock(trace), check_samples(trace.command, "the command", trace)
+    clock, command = sample_ticks(trace), check_samples(trace.command, "the command", trace)
     if not len(command):
         raise SignalUnavailable("no command was recorded")
     return np.where((clock >= command.ticks[0])[:, np.newaxis], command.at(clock), 0.0)
 
 
-def _changes(trace: Trace, values: Array, order: int) -> Array:
-    """Differences of an order by dt to that power; the ends repeat their neighbours. Being set down is no change."""
-    clock = _clock(trace)
-    if len(clock) <= order:
-        raise SignalUnavailable(f"the run is too short: {len(clock)} samples of the truth")
-    periods = np.diff(clock)
-    if (periods != periods[0]).any():
-        raise InvalidTrace("the samples of the truth are not evenly spaced")
-    step = float(periods[0]) / trace.tick_rate
-    first = np.diff(values) / step
-    placed = [k - 1 for k in teleport_samples(trace) if 0 < k < len(values)]
+def _differences(trace: Trace, values: Array, order: int) -> Array:
+    """Return differences of an order divided by the time step to that power; the ends repeat their neighbors.
+
+    Uneven samples are resampled first, and the differences held at the truth's own samples. Being set down elsewhere
+    is no change.
+    """
+    ticks = sample_ticks(trace)
+    if len(ticks) <= order:
+        raise SignalUnavailable(f"the run is too short: {len(ticks)} samples of the truth")
+    even = evenly_spaced(Samples(ticks, values[:, np.newaxis]), trace.tick_rate)
+    if len(even) <= order:
+        raise SignalUnavailable(f"the run is too short: {len(even)} samples of the truth")
+    step = float(even.ticks[1] - even.ticks[0]) / trace.tick_rate
+    first = np.diff(even.values[:, 0]) / step
+    placed = [k - 1 for k in teleport_samples(trace, even.ticks) if 0 < k < len(even)]
     first[placed] = 0.0
     if order == 1:
-        return np.concatenate((first[:1], first))
-    second = np.diff(first) / step
-    for k in placed:
-        second[max(k - 1, 0) : k + 1] = 0.0
-    return np.concatenate((second[:1], second, second[-1:]))
+        found = np.concatenate((first[:1], first))
+    else:
+        second = np.diff(first) / step
+        for k in placed:
+            second[max(k - 1, 0) : k + 1] = 0.0
+        found = np.concatenate((second[:1], second, second[-1:]))
+    return Samples(even.ticks, found[:, np.newaxis]).at(ticks)[:, 0]
 
 
 def _age(trace: Trace, came: Ticks) -> Array:
-    """Seconds since the newest of these ticks; since the start before the first."""
-    clock = _clock(trace)
+    """Return the seconds since the newest of these ticks; before the first, since the start."""
+    clock = sample_ticks(trace)
     if not len(came):
         return clock / trace.tick_rate
     at = np.searchsorted(came, clock, side="right") - 1
@@ -325,8 +302,8 @@ def _age(trace: Trace, came: Ticks) -> Array:
 
 
 def _current_goals(trace: Trace, case: Case) -> Array:
-    """x, y, yaw of the goal accepted last, (n, 3); of the first one, (1, 3), when none ever is."""
-    clock = _clock(trace)
+    """Return x, y, yaw of the goal accepted last, (n, 3); of the first goal, (1, 3), if none ever is."""
+    clock = sample_ticks(trace)
     named = {goal.name: goal.pose for goal in reversed(case.every_goal)}
     ticks, poses = [], []
     for event in trace.of_kind(EventKind.GOAL_ACCEPTED):
@@ -342,38 +319,40 @@ def _current_goals(trace: Trace, case: Case) -> Array:
     return Samples(np.array(ticks, dtype=np.int64), np.array(poses, dtype=np.float64)).at(clock)
 
 
-def _happening(of: SignalArguments) -> str:
-    return str(of.get("fault") or of["event"])
+def _label(arguments: SignalArguments) -> str:
+    return str(arguments.get("fault") or arguments["event"])
 
 
 def _between(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: object) -> Flags:
-    """From each event of the kind `start` (of that name, if one is given) to the next of `ends` under its name."""
-    stretches: list[tuple[int, float]] = []
+    """Return flags between each event of kind `start` (with `name`, if given) and the next matching one of `ends`."""
+    intervals: list[tuple[int, float]] = []
     for event in trace.of_kind(start):
         if name in (None, event.name) or (start is EventKind.GOAL_ACCEPTED and named(event.name, str(name))):
             later = (e.tick for e in trace.of_kind(*ends) if _ends(e.kind, e.name, event.name) and e.tick > event.tick)
-            stretches.append((event.tick, next(later, np.inf)))
-    return _stretches(trace, stretches)
+            intervals.append((event.tick, next(later, np.inf)))
+    return _flags(trace, intervals)
 
 
 def _ends(kind: EventKind, name: str, begun: str) -> bool:
-    """A task ends every goal, and so does the goal that takes its place; all else ends what bears its name."""
+    """Return whether an event ends what began as `begun`: the end of navigation and a new goal end every goal."""
     return name == begun or kind in (EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
 
 
-def _stretches(trace: Trace, stretches: Iterable[tuple[int, float]]) -> Flags:
-    """True from `start` to before `end`, and at the next sample at least."""
-    clock = _clock(trace)
+def _flags(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Flags:
+    """Return flags that are True from `start` to before `end`, and for at least one sample."""
+    clock = sample_ticks(trace)
     flags = np.zeros(len(clock), dtype=bool)
-    for start, end in stretches:
+    for start, end in intervals:
         first, last = np.searchsorted(clock, (start, end), side="left").tolist()
         flags[first : max(last, first + 1)] = True
     return flags
 
 
-def _truths(flags: Flags) -> Array:
+def _as_numbers(flags: Flags) -> Array:
     return flags.astype(np.float64)
 
 
 def _count(trace: Trace, ticks: list[int]) -> Array:
-    return np.searchsorted(np.array(sorted(ticks), dtype=np.int64), _clock(trace), side="right").astype(np.float64)
+    return np.searchsorted(np.array(sorted(ticks), dtype=np.int64), sample_ticks(trace), side="right").astype(
+        np.float64
+    )

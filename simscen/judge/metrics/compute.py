@@ -21,7 +21,7 @@ from simscen.criteria.plugin_metric import AnyMeasure
 from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M, pedestrian_gap
 from simscen.criteria.trace_signals.ground_truth import check_finite, drive, speed, truth, turn_rate
-from simscen.criteria.trace_signals.readers import SignalUnavailable
+from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.criteria.trace_signals.sparc_ldlj import MOVED_SPEED_M_S, ldlj, sparc
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.path import Values, path_metrics

@@ -13,7 +13,7 @@ from simscen.core.verdict import Finding, Verdict
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.stl.criterion import TemporalCriterion
 from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_signal
-from simscen.criteria.trace_signals.readers import SignalArguments, SignalUnavailable
+from simscen.criteria.trace_signals.sampling import SignalArguments, SignalUnavailable
 from simscen.model.scenario import ScenarioSpec
 from simscen.report.replay.columns import Columns
 from simscen.report.replay.thin import with_extremes
@@ -55,7 +55,9 @@ class Strip:
 def strips_of(trace: Trace, case: Case, spec: ScenarioSpec | None, columns: Columns) -> list[dict[str, Any]]:
     """Every signal that the trace holds: those that need no more to be said, and those that criteria compare."""
     asked = dict.fromkeys(_compared(spec)) if spec is not None else {}
-    plain = [Strip(name, {}) for name, signal in SIGNALS.items() if not signal.about and name not in _LEFT_OUT]
+    plain = [
+        Strip(name, {}) for name, signal in SIGNALS.items() if not signal.required_arguments and name not in _LEFT_OUT
+    ]
     found = {strip.name: strip for strip in (*plain, *(Strip(name, dict(of)) for name, of in asked))}
     return [told for strip in found.values() if (told := _strip(strip, trace, case, columns)) is not None]
 
@@ -84,7 +86,7 @@ def _strip(strip: Strip, trace: Trace, case: Case, columns: Columns) -> dict[str
         "name": strip.name,
         "text": signal.text,
         "unit": signal.unit,
-        "asks": signal.asks,
+        "asks": signal.is_boolean,
         "ticks": columns.add(trace.truth.ticks[kept]) if len(kept) < len(values) else None,
         "values": columns.add(values[kept], _step(signal.unit, values)),
     }
@@ -103,7 +105,7 @@ def _compared(spec: ScenarioSpec) -> Iterator[tuple[SignalName, tuple[tuple[str,
         chosen = entry.chosen
         for one in chosen.compared() if isinstance(chosen, TemporalCriterion) else ():
             if one.signal is not None and one.signal not in _LEFT_OUT:
-                yield one.signal, tuple(one.about.items())
+                yield one.signal, tuple(one.arguments.items())
 
 
 def _bound(verdict: Verdict, finding: Finding) -> dict[str, Any] | None:

@@ -5,7 +5,7 @@ from moments import CASE, CLOCK, about, moments
 
 from simscen.core.trace import Trace
 from simscen.criteria.trace_signals.catalog import SIGNALS, read_signal
-from simscen.criteria.trace_signals.readers import SignalUnavailable
+from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.record.recorder import Recorder
 from simscen.record.replay import read_log
 from simscen.record.tracebuilder import TraceBuilder

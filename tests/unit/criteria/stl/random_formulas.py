@@ -50,6 +50,20 @@ def larger(smaller):
 FORMULAS = st.recursive(COMPARISONS, larger, max_leaves=5)
 
 
+def with_responses(smaller):
+    """The same operators and `whenever … then`, with windows to the end of the run as well."""
+    return st.one_of(
+        larger(smaller),
+        st.tuples(smaller, smaller).map(lambda parts: {"whenever": parts[0], "then": parts[1]}),
+        st.tuples(st.sampled_from(["always", "eventually"]), smaller).map(
+            lambda parts: {parts[0]: parts[1]} if "between" not in parts[1] else parts[1]
+        ),
+    )
+
+
+RESPONSES = st.recursive(COMPARISONS, with_responses, max_leaves=6)
+
+
 def inner(part):
     return {key: value for key, value in part.items() if key != "between"}
 

@@ -34,8 +34,8 @@ def refused(words):
         ({"any": []}, "List should have at least 1 item after validation, not 0"),
         ({"all": [LOST] * 51}, "List should have at most 50 items after validation, not 51"),
         ({"any": [LOST] * 51}, "List should have at most 50 items after validation, not 51"),
-        ({**NEAR, "region": "dock"}, "`clearance` is not about `region`"),
-        ({"signal": "in_region", "goal": "a"}, "`in_region` is not about `goal`"),
+        ({**NEAR, "region": "dock"}, "`clearance` takes no `region`"),
+        ({"signal": "in_region", "goal": "a"}, "`in_region` takes no `goal`"),
         ({"signal": "in_region"}, "`in_region` needs exactly one of: region"),
         ({"signal": "distance_to", "op": "<", "value": 1}, "`distance_to` needs exactly one of: object, point, goal"),
         (
@@ -122,9 +122,9 @@ def test_a_condition_knows_its_comparisons_in_the_order_they_are_written():
 
 
 def test_what_a_signal_is_about_goes_by_the_keys_of_the_language():
-    assert Condition.model_validate({"signal": "in_collision", "with": "box"}).about == {"with": "box"}
-    assert Condition.model_validate({"signal": "in_region", "region": "dock"}).about == {"region": "dock"}
-    assert Condition.model_validate({"signal": "in_collision"}).about == {}
+    assert Condition.model_validate({"signal": "in_collision", "with": "box"}).arguments == {"with": "box"}
+    assert Condition.model_validate({"signal": "in_region", "region": "dock"}).arguments == {"region": "dock"}
+    assert Condition.model_validate({"signal": "in_collision"}).arguments == {}
 
 
 @pytest.mark.parametrize(
@@ -138,7 +138,7 @@ def test_what_a_signal_is_about_goes_by_the_keys_of_the_language():
     ],
 )
 def test_a_window_is_a_stretch_ahead(words, stretch):
-    assert Window.model_validate(words).stretch == stretch
+    assert Window.model_validate(words).interval == stretch
 
 
 @pytest.mark.parametrize(

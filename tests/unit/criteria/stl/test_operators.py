@@ -1,7 +1,8 @@
-"""Temporal operators against brute force over every window."""
+"""Temporal operators against brute force over every window, on even and uneven samples."""
 
 import math
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -11,6 +12,16 @@ from random_formulas import NUMBERS, VALUES
 
 from simscen.criteria.stl import operators
 from simscen.criteria.stl.operators import Continuation, SampleWindow
+
+
+class Ahead(NamedTuple):
+    """A window from `first` to `last` samples ahead of each of evenly spaced samples; None is the end of the run."""
+
+    first: int
+    last: int | None
+
+    def of(self, count):
+        return SampleWindow.over(np.arange(count), 1, self.first, self.last)
 
 
 def brute(operator, values, window, ahead, others=None):
@@ -51,32 +62,34 @@ def brute(operator, values, window, ahead, others=None):
 )
 def test_every_operator_is_what_brute_force_over_all_windows_says(values, first, length, beyond, over, data):
     others = data.draw(st.lists(NUMBERS, min_size=len(values), max_size=len(values)))
-    window, ahead = SampleWindow(first, None if length is None else first + length), Continuation(beyond, over)
+    window, ahead = Ahead(first, None if length is None else first + length), Continuation(beyond, over)
     p, q = np.array(values), np.array(others)
-    assert operators.always(p, window, ahead).tolist() == brute("always", values, window, ahead)
-    assert operators.eventually(p, window, ahead).tolist() == brute("eventually", values, window, ahead)
-    assert operators.until(p, q, window, ahead).tolist() == brute("until", values, window, ahead, others)
+    assert operators.always(p, window.of(len(p)), ahead).tolist() == brute("always", values, window, ahead)
+    assert operators.eventually(p, window.of(len(p)), ahead).tolist() == brute("eventually", values, window, ahead)
+    assert operators.until(p, q, window.of(len(p)), ahead).tolist() == brute("until", values, window, ahead, others)
 
 
 def test_until_over_a_whole_minute_takes_no_cubic_time():
     """rtamt 0.4.10 takes 106 s for this; by definition it is 1201 samples and as many windows."""
     chance = np.random.default_rng(3)
     p, q = chance.normal(1.0, 1.0, 1201), chance.normal(-2.0, 1.0, 1201)
-    whole = operators.until(p, q, SampleWindow(0, 1200), Continuation(-math.inf, True))
+    whole = operators.until(p, q, Ahead(0, 1200).of(1201), Continuation(-math.inf, True))
     assert whole[0] == max(min(q[k], p[:k].min(initial=math.inf)) for k in range(1201))
 
 
 FEW = [list(values) for n in (1, 2, 3) for values in product((-1.0, 2.0), repeat=n)]
-WINDOWS = [SampleWindow(first, last) for first in range(4) for last in (None, *range(first, 5))]
+WINDOWS = [Ahead(first, last) for first in range(4) for last in (None, *range(first, 5))]
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_windows_reach_over_the_blocks_they_are_computed_in(seed):
+def test_windows_of_every_length_match_brute_force(seed):
     chance, ahead = np.random.default_rng(seed), Continuation(math.inf, True)
     values = chance.integers(-9, 9, 11).astype(np.float64)
-    for window in (SampleWindow(first, first + length) for first in range(3) for length in range(7)):
-        assert operators.always(values, window, ahead).tolist() == brute("always", values.tolist(), window, ahead)
-        assert operators.eventually(values, window, ahead).tolist() == brute(
+    for window in (Ahead(first, first + length) for first in range(3) for length in range(7)):
+        assert operators.always(values, window.of(len(values)), ahead).tolist() == brute(
+            "always", values.tolist(), window, ahead
+        )
+        assert operators.eventually(values, window.of(len(values)), ahead).tolist() == brute(
             "eventually", values.tolist(), window, ahead
         )
 
@@ -87,9 +100,41 @@ def test_every_operator_in_every_window_over_every_short_signal(beyond, over):
     ahead = Continuation(beyond, over)
     for window, p in product(WINDOWS, FEW):
         values = np.array(p)
-        assert operators.always(values, window, ahead).tolist() == brute("always", p, window, ahead)
-        assert operators.eventually(values, window, ahead).tolist() == brute("eventually", p, window, ahead)
+        assert operators.always(values, window.of(len(values)), ahead).tolist() == brute("always", p, window, ahead)
+        assert operators.eventually(values, window.of(len(values)), ahead).tolist() == brute(
+            "eventually", p, window, ahead
+        )
         for q in FEW:
             if len(q) == len(p):
-                found = operators.until(values, np.array(q), window, ahead)
+                found = operators.until(values, np.array(q), window.of(len(p)), ahead)
                 assert found.tolist() == brute("until", p, window, ahead, q), (window, p, q)
+
+
+STEPS = st.lists(st.integers(1, 5), min_size=0, max_size=9)
+
+
+def in_window(ticks, k, begin, end):
+    """The samples in the window of sample k by definition; the newest one before its end if there is none."""
+    inside = [j for j, tick in enumerate(ticks) if ticks[k] + begin <= tick <= ticks[k] + end]
+    if inside or ticks[k] + begin > ticks[-1]:
+        return inside
+    return [max(j for j, tick in enumerate(ticks) if tick <= ticks[k] + end)]
+
+
+@settings(deadline=None)
+@given(STEPS, st.integers(0, 8), st.integers(0, 8), st.sampled_from([-math.inf, math.inf]), st.data())
+def test_windows_over_uneven_samples_are_those_of_their_times(steps, begin, length, beyond, data):
+    ticks = np.cumsum([0, *steps])
+    p, q = (np.array(data.draw(st.lists(NUMBERS, min_size=len(ticks), max_size=len(ticks)))) for _ in "pq")
+    period, end = data.draw(st.integers(1, 3)), begin + length
+    window, ahead = SampleWindow.over(ticks, period, begin, end), Continuation(beyond, over=True)
+    for k in range(len(ticks)):
+        reach, open_end = in_window(ticks, k, begin, end), bool(ticks[k] + end >= ticks[-1] + period)
+        values = [p[j] for j in reach] + [beyond] * (open_end or not reach)
+        assert operators.eventually(p, window, ahead)[k] == max(values)
+        assert operators.always(p, window, ahead)[k] == min(values)
+        first = reach[0] if reach else len(ticks)
+        held = [min([math.inf, *p[k:j]]) for j in range(len(ticks) + 1)]
+        after = [min(held[j], q[j]) for j in reach if j >= first]
+        after += [min(held[len(ticks)], beyond)] * (open_end or not reach)
+        assert operators.until(p, q, window, ahead)[k] == max(after)

@@ -25,12 +25,12 @@ def test_a_signal_has_a_range_that_it_can_fill(name):
         expected = (0.0, 1.0)
     if name == "clearance":
         expected = (-1.0, math.inf)
-    assert (SIGNALS[name].least, SIGNALS[name].most) == expected
+    assert (SIGNALS[name].minimum, SIGNALS[name].maximum) == expected
 
 
 @pytest.mark.parametrize("name", SIGNALS)
 def test_only_questions_are_answered_by_yes_or_no_and_have_no_unit(name):
-    assert SIGNALS[name].asks == (name in QUESTIONS)
+    assert SIGNALS[name].is_boolean == (name in QUESTIONS)
     assert (SIGNALS[name].unit == "") == (name in (*QUESTIONS, "nees") or name.endswith("_count"))
 
 

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 import shapely
 
+from simscen.core.events import Event, EventKind
 from simscen.core.navigation import Path
 from simscen.core.samples import Samples
 from simscen.core.trace import Trace
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_signal
-from simscen.criteria.trace_signals.readers import SignalUnavailable, points_in_polygon
+from simscen.criteria.trace_signals.readers import points_in_polygon
+from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.testing.sketch import sketch, sketch_case
 
 STEP = 6 / 240
@@ -54,12 +56,12 @@ def test_a_signal_has_one_finite_value_for_each_truth_sample_within_its_range(na
     }
     case = {"goals": [{"name": "shelf", "pose": [2, 1, 0]}], "regions": {"dock": [[0, 0], [1, 0], [1, 1]]}}
     of = {"object": "cart", "region": "dock", "fault": "off", "event": "off"}
-    wanted = {key: of[key] for key in SIGNALS[name].about[:1]}
+    wanted = {key: of[key] for key in SIGNALS[name].required_arguments[:1]}
     values = read_signal(name, sketch(words), sketch_case(case), wanted)
     assert values.shape == (161,)
     assert np.isfinite(values).all()
-    assert values.min() >= SIGNALS[name].least
-    assert values.max() <= SIGNALS[name].most
+    assert values.min() >= SIGNALS[name].minimum
+    assert values.max() <= SIGNALS[name].maximum
 
 
 def test_speed_is_over_ground_and_its_parts_have_signs():
@@ -149,12 +151,33 @@ def test_a_kidnapped_robot_has_not_travelled():
     assert values[-1] == pytest.approx(2.0, abs=0.02)
 
 
-def test_unevenly_spaced_samples_are_refused():
-    trace = driving([[0, 0, 0]] * 5)
-    ticks = trace.truth.ticks + np.array([0, 0, 1, 0, 0])
-    uneven = replace(trace, truth=Samples(ticks, trace.truth.values))
-    with pytest.raises(InvalidTrace, match="evenly"):
-        read_signal("acceleration", uneven, sketch_case({}), {})
+def uneven(ticks, speeds):
+    """A run that drives along x at these speeds, sampled at these ticks of 1/240 s."""
+    trace, ticks = driving([[speed, 0.0, 0.0] for speed in speeds]), np.array(ticks, dtype=np.int64)
+    truth, velocity = (Samples(ticks, samples.values) for samples in (trace.truth, trace.velocity))
+    return replace(trace, truth=truth, velocity=velocity, end=int(ticks[-1]))
+
+
+def test_differences_of_uneven_samples_are_those_of_the_interpolated_signal():
+    ticks = [0, 11, 25, 36, 60, 71, 84]
+    steady = uneven(ticks, [tick / 240 for tick in ticks])
+    assert read_signal("acceleration", steady, sketch_case({}), {}) == pytest.approx(np.ones(7), abs=1e-9)
+    assert read_signal("jerk", steady, sketch_case({}), {}) == pytest.approx(np.zeros(7), abs=1e-9)
+
+
+def test_differences_are_not_known_across_a_long_gap():
+    steady = uneven([0, 12, 24, 36, 97, 108], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert read_signal("speed", steady, sketch_case({}), {}).tolist() == [0.0] * 6
+    with pytest.raises(SignalUnavailable, match=r"no sample from t = 0.15 s to 0.40 s; .* need one every 0.25 s"):
+        read_signal("acceleration", steady, sketch_case({}), {})
+    bridged = uneven([0, 12, 24, 36, 96, 108], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert read_signal("acceleration", bridged, sketch_case({}), {}).tolist() == [0.0] * 6
+
+
+def test_being_set_down_is_no_acceleration_of_uneven_samples_either():
+    placed = Event(30, EventKind.ROBOT_PLACED, "robot")
+    trace = replace(uneven([0, 11, 25, 36, 48, 60], [0.0, 0.0, 0.0, 2.0, 2.0, 2.0]), events=(placed,))
+    assert np.abs(read_signal("acceleration", trace, sketch_case({}), {})).max() < 40.0
 
 
 def test_the_goal_is_the_one_accepted_last_also_one_that_an_event_sent():

@@ -1,0 +1,116 @@
+"""Temporal verdicts against a three-valued oracle that looks at every sample of every window."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_formulas import CASE, COMPARISONS, NUMBERS, RESPONSES, VALUES, inner, run
+
+from simscen.core.verdict import Status
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import judge
+
+UNKNOWN = None
+COMPARE = {
+    ">=": lambda value, bound: value >= bound,
+    "<=": lambda value, bound: value <= bound,
+    ">": lambda value, bound: value > bound,
+    "<": lambda value, bound: value < bound,
+}
+
+
+def negated(truth):
+    return UNKNOWN if truth is UNKNOWN else not truth
+
+
+def every(truths):
+    """Kleene's conjunction."""
+    truths = list(truths)
+    return False if False in truths else UNKNOWN if UNKNOWN in truths else True
+
+
+def some(truths):
+    """Kleene's disjunction."""
+    return negated(every(map(negated, truths)))
+
+
+class Oracle:
+    """Three-valued truth of formulas on a run of one sample a second that came to its end."""
+
+    def __init__(self, p, q):
+        self.signals, self.count = {"clearance": p, "yaw_rate": q}, len(p)
+
+    def windowed(self, truth, k, part):
+        """The truths in the window of sample k; one that is not known beyond the end."""
+        begin, end = part.get("between", (0, None))
+        last = self.count - 1 if end is None else k + end
+        inside = [truth(j) if j < self.count else UNKNOWN for j in range(k + begin, last + 1)]
+        return inside or [UNKNOWN]
+
+    def truth(self, formula, k, begin):
+        """The truth of a formula at sample k, where `begin` is the first sample at which it counts."""
+        match formula:
+            case {"signal": signal, "op": op, "value": value}:
+                return COMPARE[op](self.signals[signal][k], value)
+            case {"all": parts}:
+                return every(self.truth(part, k, begin) for part in parts)
+            case {"any": parts}:
+                return some(self.truth(part, k, begin) for part in parts)
+            case {"not": part}:
+                return negated(self.truth(part, k, begin))
+            case {"whenever": premise, "then": answer}:
+                return self.response(premise, answer, k, begin)
+            case {"until": {"hold": hold, "release": release, "between": [a, b]}}:
+                later = begin + a
+                return some(
+                    every([self.at(release, j, later), *(self.at(hold, i, begin) for i in range(k, j))])
+                    for j in range(k + a, k + b + 1)
+                )
+        ((operator, part),) = formula.items()
+        later = begin + part.get("between", (0, None))[0]
+        combine = every if operator == "always" else some
+        return combine(self.windowed(lambda j: self.truth(inner(part), j, later), k, part))
+
+    def at(self, formula, k, begin):
+        return self.truth(formula, k, begin) if k < self.count else UNKNOWN
+
+    def response(self, premise, answer, k, begin):
+        """Undecided, if nothing contradicts it, as long as the premise was never known to be true."""
+        tested = any(self.truth(premise, j, begin) is True for j in range(begin, self.count))
+        truth = every(
+            some([negated(self.truth(premise, j, begin)), self.truth(answer, j, begin)]) for j in range(k, self.count)
+        )
+        return UNKNOWN if truth is True and not tested else truth
+
+
+STATUS = {True: Status.PASS, False: Status.FAIL, UNKNOWN: Status.INCONCLUSIVE}
+
+
+@settings(deadline=None, max_examples=300)
+@given(RESPONSES, VALUES, st.data())
+def test_every_verdict_is_that_of_the_three_valued_oracle(formula, p, data):
+    q = data.draw(st.lists(NUMBERS, min_size=len(p), max_size=len(p)))
+    always = {"always": {"all": [formula], "between": [0, 1]}}
+    (verdict,) = judge([AnyCriterion.model_validate(always)], run(p, q), CASE)
+    assert verdict.status is STATUS[Oracle(p, q).truth(always, 0, 0)], verdict
+
+
+@settings(deadline=None, max_examples=200)
+@given(RESPONSES, RESPONSES, VALUES, st.data())
+def test_whenever_passes_only_if_its_premise_was_known_to_hold(premise, answer, p, data):
+    q = data.draw(st.lists(NUMBERS, min_size=len(p), max_size=len(p)))
+    written = {"whenever": {"all": [premise]}, "then": answer}
+    oracle = Oracle(p, q)
+    (verdict,) = judge([AnyCriterion.model_validate(written)], run(p, q), CASE)
+    assert verdict.status is STATUS[oracle.truth(written, 0, 0)], verdict
+    if verdict.status is Status.PASS:
+        assert any(oracle.truth(premise, k, 0) is True for k in range(len(p)))
+
+
+@settings(deadline=None)
+@given(COMPARISONS, COMPARISONS, VALUES)
+def test_a_premise_that_need_not_hold_lets_an_untested_run_pass(premise, answer, p):
+    written = {"whenever": {**premise, "required": False}, "then": answer}
+    (verdict,) = judge([AnyCriterion.model_validate(written)], run(p, p), CASE)
+    oracle = Oracle(p, p)
+    held = [k for k in range(len(p)) if oracle.truth(premise, k, 0)]
+    expected = all(oracle.truth(answer, k, 0) for k in held)
+    assert verdict.status is (Status.PASS if expected else Status.FAIL)
