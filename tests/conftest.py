@@ -23,17 +23,25 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 os.environ["SIMSCEN_CACHE_DIR"] = "off"
 
 LONG = ("tests/scenarios/test_shipped.py", "tests/ros/", "tests/conformance/")
-"""What takes longest begins first, so that no worker is left alone with it in the end."""
+"""Tests that start first because they take longest, so that no worker is left alone with them at the end."""
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int | None:
-    """One more than there are cores: a test that waits for a ROS graph or for processes it has started needs none."""
+    """Return one worker more than there are cores: some tests wait for other processes without using a core."""
     return None if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else len(os.sched_getaffinity(0)) + 1
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Long ones first; otherwise in their order."""
+    """Mark the parameter sets that `sample(n)` leaves out as slow, and sort the longest tests first."""
+    for tests in _by_function(items).values():
+        marker = tests[0].get_closest_marker("sample")
+        if marker is not None:
+            kept = {index * len(tests) // marker.args[0] for index in range(marker.args[0])}
+            for index, item in enumerate(tests):
+                if index not in kept:
+                    item.add_marker(pytest.mark.slow)
     root = Path(__file__).parents[1]
 
     def rank(item: pytest.Item) -> int:
@@ -41,6 +49,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return next((k for k, start in enumerate(LONG) if path.startswith(start)), len(LONG))
 
     items.sort(key=rank)
+
+
+def _by_function(items: list[pytest.Item]) -> dict[str, list[pytest.Item]]:
+    functions: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        functions.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    return functions
 
 
 def lay(site: Path, name: str, version: str, points: Mapping[str, Mapping[str, str]], **modules: str) -> Path:

@@ -66,6 +66,7 @@ def action(clone: Path, tmp_path: Path):
     return lambda **inputs: Composite(clone, workspace, temp, environ).run(**inputs)
 
 
+@pytest.mark.slow
 def test_a_failure_is_annotated_summed_up_with_its_picture_and_kept(action, tmp_path: Path) -> None:
     ran = action(**{"pictures-branch": "pictures", "arguments": '-k "good or bad" -j 1'})
     assert ran.failed and ran.outcomes.pop("run") == "failure", ran.printed

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 PROJECT = Path(__file__).parents[2]
 
 
@@ -13,6 +15,7 @@ def bench(*options: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
+@pytest.mark.slow
 def test_it_drives_an_experiment_and_prints_its_numbers_and_resumed_it_drives_no_run_again(tmp_path: Path) -> None:
     done = bench("--only", "narrow doorway", "--seeds", "1", "--out", str(tmp_path / "out"), "--format", "json")
     assert done.returncode == 0, done.stderr

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 SCENARIO = """\
 simscen: 1
 world: {simscen: 1, walls: [{name: wall, points: [[0, 0], [6, 0], [6, 6], [0, 6], [0, 0]]}]}
@@ -19,6 +21,7 @@ def bench(*arguments: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
+@pytest.mark.slow
 def test_a_suite_is_measured_and_its_results_are_compared(tmp_path: Path) -> None:
     for name in ("a", "b", "c"):
         (tmp_path / f"{name}.scenario.yaml").write_text(SCENARIO)

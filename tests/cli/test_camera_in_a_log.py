@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
@@ -36,6 +37,7 @@ pass: [{collisions: {max: 10}}]
 """
 
 
+@pytest.mark.slow
 def test_pictures_and_bumps_are_in_the_log_and_mean_what_was_there(tmp_path: Path) -> None:
     (tmp_path / "looker.robot.yaml").write_text(ROBOT)
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)

@@ -31,6 +31,7 @@ def call(tmp_path: Path, lay_out):
     return run
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", NAMES)
 def test_its_own_tests_pass(call, name: str) -> None:
     pytest_ = ("-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", "--import-mode=importlib", "-o", "addopts=")
@@ -47,6 +48,7 @@ def test_its_contract_is_asked_for_by_the_name_of_its_entry_point(call, tmp_path
     assert "1 passed" in done.stdout
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("stack", "used", "scenarios"),
     [
@@ -112,6 +114,7 @@ class Planner:
 """
 
 
+@pytest.mark.slow
 def test_a_planner_that_breaks_is_an_error_of_its_own_run(call, lay, tmp_path: Path) -> None:
     lay(tmp_path / "site", "nan-planner", "0.9", {"planner": {"nan": "nan_planner:Nan"}}, nan_planner=BROKEN)
     (tmp_path / "nan.stack.yaml").write_text("simscen: 1\nstack: {planner: {type: nan}}\n")

@@ -112,6 +112,7 @@ def test_89_another_seed_is_another_run_and_0_is_none(reference, pair: Path, sim
     assert not (pair / "none").exists()
 
 
+@pytest.mark.slow
 def test_90_without_fused_multiply_add_the_verdicts_are_the_same(reference, pair: Path, simscen, monkeypatch) -> None:
     plain = {
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F",
@@ -129,6 +130,7 @@ def test_90_without_fused_multiply_add_the_verdicts_are_the_same(reference, pair
     assert verdicts == {name: ["pass"] for name in reference}
 
 
+@pytest.mark.slow
 def test_a_run_that_another_session_has_otherwise_or_not_at_all_is_an_error(pair: Path, simscen) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
     assert simscen("run", "a.scenario.yaml", "--out", "same", "--check-against", "out").code == 0

@@ -40,6 +40,7 @@ def outcomes(out: Path) -> list[str]:
     return [run["outcome"] for run in json.loads((out / "results.json").read_text())["runs"]]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&- <&-"])
 def test_91_a_closed_descriptor_costs_nothing(folder: Path, closed: str) -> None:
     done = shell(f'"$simscen" run . --out out {closed}', folder)
@@ -66,6 +67,7 @@ def test_92_and_is_no_matter_for_other_formats(folder: Path) -> None:
     assert shell('"$simscen" run . --out out', folder, GITHUB_STEP_SUMMARY=str(folder)).returncode == 0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 @pytest.mark.parametrize("words", ["validate .", "list .", "--help", "schema", "judge out/runs/a/seed-7/run.mcap"])
 def test_77_a_full_stdout_is_told_by_commands_that_only_print(folder: Path, words: str) -> None:

@@ -108,6 +108,7 @@ def test_81_on_the_console_and_in_the_reports(simscen, hostile: str, folder: Pat
     assert all(name in ended.out for name in ("[/red]", "[link=https://example.org]here[/link]", "]]>", "=cmd()"))
 
 
+@pytest.mark.slow
 def test_81_on_github(simscen, hostile: str, folder: Path, monkeypatch) -> None:
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(folder / "summary.md"))
     ended = simscen("run", hostile, "--out", "out", "--format", "github")
@@ -121,6 +122,7 @@ def test_81_on_github(simscen, hostile: str, folder: Path, monkeypatch) -> None:
     assert "<img" not in summary
 
 
+@pytest.mark.slow
 def test_81_as_json(simscen, hostile: str) -> None:
     ended = simscen("run", hostile, "--out", "out", "--format", "json")
     assert ended.code == 1
@@ -128,6 +130,7 @@ def test_81_as_json(simscen, hostile: str) -> None:
     assert not COMMAND.search(ended.out)
 
 
+@pytest.mark.slow
 def test_81_on_a_terminal(hostile: str, folder: Path) -> None:
     main, end = pty.openpty()
     command = [Path(sys.executable).with_name("simscen"), "run", hostile, "--out", "out"]

@@ -126,6 +126,7 @@ def two(folder, scenario):
     return folder
 
 
+@pytest.mark.slow
 def test_69_and_76_and_79_a_killed_session_leaves_no_process_and_all_runs_and_can_go_on(start, three, scenario):
     run = start("run", ".", "--out", "out", "-j", "1")
     wait_for(lambda: begun(three, "finished") and under_way(three))
@@ -153,6 +154,7 @@ def test_69_and_76_and_79_a_killed_session_leaves_no_process_and_all_runs_and_ca
     assert (three / "out/runs/a/seed-1/run.mcap").stat().st_mtime_ns == first
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("number", "code"),
     [
@@ -174,6 +176,7 @@ def test_70_an_interrupted_session_lists_all_and_leaves_no_process(start, three,
     assert "interrupted" in out
 
 
+@pytest.mark.slow
 def test_80_a_changed_scenario_is_run_again(start, two, scenario):
     start("run", ".", "--out", "out").communicate(timeout=PATIENCE)
     assert outcomes(two / "out") == {"quick": "passed", "quick2": "passed"}
@@ -184,6 +187,7 @@ def test_80_a_changed_scenario_is_run_again(start, two, scenario):
     assert outcomes(two / "out") == {"quick": "passed", "quick2": "failed"}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 def test_77_a_full_stdout_costs_the_exit_code_but_no_report(start, two):
     with Path("/dev/full").open("w") as full:

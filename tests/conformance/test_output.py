@@ -79,6 +79,7 @@ def test_73_a_disk_that_fills_up_is_an_error_that_says_so_of_every_run_it_hits(m
     assert read_log(log).complete
 
 
+@pytest.mark.slow
 def test_74_a_full_disk_leaves_the_reports_that_were_there(mounted: Mounted, folder: Path) -> None:
     script = (
         '"$simscen" run . --out disk/out > /dev/null; cp disk/out/junit.xml before.xml; head -c 9m /dev/zero > disk/x;'
@@ -92,6 +93,7 @@ def test_74_a_full_disk_leaves_the_reports_that_were_there(mounted: Mounted, fol
     assert (folder / "after.xml").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_92_a_full_step_summary_costs_the_exit_code_but_no_report(mounted: Mounted, folder: Path) -> None:
     script = (
         "touch disk/summary; head -c 2m /dev/zero > disk/x; export GITHUB_STEP_SUMMARY=disk/summary;"
@@ -120,6 +122,7 @@ def test_78_a_report_that_cannot_be_written_is_told_before_anything_runs(simscen
     assert not list(folder.rglob("*.mcap"))
 
 
+@pytest.mark.slow
 def test_102_a_warm_process_that_is_stopped_is_noticed_and_replaced(folder: Path) -> None:
     text = (folder / "a.scenario.yaml").read_text()
     (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [stop-preparer]"))

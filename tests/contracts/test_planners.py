@@ -33,6 +33,7 @@ def test_it_keeps_its_promise(promise: Promise) -> None:
     promise.check()
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("kind", ["bit_star", "aorrtc", "rrt_star", "kpiece"])
 @pytest.mark.parametrize("space", ["reeds_shepp", "dubins"])
 def test_a_car_is_never_asked_to_turn_tighter_than_it_can(space: str, kind: str) -> None:

@@ -29,6 +29,7 @@ def start(spec: StackSpec, *goals: Goal) -> Drive:
     return drive(world, Pose2(1, 1), *goals, grid=grid, spec=spec)
 
 
+@pytest.mark.sample(1)
 @every
 def test_it_reaches_a_goal_around_an_unmapped_obstacle_without_contact(spec: StackSpec) -> None:
     d = start(spec, Goal("g", Pose2(5, 1, 0.5))).run(60)

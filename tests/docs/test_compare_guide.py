@@ -50,6 +50,7 @@ def test_its_files_and_its_configuration_are_valid(project: Path) -> None:
     assert (command.start_limit, command.answer_limit, command.cwd) == (60.0, 2.0, str(project / "home/my_nav"))
 
 
+@pytest.mark.slow
 def test_the_comparison_prints_what_it_shows(project: Path) -> None:
     """To the words and the outcomes; the last digits may differ between processors."""
     done = CliRunner().invoke(app, [*shlex.split(SHOWN), "--out", "out"])

@@ -32,6 +32,7 @@ def called(command: str, home: Path, **variables: str) -> subprocess.CompletedPr
     return subprocess.run(command, shell=True, cwd=home, env=env, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("command", "says"), COMMANDS)
 def test_a_command_says_what_the_page_says(home: Path, command: str, says: str) -> None:
     ended = called(command, home)
@@ -39,6 +40,7 @@ def test_a_command_says_what_the_page_says(home: Path, command: str, says: str) 
     assert ended.returncode == (0 if "passed" in says else 2 if "SC060" in says else 3)
 
 
+@pytest.mark.slow
 def test_the_configuration_says_what_the_name_runs(home: Path) -> None:
     ended = called("simscen run room.scenario.yaml", home, XDG_CONFIG_HOME=str(home / ".config"))
     assert (ended.returncode, ended.stderr) == (0, "")

@@ -46,6 +46,7 @@ def spec(kind: str, **options: object) -> Spec:
     return Spec(type=kind, improving_iterations=100, **options)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("kind", [*KINDS, "not eased", "navfn", "smac_2d"])
 def test_nowhere_does_a_plan_lead_over_a_cell_where_the_robot_cannot_be(kind: str) -> None:
     """A corner was cut between two looks at a motion, where a search or its easing did not look."""

@@ -113,6 +113,7 @@ def test_a_run_uses_what_the_package_adds_and_every_report_knows_it(ran) -> None
     assert [one["findings"] for one in judged["verdicts"]] == [one["findings"] for one in result["verdicts"]]
 
 
+@pytest.mark.slow
 def test_its_criterion_can_fail_and_says_by_how_much(yard) -> None:
     (yard / "door.scenario.yaml").write_text(DRIVE.replace("max: 30 s", "max: 0.5 s"))
     assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 1
@@ -130,6 +131,7 @@ def test_its_sensor_is_heard_by_the_log(once) -> None:
     assert "/scan" in topics and any("ring" in topic for topic in topics)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("old", "new", "wrong", "told", "hint"),
     [
@@ -178,6 +180,7 @@ def test_schema_and_explain_know_it_and_what_is_committed_does_not(yard) -> None
     assert subprocess.run(check, capture_output=True, text=True, check=False).stdout == ""
 
 
+@pytest.mark.slow
 def test_resume_does_again_what_a_change_of_the_package_could_change(yard, yardwork) -> None:
     assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 0
     journal = yard / "out/events.jsonl"
@@ -210,6 +213,7 @@ def test_another_version_of_the_package_does_not_judge_a_log_of_this_one(ran, ya
     assert "of yardwork==1.2, and installed is yardwork==2.0" in judged.stdout + judged.stderr
 
 
+@pytest.mark.slow
 def test_a_log_is_judged_without_what_only_its_run_needed(yard, yardwork) -> None:
     (yard / "door.scenario.yaml").write_text(
         DRIVE.replace("  - dwell: {region: doorway, max: 30 s}\n", "").partition("metrics:")[0]

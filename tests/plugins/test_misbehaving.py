@@ -106,6 +106,7 @@ def test_a_criterion_that_does_not_judge_makes_the_run_an_error(run, text: str, 
     assert result.error is not None and told in result.error.message
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("text", "told"),
     [
@@ -127,6 +128,7 @@ def test_a_metric_that_a_run_does_not_have_says_why(run) -> None:
     assert (result.metrics["mine"], result.undefined["mine"]) == (None, "nobody came")
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("kind", "text", "error", "told"),
     [
@@ -162,6 +164,7 @@ def test_a_command_that_is_none_ends_the_run_with_the_faults_name(run) -> None:
         run("fault", "def command(self, command): return Twist(float('nan'), 0.0, 0.0)", sensor="cmd_vel")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("instance", "text", "why"),
     [

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from simscen.run.process.whereabouts import whereabouts
 from simscen.spec.registry import Entry, installed
 
@@ -71,6 +73,7 @@ def test_the_folder_that_the_command_was_called_in_is_not_handed_over(yardwork, 
     assert str(yardwork) in json.loads(told)["path"]
 
 
+@pytest.mark.slow
 def test_pip_installs_what_the_tests_lay_out(tmp_path, yardwork) -> None:
     """The fixture that lays packages out leaves what an installer leaves."""
     call = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]

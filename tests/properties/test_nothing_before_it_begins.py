@@ -187,6 +187,7 @@ def assert_the_same_until(moments: list[Moment], other: list[Moment], tick: int)
         assert same(moment, known), f"tick {moment.tick}"
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize(("name", "fault"), FAULTS, ids=[name for name, _ in FAULTS])
 def test_until_a_fault_begins_the_run_is_the_one_without_it(play, quiet, name: str, fault: str) -> None:
     start = drawn(name)

@@ -50,6 +50,7 @@ def outcome(tmp_path: Path, thing: str, camera: bool) -> dict[str, str]:
     return {v.criterion: v.status.value for v in simulate(prepare(load_scenario(file, tmp_path))).result.verdicts}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("thing", [LOW_BOX, TABLE_TOP], ids=["low box", "table top"])
 def test_a_robot_that_collides_by_its_lidar_alone_does_not_with_a_depth_camera(tmp_path: Path, thing: str) -> None:
     assert outcome(tmp_path, thing, camera=False)["collisions"] == "fail"

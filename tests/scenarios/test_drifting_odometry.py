@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from simscen.bench.navigation.experiments import narrow_fields
 from simscen.core.events import EventKind
 from simscen.loading.scenario import load_scenario
@@ -25,6 +27,7 @@ def seconds(prepared: Prepared, seed: int) -> float:
     return trace.seconds(trace.end)
 
 
+@pytest.mark.slow
 def test_narrow_fields_take_hardly_longer_with_odometry_that_drifts_a_metre(tmp_path: Path) -> None:
     """In sum: one drive in seven swings once whatever drifts. With samples everywhere six take 1.7 times as long."""
     _, twenty_centimetres, _ = narrow_fields(tmp_path, [9101, 9102, 9103])

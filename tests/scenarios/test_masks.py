@@ -176,6 +176,7 @@ def test_masks_that_say_nothing_are_warned_of(tmp_path):
     ]
 
 
+@pytest.mark.slow
 def test_without_a_map_a_keepout_mask_holds_all_the_same(tmp_path):
     grey = white()
     grey[:40, 40:60] = 0
@@ -213,6 +214,7 @@ def findings(run, kind):
     return [(f.status.value, f.value, f.margin) for v in run.result.verdicts if v.criterion == kind for f in v.findings]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_robot_that_is_told_of_a_mask_keeps_out_of_it_and_another_drives_through(turned, tmp_path):
     strip(tmp_path, turned=turned)

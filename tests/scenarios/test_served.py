@@ -96,6 +96,7 @@ SHIPPED = sorted(
 )
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "name", SHIPPED if os.environ.get("SIMSCEN_SERVED") == "all" else [f"{name}.scenario.yaml" for name in CHOSEN]
 )
@@ -105,6 +106,7 @@ def test_a_shipped_scenario_gives_the_same_bits_through_the_socket(name: str, tm
     assert there == here
 
 
+@pytest.mark.slow
 def test_truth_cameras_several_lidars_preempted_late_and_canceled_goals_give_the_same_bits(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(EVERYTHING)
     (tmp_path / "watcher.robot.yaml").write_text(ROBOT)
@@ -128,6 +130,7 @@ pass: [{collisions: {max: 0}}]
 """
 
 
+@pytest.mark.slow
 def test_two_robots_each_with_a_process_of_its_own_give_the_same_bits(tmp_path: Path) -> None:
     (tmp_path / "two.scenario.yaml").write_text(TWO)
     here, there = logs(tmp_path / "two.scenario.yaml", tmp_path, tmp_path)

@@ -26,6 +26,7 @@ def test_the_shortest_way_is_no_shorter_than_the_straight_one() -> None:
     assert 10.0 <= obstacle_field(1).shortest < 20.0
 
 
+@pytest.mark.slow
 def test_fields_are_as_dense_as_the_worlds_of_barn() -> None:
     densities = [obstacle_field(number).density for number in range(1, 9)]
     assert 0.05 < np.mean(densities) < 0.22

@@ -30,6 +30,7 @@ def test_an_offer_knows_what_its_experiments_are_called(tmp_path: Path, name: st
     assert [made.name for made in offer.make()] == (list(offer.parts) or [name])
 
 
+@pytest.mark.slow
 def test_a_later_first_number_gives_other_drives_under_the_same_names(tmp_path: Path) -> None:
     def names(first: int) -> list[str]:
         small = Sizes(first, seeds=1, fields=2, dynamic=1, goals=1, lost=1)

@@ -21,6 +21,7 @@ def offered(*words: str) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("words", "among"),
     [

@@ -70,6 +70,7 @@ def test_a_session_in_which_all_goes_as_expected_is_good(simscen, project: Path)
     assert simscen("run", ".", "-k", "known or skipped", "--check-determinism", "--fail-fast").code == 0
 
 
+@pytest.mark.slow
 def test_a_failure_besides_the_one_that_is_expected_fails(simscen, project: Path) -> None:
     ended = simscen("run", ".", "-k", "other")
     assert ended.code == 1

@@ -29,6 +29,7 @@ def ran(folder: Path) -> list[tuple[str, int, str]]:
     return [(run["scenario"], run["seed"], run["outcome"]) for run in document["runs"]]
 
 
+@pytest.mark.slow
 def test_only_what_failed_runs_again_until_nothing_is_left(simscen, project: Path) -> None:
     ended = simscen("run", ".", "--last-failed")
     assert ended.err == "simscen: there is no earlier session in simscen-out: everything that is chosen runs\n"

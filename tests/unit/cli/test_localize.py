@@ -103,6 +103,7 @@ stack:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stack", ["", RECOVERY], ids=["no recovery", "recovery"])
 def test_the_log_of_a_run_on_slipping_wheels_among_people_gives_the_figures_of_its_verdict(
     simscen, tmp_path: Path, stack: str
@@ -124,6 +125,7 @@ def test_the_log_of_a_run_on_slipping_wheels_among_people_gives_the_figures_of_i
 NAV2S = "stack: {localizer: {parameters: nav2}}\n"
 
 
+@pytest.mark.slow
 def test_a_kidnapped_robot_is_lost_until_it_is_found_and_as_nav2s_amcl_from_then_on(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     lines = [f"{word},{t / 10},{value}" for t, word, value in kidnapped()]

@@ -80,6 +80,7 @@ assert not heavy, heavy
 """
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "arguments", [["--help"], ["validate", "."], ["list", "."], ["schema"], ["explain", "amcl"], ["new", "x"]], ids=str
 )

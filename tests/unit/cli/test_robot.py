@@ -74,6 +74,7 @@ def figures(check):
     return figures
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", ["amr", "car", "jackal", "mecanum", "omni", "turtlebot"])
 def test_every_shipped_robot_drives_what_it_is_told(check, name):
     code, told, _ = check(name)

@@ -46,6 +46,7 @@ def test_shipped_files_fit_their_schema(kind: str) -> None:
         assert not errors, file
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", FORM)
 def test_files_of_the_wrong_form_do_not_fit(name: str) -> None:
     validator = jsonschema.Draft7Validator(schema_of("scenario"))

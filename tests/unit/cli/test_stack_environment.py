@@ -139,6 +139,7 @@ def test_a_program_that_cannot_go_on_is_an_error_with_what_it_printed(run, simsc
     assert "nothing to compare" in ended.out
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc to make a program with a library of its own")
 def test_a_library_that_is_missing_is_told_as_the_linker_does_and_found_where_its_user_says(run, tmp_path, monkeypatch):
     (tmp_path / "lib").mkdir()

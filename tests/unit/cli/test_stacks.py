@@ -91,6 +91,7 @@ def test_a_report_from_the_journal_compares_as_the_session_did(simscen, project:
     )
 
 
+@pytest.mark.slow
 def test_a_single_stack_needs_no_label_and_the_reference_is_what_runs_without(simscen, project: Path) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "plain").code == 0
     ended = simscen("run", "a.scenario.yaml", "--stack", "mine=reference", "--out", "mine", "--check-against", "plain")
@@ -101,6 +102,7 @@ def test_a_single_stack_needs_no_label_and_the_reference_is_what_runs_without(si
     assert "nondeterministic" in other.out
 
 
+@pytest.mark.slow
 def test_the_command_that_repeats_a_run_repeats_it_with_its_stack(simscen, project: Path) -> None:
     simscen("run", "a.scenario.yaml", *BOTH, "--seed", "7", "--out", "out")
     listed = json.loads((project / "out/results.json").read_text())["runs"]
@@ -154,6 +156,7 @@ def test_equal_runs_are_checked_for_each_stack_by_itself(simscen, project: Path)
     assert runs(project / "out") == [f"a/seed-1-{stack}" for stack in ("dwb", "dwb.again", "ref", "ref.again")]
 
 
+@pytest.mark.slow
 def test_resume_runs_what_a_changed_stack_file_asks_anew_and_keeps_the_other_stack(simscen, project: Path) -> None:
     def call(*options: str) -> None:
         """In a process of its own, since one holds the folder until it ends."""

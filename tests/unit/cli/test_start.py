@@ -24,6 +24,7 @@ HEAVY = [
 ]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [

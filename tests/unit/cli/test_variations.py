@@ -60,6 +60,7 @@ def test_each_variation_runs_with_each_seed_in_a_folder_and_a_case_of_its_own(si
     assert "a[x=2]" in (project / "out/report.html").read_text()
 
 
+@pytest.mark.slow
 def test_the_command_that_repeats_a_run_repeats_exactly_that_one(simscen, project: Path) -> None:
     simscen("run", ".", "--seed", "7", "-k", "x=50cm", "--out", "out")
     (run,) = results(project / "out")
@@ -69,6 +70,7 @@ def test_the_command_that_repeats_a_run_repeats_exactly_that_one(simscen, projec
     assert logs[0].read_bytes() == logs[1].read_bytes()
 
 
+@pytest.mark.slow
 def test_stacks_are_compared_variation_by_variation(simscen, project: Path) -> None:
     (project / "dwb.stack.yaml").write_text("simscen: 1\nstack: {controller: {type: dwb}}\n")
     both = ("--stack", "ref=reference", "--stack", "dwb=dwb.stack.yaml")
@@ -81,6 +83,7 @@ def test_stacks_are_compared_variation_by_variation(simscen, project: Path) -> N
     assert [row["scenario"] for row in document["comparison"]["scenarios"]] == ["a[x=1]", "a[x=2]"]
 
 
+@pytest.mark.slow
 def test_a_session_goes_on_with_the_variations_that_it_lacks(simscen, project: Path) -> None:
     subprocess.run([*COMMAND, "run", ".", "--variation", "x=1", "--out", "out"], check=True, capture_output=True)
     before = (project / "out/runs/a/seed-1-x=1/run.mcap").stat().st_mtime_ns

@@ -84,6 +84,7 @@ def pythons(version: str) -> list[str]:
     return [*filter(None, [shutil.which(f"python{version}")]), *found]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("version", VERSIONS)
 def test_it_speaks_the_protocol_on_this_python(version: str, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(EVERYTHING)

@@ -87,6 +87,7 @@ def two_way(seed: int, chance: np.random.Generator) -> tuple[float, float]:
     return float(np.mean(orders)), float(np.mean(shuffled))
 
 
+@pytest.mark.slow
 def test_lanes_form_where_two_crowds_walk_through_each_other():
     """Their order is more than twice that of the same people with shuffled directions, and above it in every crowd."""
     chance = np.random.default_rng(1)

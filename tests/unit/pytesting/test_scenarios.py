@@ -77,6 +77,7 @@ def test_a_foreign_project_is_not_surprised(run, project: Path) -> None:
     assert not (project / "simscen-out").exists()
 
 
+@pytest.mark.slow
 def test_where_the_configuration_names_folders_scenarios_are_collected_there_and_nowhere_else(
     run, project: Path
 ) -> None:
@@ -107,6 +108,7 @@ def test_every_run_is_an_item_with_its_name_and_tags_and_a_wrong_file_an_error_w
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_runs_pass_fail_with_simscens_own_words_are_skipped_and_expected_to_fail(run, project: Path) -> None:
     code, told = run("--simscen", "-p", "no:xdist", "scenarios", "--junitxml=junit.xml", "--simscen-out=logs")
     assert code == 1, told
@@ -137,6 +139,7 @@ def test_workers_leave_all_in_one_folder_and_what_failed_is_known(run, project: 
     assert collected(told) == ["scenarios/bad.scenario.yaml::bad"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ini", "arguments", "why"),
     [

@@ -124,6 +124,7 @@ def _alive(pid: int) -> bool:
         return False
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("stubborn", [False, True])
 def test_all_that_was_launched_is_ended_when_the_adapter_goes_even_what_slipped_away(
     tmp_path: Path, stubborn: bool

@@ -25,6 +25,7 @@ def test_the_arena_is_a_hundred_metres_wide_and_its_goals_can_be_reached(tmp_pat
     assert all(length is not None and length < 100 for length in prepared.case.shortest.values())
 
 
+@pytest.mark.slow
 def test_the_warehouse_holds_five_thousand_objects_of_which_twenty_move(tmp_path):
     file = write_warehouse(tmp_path / "warehouse")
     world = load_world(load_scenario(file, file.parent))

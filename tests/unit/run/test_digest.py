@@ -121,6 +121,7 @@ def of(project: Path) -> Digest:
     return made
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(
     ("file", "old", "new"),
     [

@@ -14,6 +14,7 @@ obstacles:
 """
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("name", "x", "y"), [("crate", 5, 4.5), ("pillar", 5, 2.5), ("bend", 1.5, 3.0), ("bend", 1.5, 5.0)]
 )

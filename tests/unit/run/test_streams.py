@@ -64,6 +64,7 @@ def plain(play):
     return before(play(RANDOM % ("", "")))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_adding_a_fault_changes_nothing_before_it_takes_effect(play, plain, fault):
     assert before(play(RANDOM % ("", "  - " + fault % ", when: {time: 1 s}" + "\n"))) == plain

@@ -1,6 +1,7 @@
 """People in a run: their bodies, what is logged of them, and that one more of them changes nobody else."""
 
 import numpy as np
+import pytest
 
 from simscen.core.events import EventKind
 
@@ -76,6 +77,7 @@ def test_nobody_comes_where_there_is_no_room(play):
     assert effects == [True, False, False, False]
 
 
+@pytest.mark.slow
 def test_one_more_pedestrian_changes_neither_speed_nor_way_of_others_far_away(play):
     far = "{pedestrian: {name: aaron, pose: {x: 0.4, y: 5.6}}}"
     anna = "{pedestrian: {name: anna, pose: {x: 7.5, y: 1}, goals: [[7.5, 5]]}}"
@@ -92,6 +94,7 @@ def test_one_more_pedestrian_changes_neither_speed_nor_way_of_others_far_away(pl
         assert np.allclose(*first, atol=0.02), "they come at the same place; then they may meet"
 
 
+@pytest.mark.slow
 def test_seeds_draw_other_speeds_and_a_speed_that_is_written_is_kept(play):
     def fastest(anna: str, seed: int) -> float:
         trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), seed, **STANDING)

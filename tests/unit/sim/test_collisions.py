@@ -96,6 +96,7 @@ def test_wheels_on_the_ground_are_no_collision_even_where_the_world_has_a_floor_
     assert simulation.truth().clearance == 2.0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("pushable", [False, True])
 @pytest.mark.parametrize("seed", range(2))
 def test_no_contact_is_missed_compared_with_asking_after_every_tick(simulate, monkeypatch, seed, pushable):

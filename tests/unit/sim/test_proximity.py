@@ -155,6 +155,7 @@ def wall_of_many_triangles(columns, rows):
     return Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
 
 
+@pytest.mark.slow
 def test_a_solid_of_more_triangles_than_bullet_takes_at_once_is_as_near_as_any():
     wall = wall_of_many_triangles(400, 60)
     assert len(wall.faces) == 48_000

@@ -72,6 +72,7 @@ def wild_world(chance, pushable):
     return solids, bodies
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("pushable", [False, True])
 @pytest.mark.parametrize(
     ("seed", "robot"), [(1, "turtlebot"), (2, "turtlebot"), (3, "amr"), (4, "jackal"), (5, "omni")]

@@ -51,6 +51,7 @@ def corners(simulation, name, body):
     return simulation.robots[name].base_pose().plane.apply(points)
 
 
+@pytest.mark.slow
 def test_the_clearance_of_each_counts_the_other_as_measured_by_brute_force(meet):
     amr, turtlebot = robot_body(shipped("amr")), robot_body(shipped("turtlebot"))
     for x, y, yaw in ((1.3, 0.4, 0.7), (0.2, 1.1, 2.0), (-1.2, -0.6, -1.0)):

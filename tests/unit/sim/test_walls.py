@@ -34,6 +34,7 @@ def set_down_beside_a_post(simulation):
     simulation.drive(Twist(0.4, 0.0, 0.0))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("happens", [into_a_wall, pushed_into_a_wall_far_away, set_down_beside_a_post])
 def test_a_large_world_is_that_in_which_all_walls_stand_from_the_start(simulate, monkeypatch, happens):
     """To the last bit until something touches a wall; from then on the engine solves contacts in another order."""

@@ -69,6 +69,7 @@ def test_a_broken_promise_says_what_was_seen_and_what_was_promised(run) -> None:
     assert "1 failed, 6 passed" in told  # with their own test, as a path was given
 
 
+@pytest.mark.slow
 def test_the_name_of_a_shipped_type_and_workers_do_as_well(run) -> None:
     code, told = run("-n1", "--simscen-contract", "simple", "-k", "reset")
     assert code == 0, told
@@ -114,6 +115,7 @@ def refused(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, st
     return told
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("target", REFUSED)
 def test_what_cannot_be_tried_is_an_error_in_words(refused, target: str) -> None:
     code, told = refused[target]

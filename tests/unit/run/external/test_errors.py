@@ -26,6 +26,7 @@ def failed(play, text: str, **limits: float) -> RunError:
     return told.value
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -64,6 +65,7 @@ def test_a_stack_that_never_says_hello_is_not_waited_for(play, text: str, says: 
     assert says in str(error)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "text",
     [
@@ -80,6 +82,7 @@ def test_an_answer_has_its_limit_of_wall_time(play, text: str) -> None:
     assert "no answer to the step of t = 0.000 s (tick 0) within 0.2 s" in str(error)
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize(
     ("text", "says"),
     [

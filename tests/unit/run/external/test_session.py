@@ -52,6 +52,7 @@ def log_of(answer) -> bytes:
     return Path(answer.artifacts.mcap).read_bytes()
 
 
+@pytest.mark.slow
 def test_each_fault_is_the_error_of_its_run_alone_and_the_neighbours_log_stays_the_same(session) -> None:
     answers = session("out", BROKEN)
     alone = session("alone", {"fine": GOOD})["fine"]

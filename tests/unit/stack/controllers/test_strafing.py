@@ -40,6 +40,7 @@ def test_under_mppi_it_hardly_turns_on_the_way() -> None:
     assert max(abs(pose.yaw) for pose in driven.track) < 0.8
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "controller", [{**DWB, "max_vel_y": 0.0}, {**MPPI, "motion_model": "DiffDrive"}, {**MPPI, "vy_max": 0.0}],
     ids=["dwb", "mppi as a diff drive", "mppi without"],
@@ -56,6 +57,7 @@ def test_regulated_pure_pursuit_never_strafes_as_in_nav2() -> None:
     assert strafed(driven) == 0.0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("controller", [DWB, MPPI], ids=["dwb", "mppi"])
 def test_a_base_that_cannot_strafe_never_does(controller: dict[str, Any]) -> None:
     assert strafed(sideways(0.0, **controller)) == 0.0

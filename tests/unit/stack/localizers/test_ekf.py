@@ -39,6 +39,7 @@ def test_without_noise_it_arrives_exactly_where_the_robot_does(imu: bool) -> Non
     assert np.abs(errors(run(subject, way, 1, SILENT, imu=imu), way.truth)).max() < 1e-6
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("imu", [False, True])
 def test_its_covariance_is_consistent_with_its_errors(imu: bool) -> None:
     """50 NEES of 3 degrees of freedom add up to chi-square with 150; all but one of 1000 such tests pass by chance."""

@@ -86,6 +86,7 @@ def drive(what: object, seed: int) -> float:
     return nees(*replayed(SPEC, truth, wheels, gyro))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("what", [slide, ramp, turntable, lock, lock_on_ice, one_wheel, spin], ids=lambda f: f.__name__)
 def test_it_is_no_surer_than_it_is_right_whatever_makes_its_wheels_slip(what: object) -> None:
     """NEES of 3 degrees of freedom add up to chi-square; it may be less sure, as no sensor tells how a robot slides."""

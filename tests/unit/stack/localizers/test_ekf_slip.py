@@ -134,6 +134,7 @@ def sampled(case: dict[str, float], slip: float, seed: int) -> tuple[Belief, Arr
     return replayed(spec, truth, claimed, truth[:, 2] + bias + chance.normal(0, case["gyro"], n))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("slip", [0.0, 0.2])
 @pytest.mark.parametrize("case", CASES, ids=["tidy", "rough", "fast"])
 def test_its_covariance_is_consistent_with_its_errors_on_clean_and_on_slipping_drives(

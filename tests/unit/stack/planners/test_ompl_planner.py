@@ -133,6 +133,7 @@ def test_it_squeezes_through_when_there_is_no_other_way() -> None:
     assert path.length() < 2.5
 
 
+@pytest.mark.slow
 def test_a_way_of_hundreds_of_metres_through_many_doors_is_found() -> None:
     world = Flatland().room(60, 20)
     for k in range(1, 15):  # a serpentine: doors at the one end and at the other in turn

@@ -65,6 +65,7 @@ def crossing(t: float) -> list[Disc]:
     return [(4.0, -5.0 + 1.2 * t, 0.4), (7.0, 9.0 - 1.2 * t, 0.4)]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda spec: str(spec.type))
 @pytest.mark.parametrize("discs", [oncoming, crossing])
 def test_every_controller_of_ours_passes_what_comes_towards_it_or_across(

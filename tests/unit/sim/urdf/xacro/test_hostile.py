@@ -135,6 +135,7 @@ BOMBS = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", BOMBS)
 def test_expansion_ends(refusal, name):
     assert refusal(BOMBS[name]).code == "SC400"
