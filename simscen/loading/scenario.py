@@ -8,8 +8,7 @@ from typing import Literal
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.problems import Problem
 from simscen.loading import multirobot
-from simscen.loading.checks.robots import check_robot_names
-from simscen.loading.checks.runner import check_scenario
+from simscen.loading.checks.runner import check_robot_names, check_scenario
 from simscen.loading.files.assets import Assets, load_judged_masks
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
@@ -112,7 +111,7 @@ def _with_choice(
     spec = check(ScenarioSpec, tree, multirobot.missing_in_scenario)
     if isinstance(spec, list):
         return library.with_source(sorted([*spec, *_problems_of_world(tree, library)]))
-    if problems := list(check_robot_names(spec, tree)):
+    if problems := check_robot_names(spec, tree):
         return library.with_source(problems)
     loaded = _several(spec, tree, library, file) if spec.robots else _one(spec, tree, library, file)
     if isinstance(loaded, list):
@@ -208,7 +207,7 @@ def _one(
         robot_name=name,
         other_robots=others,
     )
-    problems = sorted(check_scenario(loaded, strangers=strangers))
+    problems = sorted(check_scenario(loaded, unknown_places=strangers))
     if any(problem.severity == "error" for problem in problems):
         return problems
     return replace(loaded, notes=(*loaded.notes, *problems))

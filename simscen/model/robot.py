@@ -368,6 +368,13 @@ class RobotSpec(Spec):
     latency: RobotLatency = by_default()
     """What computing and sensing take on it, for scenarios that ask for it."""
 
+    @property
+    def top_speed(self) -> float:
+        """Highest speed over ground in m/s, in the direction in which it drives fastest."""
+        ahead = max(self.limits.linear, self.limits.reverse or self.limits.linear)
+        sideways = (self.limits.lateral or self.limits.linear) if isinstance(self.drive, Holonomic) else 0.0
+        return float((ahead**2 + sideways**2) ** 0.5)
+
     @model_validator(mode="after")
     def _consistent(self) -> "RobotSpec":
         if strange := sorted(self.latency.sensors.keys() - self.sensors.keys()):

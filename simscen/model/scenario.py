@@ -127,7 +127,7 @@ class GoalEntry(Spec):
     """What the robot does there before it goes on."""
 
 
-MOST_GOALS = 1000
+MAX_GOALS = 1000
 """Goals that a robot is sent to in one run, loops counted."""
 
 
@@ -144,7 +144,7 @@ class OneOfSeveral(RobotEntry):
     """The map this robot gets; `none` = no map, odometry only."""
     stack: AnyStack | None = None
     """What its stack has otherwise than that of all."""
-    goals: Annotated[list[Annotated[GoalEntry, PlaceAlone("pose")]], Field(max_length=MOST_GOALS)] = []
+    goals: Annotated[list[Annotated[GoalEntry, PlaceAlone("pose")]], Field(max_length=MAX_GOALS)] = []
     """In this order; a robot without goals stands where it is."""
     navigation: Navigation | None = None
     """Which action takes its goals, and how often."""
@@ -156,7 +156,7 @@ class OneOfSeveral(RobotEntry):
     """What must hold for this robot, besides what must for all."""
 
 
-MOST_ROBOTS = 20
+MAX_ROBOTS = 20
 
 
 def _in_words(reason: str) -> str:
@@ -226,11 +226,11 @@ class ScenarioSpec(Spec):
     """The map the robot gets, if it is not that of the world; `none` = no map, odometry only."""
     robot: RobotEntry | None = None
     """The robot under test; where there are several, `robots`."""
-    robots: Annotated[dict[RobotName, OneOfSeveral], Field(min_length=2, max_length=MOST_ROBOTS)] | None = None
+    robots: Annotated[dict[RobotName, OneOfSeveral], Field(min_length=2, max_length=MAX_ROBOTS)] | None = None
     """Several robots by name, instead of `robot`: each with its own goals, faults and criteria."""
     stack: AnyStack = by_default()
     """The stack under test: simscen's own, or `{external: NAME}`, a process."""
-    goals: Annotated[list[Annotated[GoalEntry, PlaceAlone("pose")]], Field(max_length=MOST_GOALS)] = []
+    goals: Annotated[list[Annotated[GoalEntry, PlaceAlone("pose")]], Field(max_length=MAX_GOALS)] = []
     """In this order; places of the world alone will do: `[kitchen, office]`."""
     navigation: Navigation = by_default()
     """Which action takes the goals, and how often."""

@@ -390,7 +390,7 @@ def test_a_problem_in_a_folder_of_the_world_path_can_be_opened(folder: Path, ref
                      id="goal in obstacle"),
         pytest.param("x: 1.5, y: 1", "x: 0, y: 2", "5:16", 'goal `goal-1` (0, 2) is inside obstacle "wall_1"',
                      id="goal in wall"),
-        pytest.param("x: 1.5, y: 1", "x: 2.45, y: 2", "5:16", 'nearer to obstacle "crate"', id="too near"),
+        pytest.param("x: 1.5, y: 1", "x: 2.45, y: 2", "5:16", 'closer to obstacle "crate"', id="too near"),
         pytest.param("x: 1.5, y: 1", "x: 60, y: 2", "5:16", "goal `goal-1` (60, 2) is outside the world", id="outside"),
         pytest.param("{x: 1, y: 1}", "{x: 3, y: 2}", "4:39", 'the robot\'s start (3, 2) is inside obstacle "crate"',
                      id="start in obstacle"),

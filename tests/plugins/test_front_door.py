@@ -142,7 +142,7 @@ def test_its_sensor_is_heard_by_the_log(once) -> None:
             "lidar, cross",
             "imu, cross",
             "crosstalk",
-            "fault `crosstalk` makes no sense on an imu (`imu`)",
+            "fault `crosstalk` cannot affect an imu (`imu`)",
             "lidar, ring",
         ),
         ("reversing: 0.3 m/s", "reversing: -1", "-1", "must be greater than 0, got `-1`", ""),

@@ -17,7 +17,8 @@ from simscen.core.events import EventKind
 from simscen.core.readings import INSTANCES, MAP
 from simscen.core.trace import Moment
 from simscen.faults.fault import AnyFault
-from simscen.loading.checks.faults import instances, unfit_faults
+from simscen.loading.checks.faults import instances, unfit_faults, unknown_sensors
+from simscen.loading.checks.registry import NameScope
 from simscen.loading.scenario import load_scenario
 from simscen.run.prepare import prepare
 from simscen.run.simulate import simulate
@@ -125,7 +126,8 @@ def play(tmp_path_factory):
         lists = ["".join(f"\n  - {entry}" for entry in entries) or " []" for entries in (faults, events)]
         file.write_text(SCENARIO % (str(shut).lower(), f"{seconds:.3f} s", *lists))
         loaded = load_scenario(file, Path(folder))
-        assert [problem.message for problem in unfit_faults(loaded)] == []
+        scope = NameScope(loaded)
+        assert [*unknown_sensors(scope), *unfit_faults(scope)] == []
         heard = Heard()
         simulate(prepare(loaded), 3, attach=lambda rig, logs: [heard])
         return heard.moments

@@ -307,7 +307,7 @@ def test_criteria_that_no_mask_can_make_fail_are_warned_of(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("columns", "words"), [(slice(0, 14), "the robot starts in"), (slice(70, 100), "while goal `goal-1`")]
+    ("columns", "words"), [(slice(0, 14), "the robot starts in"), (slice(70, 100), "if goal `goal-1` is reached")]
 )
 def test_a_mask_that_forbids_start_or_goal_can_never_be_kept_out_of(columns, words, tmp_path):
     grey = white()

@@ -18,7 +18,6 @@ from simscen.cli.session.selection import checked
 from simscen.core.errors import Exit, InvalidInput
 from simscen.core.result import Outcome, RunKey
 from simscen.core.sessionevents import RunFinished, SessionEvent
-from simscen.loading.checks.events import top_speed
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
@@ -121,7 +120,7 @@ def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], d
 def _top_speed(scenario: LoadedScenario) -> float | None:
     """Of the fastest of its robots; None where one is none of ours."""
     robots = [view.robot.spec for view in scenario.each.values()]
-    return max(top_speed(robot) for robot in robots if robot) if all(robots) else None
+    return max(robot.top_speed for robot in robots if robot) if all(robots) else None
 
 
 def repeat_command(job: Job) -> str:

@@ -22,7 +22,7 @@ from simscen.loading.variations.problems import VariationProblems, merge_problem
 from simscen.run.robotproblems import problems_once_built
 from simscen.run.worldcache import WorldCache
 from simscen.run.worldchecks.runner import check_in_world, world_reader_notes
-from simscen.run.worldchecks.world_file import check_world_places
+from simscen.run.worldchecks.world_file import check_built_world
 from simscen.run.worldsource import world_of
 
 
@@ -149,7 +149,7 @@ class Checks:
             if self.fast:
                 return notes
             world = world_of(source, self.root, self.world_path, self.lenient)
-            return [*notes, *check_world_places(world, source), *world_reader_notes(world, source, self.root)]
+            return [*notes, *check_built_world(world, source), *world_reader_notes(world, source, self.root)]
         except InvalidInput as error:
             return error.problems
 

@@ -1,47 +1,60 @@
-"""Criteria that no run can pass: they ask for what cannot be, or contradict each other."""
+"""Checks of criteria: those that no run can pass, and bounds that hardly any run can exceed."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
-from simscen.core.problems import Problem
 from simscen.loading.checks.events import no_recovery
+from simscen.loading.checks.registry import MEANING, Finding, Keys
 from simscen.loading.known_names import goal_names
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.yaml.tree import Key
 from simscen.model.navigation import failure_of
 
-Keys = tuple[Key, ...]
-ABOUT_GOALS = frozenset({"goals_reached", "time_to_goal", "no_false_success", "stuck", "result", "error_code"})
-"""Criteria that have nothing to judge where the robot is sent nowhere."""
-NONE = 0
-"""The error code of no error."""
+GOAL_CRITERIA = frozenset({"goals_reached", "time_to_goal", "no_false_success", "stuck", "result", "error_code"})
+"""Criteria that have nothing to judge if the robot gets no goal."""
+NO_ERROR = 0
+LOOSE_SPEED_FACTOR = 1.2
+"""A bound on the speed above this multiple of the top speed is loose; below, it still limits an overshoot."""
+LOOSE_PATH_RATIO = 10.0
+LOOSE_COLLISION_COUNT = 1000
+
+LooseBounds = Iterator[tuple[str, str]]
+"""Key and reason for each bound of a criterion that hardly any run can exceed."""
 
 
-def never_holds(loaded: LoadedScenario) -> Iterator[Problem]:
-    """Every criterion, or pair of criteria, that no run can pass."""
+@MEANING.check("SC036")
+def undecidable_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find criteria that need more time than the run has."""
+    limit = loaded.spec.time_limit
     for index, entry in enumerate(loaded.spec.pass_):
-        keys: Keys = ("pass", index, entry.kind)
-        check = _CHECKS.get(entry.kind)
-        why = _without_goals(loaded, entry.kind, entry.chosen) or (check(loaded, entry.chosen) if check else None)
-        if why:
-            yield loaded.problem_at(loaded.key_place_of(*keys), "SC051", f"{entry.kind} can never hold: {why}")
-    yield from _contradictions(loaded)
-    yield from _never_sent(loaded)
+        horizon = getattr(entry.chosen, "horizon", 0.0)
+        if horizon > limit:
+            message = f"`{entry.kind}` can never hold: it needs {horizon:g} s, but the time limit is {limit:g} s"
+            yield Finding(("pass", index, entry.kind), message, at_key=True)
+
+
+@MEANING.check("SC051")
+def impossible_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find criteria that no run can pass."""
+    for index, entry in enumerate(loaded.spec.pass_):
+        check = _IMPOSSIBLE.get(entry.kind)
+        reason = _without_goals(loaded, entry.kind, entry.chosen) or (check(loaded, entry.chosen) if check else None)
+        if reason:
+            yield Finding(("pass", index, entry.kind), f"{entry.kind} can never hold: {reason}", at_key=True)
 
 
 def _without_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
-    needs = kind in ABOUT_GOALS or (kind == "path_length" and criterion.max_ratio is not None)
-    return "the robot is sent to no goal" if needs and not goal_names(loaded) else None
+    needs_goal = kind in GOAL_CRITERIA or (kind == "path_length" and criterion.max_ratio is not None)
+    return "the robot gets no goal" if needs_goal and not goal_names(loaded) else None
 
 
 def _result(loaded: LoadedScenario, result: Any) -> str | None:
     cancels = any(action.may("cancel_goal") for step in loaded.spec.steps for action in step.actions)
     if result.status == "CANCELED" and not cancels:
         return "no event cancels a goal"
-    if result.status == "SUCCEEDED" and result.error_code not in (None, NONE):
-        return f"what has SUCCEEDED has no error code, and so not {result.error_code.name}"
-    if result.status == "FAILED" and result.error_code == NONE:
-        return "what has FAILED has an error code other than NONE"
+    if result.status == "SUCCEEDED" and result.error_code not in (None, NO_ERROR):
+        return f"a result that SUCCEEDED has no error code such as {result.error_code.name}"
+    if result.status == "FAILED" and result.error_code == NO_ERROR:
+        return "a result that FAILED has an error code other than NONE"
     return None
 
 
@@ -49,27 +62,12 @@ def _recoveries(loaded: LoadedScenario, recoveries: Any) -> str | None:
     return no_recovery(loaded, recoveries.name) if recoveries.min else None
 
 
-_CHECKS = {"result": _result, "recoveries": _recoveries}
+_IMPOSSIBLE = {"result": _result, "recoveries": _recoveries}
 
 
-def _never_sent(loaded: LoadedScenario) -> Iterator[Problem]:
-    """Goals after one at which the robot is to fail, where a failure is the end."""
-    spec = loaded.spec
-    again = spec.navigation.loops > 1
-    if spec.on_goal_failure == "continue" or any(
-        action.may("new_goal") for step in spec.steps for action in step.actions
-    ):
-        return
-    for index, goal in enumerate(spec.goals):
-        if failure_of(goal.expect) and (again or index + 1 < len(spec.goals)):
-            following = spec.goal_names[(index + 1) % len(spec.goals)]
-            message = f"goal `{following}` is never sent: the robot is to fail at the one before it, and stops there"
-            yield loaded.problem(("goals", index, "expect"), "SC051", message, "say `on_goal_failure: continue`")
-            return
-
-
-def _contradictions(loaded: LoadedScenario) -> Iterator[Problem]:
-    """Results that exclude each other."""
+@MEANING.check("SC051")
+def contradicting_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find pairs of criteria that ask for different results."""
     failing = any(failure_of(goal.expect) for goal in loaded.spec.goals)
     wanted: dict[str, tuple[str, Keys]] = {}
     for index, entry in enumerate(loaded.spec.pass_):
@@ -80,9 +78,93 @@ def _contradictions(loaded: LoadedScenario) -> Iterator[Problem]:
         if not status:
             continue
         keys: Keys = ("pass", index, entry.kind)
-        before = next((told for other, told in wanted.items() if other != status), None)
+        before = next((other for key, other in wanted.items() if key != status), None)
         if before:
             first = loaded.key_place_of(*before[1])
             message = f"{entry.kind} contradicts {before[0]} at {first.line}:{first.col}: no run can pass both"
-            yield loaded.problem_at(loaded.key_place_of(*keys), "SC051", message)
+            yield Finding(keys, message, at_key=True)
         wanted.setdefault(status, (entry.kind, keys))
+
+
+@MEANING.check("SC051")
+def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find goals after one that is expected to fail, in scenarios that stop at the first failure."""
+    spec = loaded.spec
+    new_goals = any(action.may("new_goal") for step in spec.steps for action in step.actions)
+    if spec.on_goal_failure == "continue" or new_goals:
+        return
+    for index, goal in enumerate(spec.goals):
+        if failure_of(goal.expect) and (spec.navigation.loops > 1 or index + 1 < len(spec.goals)):
+            following = spec.goal_names[(index + 1) % len(spec.goals)]
+            message = f"the robot never gets goal `{following}`: it stops after this goal, which is expected to fail"
+            yield Finding(("goals", index, "expect"), message, "set `on_goal_failure: continue`")
+            return
+
+
+@MEANING.check("SC052", severity="warning")
+def loose_bounds(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find bounds that physics or the time limit already guarantee."""
+    for index, entry in enumerate(loaded.spec.pass_):
+        check = _LOOSE.get(entry.kind)
+        for key, reason in check(loaded, entry.chosen) if check else ():
+            yield Finding(("pass", index, entry.kind, key), f"{entry.kind} can hardly fail: {reason}")
+
+
+def _loose_speed(loaded: LoadedScenario, speed: Any) -> LooseBounds:
+    robot = loaded.robot.spec
+    if robot is None:
+        return
+    if speed.max is not None and speed.max > LOOSE_SPEED_FACTOR * robot.top_speed:
+        yield "max", f"the robot's top speed is {robot.top_speed:g} m/s"
+    if speed.max_turn_rate is not None and speed.max_turn_rate > LOOSE_SPEED_FACTOR * robot.limits.angular:
+        yield "max_turn_rate", f"the robot's maximum turn rate is {robot.limits.angular:g} rad/s"
+
+
+def _loose_path_length(loaded: LoadedScenario, length: Any) -> LooseBounds:
+    robot, limit = loaded.robot.spec, loaded.spec.time_limit
+    if length.max_ratio is not None and length.max_ratio > LOOSE_PATH_RATIO:
+        yield "max_ratio", f"that is {length.max_ratio:g} times the shortest path"
+    if robot is not None and length.max is not None and length.max > robot.top_speed * limit:
+        yield "max", f"at its top speed the robot drives {robot.top_speed * limit:g} m within the time limit"
+
+
+def _loose_collisions(_: LoadedScenario, collisions: Any) -> LooseBounds:
+    if collisions.max is not None and collisions.max >= LOOSE_COLLISION_COUNT:
+        yield "max", f"no run has {collisions.max} collisions"
+
+
+def _loose_goals_reached(loaded: LoadedScenario, reached: Any) -> LooseBounds:
+    yield from _beyond_limit(loaded, reached, "within")
+    timeouts = [goal.timeout for goal in loaded.spec.goals]
+    own = [timeout for timeout in timeouts if timeout is not None]
+    if reached.within is not None and own and len(own) == len(timeouts) and reached.within > max(own):
+        yield "within", f"the goals' own timeouts end after at most {max(own):g} s"
+
+
+def _beyond_limit(loaded: LoadedScenario, criterion: Any, key: str) -> LooseBounds:
+    value, limit = getattr(criterion, key), loaded.spec.time_limit
+    if value is not None and value >= limit:
+        yield key, f"the time limit ends the run after {limit:g} s"
+
+
+def _within_limit(key: str) -> Callable[[LoadedScenario, Any], LooseBounds]:
+    return lambda loaded, criterion: _beyond_limit(loaded, criterion, key)
+
+
+_LOOSE: dict[str, Callable[[LoadedScenario, Any], LooseBounds]] = {
+    "speed": _loose_speed,
+    "path_length": _loose_path_length,
+    "collisions": _loose_collisions,
+    "goals_reached": _loose_goals_reached,
+    "time_to_goal": _within_limit("max"),
+    "stuck": _within_limit("max"),
+    "stopped_within": _within_limit("time"),
+    "relocalized_within": _within_limit("time"),
+}
+
+
+@MEANING.check("SC052", severity="warning")
+def only_warnings(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find scenarios in which no criterion can fail the run."""
+    if all(entry.severity == "warn" for entry in loaded.spec.pass_):
+        yield Finding(("pass",), "no criterion can fail the run: all are `severity: warn`", at_key=True)

@@ -1,54 +1,34 @@
-"""Faults that make no sense on what they are written on."""
+"""Checks of faults: do they fit what they affect, can they happen, do they change anything?"""
 
+import math
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
-from simscen.core.problems import Problem
 from simscen.core.readings import BELIEF, COMMAND, INSTANCES, MAP, WHEELS
 from simscen.faults.base import Instance
+from simscen.loading.checks.registry import MEANING, NAMES, Finding, NameScope
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import RobotSpec
 from simscen.model.stack import StackSpec
+from simscen.triggers.trigger import Trigger
 
-WHAT = {
-    COMMAND: "a velocity command",
-    WHEELS: "wheels",
-    BELIEF: "a localizer",
-    MAP: "a map",
-}
+NOUNS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
 RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})
-"""Faults that measure once more, which they can do only when the scan is taken."""
+"""Faults that measure again, which is only possible at the moment of the scan."""
 
 
-def unfit_faults(loaded: LoadedScenario) -> Iterator[Problem]:
-    """Faults on what there is not, on what they cannot happen to, or whose keys mean nothing there."""
-    if loaded.robot.spec is None:
-        return
-    known = instances(loaded, loaded.robot.spec)
-    for index, entry in enumerate(loaded.spec.faults):
-        instance = known.get(entry.sensor)
-        if instance is None:
-            message = f"robot `{loaded.robot.name}` has no sensor called {quoted(entry.sensor)}"
-            yield loaded.problem(("faults", index, "sensor"), "SC031", message, suggestion(entry.sensor, known))
-        elif instance.kind not in entry.fault.affects:
-            fitting = [name for name, one in known.items() if one.kind in entry.fault.affects]
-            hint = f"it can happen to: {', '.join(fitting)}" if fitting else "this robot has nothing it can happen to"
-            what = WHAT.get(instance.kind) or _article(loaded.robot.spec.sensors[entry.sensor].kind)
-            message = f"fault `{entry.kind}` makes no sense on {what} (`{entry.sensor}`)"
-            yield loaded.problem_at(loaded.key_place_of("faults", index, entry.kind), "SC032", message, hint)
-        elif why := entry.fault.senseless(instance):
-            place = loaded.key_place_of("faults", index, entry.kind, *([why[0]] if why[0] else []))
-            yield loaded.problem_at(
-                place, "SC032", f"fault `{entry.kind}` makes no sense on `{entry.sensor}`: {why[1]}"
-            )
-        else:
-            yield from _unreached(loaded, index, entry, instance.kind)
-    yield from _seen_too_late(loaded, known)
+class ListedFault(NamedTuple):
+    """A fault, its position in the list of faults, and the instance that it affects (None if there is none)."""
+
+    position: int
+    entry: FaultEntry
+    instance: Instance | None
 
 
 def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance]:
-    """What faults can be written on, by name."""
+    """Return everything that faults can affect, by name: the robot's sensors, then commands, wheels and so on."""
     frequency = loaded.spec.stack.controller_frequency
     others = {
         name: Instance(kind, frequency if kind == COMMAND else 0.0, robot.drive if kind == WHEELS else None)
@@ -61,37 +41,120 @@ def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance
     return {**sensors, **{name: other for name, other in others.items() if name not in sensors}}
 
 
-def _unreached(loaded: LoadedScenario, index: int, entry: FaultEntry, kind: str) -> Iterator[Problem]:
-    """Faults on the localizer of a stack that shows none, and on a map that is not there, or not for the whole run."""
-    own = isinstance(loaded.spec.stack, StackSpec)
-    if kind == BELIEF and not own:
-        message = "simscen cannot come between the localizer and the navigator of a stack that is not its own"
-        hint = "disturb what the localizer hears: odometry, lidar, imu, or the map"
-        yield loaded.problem(("faults", index, "sensor"), "SC032", message, hint)
-    if kind != MAP:
-        return
-    if loaded.spec.map == "none":
-        message = "there is no map that could be wrong: the scenario says `map: none`"
-        yield loaded.problem(("faults", index, "sensor"), "SC032", message)
-    for key, given in (("when", entry.when), ("for", entry.for_)):
-        if given is not None:
-            message = f"a map has no `{key}`: the stack gets it once, before it starts"
-            yield loaded.problem_at(loaded.key_place_of("faults", index, key), "SC032", message)
+def _listed(loaded: LoadedScenario) -> Iterator[ListedFault]:
+    """Return the faults; none if the sensors of the robot are not known yet."""
+    if loaded.robot.spec is not None:
+        known = instances(loaded, loaded.robot.spec)
+        for index, entry in enumerate(loaded.spec.faults):
+            yield ListedFault(index, entry, known.get(entry.sensor))
 
 
-def _seen_too_late(loaded: LoadedScenario, known: Mapping[str, Instance]) -> Iterator[Problem]:
-    """Faults that measure once more, behind one of the same sensor that keeps its scans back."""
+@NAMES.check("SC031")
+def unknown_sensors(scope: NameScope) -> Iterator[Finding]:
+    """Find faults on a sensor that the robot does not have."""
+    loaded = scope.loaded
+    for index, entry, instance in _listed(loaded):
+        if instance is None:
+            assert loaded.robot.spec is not None
+            hint = suggestion(entry.sensor, instances(loaded, loaded.robot.spec))
+            message = f"robot `{loaded.robot.name}` has no sensor called {quoted(entry.sensor)}"
+            yield Finding(("faults", index, "sensor"), message, hint)
+
+
+@NAMES.check("SC032")
+def unfit_faults(scope: NameScope) -> Iterator[Finding]:
+    """Find faults that cannot happen to what they are written for, or whose values do not fit it."""
+    loaded = scope.loaded
+    for index, entry, instance in _listed(loaded):
+        if instance is None:
+            continue
+        assert loaded.robot.spec is not None
+        keys = ("faults", index, entry.kind)
+        if instance.kind not in entry.fault.affects:
+            known = instances(loaded, loaded.robot.spec)
+            fitting = [name for name, one in known.items() if one.kind in entry.fault.affects]
+            hint = f"it can affect: {', '.join(fitting)}" if fitting else "it can affect nothing on this robot"
+            what = NOUNS.get(instance.kind) or _with_article(loaded.robot.spec.sensors[entry.sensor].kind)
+            message = f"fault `{entry.kind}` cannot affect {what} (`{entry.sensor}`)"
+            yield Finding(keys, message, hint, at_key=True)
+        elif why := entry.fault.senseless(instance):
+            below = (why[0],) if why[0] else ()
+            message = f"fault `{entry.kind}` does not fit `{entry.sensor}`: {why[1]}"
+            yield Finding((*keys, *below), message, at_key=True)
+
+
+@NAMES.check("SC032")
+def faults_out_of_reach(scope: NameScope) -> Iterator[Finding]:
+    """Find faults on the localizer of an external stack, on a map that is not used, or during part of a run."""
+    loaded = scope.loaded
+    for index, entry, instance in _listed(loaded):
+        if instance is None or instance.kind not in entry.fault.affects or entry.fault.senseless(instance):
+            continue
+        if instance.kind == BELIEF and not isinstance(loaded.spec.stack, StackSpec):
+            message = "only the localizer of simscen's own stacks can have faults"
+            hint = "disturb the inputs of the localizer instead: odometry, lidar, imu, or the map"
+            yield Finding(("faults", index, "sensor"), message, hint)
+        if instance.kind != MAP:
+            continue
+        if loaded.spec.map == "none":
+            message = "the map cannot have faults: the scenario says `map: none`"
+            yield Finding(("faults", index, "sensor"), message)
+        for key, given in (("when", entry.when), ("for", entry.for_)):
+            if given is not None:
+                message = f"a fault on the map cannot have `{key}`: the stack gets the map once, before it starts"
+                yield Finding(("faults", index, key), message, at_key=True)
+
+
+@NAMES.check("SC032")
+def resampling_after_delay(scope: NameScope) -> Iterator[Finding]:
+    """Find faults that measure again but are listed behind a fault that holds the scans back."""
+    loaded = scope.loaded
     faults = loaded.spec.faults
-    for index, entry in enumerate(faults):
+    for index, entry, instance in _listed(loaded):
         before = [one.label for one in faults[:index] if one.sensor == entry.sensor and one.kind in ("delay", "stuck")]
-        sees = (
-            entry.kind in RESAMPLING_FAULTS and entry.sensor in known and known[entry.sensor].kind in ("Scan", "Image")
-        )
-        if sees and before:
-            message = f"`{entry.label}` would come too late: `{before[0]}` keeps back what it should change"
-            place = loaded.key_place_of("faults", index, entry.kind)
-            yield loaded.problem_at(place, "SC032", message, f"write it before `{before[0]}`: faults go in their order")
+        resamples = entry.kind in RESAMPLING_FAULTS and instance is not None and instance.kind in ("Scan", "Image")
+        if resamples and before:
+            message = f"`{entry.label}` has no effect: `{before[0]}` before it holds the measurements back"
+            hint = f"list it before `{before[0]}`; faults apply in the order of the list"
+            yield Finding(("faults", index, entry.kind), message, hint, at_key=True)
 
 
-def _article(noun: str) -> str:
+@MEANING.check("SC050")
+def faults_between_messages(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find faults that are shorter than the time between two messages of their sensor."""
+    if loaded.robot.spec is None:
+        return
+    rates = {name: getattr(sensor.chosen, "rate", None) for name, sensor in loaded.robot.spec.sensors.items()}
+    rates["cmd_vel"] = loaded.spec.stack.controller_frequency
+    for index, entry in enumerate(loaded.spec.faults):
+        rate = rates.get(entry.sensor)
+        if entry.for_ is None or rate is None or entry.for_ * rate >= 1 - 1e-9:
+            continue
+        begin = _begin(entry.when)
+        between = begin is not None and math.ceil(begin * rate - 1e-6) > (begin + entry.for_) * rate + 1e-6
+        if begin is None or between:
+            when = "begins and ends" if between else "may begin and end"
+            message = f"`{entry.label}` {when} between two messages: `{entry.sensor}` sends {rate:g} per second"
+            hint = f"make it last at least {1 / rate:g} s"
+            yield Finding(("faults", index, "for"), message, hint, warning=not (between and entry.required))
+
+
+def _begin(when: Trigger | None) -> float | None:
+    """Return when a fault begins, in s, if that depends on the time alone."""
+    if when is None:
+        return 0.0
+    return float(when.chosen.root) + when.delay if when.time is not None else None  # type: ignore[attr-defined]
+
+
+@MEANING.check("SC055", severity="warning")
+def faults_without_effect(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find faults whose values change nothing."""
+    for index, entry in enumerate(loaded.spec.faults):
+        idle = entry.fault.idle
+        if idle and all(getattr(entry.chosen, key) == value for key, value in idle.items()):
+            message = f"fault `{entry.label}` changes nothing with these values"
+            yield Finding(("faults", index, entry.kind), message, at_key=True)
+
+
+def _with_article(noun: str) -> str:
     return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"

@@ -1,69 +1,62 @@
-"""What in a world file means nothing: names that two things share, things without extent, the same thing twice."""
+"""Checks of world files: unique names, things without extent, duplicates, unknown regions."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
-from simscen.core.problems import Problem
+from simscen.loading.checks.registry import WORLD_FILE, Finding, Keys
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
-from simscen.loading.yaml.tree import Key, MappingNode, key_position, value_position
 from simscen.model.world import Thing, WorldSpec
 
-Keys = tuple[Key, ...]
+
+def _spec(world: LoadedWorld) -> WorldSpec:
+    assert world.spec is not None, "only worlds in simscen's own language are checked"
+    return world.spec
 
 
-def check_world_file(world: LoadedWorld) -> list[Problem]:
-    """Problems at their places in the world's file, without the text of their lines; some are warnings."""
-    if world.spec is None or world.tree is None:
-        return []
-    return [
-        problem
-        for check in (_shared_names, _no_extent, _twice, _frictions)
-        for problem in check(world.spec, world.tree)
-    ]
-
-
-def _shared_names(spec: WorldSpec, tree: MappingNode) -> Iterator[Problem]:
-    """A thing that can move needs a name of its own; fixed ones that share theirs cannot be told apart in reports."""
+@WORLD_FILE.check("SC033")
+def shared_names(world: LoadedWorld) -> Iterator[Finding]:
+    """Find obstacles and walls that are called like an object or a door, or obstacles of one name (a warning)."""
+    spec = _spec(world)
     moving = {thing.name for thing in spec.objects} | {door.name for door in spec.doors}
     seen: set[str] = set()
     for index, obstacle in enumerate(spec.obstacles):
-        place = value_position(tree, ("obstacles", index, "name"))
+        keys: Keys = ("obstacles", index, "name")
         if obstacle.name in moving:
-            message = f"an object or a door is called {quoted(obstacle.name)}, too"
-            yield Problem(*place, code="SC033", message=message, hint="give one of them another name")
+            message = f"an object or a door is also called {quoted(obstacle.name)}"
+            yield Finding(keys, message, "rename one of them")
         elif obstacle.name in seen:
-            message = f"another obstacle is called {quoted(obstacle.name)}, too: reports cannot tell them apart"
-            yield Problem(*place, code="SC033", message=message, severity="warning")
+            message = f"another obstacle is also called {quoted(obstacle.name)}; reports cannot tell them apart"
+            yield Finding(keys, message, warning=True)
         seen.add(obstacle.name)
     for number, wall in enumerate(spec.walls, start=1):
         if wall.called(number) in moving:
-            place = value_position(tree, ("walls", number - 1, "name"))
-            message = f"an object or a door is called {quoted(wall.called(number))}, too"
-            yield Problem(*place, code="SC033", message=message, hint="give one of them another name")
+            message = f"an object or a door is also called {quoted(wall.called(number))}"
+            yield Finding(("walls", number - 1, "name"), message, "rename one of them")
 
 
-def _no_extent(spec: WorldSpec, tree: MappingNode) -> Iterator[Problem]:
+@WORLD_FILE.check("SC313")
+def no_extent(world: LoadedWorld) -> Iterator[Finding]:
+    """Find walls, ramps and doors of zero size, and motions that end where they start (a warning)."""
+    spec = _spec(world)
     for index, wall in enumerate(spec.walls):
         if all(point == wall.points[0] for point in wall.points):
-            yield _at(tree, ("walls", index, "points"), "SC313", "the wall has no length")
+            yield Finding(("walls", index, "points"), "the wall has no length: all its points are the same")
     for index, ramp in enumerate(spec.ramps):
         if ramp.start == ramp.end:
-            yield _at(tree, ("ramps", index, "end"), "SC313", "the ramp has no length: it ends where it starts")
+            yield Finding(("ramps", index, "end"), "the ramp has no length: `start` and `end` are the same")
     for index, door in enumerate(spec.doors):
         if door.points[0] == door.points[1]:
-            yield _at(tree, ("doors", index, "points"), "SC313", "the door has no width")
+            yield Finding(("doors", index, "points"), "the door has no width: both points are the same")
     for index, thing in enumerate(spec.objects):
-        if thing.move is None:
-            continue
-        if len(set(thing.move.path(thing.pose.pose).poses)) == 1:
+        if thing.move is not None and len(set(thing.move.path(thing.pose.pose).poses)) == 1:
             key = "through" if thing.move.keyframes is None else "keyframes"
-            problem = _at(tree, ("objects", index, "move", key), "SC313", "it moves nowhere")
-            yield replace(problem, severity="warning")
+            yield Finding(("objects", index, "move", key), "the motion leads nowhere", warning=True)
 
 
-def _twice(spec: WorldSpec, tree: MappingNode) -> Iterator[Problem]:
-    """The same shape at the same place under another name."""
+@WORLD_FILE.check("SC054", severity="warning")
+def duplicate_shapes(world: LoadedWorld) -> Iterator[Finding]:
+    """Find the same shape at the same pose under another name."""
+    spec = _spec(world)
     things: list[tuple[Keys, Thing]] = [(("obstacles", k), thing) for k, thing in enumerate(spec.obstacles)]
     things += [(("objects", k), thing) for k, thing in enumerate(spec.objects)]
     seen: list[tuple[object, str]] = []
@@ -71,21 +64,15 @@ def _twice(spec: WorldSpec, tree: MappingNode) -> Iterator[Problem]:
         shape = (thing.box, thing.cylinder, thing.polygon, thing.height, thing.z, thing.pose.pose)
         same = next((name for other, name in seen if other == shape), None)
         if same is not None:
-            problem = Problem(
-                *key_position(tree, keys), code="SC054", message=f"{quoted(same)} is exactly there already"
-            )
-            yield replace(problem, severity="warning")
+            yield Finding(keys, f"{quoted(same)} has the same shape and pose", at_key=True)
         seen.append((shape, thing.name))
 
 
-def _frictions(spec: WorldSpec, tree: MappingNode) -> Iterator[Problem]:
-    """The floor is slippery in regions, which are those of the same file."""
+@WORLD_FILE.check("SC030")
+def unknown_friction_regions(world: LoadedWorld) -> Iterator[Finding]:
+    """Find friction in regions that do not exist."""
+    spec = _spec(world)
     for name in spec.friction:
         if name not in spec.regions:
-            place = key_position(tree, ("friction", name))
             message, hint = f"no region is called {quoted(name)}", suggestion(name, spec.regions)
-            yield Problem(*place, code="SC030", message=message, hint=hint)
-
-
-def _at(tree: MappingNode, keys: Keys, code: str, message: str) -> Problem:
-    return Problem(*value_position(tree, keys), code=code, message=message)
+            yield Finding(("friction", name), message, hint, at_key=True)

@@ -1,4 +1,4 @@
-"""Which failures a scenario asks for: what a robot is to refuse need not be possible."""
+"""Failures that a scenario expects: such a goal need not be reachable."""
 
 from collections.abc import Iterator
 
@@ -8,14 +8,14 @@ from simscen.criteria.result import ErrorCodeIs, Result
 from simscen.model.navigation import failure_of
 from simscen.model.scenario import ScenarioSpec
 
-AT_THE_START = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
+START_FAILURES = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
 
 
 def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
-    """Whether the scenario passes when the robot fails at this goal.
+    """Return whether the scenario passes if the robot fails at this goal.
 
-    It does by what it expects of the goal, by the result or the code of the navigation as a whole, or by the code of
-    this goal.
+    The scenario says so with `expect` at the goal, with the result or the error code of the whole navigation, or with
+    the error code of this goal.
     """
     through = spec.navigation.mode == "navigate_through_poses"
     entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
@@ -27,12 +27,12 @@ def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
 
 
 def expects_start_failure(spec: ScenarioSpec) -> bool:
-    """Whether the scenario passes when the robot says that it cannot even start."""
-    return any(code in AT_THE_START for code, _ in _codes(spec))
+    """Return whether the scenario passes if the robot cannot start."""
+    return any(code in START_FAILURES for code, _ in _codes(spec))
 
 
 def _codes(spec: ScenarioSpec) -> Iterator[tuple[ErrorCode, str | None]]:
-    """Each error code that a criterion asks for, and of which goal; None = of the navigation as a whole."""
+    """Return each error code that a criterion asks for, and its goal; None: the whole navigation."""
     for entry in spec.pass_:
         if entry.severity != "fail":
             continue

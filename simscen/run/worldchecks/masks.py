@@ -1,7 +1,6 @@
-"""What zones and filter masks forbid although the scenario asks for it, and masks that say nothing."""
+"""Checks of keepout zones and filter masks: do they forbid the start or a goal, do they have any effect?"""
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
@@ -10,119 +9,125 @@ from simscen.core.geometry import Pose2
 from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.maskcells import MaskCells
 from simscen.core.polygons import deep_inside
-from simscen.core.problems import Problem
 from simscen.core.separation import separation_of_boxes
 from simscen.core.world import Polygon
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.speed import Speed
+from simscen.loading.checks.registry import Finding, Keys
 from simscen.loading.schema.messages import quoted
-from simscen.run.masks import KEEPOUT, SPEED, load_judged_masks
+from simscen.run.masks import KEEPOUT, SPEED, load_judged_masks, load_masks
 from simscen.run.worldchecks.expected_failures import expects_start_failure
-from simscen.run.worldchecks.scene import Keys, Scene
+from simscen.run.worldchecks.scene import WORLD, Scene
 
 Forbids = Callable[[Pose2, float], bool]
-"""Whether a zone holds a place and all around it within some metres."""
+"""Whether a zone contains a pose and everything around it within a distance in m."""
 
-CELL = 0.1
-"""m inside a zone beyond which no rounding to cells lets a goal be free."""
-ESTIMATE = 0.5
-"""m by which a robot may err about where it starts, and which it may drive to get out."""
+CELL_M = 0.1
+"""Depth inside a zone at which a goal is forbidden however the zone is rounded to cells."""
+ESTIMATE_ERROR_M = 0.5
+"""Possible error of the initial estimate."""
+NO_LIMIT = "no cell of the mask limits the speed with this `base` and `multiplier`"
 
 
-def check_stack_zones(scene: Scene, masks: FilterMasks) -> Iterator[Problem]:
-    """Errors for goals and starts that the stack keeps out of, warnings for masks without any effect."""
+def stack_masks(scene: Scene) -> FilterMasks:
+    """Return the filter masks of the stack. Raises InvalidInput for a mask that cannot be read."""
+    return load_masks(scene.loaded)
+
+
+def judged_masks(scene: Scene) -> Mapping[str, MaskCells]:
+    """Return the masks of criteria, by file. Raises InvalidInput for a mask that cannot be read."""
+    return load_judged_masks(scene.loaded.judged_masks, scene.loaded.tree, scene.loaded.sourced)
+
+
+@WORLD.check("SC302")
+def check_stack_zones(scene: Scene) -> Iterator[Finding]:
+    """Find goals, and starts (a warning), in zones that the stack keeps out of."""
     regions = scene.world.regions
     zones: list[tuple[Keys, str, Forbids]] = [
-        (("stack", "keepout", index), f"in `{region}`", _of_region(regions[region]))
+        (("stack", "keepout", index), f"in `{region}`", _inside_region(regions[region]))
         for index, region in enumerate(scene.loaded.spec.stack.keepout)
     ]
-    if masks.keepout is not None:
-        zones.append((KEEPOUT, "in a cell that the keepout mask forbids", forbidden_test(masks.keepout)))
+    keepout = scene.once(stack_masks).keepout
+    if keepout is not None:
+        zones.append((KEEPOUT, "in a cell that the keepout mask forbids", forbidden_test(keepout)))
     for keys, where, forbids in zones:
-        yield from _forbidden(scene, keys, where, forbids)
-    yield from _without_effect(scene, masks)
+        hint = "move one of them, or expect the failure with `result: {status: FAILED, error_code: %s}`"
+        for name in [goal.name for _, goal in scene.targets if forbids(goal.pose, CELL_M)]:
+            message = f"goal `{name}` cannot be reached: it is {where}, which the stack keeps out of"
+            yield Finding(keys, message, hint % "GOAL_OCCUPIED")
+        if forbids(scene.start, ESTIMATE_ERROR_M) and not expects_start_failure(scene.loaded.spec):
+            message = f"the robot starts {where}, which the stack keeps out of"
+            yield Finding(keys, message, hint % "START_OCCUPIED", warning=True)
 
 
-def _forbidden(scene: Scene, keys: Keys, where: str, forbids: Forbids) -> Iterator[Problem]:
-    for name in [goal.name for _, goal in scene.targets if forbids(goal.pose, CELL)]:
-        message = f"goal `{name}` cannot be reached: it lies {where}, which the stack keeps out of"
-        hint = "move one of them, or expect the failure with `result: {status: FAILED, error_code: GOAL_OCCUPIED}`"
-        yield scene.loaded.problem(keys, "SC302", message, hint)
-    if forbids(scene.start, ESTIMATE) and not expects_start_failure(scene.loaded.spec):
-        message = f"the robot starts {where}, which the stack keeps out of"
-        hint = "move one of them, or expect the failure with `result: {status: FAILED, error_code: START_OCCUPIED}`"
-        yield replace(scene.loaded.problem(keys, "SC302", message, hint), severity="warning")
-
-
-def _of_region(corners: Polygon) -> Forbids:
+def _inside_region(corners: Polygon) -> Forbids:
     return lambda pose, within: deep_inside(pose, corners) > within
 
 
 def forbidden_test(mask: OccupancyGrid) -> Forbids:
-    """What of the plane a keepout mask forbids."""
+    """Return the test whether a keepout mask forbids a position."""
 
     def forbids(pose: Pose2, within: float) -> bool:
-        steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, CELL))) + 1)
+        steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, CELL_M))) + 1)
         around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         return bool(kept_out(mask, around + np.array((pose.x, pose.y))).all())
 
     return forbids
 
 
-def _without_effect(scene: Scene, masks: FilterMasks) -> Iterator[Problem]:
-    if masks.keepout is not None:
-        shades = np.count_nonzero((masks.keepout.cells > FREE) & (masks.keepout.cells < OCCUPIED))
-        if not (masks.keepout.cells == OCCUPIED).any():
-            yield _warning(scene, KEEPOUT, "SC055", "no cell of the keepout mask is occupied: it forbids nothing")
-        elif shades:
-            message = f"{shades} cells of the keepout mask are neither free nor occupied: they forbid nothing"
-            yield _warning(scene, KEEPOUT, "SC311", message)
-    speed = masks.speed
-    if speed is not None and not speed.limiting:
-        yield _warning(scene, SPEED, "SC055", "no cell of the speed mask limits anything with this base and multiplier")
+@WORLD.check("SC055", severity="warning")
+def masks_without_effect(scene: Scene) -> Iterator[Finding]:
+    """Find masks of the stack that forbid or limit nothing."""
+    masks = scene.once(stack_masks)
+    if masks.keepout is not None and not (masks.keepout.cells == OCCUPIED).any():
+        yield Finding(KEEPOUT, "the keepout mask forbids nothing: none of its cells is occupied")
+    if masks.speed is not None and not masks.speed.limiting:
+        yield Finding(SPEED, f"the speed mask has no effect: {NO_LIMIT}")
 
 
-def _warning(scene: Scene, keys: Keys, code: str, message: str) -> Problem:
-    return replace(scene.loaded.problem(keys, code, message), severity="warning")
+@WORLD.check("SC311", severity="warning")
+def shades_in_keepout_mask(scene: Scene) -> Iterator[Finding]:
+    """Find keepout masks with cells that are neither free nor occupied."""
+    keepout = scene.once(stack_masks).keepout
+    if keepout is not None and (keepout.cells == OCCUPIED).any():
+        count = np.count_nonzero((keepout.cells > FREE) & (keepout.cells < OCCUPIED))
+        if count:
+            message = f"{count} cells of the keepout mask are neither free nor occupied: they forbid nothing"
+            yield Finding(KEEPOUT, message)
 
 
-# MERGED: Criteria that judge by a filter mask, and can never hold or never fail by it.
-def check_judged_masks(scene: Scene) -> Iterator[Problem]:
-    """Errors for keepout masks that hold the start or a goal, warnings for masks by which nothing is judged.
-
-    Raises InvalidInput for a mask that cannot be read.
-    """
-    loaded = scene.loaded
-    masks = load_judged_masks(loaded.judged_masks, loaded.tree, loaded.sourced)
-    for index, entry in enumerate(loaded.spec.pass_):
+@WORLD.check("SC055", severity="warning")
+def judged_masks_without_effect(scene: Scene) -> Iterator[Finding]:
+    """Find masks of criteria that forbid or limit nothing."""
+    masks = scene.once(judged_masks)
+    for index, entry in enumerate(scene.loaded.spec.pass_):
         match entry.chosen:
-            case Keepout(mask=str(name)):
-                yield from _keepout(scene, ("pass", index, "keepout", "mask"), name, masks[name])
-            case Speed(mask=spec) if spec is not None:
-                if not spec.over(masks[spec.file].grid).limiting:
-                    message = "no cell of the mask limits anything with this base and multiplier: nothing is judged"
-                    yield _mask_warning(scene, ("pass", index, "speed", "mask", "file"), message)
+            case Keepout(mask=str(name)) if not len(masks[name].forbidden):
+                message = "the criterion judges nothing: no cell of the mask is occupied"
+                yield Finding(("pass", index, "keepout", "mask"), message)
+            case Speed(mask=spec) if spec is not None and not spec.over(masks[spec.file].grid).limiting:
+                yield Finding(("pass", index, "speed", "mask", "file"), f"the criterion judges nothing: {NO_LIMIT}")
             case _:
                 pass
 
 
-def _keepout(scene: Scene, keys: Keys, name: str, mask: MaskCells) -> Iterator[Problem]:
-    if not len(mask.forbidden):
-        yield _mask_warning(scene, keys, "no cell of the mask is occupied: it forbids nothing, and nothing is judged")
-        return
-    start = mask.seen_from(np.array([scene.start]))
-    if separation_of_boxes(start, scene.outline, mask.forbidden)[0] < 0:
-        message = f"keepout can never hold: the robot starts in what {quoted(name)} forbids"
-        yield scene.loaded.problem(keys, "SC051", message)
-        return
-    forbids = forbidden_test(mask.grid)
-    inside = [goal.name for _, goal in scene.targets if forbids(goal.pose, goal.xy_tolerance)]
-    if inside:
-        message = (
-            f"keepout can never hold while goal `{inside[0]}` is reached, which lies in what {quoted(name)} forbids"
-        )
-        yield scene.loaded.problem(keys, "SC051", message)
-
-
-def _mask_warning(scene: Scene, keys: Keys, message: str) -> Problem:
-    return replace(scene.loaded.problem(keys, "SC055", message), severity="warning")
+@WORLD.check("SC051")
+def keepout_masks_on_goals(scene: Scene) -> Iterator[Finding]:
+    """Find keepout criteria whose mask forbids the start or a goal."""
+    masks = scene.once(judged_masks)
+    for index, entry in enumerate(scene.loaded.spec.pass_):
+        if not isinstance(entry.chosen, Keepout) or entry.chosen.mask is None:
+            continue
+        name, keys = entry.chosen.mask, ("pass", index, "keepout", "mask")
+        mask = masks[name]
+        if not len(mask.forbidden):
+            continue
+        start = mask.seen_from(np.array([scene.start]))
+        if separation_of_boxes(start, scene.outline, mask.forbidden)[0] < 0:
+            yield Finding(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
+            continue
+        forbids = forbidden_test(mask.grid)
+        inside = [goal.name for _, goal in scene.targets if forbids(goal.pose, goal.xy_tolerance)]
+        if inside:
+            message = f"keepout cannot hold if goal `{inside[0]}` is reached: {quoted(name)} forbids its position"
+            yield Finding(keys, message)

@@ -1,8 +1,7 @@
-"""What would stand in something else: the robot at its start or a goal, and what events put into the world."""
+"""Checks of poses: is the robot, a goal, or what an event adds inside an obstacle or outside the map?"""
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import combinations, product
 
 from simscen.actions.move import Move
@@ -15,8 +14,9 @@ from simscen.core.navigation import Goal
 from simscen.core.problems import Problem
 from simscen.core.shapes import Solid
 from simscen.core.world import Polygon
+from simscen.loading.checks.registry import Finding, Keys
 from simscen.run.worldchecks.expected_failures import expects_start_failure
-from simscen.run.worldchecks.scene import CIRCLE_EDGE, SILL, Keys, Scene
+from simscen.run.worldchecks.scene import SILL_M, START, TOUCH_M, WORLD, Scene
 from simscen.spec.motions import Motion
 from simscen.triggers.time import Time
 from simscen.triggers.trigger import Trigger
@@ -24,97 +24,89 @@ from simscen.worlds.contain import first_blocking
 from simscen.worlds.overlap import placed, polygons_overlap
 from simscen.worlds.upright import upright
 
+START_HINT = "move it to free space"
 GOAL_HINT = "move it, or expect the failure with `result: {status: FAILED, error_code: GOAL_OCCUPIED}`"
 OUTSIDE_HINT = GOAL_HINT.replace("GOAL_OCCUPIED", "GOAL_OUTSIDE_MAP")
-WITHIN = (-0.9, 0.0, 0.9)
-"""Shares of a goal's tolerances at which the robot may stand instead."""
+TOLERANCE_SHARES = (-0.9, 0.0, 0.9)
+"""Shares of a goal's tolerances at which the robot may stop instead of at the exact pose."""
+
+MotionStop = tuple[Keys, str, tuple[float, float]]
+"""Keys below the motion, name and position of a keyframe or waypoint."""
 
 
-def check_placement(scene: Scene) -> list[tuple[Keys, Problem]]:
-    """Problems and whose they are: the start, goals that are to be reached, kidnappings, spawns."""
-    checks = (_start(scene), _goals(scene), _kidnaps(scene), _spawns(scene), _people(scene))
-    return [found for check in checks for found in check]
+def blocked_poses(scene: Scene) -> dict[Keys, Finding]:
+    """Return the findings for the start, goals and kidnap poses that the robot cannot have, by their keys."""
+    found = [*_start(scene), *_goals(scene), *_kidnaps(scene)]
+    return {finding.keys: finding for finding in found}
 
 
-def _start(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
-    solids = (*scene.world.solids, *scene.standing)
+@WORLD.check("SC301")
+def check_robot_poses(scene: Scene) -> Iterator[Finding]:
+    """Find start, goal and kidnap poses inside an obstacle or outside the map."""
+    yield from scene.once(blocked_poses).values()
+
+
+def _start(scene: Scene) -> Iterator[Finding]:
     if not expects_start_failure(scene.loaded.spec):
-        yield from _told(scene, ("robot", "pose"), "the robot's start", scene.start, solids, "move it to free space")
+        solids = (*scene.world.solids, *scene.bodies)
+        yield from _blocked(scene, START, "the robot's start", scene.start, solids, START_HINT)
 
 
-def _goals(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
+def _goals(scene: Scene) -> Iterator[Finding]:
     for keys, goal in scene.targets:
-        hint = OUTSIDE_HINT if scene.ground.outside(goal.pose) else GOAL_HINT
-        found = list(_told(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))
-        if not found or not _fits_nearby(scene, goal):
+        hint = OUTSIDE_HINT if scene.area.outside(goal.pose) else GOAL_HINT
+        found = list(_blocked(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))
+        if found and not _fits_nearby(scene, goal):
             yield from found
-        place = goal.pose.x, goal.pose.y
-        if not found and (thing := first_blocking(scene.lying, place, CIRCLE_EDGE, scene.z_range)):
-            message = f"goal `{goal.name}` is where `{thing}` is at first, and nothing says that it will be gone"
-            yield keys, replace(scene.loaded.problem(keys, "SC301", message, GOAL_HINT), severity="warning")
+        position = goal.pose.x, goal.pose.y
+        if not found and (thing := first_blocking(scene.unmoved_bodies, position, TOUCH_M, scene.z_range)):
+            message = f"goal `{goal.name}` is inside `{thing}`, and no event moves or removes `{thing}`"
+            yield Finding(keys, message, GOAL_HINT, warning=True)
 
 
 def _fits_nearby(scene: Scene, goal: Goal) -> bool:
-    """Whether only the exact pose is too tight, for a footprint that is not round: the robot may stop near it."""
-    outside = scene.ground.outside(goal.pose)
-    if outside or scene.size.radius is not None or scene.circle_at(goal.pose, scene.world.solids):
+    """Return whether only the exact pose is blocked and a footprint that is not round fits within the tolerances."""
+    outside = scene.area.outside(goal.pose)
+    if outside or scene.size.radius is not None or scene.circle_conflict(goal.pose, scene.world.solids):
         return False
     x, y, yaw = goal.pose
     near = (
         Pose2(x + a * goal.xy_tolerance, y + b * goal.xy_tolerance, yaw + c * goal.yaw_tolerance)
-        for a, b, c in product(WITHIN, repeat=3)
+        for a, b, c in product(TOLERANCE_SHARES, repeat=3)
         if math.hypot(a, b) <= 1
     )
-    return any(scene.footprint_at(pose, scene.world.solids) is None for pose in near)
+    return any(scene.footprint_conflict(pose, scene.world.solids) is None for pose in near)
 
 
-def _kidnaps(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
+def _kidnaps(scene: Scene) -> Iterator[Finding]:
     for keys, _, action in scene.actions:
         if isinstance(action, Kidnap):
-            what, hint = "the place where the robot is set down", "move it to free space"
-            yield from _told(scene, (*keys, "pose"), what, action.pose.pose, scene.world.solids, hint)
+            what = "the pose to which the robot is kidnapped"
+            yield from _blocked(scene, (*keys, "pose"), what, action.pose.pose, scene.world.solids, START_HINT)
 
 
-def _told(
+def _blocked(
     scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
-) -> Iterator[tuple[Keys, Problem]]:
-    where = scene.ground.outside(pose) or scene.footprint_at(pose, solids)
-    if where:
-        yield keys, scene.loaded.problem(keys, "SC301", f"{what} ({pose.x:g}, {pose.y:g}) is {where}", hint)
+) -> Iterator[Finding]:
+    conflict = scene.area.outside(pose) or scene.footprint_conflict(pose, solids)
+    if conflict:
+        yield Finding(keys, f"{what} ({pose.x:g}, {pose.y:g}) is {conflict}", hint)
 
 
-def _spawns(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
+@WORLD.check("SC304")
+def check_spawns(scene: Scene) -> Iterator[Finding]:
+    """Find things that are spawned inside an obstacle or on the robot."""
     for keys, _, action in scene.actions:
         if isinstance(action, Spawn):
-            first = keys[2] == "do"  # a step of a story comes later, and its time counts from the one before it
-            when = scene.loaded.spec.events[int(keys[1])].when if first else None
-            where = _buried(scene, action) or _on_the_robot(scene, action, when)
+            is_event = keys[2] == "do"  # the time of a later step counts from the step before it
+            when = scene.loaded.spec.events[int(keys[1])].when if is_event else None
+            where = _inside_obstacle(scene, action) or _on_robot(scene, action, when)
             if where:
-                message, hint = f"`{action.name}` would appear {where}", "put it somewhere else"
-                yield keys, scene.loaded.problem((*keys, "name"), "SC304", message, hint)
+                yield Finding((*keys, "name"), f"`{action.name}` would appear {where}", "choose another pose")
 
 
-def _people(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
-    """People who would stand, or want to go, where a wall or an obstacle leaves no room for them."""
-    solids = (*scene.world.solids, *scene.staying)
-    for keys, _, action in scene.actions:
-        if not isinstance(action, Pedestrian):
-            continue
-        stops: list[tuple[Keys, str, tuple[float, float]]]
-        stops = [
-            ((*keys, "goals", k), f"goal {k + 1} of `{action.name}`", (x, y)) for k, (x, y) in enumerate(action.goals)
-        ]
-        stops.insert(0, ((*keys, "pose"), f"where `{action.name}` comes", (action.pose.x, action.pose.y)))
-        for at, what, place in stops:
-            if solid := first_blocking(solids, place, action.radius, (SILL, action.height)):
-                message = (
-                    f'{what} ({place[0]:g}, {place[1]:g}) is nearer to obstacle "{solid}" than {action.radius:g} m'
-                )
-                yield at, scene.loaded.problem(at, "SC304", message, "put it where a person has room")
-
-
-def _buried(scene: Scene, spawn: Spawn) -> str | None:
-    """Where a thing is put whose whole outline lies within one obstacle: nobody would ever meet it."""
+def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
+    """Return the obstacle that contains the whole outline of a spawned thing, which nothing could ever meet."""
     if spawn.pose is None:
         return None
     corners = placed(_outline(spawn), spawn.pose.pose)
@@ -127,8 +119,8 @@ def _buried(scene: Scene, spawn: Spawn) -> str | None:
     return None
 
 
-def _on_the_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
-    """Whether a thing is put where the robot is at that moment: beside it at any time, or at its start at once."""
+def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
+    """Return "on the robot" if a thing overlaps the robot when it appears: relative to the robot, or at t = 0."""
     if spawn.z >= scene.size.height:
         return None
     if spawn.ahead is not None:
@@ -141,48 +133,54 @@ def _on_the_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | Non
 
 
 def _outline(spawn: Spawn) -> Polygon:
-    """Of a thing in its own frame; corner for corner that of its convex hull when it is not convex."""
+    """Return the outline of a thing in its own frame."""
     solid = spawn.solid(spawn.name)
     prism = upright(Solid(solid.shape, Pose3(z=solid.pose.z), spawn.name))
     return prism.base if prism is not None else tuple((x, y) for x, y in spawn.polygon or ())
 
 
-# MERGED: Where scripts would lead things: into walls, where nobody meets them.
-Stop = tuple[Keys, str, tuple[float, float]]
-
-
-def check_motions(scene: Scene) -> Iterator[Problem]:
-    """Warnings about keyframes, waypoints and new places of things that lie within the fixed world."""
+@WORLD.check("SC304")
+def check_pedestrians(scene: Scene) -> Iterator[Finding]:
+    """Find pedestrians that appear, or want to go, where they have no room."""
+    solids = (*scene.world.solids, *scene.immovable_bodies)
     for keys, _, action in scene.actions:
-        stops: list[Stop] = []
+        if not isinstance(action, Pedestrian):
+            continue
+        stops: list[MotionStop] = [(("pose",), f"the start of `{action.name}`", (action.pose.x, action.pose.y))]
+        stops += [(("goals", k), f"goal {k + 1} of `{action.name}`", (x, y)) for k, (x, y) in enumerate(action.goals)]
+        for below, what, (x, y) in stops:
+            if solid := first_blocking(solids, (x, y), action.radius, (SILL_M, action.height)):
+                message = f'{what} ({x:g}, {y:g}) is closer to obstacle "{solid}" than {action.radius:g} m'
+                yield Finding((*keys, *below), message, "choose a position with enough room")
+
+
+@WORLD.check("SC304", severity="warning")
+def check_motions(scene: Scene) -> Iterator[Finding]:
+    """Find keyframes, waypoints and teleport targets inside the fixed world."""
+    for keys, _, action in scene.actions:
+        stops: list[MotionStop] = []
         if isinstance(action, Move):
-            stops = [
-                ((*keys, *below), f"{what} of `{action.name}`", place) for below, what, place in motion_stops(action)
-            ]
+            stops = [(below, f"{what} of `{action.name}`", position) for below, what, position in motion_stops(action)]
         elif isinstance(action, Teleport):
-            stops = [((*keys, "pose"), f"the new place of `{action.name}`", (action.pose.x, action.pose.y))]
-        for at, what, (x, y) in stops:
-            if solid := first_blocking(scene.world.solids, (x, y), CIRCLE_EDGE, scene.z_range):
+            stops = [(("pose",), f"the new pose of `{action.name}`", (action.pose.x, action.pose.y))]
+        for below, what, (x, y) in stops:
+            if solid := first_blocking(scene.world.solids, (x, y), TOUCH_M, scene.z_range):
                 message = f'{what} ({x:g}, {y:g}) is inside obstacle "{solid}"'
-                problem = scene.loaded.problem(
-                    at, "SC304", message, "put it where it can be met: nothing stops what a script moves"
-                )
-                yield replace(problem, severity="warning")
+                yield Finding((*keys, *below), message, "move it to free space: walls do not stop scripted motions")
 
 
-def motion_stops(motion: Motion) -> list[Stop]:
-    """The keyframes or waypoints of a motion: keys below its own, what each is, and where."""
+def motion_stops(motion: Motion) -> list[MotionStop]:
+    """Return the keyframes or waypoints of a motion."""
     if motion.keyframes is not None:
         return [(("keyframes", k), f"keyframe {k + 1}", (x, y)) for k, (_, x, y, _) in enumerate(motion.keyframes)]
     return [(("through", k), f"waypoint {k + 1}", (x, y)) for k, (x, y) in enumerate(motion.through or [])]
 
 
-# MERGED: Whether several robots start apart from each other.
 def check_robots_apart(scenes: Sequence[Scene]) -> Iterator[Problem]:
-    """An error for each robot that starts where another one does, told of the later by name."""
+    """Find robots whose footprints overlap at their starts (SC044); `scenes` are the views of one scenario."""
     for one, other in combinations(scenes, 2):
         if polygons_overlap(placed(one.outline, one.start), placed(other.outline, other.start)):
-            names = f"`{other.loaded.robot_name}` starts in the same place as `{one.loaded.robot_name}`"
+            first, second = one.loaded.robot_name, other.loaded.robot_name
             where = f"({other.start.x:g}, {other.start.y:g}) and ({one.start.x:g}, {one.start.y:g})"
-            hint = "move one of them by more than the size of both"
-            yield other.loaded.problem(("robot", "pose"), "SC044", f"robot {names}: {where}", hint)
+            message = f"robot `{second}` overlaps robot `{first}` at the start: {where}"
+            yield other.loaded.problem(START, "SC044", message, "move one of them farther away")

@@ -1,4 +1,4 @@
-"""Which ways a robot has before anything happens: first in plain numbers, exactly only where those do not settle it."""
+"""Routes of a robot through the fixed world, first with a fast approximation, then exactly if that does not decide."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,35 +7,34 @@ from typing import TYPE_CHECKING
 
 from simscen.core.geometry import Pose2
 from simscen.core.shapes import Solid
-from simscen.run.worldcache import WorldCache, around
+from simscen.run.worldcache import around
 from simscen.run.worldchecks.scene import Scene
 from simscen.worlds.plainways import PlainWays, plain_ways
 
 if TYPE_CHECKING:
     from simscen.worlds.shortest import ShortestWays
 
-SILL = 0.03
-"""Metres: what is lower may be driven over, which a way may do where no robot could stop."""
+SILL_M = 0.03
+"""Height of obstacles that a route may cross, although no robot could stop there."""
 
 
 @dataclass(frozen=True)
 class RobotRoutes:
-    """The ways of a disc that fits into the robot's footprint: where that finds none, the robot has none."""
+    """Routes of a disc that fits into the footprint: if the disc has no route, neither has the robot."""
 
     scene: Scene
-    cache: WorldCache
     stops: tuple[Pose2, ...]
 
-    def lead(self, starts: Sequence[Pose2], goal: Pose2, solids: tuple[Solid, ...]) -> bool:
-        """Whether a way may lead from one of the starts to the goal; False is a proof that there is none."""
+    def is_reachable(self, starts: Sequence[Pose2], goal: Pose2, solids: tuple[Solid, ...]) -> bool:
+        """Return whether a route may lead from a start to the goal; False proves that there is none."""
         plain = self._plain(solids)
         if plain is not None and any(plain.length(start[:2], goal[:2]) < float("inf") for start in starts):
             return True
         exact = self._exact(solids)
         return any(exact.may_reach(start, goal) for start in starts)
 
-    def come_to(self, starts: Sequence[Pose2], towards: Pose2, distance: Callable[[Pose2], float]) -> bool:
-        """Whether the robot's middle may come from a start to where `distance` is 0, past the fixed solids."""
+    def can_come_to(self, starts: Sequence[Pose2], towards: Pose2, distance: Callable[[Pose2], float]) -> bool:
+        """Return whether the center of the robot can get from a start to where `distance` is at most 0."""
         plain = self._plain(self.scene.world.solids)
 
         def arrived(point: tuple[float, float]) -> bool:
@@ -45,28 +44,28 @@ class RobotRoutes:
             return True
         return self._exact(self.scene.world.solids).may_come_to(starts, distance)
 
-    def longest(self, start: Pose2, goal: Pose2) -> float:
-        """Metres that the shortest way has at most; inf where plain numbers do not tell."""
+    def length_upper_bound(self, start: Pose2, goal: Pose2) -> float:
+        """Return an upper bound of the shortest route in m; inf if the approximation finds none."""
         plain = self._fixed
         return float("inf") if plain is None else plain.length(start[:2], goal[:2])
 
-    def shortest(self, start: Pose2, goal: Pose2) -> float:
-        """Metres of the shortest way past the fixed solids; inf where none is found."""
+    def length(self, start: Pose2, goal: Pose2) -> float:
+        """Return the length of the shortest route around the fixed solids in m; inf if there is none."""
         return self._exact(self.scene.world.solids).length(start, goal)
 
     @property
     def z_range(self) -> tuple[float, float]:
-        """Between which heights a way is closed."""
-        return SILL, max(2 * SILL, self.scene.size.height)
+        """Heights in m between which an obstacle blocks a route."""
+        return SILL_M, max(2 * SILL_M, self.scene.size.height)
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Of all that a way may lead around."""
+        """Bounds of the world and of all stops, with room to drive around them."""
         return around(self.scene.world.bounds, list(self.stops))
 
     @cached_property
     def _fixed(self) -> PlainWays | None:
-        return self.cache.plain_ways(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
+        return self.scene.cache.plain_ways(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
 
     def _plain(self, solids: tuple[Solid, ...]) -> PlainWays | None:
         if solids is self.scene.world.solids:
@@ -74,4 +73,4 @@ class RobotRoutes:
         return plain_ways(solids, self.scene.size.inscribed, self.z_range)
 
     def _exact(self, solids: tuple[Solid, ...]) -> "ShortestWays":
-        return self.cache.ways(solids, self.bounds, self.scene.size.inscribed, self.z_range)
+        return self.scene.cache.ways(solids, self.bounds, self.scene.size.inscribed, self.z_range)

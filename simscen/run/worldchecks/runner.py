@@ -1,9 +1,9 @@
-"""What only geometry can tell about a scenario before it runs: is the start free, can a goal be reached at all?
+"""Check a scenario in its built world before it runs: is the start free, can every goal be reached in time?
 
-Needs no engine, and for own worlds of simple shapes not even numpy.
+No physics engine is needed.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,115 +13,69 @@ from simscen.core.problems import Problem
 from simscen.core.world import World
 from simscen.loading.checks.runner import check_scenario
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
-from simscen.run.masks import load_masks
 from simscen.run.robotsize import robot_size_of
 from simscen.run.robotways import as_met
 from simscen.run.worldcache import WorldCache
-from simscen.run.worldchecks.masks import check_judged_masks, check_stack_zones
-from simscen.run.worldchecks.placement import check_motions, check_placement, check_robots_apart
-from simscen.run.worldchecks.reachability import check_reachability, start_poses
-from simscen.run.worldchecks.regions import check_regions, trigger_positions
-from simscen.run.worldchecks.routes import RobotRoutes
-from simscen.run.worldchecks.scene import Scene
-from simscen.run.worldchecks.timing import check_time_bounds
-from simscen.run.worldchecks.world_file import check_world_places
+from simscen.run.worldchecks import masks, placement, reachability, regions, timing
+from simscen.run.worldchecks.scene import TIMING, WORLD, Scene
+from simscen.run.worldchecks.world_file import check_built_world
 from simscen.run.worldsource import load_robot
 from simscen.worlds.mapsize import too_large
 from simscen.worlds.overlap import placed
+
+MODULES = (masks, placement, reachability, regions, timing)
+"""Modules that register checks when they are imported."""
 
 
 def check_in_world(
     loaded: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None
 ) -> list[Problem]:
-    """What cannot be, at the line it is written in, and what deserves a look, as warnings.
+    """Return the problems of a scenario in its world; some are warnings.
 
-    `cache` keeps worlds for the scenarios to come; into the folder `pictures` goes a picture of what is wrong. Raises
-    InvalidInput for unusable files, and UsageError for a picture that cannot be written.
+    `cache` keeps worlds for further scenarios. With `pictures`, a picture of each scenario with problems is written
+    to that folder. Raises InvalidInput for unusable files, and UsageError for a picture that cannot be written.
     """
     cache = cache or WorldCache()
     if not loaded.robots:
-        return _checked(loaded, cache, pictures)
-    found = [problem for view in loaded.robots.values() for problem in _checked(view, cache, pictures)]
-    problems = list(dict.fromkeys(found))  # what is wrong with all of them is told once
+        return _check_robot(loaded, cache, pictures)
+    found = [problem for view in loaded.robots.values() for problem in _check_robot(view, cache, pictures)]
+    problems = list(dict.fromkeys(found))  # the robots share most problems
     if not _has_errors(problems):
-        world, views = cache.world(loaded), [_with_robot(view) for view in loaded.robots.values()]
-        problems += check_robots_apart([Scene(view, world, robot_size_of(view)) for view in views])
+        world, views = cache.world(loaded), [_with_robot_spec(view) for view in loaded.robots.values()]
+        problems += placement.check_robots_apart([Scene(view, world, robot_size_of(view), cache) for view in views])
     return problems
 
 
-def _checked(loaded: LoadedScenario, cache: WorldCache, pictures: Path | None) -> list[Problem]:
-    """Of a scenario of one robot, or as one of several sees it."""
+def _check_robot(loaded: LoadedScenario, cache: WorldCache, pictures: Path | None) -> list[Problem]:
+    """Return the problems of a scenario of one robot, or as one of several robots sees it."""
     world = cache.world(loaded)
-    loaded = _with_robot(loaded)
-    met = as_met(loaded, world)
-    problems = [*_once_known(loaded, world), *_too_large(loaded, world)]
-    problems += [loaded.sourced(problem) for problem in check_world_places(met, loaded.world)]
-    problems += _otherwise(loaded)
+    loaded = _with_robot_spec(loaded)
+    blocking = as_met(loaded, world)
+    problems = [*_check_names_again(loaded, world), *_too_large(loaded, world)]
+    problems += [loaded.sourced(problem) for problem in check_built_world(blocking, loaded.world)]
+    problems += _robot_file_mismatches(loaded)
     if not _has_errors(problems):
-        problems += _impossible(Scene(loaded, met, robot_size_of(loaded)), cache, pictures)
+        problems += _check_scene(Scene(loaded, blocking, robot_size_of(loaded), cache), pictures)
     return [*problems, *world_reader_notes(world, loaded.world, loaded.root)]
 
 
-def _impossible(scene: Scene, cache: WorldCache, pictures: Path | None) -> list[Problem]:
-    stops = (*start_poses(scene), *(goal.pose for _, goal in scene.targets), *trigger_positions(scene))
-    ways = RobotRoutes(scene, cache, stops)
-    wrong = check_placement(scene)
-    closed = list(check_reachability(scene, ways, {keys for keys, _ in wrong}))
-    problems = [*(problem for _, problem in wrong), *(problem for problem, _ in closed)]
-    problems += [] if any(keys == ("robot", "pose") for keys, _ in wrong) else check_regions(scene, ways)
-    problems += check_motions(scene)
-    problems += check_judged_masks(scene)
-    problems += check_stack_zones(scene, load_masks(scene.loaded))
-    problems += [] if _has_errors(problems) else check_time_bounds(scene, ways)
+def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
+    problems = WORLD.problems(scene)
+    if not _has_errors(problems):
+        problems += TIMING.problems(scene)
+    problems = [scene.loaded.sourced(problem) for problem in sorted(problems)]
     if problems and pictures is not None:
-        file = draw_picture(scene, [gap for _, gap in closed], pictures)
+        gaps = [gap.position for _, gap in scene.once(reachability.closed_gaps)]
+        file = draw_picture(scene, gaps, pictures)
         problems = [replace(problem, hint=f"{problem.hint}; picture: {file}".lstrip("; ")) for problem in problems]
     return problems
 
 
-def _otherwise(loaded: LoadedScenario) -> Iterator[Problem]:
-    """Where a robot's file and its URDF do not agree."""
-    if loaded.robot.urdf is None:
-        return
-    from simscen.run.robotgeometry import otherwise
-
-    yield from map(loaded.sourced, otherwise(loaded.robot, load_robot(loaded)[1]))
-
-
-def _has_errors(problems: list[Problem]) -> bool:
-    return any(problem.severity == "error" for problem in problems)
-
-
-def _with_robot(loaded: LoadedScenario) -> LoadedScenario:
-    """The scenario with what is plain from its robot's URDF."""
-    if loaded.robot.spec is not None:
-        return loaded
-    return replace(loaded, robot=replace(loaded.robot, spec=load_robot(loaded)[0]))
-
-
-def _once_known(loaded: LoadedScenario, world: World) -> list[Problem]:
-    """What the text alone could not tell: the names of an imported world, the sensors of a bare URDF."""
-    bare = loaded.robot.path == loaded.robot.urdf
-    if bare or loaded.world.map is not None or loaded.world.sdf is not None:
-        return sorted(check_scenario(loaded, world))
-    return []
-
-
-def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Problem]:
-    """What the readers of a world had to say, as warnings about its file."""
-    shown = source.path.relative_to(root).as_posix() if source.path.is_relative_to(root) else str(source.path)
-    return [Problem(shown, 0, 0, "SC311", note.removeprefix(f"{shown}: "), severity="warning") for note in world.notes]
-
-
-def _too_large(loaded: LoadedScenario, world: World) -> Iterator[Problem]:
-    message = too_large(world.bounds) if world.grid is None else None
-    if message:
-        yield loaded.problem(("world",), "SC330", message, "is something placed far away from the rest?")
-
-
-# MERGED: A picture of what `validate` refuses: the world, the robot at its start and its goals, and the gap that is closed.
 def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path) -> Path:
-    """Write `<folder>/<id>.png`, and say where. Raises UsageError when it cannot be written."""
+    """Draw the world, the robot at its start and its goals, and gaps that are too narrow; return the image file.
+
+    Raises UsageError if it cannot be written.
+    """
     from simscen.worlds.build import build
     from simscen.worlds.picture import picture
 
@@ -137,3 +91,43 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
     except OSError as error:
         raise UsageError(f"cannot write the picture {file}: {error.strerror}") from error
     return file
+
+
+def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Problem]:
+    """Return the notes of the reader of a world, as warnings about its file."""
+    shown = source.path.relative_to(root).as_posix() if source.path.is_relative_to(root) else str(source.path)
+    return [Problem(shown, 0, 0, "SC311", note.removeprefix(f"{shown}: "), severity="warning") for note in world.notes]
+
+
+def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:
+    """Check names that are only known now: those of an imported world, and the sensors of a bare URDF."""
+    is_urdf = loaded.robot.path == loaded.robot.urdf
+    if is_urdf or loaded.world.map is not None or loaded.world.sdf is not None:
+        return sorted(check_scenario(loaded, world))
+    return []
+
+
+def _too_large(loaded: LoadedScenario, world: World) -> Iterator[Problem]:
+    message = too_large(world.bounds) if world.grid is None else None
+    if message:
+        yield loaded.problem(("world",), "SC330", message, "is something far away from everything else?")
+
+
+def _robot_file_mismatches(loaded: LoadedScenario) -> Iterator[Problem]:
+    """Find contradictions between a robot file and its URDF."""
+    if loaded.robot.urdf is None:
+        return
+    from simscen.run.robotgeometry import otherwise
+
+    yield from map(loaded.sourced, otherwise(loaded.robot, load_robot(loaded)[1]))
+
+
+def _with_robot_spec(loaded: LoadedScenario) -> LoadedScenario:
+    """Return the scenario with the specification that follows from a bare URDF."""
+    if loaded.robot.spec is not None:
+        return loaded
+    return replace(loaded, robot=replace(loaded.robot, spec=load_robot(loaded)[0]))
+
+
+def _has_errors(problems: Iterable[Problem]) -> bool:
+    return any(problem.severity == "error" for problem in problems)

@@ -62,24 +62,24 @@ WRONG = {
     ),
     "a thing's name": (
         f"robots: {{{A}, crate: {{pose: there}}}}\n" + PASS,
-        (7, "SC033", "something in the world is called `crate`, too: nobody could tell them apart"),
+        (7, "SC033", "an object of the world is also called `crate`"),
     ),
     "whose trigger": (
         f"robots: {{{A}, {B}}}\nevents: [{{when: {{travelled: 1}}, {REMOVE}}}]\n" + PASS,
-        (8, "SC043", "`travelled` is about a robot, and does not say which"),
+        (8, "SC043", "`travelled` must name one of the robots"),
     ),
     "whose part of a trigger": (
         f"robots: {{{A}, {B}}}\nevents: [{{when: {{all: [{{time: 1}}, {{travelled: 1}}]}}, {REMOVE}}}]\n" + PASS,
-        (8, "SC043", "`travelled` is about a robot, and does not say which"),
+        (8, "SC043", "`travelled` must name one of the robots"),
     ),
     "whose action": (
         f"robots: {{{A}, {B}}}\nevents: [{{when: {{time: 1}}, do: {{push: {{impulse: [1, 0]}}}}}}]\n" + PASS,
-        (8, "SC043", "`push` is about a robot, and does not say which"),
+        (8, "SC043", "`push` must name one of the robots"),
     ),
     "whose fault": (
         "robots:\n  a: {pose: here, faults: [{sensor: lidar, off: {}}]}\n"
         f"  {B}\nevents: [{{when: {{event: {{name: lidar.off}}}}, {REMOVE}}}]\n" + PASS,
-        (10, "SC043", "`event` is about a robot, and does not say which"),
+        (10, "SC043", "`event` must name one of the robots"),
     ),
     "a stranger": (
         f"robots: {{{A}, {B}}}\nevents: [{{when: {{travelled: 1, robot: c}}, {REMOVE}}}]\n" + PASS,
@@ -92,7 +92,7 @@ WRONG = {
     ),
     "a robot is no thing to remove": (
         f"robots: {{{A}, {B}}}\nevents: [{{when: {{time: 1}}, do: {{remove: {{name: b}}}}}}]\n" + PASS,
-        (8, "SC035", "`b` is one of the robots: it cannot move, go or be followed"),
+        (8, "SC035", "`b` is one of the robots, which cannot be moved or followed"),
     ),
     "a sensor of one": (
         "robots:\n  a: {pose: here, faults: [{sensor: sonar, off: {}}]}\n  " + B + "\n" + PASS,
@@ -108,7 +108,7 @@ WRONG = {
     ),
     "a name in a scenario of one robot": (
         "robot: {pose: here}\nevents: [{when: {travelled: 1, robot: a}, do: {remove: {name: crate}}}]\n" + PASS,
-        (8, "SC030", "no robot is called `a`: there is one only, which has no name"),
+        (8, "SC030", "no robot is called `a`: the only robot has no name"),
     ),
 }
 
@@ -121,7 +121,7 @@ def test_what_is_wrong_is_told_where_it_is(load, case):
 
 def test_a_robot_that_an_event_takes_for_a_thing_is_told_once(load):
     text = f"robots: {{{A}, {B}}}\nevents: [{{when: {{time: 1}}, do: {{remove: {{name: b}}}}}}]\n"
-    assert told(load(text + PASS)) == [(8, "SC035", "`b` is one of the robots: it cannot move, go or be followed")]
+    assert told(load(text + PASS)) == [(8, "SC035", "`b` is one of the robots, which cannot be moved or followed")]
 
 
 def test_each_robot_may_be_sent_a_goal_of_the_same_name(load):
@@ -135,7 +135,7 @@ def test_robots_that_start_in_one_another_are_told(load, pose):
     loaded = load(f"robots: {{{A}, b: {{pose: {pose}}}}}\n" + PASS)
     (problem,) = [problem for problem in check_in_world(loaded) if problem.severity == "error"]
     assert (problem.line, problem.code) == (7, "SC044")
-    assert "`b` starts in the same place as `a`" in problem.message
+    assert "robot `b` overlaps robot `a` at the start" in problem.message
 
 
 def test_what_is_said_for_all_holds_for_each_that_says_nothing_else(load):

@@ -81,7 +81,7 @@ def test_objects_of_imported_worlds_are_not_second_guessed(write: Write, scenari
 def test_a_fault_must_fit_its_sensor(told: Told) -> None:
     problems = told("faults:\n  - {sensor: front, slip: {left: 10 %}}\n  - {sensor: rear, off: {}}\n")
     assert [(p.code, p.line, p.col) for p in problems] == [("SC032", 7, 21), ("SC031", 8, 14)]
-    assert problems[0].hint == "it can happen to: odom, wheels"
+    assert problems[0].hint == "it can affect: odom, wheels"
     assert problems[1].hint == "expected one of: front, odom, cmd_vel, wheels, localizer, map"
 
 
@@ -102,4 +102,4 @@ def test_two_goals_at_one_place_are_fine_but_two_of_one_name_are_not(
     named = scenario.replace("[{pose: desk}]", "[{name: a, pose: desk}, {name: a, pose: start}]")
     problems = try_scenario(write("b.scenario.yaml", named), tmp_path)
     assert isinstance(problems, list)
-    assert [p.message for p in problems] == ["goal `a` is there already (first at 4:16)"]
+    assert [p.message for p in problems] == ["goal `a` is already defined at 4:16"]

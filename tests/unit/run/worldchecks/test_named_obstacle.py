@@ -28,4 +28,4 @@ def test_a_wall_that_cuts_a_hall_in_two_is_named_and_not_a_corner_of_the_outer_w
     file.write_text(HALL % points)
     (problem,) = check_in_world(load_scenario(file, tmp_path))
     assert problem.code == "SC302"
-    assert "`middle` at (" in problem.message
+    assert "`middle` closes the last route at (" in problem.message

@@ -1,0 +1,104 @@
+"""Checks of actions that are impossible or change nothing."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from simscen.loading.checks.registry import MEANING, Finding, Keys
+from simscen.loading.known_names import pedestrian_names
+from simscen.loading.loaded import LoadedScenario
+from simscen.model.anystack import ExternalStackSpec
+
+
+@MEANING.check("SC050")
+def stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find pedestrians that are stopped for a while: they have no script that could continue."""
+    pedestrians = pedestrian_names(loaded)
+    for step in loaded.spec.steps:
+        for keys, action in step.placed():
+            stop: Any = action.chosen
+            if action.kind == "stop" and stop.for_ is not None and stop.name in pedestrians:
+                message = f"`{step.name}` can never happen: pedestrian `{stop.name}` does not walk on after a stop"
+                yield Finding((*keys, "stop", "for"), message, "remove `for`")
+
+
+def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
+    """Return name of the event, keys and specification of each action that switches a zone."""
+    return [
+        (step.name, (*keys, action.kind), action.chosen)
+        for step in loaded.spec.steps
+        for keys, action in step.placed()
+        if action.kind in ("keepout", "speed_zone") and loaded.concerns(action.robot)
+    ]
+
+
+@MEANING.check("SC050")
+def impossible_zone_actions(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find zones that are switched for an external stack, and speed zones without a limit."""
+    actions = _zone_actions(loaded)
+    limited = [zone.region for zone in loaded.spec.stack.speed_zones]
+    limited += [action.region for _, _, action in actions if getattr(action, "speed_limit", None)]
+    for name, keys, action in actions:
+        if isinstance(loaded.spec.stack, ExternalStackSpec):
+            message = f"`{name}` can never happen: an external stack gets its zones once, at the start"
+            hint = "list all zones under `stack`, or remove the event"
+            yield Finding(keys, message, hint, at_key=True)
+        elif _limits_speed(keys, action) and action.region not in limited:
+            message = f"`{name}` can never happen: region `{action.region}` has no speed limit"
+            yield Finding((*keys, "region"), message, "add a limit: `speed_limit: 0.3 m/s`")
+
+
+@MEANING.check("SC055", severity="warning")
+def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find speed zones whose limit is not below the top speed of the robot."""
+    robot = loaded.robot.spec
+    for _, keys, action in _zone_actions(loaded):
+        if isinstance(loaded.spec.stack, ExternalStackSpec) or robot is None or not _limits_speed(keys, action):
+            continue
+        if action.speed_limit is not None and action.speed_limit >= robot.top_speed:
+            message = f"the limit has no effect: the robot's top speed is {robot.top_speed:g} m/s"
+            yield Finding((*keys, "speed_limit"), message)
+
+
+def _limits_speed(keys: Keys, action: Any) -> bool:
+    return keys[-1] == "speed_zone" and action.enabled and action.region is not None
+
+
+@MEANING.check("SC055", severity="warning")
+def pushes_without_effect(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find pushes of zero, and pushes of what has no mass."""
+    world = loaded.world.spec
+    spawned = [action.chosen for step in loaded.spec.steps for action in step.actions if action.kind == "spawn"]
+    things = [*(world.objects if world else []), *spawned]
+    doors = [door.name for door in world.doors] if world else []
+    for step in loaded.spec.steps:
+        for keys, action in step.placed():
+            if action.kind != "push":
+                continue
+            push: Any = action.chosen
+            if not any(push.impulse or push.force):
+                key = "impulse" if push.force is None else "force"
+                yield Finding((*keys, "push", key), "a push of zero changes nothing")
+            named: list[Any] = [thing for thing in things if getattr(thing, "name", "") == push.name]
+            if push.name in doors or (named and not any(thing.mass for thing in named)):
+                message = f"a push cannot move `{push.name}`, which has no mass"
+                yield Finding((*keys, "push", "name"), message, "give it a `mass`, or `move` it")
+            elif push.name in pedestrian_names(loaded):
+                message = f"a push cannot move pedestrian `{push.name}`"
+                yield Finding((*keys, "push", "name"), message, "use `stop`, `teleport` or `move`")
+
+
+@MEANING.check("SC055", severity="warning")
+def doors_already_there(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find doors that are opened or closed although they already are."""
+    done = [placed for step in loaded.spec.steps for placed in step.placed()]
+    if loaded.world.spec is None or any(action.may() for _, action in done):
+        return
+    kinds = {(action.kind, getattr(action.chosen, "name", "")) for _, action in done}
+    closed = {door.name: door.closed for door in loaded.world.spec.doors}
+    for keys, action in done:
+        name, fully = getattr(action.chosen, "name", ""), getattr(action.chosen, "to", 1) == 1
+        for kind, opposite, state in (("open", "close", False), ("close", "open", True)):
+            if action.kind == kind and fully and closed.get(name) is state and (opposite, name) not in kinds:
+                initial = "closed" if state else "open"
+                message = f"door `{name}` is {initial} from the start, and no event {opposite}s it"
+                yield Finding((*keys, kind, "name"), message)

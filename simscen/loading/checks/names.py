@@ -1,0 +1,145 @@
+"""Checks of names: do they exist, are they unique, do they fit?"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from simscen.core.goalnames import LOOP
+from simscen.loading.checks.registry import NAMES, Finding, Keys, NameScope
+from simscen.loading.known_names import NOUNS, event_names, known_names, own_goal_names, world_object_names
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.spec_walk import Reference, references, walk
+from simscen.triggers.trigger import Test
+
+RENAME_HINT = "rename one of them"
+
+
+@NAMES.check("SC030")
+def unknown_names(scope: NameScope) -> Iterator[Finding]:
+    """Find names that refer to nothing."""
+    loaded = scope.loaded
+    known = known_names(loaded, scope.world)
+    for reference in references(loaded.spec, concerns=loaded.concerns):
+        names = known.get(reference.to)
+        if names is not None and reference.name not in names and not _is_immovable(scope, reference):
+            hint = suggestion(reference.name, dict.fromkeys(names)) or "there is none"
+            message = f"no {NOUNS[reference.to]} is called {quoted(reference.name)}"
+            yield Finding(reference.keys, message, hint)
+
+
+@NAMES.check("SC035")
+def immovable_names(scope: NameScope) -> Iterator[Finding]:
+    """Find fixed parts of the world, and robots, where something that can be moved is expected."""
+    loaded = scope.loaded
+    known = known_names(loaded, scope.world)
+    for reference in references(loaded.spec, concerns=loaded.concerns):
+        names = known.get(reference.to)
+        if names is None or reference.name in names or not _is_immovable(scope, reference):
+            continue
+        what = "one of the robots" if reference.name in _robots(scope, reference) else "a fixed part of the world"
+        message = f"{quoted(reference.name)} is {what}, which cannot be moved or followed"
+        yield Finding(reference.keys, message, "name an object, a door or something that an event spawns")
+
+
+def _is_immovable(scope: NameScope, reference: Reference) -> bool:
+    if reference.to not in ("movable", "mover"):
+        return False
+    objects = known_names(scope.loaded, scope.world)["object"] or ()
+    return reference.name in (*_robots(scope, reference), *objects)
+
+
+def _robots(scope: NameScope, reference: Reference) -> tuple[str, ...]:
+    """Return the robots that cannot be meant by a reference."""
+    own = (scope.loaded.robot_name,) if reference.to == "movable" else ()
+    return (*own, *scope.loaded.other_robots)
+
+
+@NAMES.check("SC031")
+def unknown_lidars(scope: NameScope) -> Iterator[Finding]:
+    """Find triggers on the scans of a lidar that the robot does not have."""
+    loaded = scope.loaded
+    if loaded.robot.spec is None:
+        return
+    lidars = [name for name, sensor in loaded.robot.spec.sensors.items() if sensor.says == "Scan"]
+    for keys, part in walk(loaded.spec, concerns=loaded.concerns):
+        named = getattr(part.scan_age, "sensor", None) if isinstance(part, Test) else None
+        if named is not None and named not in lidars:
+            message = f"robot `{loaded.robot.name}` has no lidar called {quoted(named)}"
+            yield Finding((*keys, "scan_age", "sensor"), message, suggestion(named, lidars) or "it has no lidar")
+
+
+@NAMES.check("SC033")
+def duplicate_names(scope: NameScope) -> Iterator[Finding]:
+    """Find two goals, events or faults of one name, and an event and a fault of one name."""
+    loaded = scope.loaded
+    lists: dict[str, list[tuple[Keys, str | None]]] = {
+        "goal": [(("goals", k), goal.name) for k, goal in enumerate(loaded.spec.goals)],
+        "event": [(step.keys, step.entry.name) for step in loaded.spec.steps],
+        "fault": [(("faults", k), fault.name) for k, fault in enumerate(loaded.spec.faults)],
+    }
+    for what, named in lists.items():
+        seen: dict[str, Keys] = {}
+        for keys, name in named:
+            if name is not None and name in seen:
+                first = loaded.place_of(*seen[name], "name")
+                message = f"{what} {quoted(name)} is already defined at {first.line}:{first.col}"
+                yield Finding((*keys, "name"), message, "choose another name")
+            seen.setdefault(name or "", keys)
+    for index, fault in enumerate(loaded.spec.faults):
+        if fault.name is not None and fault.name in event_names(loaded):
+            message = f"an event is also called {quoted(fault.name)}; criteria could not tell them apart"
+            yield Finding(("faults", index, "name"), message, RENAME_HINT)
+
+
+@NAMES.check("SC033")
+def duplicate_names_of_actions(scope: NameScope) -> Iterator[Finding]:
+    """Find marks and new goals that are called like an event, a fault or a goal."""
+    loaded = scope.loaded
+    happenings = [*event_names(loaded), *(fault.label for fault in loaded.spec.faults)]
+    goals = own_goal_names(loaded)
+    for keys, action in (placed for step in loaded.spec.steps for placed in step.placed()):
+        name = getattr(action.chosen, "name", "")
+        if action.kind == "mark" and name in happenings:
+            message = f"an event or a fault is also called {quoted(name)}; criteria could not tell them apart"
+            yield Finding((*keys, "mark", "name"), message, RENAME_HINT)
+        if action.kind != "new_goal" or not name or not loaded.concerns(action.robot):
+            continue
+        if name in goals:
+            message = f"another goal is also called {quoted(name)}; criteria could not tell them apart"
+            yield Finding((*keys, "new_goal", "name"), message, "choose another name")
+        goals.append(name)
+
+
+@NAMES.check("SC033")
+def reserved_goal_names(scope: NameScope) -> Iterator[Finding]:
+    """Find goals with names such as `shelf#2`, which further loops use."""
+    for index, goal in enumerate(scope.loaded.spec.goals):
+        if goal.name is not None and LOOP.fullmatch(goal.name):
+            message = f"{quoted(goal.name)} is reserved for the goals of further loops"
+            yield Finding(("goals", index, "name"), message, "choose a name that does not end in # and a number")
+
+
+@NAMES.check("SC033")
+def duplicate_pedestrians(scope: NameScope) -> Iterator[Finding]:
+    """Find pedestrians that are called like an object of the world or like another pedestrian."""
+    loaded = scope.loaded
+    taken = dict.fromkeys(world_object_names(loaded, scope.world), "an object of the world")
+    for step in loaded.spec.steps:
+        for keys, action in step.placed():
+            if action.kind not in ("spawn", "pedestrian", "crowd"):
+                continue
+            names = getattr(action.chosen, "names", None) or [getattr(action.chosen, "name", "")]
+            twice = [name for name in names if name in taken]
+            if twice and (action.kind != "spawn" or taken[twice[0]] == "a pedestrian"):
+                message = f"{taken[twice[0]]} is also called {quoted(twice[0])}"
+                yield Finding((*keys, action.kind, "name"), message, RENAME_HINT)
+            taken.update(dict.fromkeys(names, "a spawned object" if action.kind == "spawn" else "a pedestrian"))
+
+
+@NAMES.check("SC033")
+def robots_named_like_objects(scope: NameScope) -> Iterator[Finding]:
+    """Find robots that are called like an object of the world."""
+    loaded = scope.loaded
+    objects = known_names(replace(loaded, other_robots=()), scope.world)["object"] or ()
+    if loaded.robot_name in objects:
+        message = f"an object of the world is also called {quoted(loaded.robot_name)}"
+        yield Finding(("robot",), message, "rename the robot", at_key=True)

@@ -1,0 +1,124 @@
+"""Semantic checks: what a check receives and returns, and the stages in which checks run.
+
+A check is a generator function that yields one Finding per problem. It is registered for a stage together with the
+error code that it reports:
+
+    @MEANING.check("SC050")
+    def impossible_events(loaded: LoadedScenario) -> Iterator[Finding]: ...
+
+Stages, in the order in which they run (a scenario with errors does not reach the next one):
+
+| stage | subject | needs |
+|---|---|---|
+| ROBOT_NAMES | the scenario as written | nothing |
+| WORLD_FILE | a world file | nothing |
+| NAMES | one robot's view of the scenario | the files that it names |
+| MEANING | one robot's view of the scenario | the files that it names |
+| WORLD, ROUTES (`simscen.run.worldchecks`) | the scenario in its world | the built world |
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+
+from simscen.core.problems import Problem
+from simscen.core.world import World
+from simscen.loading.loaded import LoadedScenario, LoadedWorld
+from simscen.loading.yaml.tree import Key, MappingNode, key_position, value_position
+from simscen.model.scenario import ScenarioSpec
+
+Keys = tuple[Key, ...]
+
+
+class Finding(NamedTuple):
+    """A problem found by a check: where it is, what is wrong, and what to do.
+
+    `keys` lead to the value to mark, or to the key itself with `at_key`. They are keys of the checked file, or of
+    `tree` if that is given. A finding with `warning` is a warning even if the check reports errors.
+    """
+
+    keys: Keys
+    message: str
+    hint: str = ""
+    at_key: bool = False
+    warning: bool = False
+    tree: MappingNode | None = None
+
+    def problem(self, code: str, tree: MappingNode, severity: str = "error") -> Problem:
+        """Return the finding as a problem at its position in `tree`, without the text of its line."""
+        position_of = key_position if self.at_key else value_position
+        position = position_of(self.tree or tree, self.keys)
+        return Problem(*position, code, self.message, self.hint, "warning" if self.warning else severity)
+
+
+class Subject(Protocol):
+    """What checks look at: anything with the tree of the file in which problems are reported."""
+
+    @property
+    def tree(self) -> MappingNode | None:
+        """The tree of the file; None if the file is not in YAML."""
+        ...
+
+
+S = TypeVar("S", bound=Subject)
+Check = Callable[[S], Iterable[Finding]]
+C = TypeVar("C", bound=Callable[..., Any])
+
+
+@dataclass
+class Stage(Generic[S]):
+    """Checks that run together, in the order in which they were registered."""
+
+    name: str
+    checks: list[tuple[str, str, Check[S]]] = field(default_factory=list)
+    """Error code, severity and function of each check."""
+
+    def check(self, code: str, severity: str = "error") -> Callable[[C], C]:
+        """Register the decorated function as a check that reports problems with this code."""
+
+        def register(function: C) -> C:
+            self.checks.append((code, severity, function))
+            return function
+
+        return register
+
+    def problems(self, subject: S) -> list[Problem]:
+        """Return what all checks of this stage find, without the text of lines."""
+        tree = subject.tree
+        if tree is None:
+            return []
+        return [
+            finding.problem(code, tree, severity)
+            for code, severity, function in self.checks
+            for finding in function(subject)
+        ]
+
+
+class WrittenScenario(NamedTuple):
+    """A scenario as written, with all its robots."""
+
+    spec: ScenarioSpec
+    tree: MappingNode
+
+
+class NameScope(NamedTuple):
+    """A scenario and its world; `world` is None until the world has been built."""
+
+    loaded: LoadedScenario
+    world: World | None = None
+
+    @property
+    def tree(self) -> MappingNode:
+        """The tree of the scenario."""
+        return self.loaded.tree
+
+
+ROBOT_NAMES: Stage[WrittenScenario] = Stage("robot names")
+WORLD_FILE: Stage[LoadedWorld] = Stage("world file")
+NAMES: Stage[NameScope] = Stage("names")
+MEANING: Stage[LoadedScenario] = Stage("meaning")
+
+
+def warnings(findings: Iterable[Finding]) -> Iterator[Finding]:
+    """Return the findings as warnings."""
+    return (finding._replace(warning=True) for finding in findings)
