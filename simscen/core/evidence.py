@@ -1,12 +1,12 @@
-"""What a log must hold for a criterion to be decided. One that simscen wrote holds everything."""
+"""What a log must hold for a criterion to be decided, and what a given log lacks of it."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Set
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 
 class Evidence(str, Enum):
-    """A kind of knowledge about a run, in words that end the sentence "the log does not say …"."""
+    """A kind of information about a run, in words that end the sentence "the log does not say …"."""
 
     TRUTH = "where the robot truly was"
     VELOCITY = "how fast the robot truly went"
@@ -27,13 +27,30 @@ class Evidence(str, Enum):
     FOOTPRINT = "how much ground the robot covers"
 
 
+POSITION = frozenset({Evidence.TRUTH, Evidence.ALIGNMENT})
+"""What is needed to compare the true position with places of the map."""
+
+
 @dataclass(frozen=True)
 class Coverage:
-    """What a log lacks: `missing` altogether, or for a part of the time (`partial`); each with the reason."""
+    """Evidence that a log lacks, each with the reason: `missing` altogether, or for a part of the time (`partial`).
+
+    `recorded_by_simscen` is False for the log of another recorder, whose signals may be irregular or not finite. In a
+    log of simscen's own, that means that the simulation or the log is broken.
+    """
 
     missing: Mapping[Evidence, str] = field(default_factory=dict)
     partial: Mapping[Evidence, str] = field(default_factory=dict)
+    recorded_by_simscen: bool = True
+
+    def lacking(self, wanted: Set[Evidence]) -> list[Evidence]:
+        """Return the wanted evidence that is missing altogether."""
+        return [evidence for evidence in Evidence if evidence in self.missing and evidence in wanted]
+
+    def with_gaps(self, gaps: Mapping[Evidence, str]) -> "Coverage":
+        """Return the same coverage with more evidence that is there only for a part of the time."""
+        return replace(self, partial={**gaps, **self.partial})
 
 
 WHOLE = Coverage()
-"""That of a log that simscen wrote."""
+"""Coverage of a run that was just simulated: nothing is missing."""

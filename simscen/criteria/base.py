@@ -1,4 +1,4 @@
-"""What a criterion is."""
+"""Interface of pass criteria."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ if TYPE_CHECKING:
 
 
 class Criterion(ABC):
-    """A question about a trace with a yes or no for an answer.
+    """A requirement on a run that its trace either meets or not.
 
-    *Given* the same trace and case *then* the same findings. It looks at nothing else, and every bound it checks
-    yields a finding, so that a criterion without findings has checked nothing.
+    *Given* the same trace and case *then* the findings are the same: a criterion looks at nothing else. Every bound
+    that it checks yields a finding, so a criterion without findings has checked nothing.
     """
 
     @property
     def clearance_range(self) -> float:
-        """How far around the robot, in metres, it needs clearance to be searched; 0 where it does not look at it."""
+        """Distance around the robot, in meters, in which it needs the clearance; 0 if it does not use it."""
         return 0.0
 
     @property
     def horizon(self) -> float:
-        """Seconds of simulated time before which it cannot be known that it holds."""
+        """Seconds of simulated time before which it cannot be known to hold."""
         return 0.0
 
     @property
     def evidence(self) -> frozenset[Evidence] | None:
-        """What a log must hold for it to be decided; None = everything that a log of simscen holds."""
+        """What a log must hold for it to be decided; None for everything that a log of simscen holds."""
         return None
 
     @abstractmethod
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding for each bound, in the order of the specification."""
+        """Return one finding for each bound, in the order of the specification."""

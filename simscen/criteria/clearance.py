@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.core.evidence import Evidence
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, undecided
@@ -40,6 +41,11 @@ class Clearance(Spec, Criterion):
     def clearance_range(self) -> float:
         """Its bound and a little more, so that a margin is left to be seen."""
         return self.min + SEARCH_MARGIN_M
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return frozenset({Evidence.CLEARANCE})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The tightest moment. Space that is free as far as was searched may be infinite; nan may not."""

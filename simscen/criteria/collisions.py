@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.events import Event, EventKind
+from simscen.core.evidence import Evidence
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import InvalidTrace, MissingEvidence, at_most, counted, undecided
@@ -54,6 +55,13 @@ class Collisions(Spec, Criterion):
     """Only contacts with people: pedestrians, and those of crowds."""
     caused_by_robot: bool = False
     """Only contacts at which the robot itself was moving: not when something ran into it while it stood."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        speed_needed = {Evidence.TRUTH, Evidence.VELOCITY} if self.caused_by_robot else set()
+        people_needed = {Evidence.OBJECTS} if self.people else set()
+        return frozenset({Evidence.CONTACTS, *speed_needed, *people_needed})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The count, then the hardest contact."""

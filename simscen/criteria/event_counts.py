@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field, model_validator
 
 from simscen.core.events import Event, EventKind
+from simscen.core.evidence import Evidence
 from simscen.core.navigation import ReplanReason
 from simscen.core.verdict import Finding, Status
 from simscen.criteria.base import Criterion
@@ -74,6 +75,11 @@ class Replans(CountBounds, Criterion):
     near (`tight`), obstacles went away (`better`), a mapless robot's `window` moved on, after a `recovery`, or at the
     planner's `rate`."""
 
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return frozenset({Evidence.PLANNING})
+
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each bound."""
         plans = trace.of_kind(EventKind.PLAN_MADE)
@@ -99,6 +105,11 @@ class Recoveries(CountBounds, Criterion):
 
     name: BehaviorName | None = None
     """Only this behaviour."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return frozenset({Evidence.RECOVERIES})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each bound."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
+from simscen.core.evidence import POSITION, Evidence
 from simscen.core.geometry import wrap
 from simscen.core.goalnames import FAILED, named
 from simscen.core.verdict import Finding
@@ -55,6 +56,11 @@ class GoalsReached(Spec, Criterion):
     """How far the true heading may be off; default: the goal's own tolerance."""
     within: PositiveDuration | None = None
     """Each goal at most this long after the robot accepted it."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return POSITION | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Distance, heading and, if asked for, time of each goal; one finding for a goal that was not reached."""

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import model_validator
 
 from simscen.core.events import EventKind
+from simscen.core.evidence import POSITION, Evidence
 from simscen.core.polygons import flaw
 from simscen.core.separation import separation, separation_of_boxes
 from simscen.core.verdict import Finding
@@ -72,6 +73,12 @@ class Keepout(Spec, Criterion):
         if self.grace and not self.while_on:
             raise ValueError("grace is for a zone that is switched on: `while_on: true`")
         return self
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        switched = {Evidence.DISTURBANCES} if self.while_on else set()
+        return POSITION | {Evidence.FOOTPRINT, *switched}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The nearest moment."""

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.chisquare import mean_bounds, quantile
+from simscen.core.evidence import POSITION, Evidence
 from simscen.core.samples import Samples
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
@@ -52,6 +53,11 @@ class LocalizationConsistency(Spec, Criterion):
     def horizon(self) -> float:
         """When judging begins."""
         return self.after
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return POSITION | {Evidence.BELIEF, Evidence.COVARIANCE}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The average against its upper bound, and with `both_sides` against its lower."""

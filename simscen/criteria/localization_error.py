@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import model_validator
 
+from simscen.core.evidence import POSITION, Evidence
 from simscen.core.geometry import Array
 from simscen.core.samples import Samples
 from simscen.core.verdict import Finding
@@ -55,6 +56,11 @@ class LocalizationError(Spec, Criterion):
     def horizon(self) -> float:
         """When judging begins."""
         return self.after
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return POSITION | {Evidence.BELIEF}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each bound that is given."""

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from simscen.core.events import Event, EventKind
+from simscen.core.evidence import POSITION, Evidence
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, held, missed, undecided
@@ -34,6 +35,11 @@ class NoFalseSuccess(Spec, Criterion):
 
     tolerance: PositiveLength = 1.0
     """From here on a success is false; larger than the goal's own tolerance, which goals_reached judges."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return POSITION | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each goal reported reached, one for the end of navigation."""

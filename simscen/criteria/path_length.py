@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import model_validator
 
 from simscen.core.events import EventKind
+from simscen.core.evidence import Evidence
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
@@ -46,6 +47,11 @@ class PathLength(Spec, Criterion):
         if self.max is None and self.max_ratio is None:
             raise ValueError("expected max or max_ratio")
         return self
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return frozenset({Evidence.TRUTH})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The length, then the ratio; both in metres of margin."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.core.evidence import POSITION, Evidence
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, undecided
@@ -42,6 +43,11 @@ class PersonalSpace(Spec, Criterion):
     """Of the gap."""
     while_driving: bool = False
     """Only moments at which the robot drives, faster than 0.1 m/s: people come up to one that stands as they like."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The nearest moment."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.core.evidence import POSITION, Evidence
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
@@ -46,6 +47,12 @@ class RelocalizedWithin(Spec, Criterion):
     """How far the believed heading may be off."""
     hold: PositiveDuration = 1.0
     """It must stay right so long to count."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        started = {Evidence.DISTURBANCES} if self.after is not None else set()
+        return POSITION | {Evidence.BELIEF, *started}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding each time it happened."""

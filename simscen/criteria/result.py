@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from simscen.core.events import Event, EventKind
+from simscen.core.evidence import Evidence
 from simscen.core.goalnames import named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
@@ -35,6 +36,12 @@ class Result(Spec, Criterion):
     error_code: Code | None = None
     """Nav2's error code that it must give, by name or number."""
 
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        codes = set() if self.error_code is None else {Evidence.ERROR_CODES}
+        return frozenset({Evidence.NAVIGATION, *codes})
+
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for the result, one for the code if it is asked for."""
         end = _last(trace, EventKind.NAVIGATION_ENDED)
@@ -61,6 +68,11 @@ class ErrorCodeIs(Spec, Criterion):
     """By name or number; NONE = no error."""
     goal: GoalName | None = None
     """Of this goal; default: of the navigation as a whole."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return frozenset({Evidence.NAVIGATION, Evidence.ERROR_CODES})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding."""

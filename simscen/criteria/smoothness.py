@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
+from simscen.core.evidence import Evidence
 from simscen.core.geometry import Array
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, undecided
 from simscen.criteria.trace_signals.catalog import SignalName, read_signal
 from simscen.criteria.trace_signals.ground_truth import speed
+from simscen.criteria.trace_signals.readers import evenly_sampled_speed
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.criteria.trace_signals.sparc_ldlj import MOVED_SPEED_M_S, ldlj, sparc
 from simscen.spec.base import Spec
@@ -58,6 +60,11 @@ class Smoothness(Spec, Criterion):
             raise ValueError(f"expected at least one of: {', '.join(type(self).model_fields)}")
         return self
 
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return frozenset({Evidence.TRUTH, Evidence.VELOCITY})
+
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each bound that is given."""
         findings = []
@@ -101,7 +108,11 @@ def _without_unit(trace: Trace, name: str, limit: float) -> Finding:
     fast = speed(trace)
     if not len(fast) or fast.values.max() < MOVED_SPEED_M_S:
         return undecided(name, "the robot never moved", f"≥ {limit:g}")
-    value = (sparc if name == "sparc" else ldlj)(fast.values[:, 0], trace.tick_rate / float(np.diff(fast.ticks)[0]))
+    try:
+        even, rate = evenly_sampled_speed(trace)
+    except SignalUnavailable as reason:
+        return undecided(name, str(reason), f"≥ {limit:g}")
+    value = (sparc if name == "sparc" else ldlj)(even, rate)
     if value is None:
         return undecided(name, "the speed never changed", f"≥ {limit:g}")
     return at_least(name, value, limit, "")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field, model_validator
 
+from simscen.core.evidence import POSITION, Evidence
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
@@ -83,6 +84,13 @@ class Speed(Spec, Criterion):
         if not percent and self.full_speed is not None:
             raise ValueError("full_speed is for a mask of percents")
         return self
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        place = POSITION if self.in_ is not None or self.mask is not None else set()
+        switched = {Evidence.DISTURBANCES} if self.while_on else set()
+        return frozenset({Evidence.TRUTH, Evidence.VELOCITY, *place, *switched})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each bound."""

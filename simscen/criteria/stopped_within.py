@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.core.evidence import Evidence
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import MissingEvidence, at_most, held, missed, undecided
@@ -52,6 +53,11 @@ class StoppedWithin(Spec, Criterion):
     """It must stand so long to count: changing direction is not stopping."""
     stay: bool = False
     """Must it also stand until the fault or event ends?"""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return frozenset({Evidence.TRUTH, Evidence.VELOCITY, Evidence.DISTURBANCES})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding each time it happened, and one more with `stay`."""

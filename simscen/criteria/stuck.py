@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.core.evidence import Evidence
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
@@ -37,6 +38,11 @@ class Stuck(Spec, Criterion):
     """Seconds."""
     radius: PositiveLength = 0.5
     """Metres that count as getting on."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return frozenset({Evidence.TRUTH, Evidence.NAVIGATION})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The longest stay over all goals."""

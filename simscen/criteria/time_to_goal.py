@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from simscen.core.evidence import Evidence
 from simscen.core.goalnames import named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
@@ -36,6 +37,11 @@ class TimeToGoal(Spec, Criterion):
     """Seconds of simulated time."""
     goal: GoalName | None = None
     """Of this goal alone; default: of the whole tour."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return frozenset({Evidence.NAVIGATION})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding; one for each goal if several share the name."""

@@ -1,4 +1,4 @@
-"""Every criterion answers, whatever happens to the others."""
+"""Evaluates all criteria of a run, each independently of the others."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from simscen.core.case import Case
 from simscen.core.events import EventKind
-from simscen.core.evidence import WHOLE, Coverage
+from simscen.core.evidence import WHOLE, Coverage, Evidence
 from simscen.core.result import Outcome
 from simscen.core.trace import Trace
 from simscen.core.verdict import Finding, Status, Verdict
@@ -14,17 +14,18 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.findings import MissingEvidence, undecided
 from simscen.criteria.registry import AnyCriterion, verdict_names
 from simscen.criteria.timeline import has_ended
-from simscen.judge.required_evidence import missing_evidence_finding, partial_evidence_reason
+
+_STATUSES = (Status.PASS, Status.FAIL, Status.INCONCLUSIVE, Status.ERROR)
 
 
 def judge(
     criteria: Sequence[AnyCriterion], trace: Trace, case: Case, coverage: Coverage = WHOLE
 ) -> tuple[Verdict, ...]:
-    """One verdict for each criterion, in order.
+    """Return one verdict for each criterion, in order.
 
-    An exception inside a criterion is its verdict, an error that names it; what it needs and was not recorded, or what
-    the log lacks (`coverage`), leaves it inconclusive. On a log that was cut off nothing passes, for what came after
-    might have failed, nor on an empty one.
+    A criterion that raises an exception gets the status error; the others are not affected. A criterion whose evidence
+    is missing is inconclusive. Nothing passes on a truncated log, on an empty one, or with evidence that is there only
+    for a part of the time, because what is not recorded might have failed.
     """
     return tuple(
         Verdict(entry.kind, name, entry.severity, _findings(entry, trace, case, coverage))
@@ -33,10 +34,10 @@ def judge(
 
 
 def outcome_of_verdicts(verdicts: Sequence[Verdict]) -> Outcome:
-    """The outcome of a run that came to its end.
+    """Return the outcome of a run that came to its end.
 
-    Only severity `fail` can fail it, and inconclusive counts as failed. A criterion that broke down makes the run an
-    error whatever its severity, and so does a run that nothing judged: neither may look like a pass.
+    Only verdicts of severity `fail` can fail the run, and inconclusive counts as failed. An error of any criterion,
+    whatever its severity, makes the run an error; so does a run without any verdict.
     """
     if not verdicts or any(verdict.status is Status.ERROR for verdict in verdicts):
         return Outcome.ERROR
@@ -44,33 +45,66 @@ def outcome_of_verdicts(verdicts: Sequence[Verdict]) -> Outcome:
     return Outcome.PASSED if all(verdict.status is Status.PASS for verdict in decisive) else Outcome.FAILED
 
 
+def required_evidence(entry: AnyCriterion) -> frozenset[Evidence]:
+    """Return the evidence that decides a criterion as it is written; all evidence if it does not say."""
+    own = getattr(entry.chosen, "evidence", None)
+    return frozenset(Evidence) if own is None else frozenset(own)
+
+
+def missing_evidence_finding(entry: AnyCriterion, coverage: Coverage) -> Finding | None:
+    """Return the finding of a criterion whose evidence is missing; None if it can be judged."""
+    lacking = coverage.lacking(required_evidence(entry))
+    if not lacking:
+        return None
+    because = f"the log does not say {' nor '.join(evidence.value for evidence in lacking)}"
+    reasons = dict.fromkeys(reason for evidence in lacking if (reason := coverage.missing[evidence]))
+    return Finding(Status.INCONCLUSIVE, entry.kind, because, "", detail=tuple(reasons))
+
+
+def partial_evidence_reason(entry: AnyCriterion, coverage: Coverage) -> str:
+    """Return why a pass proves nothing: its evidence is there only for a part of the time; "" if it is complete."""
+    wanted = required_evidence(entry)
+    return "; ".join(dict.fromkeys(reason for evidence, reason in coverage.partial.items() if evidence in wanted))
+
+
+def findings_defect(findings: object) -> str:
+    """Return what is wrong with the findings that a criterion returned; "" if nothing is.
+
+    Plug-ins return findings, too: a margin that is not a number, or that contradicts the status, must not become a
+    verdict.
+    """
+    if not isinstance(findings, Sequence) or not findings:
+        return "it checked nothing"
+    return next((defect for finding in findings if (defect := _defect(finding))), "")
+
+
 def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: Coverage) -> tuple[Finding, ...]:
     criterion = entry.chosen
     assert isinstance(criterion, Criterion)
     try:
-        if (unknown := missing_evidence_finding(entry, coverage)) is not None:
-            return (unknown,)
+        if (missing := missing_evidence_finding(entry, coverage)) is not None:
+            return (missing,)
         findings = criterion.judge(trace, case)
-    except MissingEvidence as missing:
-        return (undecided(entry.kind, str(missing)),)
-    except Exception as error:  # the boundary: one criterion must not silence the others
-        return (_broken(entry, f"{type(error).__name__}: {error}"),)
-    if flaw := findings_defect(findings):
-        return (_broken(entry, flaw),)
+    except MissingEvidence as missing_evidence:
+        return (undecided(entry.kind, str(missing_evidence)),)
+    except Exception as error:  # the boundary: one criterion must not affect the others
+        return (_error(entry, f"{type(error).__name__}: {error}"),)
+    if defect := findings_defect(findings):
+        return (_error(entry, defect),)
     if not has_ended(trace):
-        return _reserved(findings, f"so far, but the log stops at t = {trace.seconds(trace.end):.2f} s")
-    if doubts := partial_evidence_reason(entry, coverage):
-        return _reserved(findings, f"so far, but {doubts}")
-    return _reserved(findings, "in a log with nothing in it") if _empty(trace) else tuple(findings)
+        return _without_pass(findings, f"so far, but the log stops at t = {trace.seconds(trace.end):.2f} s")
+    if reason := partial_evidence_reason(entry, coverage):
+        return _without_pass(findings, f"so far, but {reason}")
+    return _without_pass(findings, "in a log with nothing in it") if _is_empty(trace) else tuple(findings)
 
 
-def _broken(entry: AnyCriterion, what: str) -> Finding:
-    """The finding of a criterion that gave none; one of an installed package is named with it."""
+def _error(entry: AnyCriterion, what: str) -> Finding:
+    """Return the finding of a criterion that failed to judge; a plug-in is named with its package."""
     return Finding(Status.ERROR, entry.kind, f"{what}{entry.added_by}", "a judgement")
 
 
-def _reserved(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:
-    """The same without a pass."""
+def _without_pass(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:
+    """Return the findings with each pass turned into inconclusive."""
     return tuple(
         replace(finding, status=Status.INCONCLUSIVE, measured=f"{finding.measured} {because}")
         if finding.status is Status.PASS
@@ -79,25 +113,14 @@ def _reserved(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:
     )
 
 
-def _empty(trace: Trace) -> bool:
-    """Whether nothing was recorded but the end of the run."""
+def _is_empty(trace: Trace) -> bool:
+    """Return True if nothing was recorded but the end of the run."""
     signals = (trace.truth, trace.belief, trace.odometry, trace.command)
     return not any(map(len, signals)) and all(event.kind == EventKind.RUN_ENDED for event in trace.events)
 
 
-# MERGED: Whether an answer is one: what a criterion or a metric hands over is looked at before anybody believes it.
-_JUDGED = (Status.PASS, Status.FAIL, Status.INCONCLUSIVE, Status.ERROR)
-
-
-def findings_defect(findings: object) -> str:
-    """Why a criterion's findings are no judgement; "" when they are. A number that is none could pass for a verdict."""
-    if not isinstance(findings, Sequence) or not findings:
-        return "it checked nothing"
-    return next((flaw for finding in findings if (flaw := _flaw(finding))), "")
-
-
-def _flaw(finding: object) -> str:
-    if not isinstance(finding, Finding) or finding.status not in _JUDGED:
+def _defect(finding: object) -> str:
+    if not isinstance(finding, Finding) or finding.status not in _STATUSES:
         return f"its finding is {type(finding).__name__}, which is none"
     if not all(isinstance(text, str) for text in (finding.what, finding.measured, finding.limit, finding.unit)):
         return "its finding says something that is no text"
@@ -109,6 +132,10 @@ def _flaw(finding: object) -> str:
     if tick is not None and not isinstance(tick, int):
         return f"the tick of {what} is no int: {tick!r}"
     margin, status = finding.margin, finding.status
-    if margin is not None and status in (Status.PASS, Status.FAIL) and (margin < 0) is not (status is Status.FAIL):
+    if margin is None or status not in (Status.PASS, Status.FAIL):
+        return ""
+    if (margin < 0) is not (status is Status.FAIL):
         return f"{what} is a {status.value} by a margin of {margin:g}"
+    if math.isinf(margin) and (finding.value is None or math.isfinite(finding.value)):
+        return f"the margin of {what} is infinite, so its limit is none"
     return ""

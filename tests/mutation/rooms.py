@@ -42,7 +42,7 @@ CONCERNED = {
     ],
     "judge/run_result": [["tests/unit/judge/test_run_result.py", "tests/unit/judge/test_disturbances.py"]],
     "judge/result_json": [[f"tests/unit/judge/test_{of}.py" for of in ("result_json", "run_result", "disturbances")]],
-    "judge/required_evidence": [
+    "judge/evaluation": [
         [f"tests/unit/judge/test_{of}.py" for of in ("required_evidence", "required_evidence_of_signals", "evaluation")]
     ],
     **{f"judge/{of}": [[f"tests/unit/judge/test_{of}.py"]] for of in ("finding_text", "disturbances")},

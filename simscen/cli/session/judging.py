@@ -131,7 +131,7 @@ class Judging:
         missing = dict(read.coverage.missing)
         if case.footprint:
             del missing[Evidence.FOOTPRINT]
-        coverage = Coverage(missing, read.coverage.partial)
+        coverage = replace(read.coverage, missing=missing)
         return read, self._finished(log, RunKey(log.stem, 0), read.trace, case, coverage, criteria).result
 
     def _masks(self, criteria: LoadedCriteria) -> Mapping[str, MaskCells]:

@@ -87,7 +87,7 @@ def until(hold: Array, release: Array, window: SampleWindow, ahead: Continuation
     count = len(hold)
     follows = np.append(_unbounded_until(hold, release, window, ahead), ahead.beyond)
     before = -_range_maximum(-hold, np.arange(count), np.minimum(window.first, count) - 1)
-    robustness = np.minimum(follows[np.minimum(window.first, count)], before)
+    robustness: Array = np.minimum(follows[np.minimum(window.first, count)], before)
     return robustness if window.unbounded else np.minimum(robustness, eventually(release, window, ahead))
 
 

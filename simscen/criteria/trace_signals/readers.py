@@ -33,6 +33,7 @@ from simscen.criteria.trace_signals.sampling import (
     hold,
     sample_ticks,
 )
+from simscen.criteria.trace_signals.sparc_ldlj import CUTOFF_HZ, MIN_RATE_HZ
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
@@ -80,6 +81,20 @@ def angular_acceleration(query: SignalQuery) -> Array:
 def jerk(query: SignalQuery) -> Array:
     """Return |v[k+1] - 2 v[k] + v[k-1]| / dt^2 of the speed over ground."""
     return np.abs(_differences(query.trace, ground_speed(query), 2))
+
+
+def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
+    """Return the true speed over ground at even samples, and their rate in Hz.
+
+    Raises SignalUnavailable if there is no velocity, or if the samples are too rare for SPARC and LDLJ.
+    """
+    even = evenly_spaced(speed(trace), trace.tick_rate)
+    rate = trace.tick_rate / float(even.ticks[1] - even.ticks[0])
+    if rate < MIN_RATE_HZ:
+        raise SignalUnavailable(
+            f"the truth has {rate:.1f} samples a second, too few to see changes up to {CUTOFF_HZ:g} Hz"
+        )
+    return even.values[:, 0], rate
 
 
 def localization_error(query: SignalQuery) -> Array:

@@ -1,8 +1,8 @@
-"""How smooth a speed profile is, in one number: SPARC and LDLJ.
+"""Smoothness of a speed profile: spectral arc length (SPARC) and log dimensionless jerk (LDLJ).
 
-Balasubramanian, Melendez-Calderon, Roby-Brami, Burdet 2015, "On the analysis of movement smoothness", and the authors'
-own code (siva82kb/SPARC), whose doctests are ours. Neither sees all: SPARC hardly notices a stop on the way, LDLJ
-hardly a slow wobble; and both drift with the duration, so compare only drives of the same way.
+Source: Balasubramanian, Melendez-Calderon, Roby-Brami, Burdet 2015, "On the analysis of movement smoothness", and the
+authors' own code (siva82kb/SPARC), whose doctests are tests here. SPARC hardly reacts to a stop on the way, LDLJ hardly
+to a slow wobble, and both drift with the duration: compare only drives of the same path.
 """
 
 from __future__ import annotations
@@ -14,20 +14,22 @@ import numpy as np
 from simscen.core.geometry import Array
 
 MOVED_SPEED_M_S = 0.01
-"""m/s; a robot that was never faster did not move, and what it did is noise."""
+"""A robot that was never faster did not move; its speed is noise."""
 
 CUTOFF_HZ = 10.0
-"""Hz; faster changes of speed are noise."""
+"""Faster changes of speed are noise."""
+MIN_RATE_HZ = 18.0
+"""Samples a second that show changes up to the cutoff: twice that, with room for jitter."""
 MIN_RELATIVE_AMPLITUDE = 0.05
-"""Of the greatest; where the spectrum is lower at both ends, it is cut off."""
+"""Share of the greatest amplitude; both ends of the spectrum below it are cut off."""
 PADDING_LEVEL = 4
-"""The spectrum is that of a profile with zeros behind, 2^4 times as long, which makes it finer."""
+"""The profile is padded with zeros to 2^4 times its length, for a finer spectrum."""
 
 
 def sparc(speeds: Array, rate: float) -> float | None:
-    """Spectral arc length of speeds (n,) sampled `rate` times a second; 0 = smooth, never above.
+    """Return the spectral arc length of speeds (n,) sampled at `rate` Hz: 0 is smooth, less is less smooth.
 
-    None where it is not defined: for a robot that never moved.
+    It is None for a robot that never moved.
     """
     if len(speeds) < 2 or not np.any(speeds):
         return None
@@ -45,9 +47,9 @@ def sparc(speeds: Array, rate: float) -> float | None:
 
 
 def ldlj(speeds: Array, rate: float) -> float | None:
-    """Log dimensionless jerk, -ln(T^3 / v_max^2 * sum(jerk^2) dt), of speeds (n,) at `rate`; greater = smoother.
+    """Return -ln(T^3 / v_max^2 * sum(jerk^2) dt) of speeds (n,) sampled at `rate` Hz; greater is smoother.
 
-    None where it is not defined: for a robot that never moved, or whose speed never changed its slope.
+    It is None for a robot that never moved, or whose speed never changed its slope.
     """
     if not np.any(speeds):
         return None

@@ -11,7 +11,10 @@ CURVATURE_SPACING_M = 0.3
 """Metres between the points of which curvature is taken; nearer ones are noise (bench-mr)."""
 
 Values = dict[str, float | str]
-"""Numbers by name; a text says why there is none."""
+"""Metrics by name; a text says why there is no number."""
+
+_CURVATURE = ("norm_curvature", "max_curvature")
+PATH_METRICS = ("heading_change", "path_irregularity", "aol", *_CURVATURE)
 
 
 def path_metrics(trace: Trace, way: Drive) -> Values:
@@ -69,7 +72,7 @@ def _curvature(legs: list[Array]) -> Values:
         bends.append(bend)
     if not any(len(bend) for bend in bends):
         short = f"the robot drove too short a way: fewer than three points {CURVATURE_SPACING_M:g} m apart"
-        return {"norm_curvature": short, "max_curvature": short}
+        return dict.fromkeys(_CURVATURE, short)
     return {"norm_curvature": weighted, "max_curvature": float(np.concatenate(bends).max())}
 
 

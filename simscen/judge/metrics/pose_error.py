@@ -19,7 +19,7 @@ def pose_metrics(trace: Trace) -> Values:
     """APE, RPE over DELTA metres, NEES."""
     error = pose_error(trace)
     if not len(error):
-        return dict.fromkeys(_NAMES, SILENT)
+        return dict.fromkeys(POSE_METRICS, SILENT)
     off, turned = error.values.T
     return {
         **_summed("ape_trans", off),
@@ -86,7 +86,7 @@ def _nees(trace: Trace) -> float | str:
 
 
 _KINDS = ("trans", "rot")
-_NAMES = (
+POSE_METRICS = (
     *(f"{error}_{kind}_{one}" for error in ("ape", "rpe") for kind in _KINDS for one in _SUMS),
     "ape_trans_final",
     "nees",

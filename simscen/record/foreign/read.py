@@ -56,7 +56,7 @@ def read_foreign(path: Path, wanted: Wanted, looks: bool = False) -> ForeignLog:
         else:
             reading.notes.append("the log breaks off, so nothing passes on it")
         trace = reading.rows.trace(wanted.tick_rate, end)
-        coverage = Coverage(reading.missing, reading.partial)
+        coverage = Coverage(reading.missing, reading.partial, recorded_by_simscen=False)
         if watched is None:
             return ForeignLog(trace, coverage, reading.notes)
         return ForeignLog(trace, coverage, reading.notes, watched.seen(reading.time, found), watched.map)

@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,8 +9,9 @@ from simscen.core.result import Outcome
 from simscen.core.samples import Samples
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.criteria.clearance import Clearance
+from simscen.criteria.findings import at_least, at_most
 from simscen.criteria.registry import AnyCriterion
-from simscen.judge.evaluation import judge, outcome_of_verdicts
+from simscen.judge.evaluation import findings_defect, judge, outcome_of_verdicts
 from simscen.testing.sketch import sketch, sketch_case
 
 TRACE = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})
@@ -53,6 +55,22 @@ def test_a_criterion_that_checked_nothing_is_an_error(monkeypatch):
     monkeypatch.setattr(Clearance, "judge", lambda *_: [])
     (empty,) = judge([criterion(clearance={"min": 0.1})], TRACE, CASE)
     assert empty.status is Status.ERROR
+
+
+@pytest.mark.parametrize(
+    ("finding", "defect"),
+    [
+        (at_least("value", 0.3, -math.inf, "m"), "the margin of value is infinite, so its limit is none"),
+        (at_most("value", 0.3, math.inf, "m"), "the margin of value is infinite, so its limit is none"),
+        (at_least("value", 0.3, math.inf, "m"), "the margin of value is infinite, so its limit is none"),
+        (Finding(Status.PASS, "value", "", "", math.inf), "the margin of value is infinite, so its limit is none"),
+        (at_least("value", math.inf, 0.3, "m"), ""),
+        (at_most("value", -math.inf, 0.3, "m"), ""),
+        (at_least("value", 0.3, 0.1, "m"), ""),
+    ],
+)
+def test_a_limit_that_nothing_could_break_is_a_defect(finding, defect):
+    assert findings_defect([finding]) == defect
 
 
 @pytest.mark.parametrize(

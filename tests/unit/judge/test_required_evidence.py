@@ -4,9 +4,10 @@ import pytest
 
 from simscen.core.evidence import Coverage, Evidence
 from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import partial_evidence_reason, required_evidence
 from simscen.judge.metrics.catalog import METRICS
-from simscen.judge.metrics.compute import MetricValues
-from simscen.judge.required_evidence import metrics_with_evidence, partial_evidence_reason, required_evidence
+from simscen.judge.metrics.compute import compute_metrics
+from simscen.testing.sketch import sketch, sketch_case
 
 TRUTH, ALIGNMENT, GOALS, BELIEF = Evidence.TRUTH, Evidence.ALIGNMENT, Evidence.NAVIGATION, Evidence.BELIEF
 
@@ -71,8 +72,14 @@ NEAR_PEOPLE = {"min_person_distance", "intrusion_intimate", "intrusion_personal"
     ],
 )
 def test_what_a_log_lacks_leaves_these_metrics_out_and_no_others(lacking, left_out):
-    measures = metrics_with_evidence(MetricValues(dict.fromkeys(METRICS, 1.0), {}), Coverage({lacking: ""}))
-    assert set(measures.undefined) == {name for name, value in measures.values.items() if value is None} == left_out
+    trace = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})
+    whole = compute_metrics(trace, sketch_case({}))
+    for coverage in (Coverage({lacking: ""}), Coverage(partial={lacking: "not after t = 1 s"})):
+        found = compute_metrics(trace, sketch_case({}), coverage)
+        reasons = {f"the log does not say {lacking.value}", "not after t = 1 s"}
+        assert {name for name, reason in found.undefined.items() if reason in reasons} == left_out
+        assert all(found.values[name] is None for name in left_out)
+        assert all(found.values[name] == whole.values[name] for name in METRICS if name not in left_out)
 
 
 def test_only_what_decides_a_criterion_makes_its_pass_doubtful():

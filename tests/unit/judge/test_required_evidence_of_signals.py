@@ -6,10 +6,9 @@ from simscen.core.evidence import Coverage, Evidence
 from simscen.core.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.trace_signals.catalog import SIGNALS, signal_evidence
-from simscen.judge.evaluation import judge
+from simscen.judge.evaluation import judge, required_evidence
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.compute import compute_metrics
-from simscen.judge.required_evidence import metrics_with_evidence, required_evidence
 from simscen.testing.sketch import sketch, sketch_case
 
 DRIVE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]}
@@ -40,9 +39,7 @@ def test_a_criterion_needs_what_its_signals_need(criterion, wanted):
 
 @pytest.mark.parametrize("lacking", Evidence)
 def test_a_metric_that_the_log_cannot_tell_is_none_and_says_so(lacking):
-    measures = metrics_with_evidence(
-        compute_metrics(sketch(DRIVE), sketch_case({})), Coverage({lacking: "no such topic"})
-    )
+    measures = compute_metrics(sketch(DRIVE), sketch_case({}), Coverage({lacking: "no such topic"}))
     assert list(measures.values) == list(METRICS)
     assert {name for name, value in measures.values.items() if value is None} == set(measures.undefined)
     if lacking is Evidence.CONTACTS:

@@ -28,8 +28,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.navigation import Goal
 from simscen.core.verdict import Status
 from simscen.criteria.registry import AnyCriterion
-from simscen.judge.evaluation import judge
-from simscen.judge.required_evidence import required_evidence
+from simscen.judge.evaluation import judge, required_evidence
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.record.foreign.read import read_foreign
 from simscen.record.foreign.wanted import Wanted

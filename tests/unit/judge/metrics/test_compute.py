@@ -9,7 +9,6 @@ from filterpy import stats
 
 from simscen.core.navigation import Path
 from simscen.core.samples import Samples
-from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.trace_signals.sparc_ldlj import ldlj, sparc
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.compute import barn_score, compute_metrics
@@ -175,7 +174,7 @@ def test_who_does_not_arrive_scores_nothing():
 def test_a_reference_of_negative_length_gives_no_score():
     """BARN's run.py takes -31 m in its dynamic branch: every success scores 0.125, after 12 s or after 99 s."""
     for length in (-31.0, 0.0, math.nan):
-        with pytest.raises(ValueError, match="reference way"):
+        with pytest.raises(ValueError, match="reference path"):
             barn_score(True, 12.0, length)
     assert barn_score(True, 15.0, 31.0) > barn_score(True, 99.0, 31.0) > 0.125
 
@@ -369,6 +368,9 @@ def test_a_run_without_belief_has_no_localization():
     assert measures.undefined["nees"] == "the robot never said where it believes to be"
 
 
-def test_a_signal_that_is_not_a_number_is_no_metric():
-    with pytest.raises(InvalidTrace, match="true pose"):
-        measured({"seconds": 2, "truth": [[0, 0, 0], [1, math.nan, 0], [2, 0, 0]]})
+def test_a_signal_that_is_not_a_number_leaves_its_metrics_undefined_and_no_others():
+    words = {"seconds": 2, "truth": [[0, 0, 0], [1, math.nan, 0], [2, 0, 0]], "clearance": 0.5}
+    found = compute_metrics(sketch(words), sketch_case({}))
+    assert found.undefined["path_length"] == found.undefined["heading_change"]
+    assert found.undefined["path_length"].startswith("the true pose is not finite at t = ")
+    assert (found.values["min_clearance"], found.values["collisions"]) == (0.5, 0.0)

@@ -94,7 +94,7 @@ def test_a_centimetre_a_second_is_motion():
 def test_smoothness_takes_two_samples_at_least():
     assert with_speeds(np.array([1.0, 0.5])).values["sparc"] == sparc(np.array([1.0, 0.5]), 40.0)
     one = with_speeds(np.array([1.0]))
-    assert one.undefined["sparc"] == one.undefined["ldlj"] == "the run is too short"
+    assert one.undefined["sparc"] == one.undefined["ldlj"] == "the run is too short: 1 sample of the truth"
 
 
 def test_a_velocity_that_is_recorded_later_is_as_smooth():

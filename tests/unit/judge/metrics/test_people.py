@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.judge.metrics.compute import person_metrics
+from simscen.judge.metrics.compute import compute_metrics, person_metrics
 from simscen.testing.sketch import sketch, sketch_case
 
 ANNA = [0, "object.spawned", "anna", {"person": True, "size": [0.25, 1.7]}]
@@ -29,5 +29,6 @@ def test_of_several_people_the_nearest_counts_and_only_while_they_are_there():
 
 
 def test_without_people_there_is_no_number():
-    found = person_metrics(sketch({"seconds": 1, "truth": [[0, 0, 0]]}), sketch_case({}))
-    assert set(found.values()) == {"there were no people"}
+    found = compute_metrics(sketch({"seconds": 1, "truth": [[0, 0, 0]]}), sketch_case({}))
+    people = ["min_person_distance", "intrusion_intimate", "intrusion_personal", "intrusion_social"]
+    assert {found.undefined[name] for name in people} == {"there were no people"}
