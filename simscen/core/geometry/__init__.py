@@ -1,0 +1,17 @@
+"""Planar and spatial geometry: poses, polygons, shapes, meshes, rays and scripted paths.
+
+Lengths are in meters and angles in radians. Frames follow ROS REP 103.
+"""
+
+from simscen.core.geometry.poses import (
+    Array,
+    Pose2,
+    Pose3,
+    Vector,
+    forward_and_left,
+    rotated,
+    wrap,
+    wrap_array,
+)
+
+__all__ = ["Array", "Pose2", "Pose3", "Vector", "forward_and_left", "rotated", "wrap", "wrap_array"]
