@@ -14,24 +14,23 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from simscen.actions.base import Action
-    from simscen.core.belief import Belief, Estimate
-    from simscen.core.case import Case
-    from simscen.core.chance import Streams
-    from simscen.core.events import Event, EventKind
-    from simscen.core.evidence import Evidence
+    from simscen.core.clock import Clock
+    from simscen.core.environment.costmap_filters import Zones, ZoneSwitch
+    from simscen.core.environment.occupancy_grid import OccupancyGrid
     from simscen.core.geometry import Array, Pose2, Pose3, wrap
-    from simscen.core.grid import OccupancyGrid
-    from simscen.core.motion import STOP, Twist
-    from simscen.core.navigation import ErrorCode, Goal, Path, TaskResult
-    from simscen.core.polygons import distance_to_polygon
-    from simscen.core.samples import Samples
-    from simscen.core.sensing import Bump, Image, Imu, Odometry, Reading, Readings, Scan
-    from simscen.core.shapes import Body, MotionPath
+    from simscen.core.geometry.kinematics import STOP, Twist
+    from simscen.core.geometry.polygons import distance_to_polygon
+    from simscen.core.geometry.shapes import Body, MotionPath
+    from simscen.core.messages.localization import Belief, Estimate
+    from simscen.core.messages.navigation import ErrorCode, Goal, Path, TaskResult
+    from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Readings, Scan
+    from simscen.core.random_streams import Streams
+    from simscen.core.records.case import Case
+    from simscen.core.records.events import Event, EventKind
+    from simscen.core.records.evidence import Evidence
+    from simscen.core.records.trace import CostGrid, Decision, Samples, Trace
+    from simscen.core.records.verdict import Finding, Status
     from simscen.core.stage import Effect, Situation, Stage
-    from simscen.core.time import Clock
-    from simscen.core.trace import CostGrid, Decision, Trace
-    from simscen.core.verdict import Finding, Status
-    from simscen.core.zones import Zones, ZoneSwitch
     from simscen.criteria.base import Criterion
     from simscen.criteria.findings import at_least, at_most, counted, held, missed, undecided
     from simscen.criteria.plugin_metric import Measure
@@ -318,37 +317,36 @@ _WHERE = {
         "turn_rate",
     ),
     # The words that all speak.
-    "simscen.core.belief": (
+    "simscen.core.messages.localization": (
         "Belief",
         "Estimate",
     ),
-    "simscen.core.case": ("Case",),
-    "simscen.core.chance": ("Streams",),
-    "simscen.core.events": (
+    "simscen.core.records.case": ("Case",),
+    "simscen.core.random_streams": ("Streams",),
+    "simscen.core.records.events": (
         "Event",
         "EventKind",
     ),
-    "simscen.core.evidence": ("Evidence",),
+    "simscen.core.records.evidence": ("Evidence",),
     "simscen.core.geometry": (
         "Array",
         "Pose2",
         "Pose3",
         "wrap",
     ),
-    "simscen.core.grid": ("OccupancyGrid",),
-    "simscen.core.motion": (
+    "simscen.core.environment.occupancy_grid": ("OccupancyGrid",),
+    "simscen.core.geometry.kinematics": (
         "STOP",
         "Twist",
     ),
-    "simscen.core.navigation": (
+    "simscen.core.messages.navigation": (
         "ErrorCode",
         "Goal",
         "Path",
         "TaskResult",
     ),
-    "simscen.core.polygons": ("distance_to_polygon",),
-    "simscen.core.samples": ("Samples",),
-    "simscen.core.sensing": (
+    "simscen.core.geometry.polygons": ("distance_to_polygon",),
+    "simscen.core.messages.sensor_data": (
         "Bump",
         "Image",
         "Imu",
@@ -357,7 +355,7 @@ _WHERE = {
         "Readings",
         "Scan",
     ),
-    "simscen.core.shapes": (
+    "simscen.core.geometry.shapes": (
         "Body",
         "MotionPath",
     ),
@@ -366,17 +364,18 @@ _WHERE = {
         "Situation",
         "Stage",
     ),
-    "simscen.core.time": ("Clock",),
-    "simscen.core.trace": (
+    "simscen.core.clock": ("Clock",),
+    "simscen.core.records.trace": (
         "CostGrid",
         "Decision",
+        "Samples",
         "Trace",
     ),
-    "simscen.core.verdict": (
+    "simscen.core.records.verdict": (
         "Finding",
         "Status",
     ),
-    "simscen.core.zones": (
+    "simscen.core.environment.costmap_filters": (
         "ZoneSwitch",
         "Zones",
     ),

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from simscen.actions.base import Action
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.shapes import MotionPath
+from simscen.core.geometry.shapes import MotionPath
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveDuration, Ratio

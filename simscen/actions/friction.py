@@ -7,8 +7,8 @@ import math
 from pydantic import Field, model_validator
 
 from simscen.actions.base import Action
+from simscen.core.environment.world_model import Patch, disc_outline
 from simscen.core.stage import Effect, Stage
-from simscen.core.surface import Patch, disc
 from simscen.spec.base import Spec
 from simscen.spec.named_places import PlaceOrPoint
 from simscen.spec.places import PlaceName
@@ -59,7 +59,7 @@ class FrictionPatch(Spec, Action):
         else:
             assert self.at is not None and self.radius is not None  # the validator promises it
             x, y = self.at
-            name, outline, where = self.name, disc((x, y), self.radius), f"around ({x:g}, {y:g})"
+            name, outline, where = self.name, disc_outline((x, y), self.radius), f"around ({x:g}, {y:g})"
         until = math.inf if self.for_ is None else stage.tick + stage.clock.ticks(self.for_)
         stage.lay(name, Patch(outline, self.value, until))
         return Effect(True, f"made the friction of the floor {where} {self.value:g}")

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from simscen.actions.base import Action
-from simscen.core.events import Event, EventKind
+from simscen.core.records.events import Event, EventKind
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
 from simscen.spec.places import Name

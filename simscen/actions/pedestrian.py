@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from simscen.actions.base import Action
+from simscen.core.environment.pedestrians import Behavior, Unseen, WalkingPedestrian
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2
-from simscen.core.polygons import holds
+from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.stage import Effect, Stage
-from simscen.core.walker import Behavior, Unseen, Walker
-from simscen.core.world import Polygon
 from simscen.spec.base import Spec
 from simscen.spec.named_places import PlaceOrPoint, PlaceOrPose
 from simscen.spec.places import Name
@@ -76,12 +76,14 @@ class _Walks(Spec):
             raise ValueError(f"who is blind to robots cannot be {self.behavior}")
         return self
 
-    def somebody(self, stage: Stage, name: str, pose: Pose2, goals: tuple[Place, ...], group: str | None) -> Walker:
+    def somebody(
+        self, stage: Stage, name: str, pose: Pose2, goals: tuple[Place, ...], group: str | None
+    ) -> WalkingPedestrian:
         """One of them; those of a group like the same speed."""
         within, lasts = REACTIONS.get(self.behavior, (0.0, 0.0))
         whose = f"person {name}" if group is None else f"group {group}"
         speed = self.speed if self.speed is not None else _liked(stage.chance(f"{whose}, speed"))
-        return Walker(
+        return WalkingPedestrian(
             name=name,
             pose=pose,
             goals=goals,
@@ -180,7 +182,7 @@ class Crowd(_Walks, Action):
         chance, corners = stage.chance(f"person {self.names[number]}, start"), stage.region(self.start)
         near = Box(*friend, TOGETHER, TOGETHER) if friend is not None else _around(corners)
         for place in near.places(chance):
-            if holds(corners, place) and stage.room(place, self.radius + ELBOW_ROOM):
+            if polygon_contains(corners, place) and stage.room(place, self.radius + ELBOW_ROOM):
                 return place
         return None
 
@@ -223,7 +225,7 @@ def _around(corners: Polygon) -> Box:
 
 def _goal(stage: Stage, chance: np.random.Generator, corners: Polygon, radius: float) -> Place | None:
     """A place in a region where no wall is in the way; None where none was found."""
-    inside = (place for place in _around(corners).places(chance) if holds(corners, place))
+    inside = (place for place in _around(corners).places(chance) if polygon_contains(corners, place))
     return next((place for place in inside if stage.room(place, radius + ELBOW_ROOM, walls_only=True)), None)
 
 

@@ -9,8 +9,8 @@ from pydantic import Field, model_validator
 
 from simscen.actions.base import Action
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.navigation import Path
-from simscen.core.shapes import Body
+from simscen.core.geometry.shapes import Body
+from simscen.core.messages.navigation import Path
 from simscen.core.stage import Effect, Stage
 from simscen.spec.named_places import PlaceOrPose
 from simscen.spec.objects import Shaped

@@ -3,7 +3,7 @@
 from typing import Any, cast
 
 from simscen.actions.base import Action
-from simscen.core.errors import BROKEN, RunError
+from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.core.stage import Effect, Situation, Stage
 
 _TELLING = frozenset({*dir(Situation), "room", "chance", "door", "motion", "mass"})
@@ -15,9 +15,9 @@ def perform_watched(action: Action, stage: Stage, whose: str) -> Effect:
     watched = _Watched(stage)
     effect: object = action.perform(cast(Stage, watched))
     if not isinstance(effect, Effect) or not isinstance(effect.happened, bool) or not isinstance(effect.what, str):
-        raise RunError(BROKEN, f"an action says {effect!r}, which is no Effect{whose}")
+        raise RunError(BROKEN_COMPONENT, f"an action says {effect!r}, which is no Effect{whose}")
     if effect.happened and not watched.done:
-        raise RunError(BROKEN, f"an action says `{effect.what}`, but did nothing{whose}")
+        raise RunError(BROKEN_COMPONENT, f"an action says `{effect.what}`, but did nothing{whose}")
     return effect
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pydantic import model_validator
 
 from simscen.actions.base import Action
+from simscen.core.environment.costmap_filters import ZoneSwitch
 from simscen.core.stage import Effect, Stage
-from simscen.core.zones import ZoneSwitch
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveSpeed
 from simscen.spec.references import RegionName

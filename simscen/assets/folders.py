@@ -12,7 +12,7 @@ from typing_extensions import Self
 from simscen.assets.addresses import PACKAGES, SCHEMES, fuel, places
 from simscen.assets.neighbours import neighbour
 from simscen.assets.packages import is_package_name, places_of
-from simscen.core.filesread import note_read
+from simscen.core.files import record_read_file
 
 LONGEST_PATH = 1000
 
@@ -130,7 +130,7 @@ class Folders:
     def open(self, path: Path, limit: int) -> tuple[Path, bytes]:
         """The real path and the bytes of a regular file of at most `limit` bytes; raises Trouble."""
         real = self.check(path, limit)
-        note_read(real)
+        record_read_file(real)
         try:
             return real, real.read_bytes()
         except OSError as error:

@@ -11,7 +11,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, TextIO
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.report.checkout import in_checkout
 from simscen.report.text import ascii_only, no_marker, no_marker_in_json, one_line, width
 

@@ -1,1 +1,1 @@
-"""The words every other part of simscen speaks: plain data, no pydantic, no files, no engine."""
+"""Shared data types and pure functions. Imports neither pydantic nor an engine."""

@@ -1,8 +1,7 @@
 """Every way to fail, its exit code, and who can mend it. A verdict is not an error."""
 
+from dataclasses import dataclass
 from enum import IntEnum
-
-from simscen.core.problems import Problem
 
 
 class Exit(IntEnum):
@@ -51,7 +50,7 @@ class NothingSelected(SimscenError):
     exit = Exit.NOTHING_SELECTED
 
 
-BROKEN = "broken-component"
+BROKEN_COMPONENT = "broken-component"
 """The kind of error of a run in which something that was installed answered with what is no answer."""
 
 
@@ -70,3 +69,26 @@ class RunError(SimscenError):
     def __reduce__(self) -> "tuple[type[RunError], tuple[str, str, str]]":
         """As InvalidInput."""
         return type(self), (self.kind, str(self), self.tail)
+
+
+# MERGED: A mistake in a file, told so that it can be mended.
+@dataclass(frozen=True, order=True)
+class Problem:
+    """What is wrong, where (`line` and `col` count from 1; 0 = the file as a whole), and how to mend it.
+
+    `code` is stable (SC…); `severity` is "error" or "warning"; `source` is the text of the line for the caret.
+    """
+
+    path: str
+    line: int
+    col: int
+    code: str
+    message: str
+    hint: str = ""
+    severity: str = "error"
+    source: str = ""
+
+    @property
+    def place(self) -> str:
+        """path:line:col, or the path alone."""
+        return f"{self.path}:{self.line}:{self.col}" if self.line else self.path

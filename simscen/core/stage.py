@@ -5,17 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from simscen.core.belief import Belief
-from simscen.core.events import Event
+from simscen.core.clock import Clock
+from simscen.core.environment.costmap_filters import ZoneSwitch
+from simscen.core.environment.pedestrians import WalkingPedestrian
+from simscen.core.environment.world_model import Patch, Polygon
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal, Path
-from simscen.core.shapes import Body, MotionPath
-from simscen.core.surface import Patch
-from simscen.core.time import Clock
-from simscen.core.walker import Walker
-from simscen.core.world import Polygon
-from simscen.core.zones import ZoneSwitch
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Body, MotionPath
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Goal, Path
+from simscen.core.records.events import Event
 
 if TYPE_CHECKING:
     import numpy as np
@@ -118,7 +117,7 @@ class Stage(Situation, Protocol):
         """Put a new body into the world: physics, rays and picture see it from the next tick on."""
         ...
 
-    def walk(self, walker: Walker) -> None:
+    def walk(self, walker: WalkingPedestrian) -> None:
         """Let somebody come who walks by themselves from the next tick on."""
         ...
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
-from simscen.core.verdict import Finding
+from simscen.core.records.verdict import Finding
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.evidence import Evidence
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.evidence import Evidence
+    from simscen.core.records.trace import Trace
 
 
 class Criterion(ABC):

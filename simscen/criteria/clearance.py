@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.evidence import Evidence
-from simscen.core.verdict import Finding
+from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, undecided
 from simscen.criteria.trace_signals.ground_truth import clearance
@@ -15,8 +15,8 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import NonNegativeLength
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 SEARCH_MARGIN_M = 0.5
 """Metres beyond its bound."""

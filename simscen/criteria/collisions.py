@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
-from simscen.core.events import Event, EventKind
-from simscen.core.evidence import Evidence
-from simscen.core.verdict import Finding
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import InvalidTrace, MissingEvidence, at_most, counted, undecided
 from simscen.criteria.trace_signals.distances import pedestrian_radii
@@ -20,8 +20,8 @@ from simscen.spec.quantities import Impulse
 from simscen.spec.references import ObjectName
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 MOVING_SPEED_M_S = 0.1
 """m/s; a slower robot was run into (CARLA's CollisionTest draws the line here)."""

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 from pydantic import GetJsonSchemaHandler, PlainValidator
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from simscen.core.events import Event
-from simscen.core.navigation import ErrorCode, error_code
+from simscen.core.messages.navigation import ErrorCode, error_code
+from simscen.core.records.events import Event
 
 
 def parse(value: Any) -> ErrorCode:

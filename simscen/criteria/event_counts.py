@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
-from simscen.core.events import Event, EventKind
-from simscen.core.evidence import Evidence
-from simscen.core.navigation import ReplanReason
-from simscen.core.verdict import Finding, Status
+from simscen.core.messages.navigation import ReplanReason
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import counted, undecided
 from simscen.criteria.timeline import has_ended
@@ -18,14 +18,14 @@ from simscen.spec.base import Spec
 from simscen.spec.bytype import BehaviorName
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 if TYPE_CHECKING:
-    from simscen.core.trace import Trace
+    from simscen.core.records.trace import Trace
 
 Count = Annotated[int, Field(ge=0, le=100_000)]
 

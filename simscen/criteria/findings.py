@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from simscen.core.verdict import Finding, Status
+from simscen.core.records.verdict import Finding, Status
 
 if TYPE_CHECKING:
-    from simscen.core.trace import Trace
+    from simscen.core.records.trace import Trace
 
 
 class InvalidTrace(ValueError):

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.events import Event, EventKind
-from simscen.core.goalnames import FAILED
-from simscen.core.navigation import Goal
+from simscen.core.messages.goal_names import FAILED
+from simscen.core.messages.navigation import Goal
+from simscen.core.records.events import Event, EventKind
 from simscen.criteria.error_codes import code_of
 from simscen.criteria.trace_signals.ground_truth import truth
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 _ARRIVED = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
 _GOAL_ENDS = (*_ARRIVED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
-from simscen.core.evidence import POSITION, Evidence
 from simscen.core.geometry import wrap
-from simscen.core.goalnames import FAILED, named
-from simscen.core.verdict import Finding
+from simscen.core.messages.goal_names import FAILED, matches_goal_name
+from simscen.core.records.evidence import POSITION, Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, held, missed, undecided
 from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_outcomes, outcome_start
@@ -22,8 +22,8 @@ from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLen
 from simscen.spec.references import GoalName
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 
 class GoalsReached(Spec, Criterion):
@@ -65,7 +65,11 @@ class GoalsReached(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Distance, heading and, if asked for, time of each goal; one finding for a goal that was not reached."""
         told = goal_outcomes(trace, case)
-        chosen = [outcome for outcome in told if any(named(outcome.goal.name, name) for name in self.goals or (None,))]
+        chosen = [
+            outcome
+            for outcome in told
+            if any(matches_goal_name(outcome.goal.name, name) for name in self.goals or (None,))
+        ]
         findings = self._untold(trace, case, {outcome.goal.name for outcome in chosen})
         if not chosen and not findings:
             return [undecided("goals_reached", "the scenario has no goals", "reached")]
@@ -86,10 +90,10 @@ class GoalsReached(Spec, Criterion):
         names = [goal.name for goal in case.every_goal]
         findings = []
         for name in dict.fromkeys(self.goals or ()):
-            if not any(named(each, name) for each in names):
+            if not any(matches_goal_name(each, name) for each in names):
                 because, detail = f"the scenario has no goal `{name}`", [f"goals: {', '.join(names)}"]
                 findings.append(undecided(f"goal {name}", because, "reached", detail))
-            elif not any(named(each, name) for each in told):
+            elif not any(matches_goal_name(each, name) for each in told):
                 tell = missed if has_ended(trace) else undecided
                 findings.append(tell(f"goal {name}", "never sent", "reached"))
         return findings

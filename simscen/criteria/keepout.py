@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import model_validator
 
-from simscen.core.events import EventKind
-from simscen.core.evidence import POSITION, Evidence
-from simscen.core.polygons import flaw
-from simscen.core.separation import separation, separation_of_boxes
-from simscen.core.verdict import Finding
+from simscen.core.geometry.polygons import polygon_defect
+from simscen.core.geometry.separation import separation, separation_from_boxes
+from simscen.core.records.events import EventKind
+from simscen.core.records.evidence import POSITION, Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import InvalidTrace, at_least, undecided
 from simscen.criteria.timeline import NEVER_SWITCHED, clip_samples, enabled_spans
@@ -24,10 +24,9 @@ from simscen.spec.references import MaskFile, RegionName
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simscen.core.case import Case
     from simscen.core.geometry import Array
-    from simscen.core.samples import Samples
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Samples, Trace
 
     Away = Callable[[Array], Array]
 
@@ -109,11 +108,11 @@ class Keepout(Spec, Criterion):
             boxes = mask.forbidden
             if not len(boxes):
                 return f"no cell of `{self.mask}` is occupied"
-            return lambda poses: separation_of_boxes(mask.seen_from(poses), hull, boxes)
+            return lambda poses: separation_from_boxes(mask.seen_from(poses), hull, boxes)
         if self.region not in case.regions:
             return f"the world has no region `{self.region}`"
         region = case.regions[self.region]
-        wrong = flaw(region)
+        wrong = polygon_defect(region)
         if wrong:
             raise InvalidTrace(f"region `{self.region}` {wrong}, so nothing is inside or outside of it")
         return lambda poses: separation(poses, hull, region)

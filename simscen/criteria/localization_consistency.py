@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
-from simscen.core.chisquare import mean_bounds, quantile
-from simscen.core.evidence import POSITION, Evidence
-from simscen.core.samples import Samples
-from simscen.core.verdict import Finding
+from simscen.core.records.evidence import POSITION, Evidence
+from simscen.core.records.trace import Samples
+from simscen.core.records.verdict import Finding
+from simscen.core.statistics import chi2_quantile, nees_mean_bounds
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, missed, undecided
 from simscen.criteria.trace_signals.nees import DIMENSIONS, nees_samples
@@ -19,8 +19,8 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, PositiveDuration, Quantity
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 
 class LocalizationConsistency(Spec, Criterion):
@@ -80,8 +80,8 @@ class LocalizationConsistency(Spec, Criterion):
 
     def _bounds(self, count: int) -> tuple[float | None, float]:
         if self.both_sides:
-            return mean_bounds(count, DIMENSIONS, self.probability)
-        return None, quantile(self.probability, DIMENSIONS * count) / count
+            return nees_mean_bounds(count, DIMENSIONS, self.probability)
+        return None, chi2_quantile(self.probability, DIMENSIONS * count) / count
 
     def _sampled(self, trace: Trace) -> Samples | None:
         """The newest NEES at `after` and every so often from there to the last belief."""

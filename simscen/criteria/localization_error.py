@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import model_validator
 
-from simscen.core.evidence import POSITION, Evidence
 from simscen.core.geometry import Array
-from simscen.core.samples import Samples
-from simscen.core.verdict import Finding
+from simscen.core.records.evidence import POSITION, Evidence
+from simscen.core.records.trace import Samples
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
 from simscen.criteria.timeline import has_ended
@@ -19,8 +19,8 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, PositiveAngle, PositiveLength
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 
 class LocalizationError(Spec, Criterion):

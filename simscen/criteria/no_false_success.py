@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from simscen.core.events import Event, EventKind
-from simscen.core.evidence import POSITION, Evidence
-from simscen.core.verdict import Finding
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.evidence import POSITION, Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, held, missed, undecided
 from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_outcomes, outcome_start
@@ -16,8 +16,8 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 
 class NoFalseSuccess(Spec, Criterion):

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import model_validator
 
-from simscen.core.events import EventKind
-from simscen.core.evidence import Evidence
-from simscen.core.verdict import Finding
+from simscen.core.records.events import EventKind
+from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
 from simscen.criteria.goal_outcomes import goal_outcomes
@@ -19,8 +19,8 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength, Ratio
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 
 class PathLength(Spec, Criterion):

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.evidence import POSITION, Evidence
-from simscen.core.verdict import Finding
+from simscen.core.records.evidence import POSITION, Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, undecided
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, pedestrian_gap
@@ -17,8 +17,8 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import NonNegativeLength
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 DRIVING_SPEED_M_S = 0.1
 """m/s; a slower robot stands, and people come up to it as they like."""

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, ClassVar
 from simscen.spec.choice import Choice
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.evidence import Evidence
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.evidence import Evidence
+    from simscen.core.records.trace import Trace
 
 
 class Measure(ABC):

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.evidence import POSITION, Evidence
-from simscen.core.verdict import Finding
+from simscen.core.records.evidence import POSITION, Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
 from simscen.criteria.timeline import Span, end_reason, never_started, spans
@@ -17,9 +17,8 @@ from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLen
 from simscen.spec.references import HappeningName
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.samples import Samples
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Samples, Trace
 
 
 class RelocalizedWithin(Spec, Criterion):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from simscen.core.events import Event, EventKind
-from simscen.core.evidence import Evidence
-from simscen.core.goalnames import named
-from simscen.core.verdict import Finding
+from simscen.core.messages.goal_names import matches_goal_name
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.error_codes import Code, code_of
 from simscen.criteria.findings import held, missed, undecided
@@ -16,8 +16,8 @@ from simscen.spec.base import Spec
 from simscen.spec.references import GoalName
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 
 class Result(Spec, Criterion):
@@ -89,7 +89,7 @@ class ErrorCodeIs(Spec, Criterion):
 
 
 def _last(trace: Trace, *kinds: EventKind, name: str | None = None) -> Event | None:
-    events = [event for event in trace.of_kind(*kinds) if named(event.name, name)]
+    events = [event for event in trace.of_kind(*kinds) if matches_goal_name(event.name, name)]
     return events[-1] if events else None
 
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from simscen.core.evidence import Evidence
 from simscen.core.geometry import Array
-from simscen.core.verdict import Finding
+from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, undecided
 from simscen.criteria.trace_signals.catalog import SignalName, read_signal
@@ -21,8 +21,8 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAcceleration, PositiveJerk
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 
 class Smoothness(Spec, Criterion):

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field, model_validator
 
-from simscen.core.evidence import POSITION, Evidence
-from simscen.core.verdict import Finding
+from simscen.core.records.evidence import POSITION, Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
 from simscen.criteria.timeline import NEVER_SWITCHED, enabled_spans
@@ -20,10 +20,9 @@ from simscen.spec.references import RegionName
 from simscen.spec.speedmask import SpeedMask
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
     from simscen.core.geometry import Array
-    from simscen.core.samples import Samples, Ticks
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Samples, Ticks, Trace
 
 
 class Speed(Spec, Criterion):

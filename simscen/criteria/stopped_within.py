@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.evidence import Evidence
-from simscen.core.verdict import Finding
+from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import MissingEvidence, at_most, held, missed, undecided
 from simscen.criteria.timeline import Span, end_reason, never_started, spans
@@ -18,8 +18,8 @@ from simscen.spec.quantities import PositiveAngularSpeed, PositiveDuration, Posi
 from simscen.spec.references import HappeningName
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 STALE_SCAN_S = 0.2
 """Seconds; a scan older than two periods of a 10 Hz lidar is worth a line."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.evidence import Evidence
-from simscen.core.verdict import Finding
+from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
 from simscen.criteria.goal_outcomes import goal_outcomes
@@ -17,9 +17,8 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveDuration, PositiveLength
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.samples import Samples
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Samples, Trace
 
 
 class Stuck(Spec, Criterion):

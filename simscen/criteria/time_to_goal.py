@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from simscen.core.evidence import Evidence
-from simscen.core.goalnames import named
-from simscen.core.verdict import Finding
+from simscen.core.messages.goal_names import matches_goal_name
+from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, missed, undecided
 from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes
@@ -16,8 +16,8 @@ from simscen.spec.quantities import PositiveDuration
 from simscen.spec.references import GoalName
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 
 class TimeToGoal(Spec, Criterion):
@@ -47,9 +47,9 @@ class TimeToGoal(Spec, Criterion):
         """One finding; one for each goal if several share the name."""
         told = goal_outcomes(trace, case)
         if self.goal is not None:
-            own = [outcome for outcome in told if named(outcome.goal.name, self.goal)]
+            own = [outcome for outcome in told if matches_goal_name(outcome.goal.name, self.goal)]
             if not own:
-                known = any(named(goal.name, self.goal) for goal in case.every_goal)
+                known = any(matches_goal_name(goal.name, self.goal) for goal in case.every_goal)
                 because = "never sent" if known else f"the scenario has no goal `{self.goal}`"
                 return [undecided(f"goal {self.goal}", because)]
             return [self._timed(trace, f"goal {outcome.goal.name}", outcome.accepted, outcome) for outcome in own]

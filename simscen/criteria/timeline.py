@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.events import EventKind
-from simscen.core.samples import Samples
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Samples
 
 if TYPE_CHECKING:
-    from simscen.core.trace import Trace
-    from simscen.core.zones import Filter
+    from simscen.core.environment.costmap_filters import Filter
+    from simscen.core.records.trace import Trace
 
 _STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
 _ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from simscen.core.belief import Belief
 from simscen.core.geometry import Pose2
+from simscen.core.messages.localization import Belief
 
 
 def with_correction(belief: Belief, correction: Pose2) -> Belief:

@@ -4,8 +4,8 @@ from abc import abstractmethod
 from dataclasses import replace
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry, Reading
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Odometry, Reading
 from simscen.faults.base import Disturbance
 
 

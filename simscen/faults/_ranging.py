@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.sensing import Image, Reading, Scan
+from simscen.core.messages.sensor_data import Image, Reading, Scan
 
 
 def with_distances(reading: Reading, change: Callable[[Array], Array]) -> Reading:

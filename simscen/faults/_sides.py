@@ -1,6 +1,6 @@
 """Faults that befall the wheels of one side."""
 
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.faults.base import Instance
 
 

@@ -6,19 +6,19 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from simscen.core.readings import KINDS
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
+from simscen.core.records.disturbances import FAULT_TARGET_KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
     import numpy as np
 
-    from simscen.core.belief import Belief
+    from simscen.core.environment.occupancy_grid import OccupancyGrid
     from simscen.core.geometry import Array, Pose3
-    from simscen.core.grid import OccupancyGrid
-    from simscen.core.motion import Twist
-    from simscen.core.sensing import Image, Reading, Scan
+    from simscen.core.geometry.kinematics import Twist
+    from simscen.core.messages.localization import Belief
+    from simscen.core.messages.sensor_data import Image, Reading, Scan
 
 
 @dataclass(frozen=True)
@@ -135,8 +135,8 @@ class Fault(ABC):
     def broken_promise(cls) -> str:
         """Why it is no specification of a fault; "" for one that is."""
         affects: object = getattr(cls, "affects", None)
-        fine = isinstance(affects, frozenset) and affects and affects <= set(KINDS)
-        return "" if fine else f"its `affects` is no set of {', '.join(KINDS)}"
+        fine = isinstance(affects, frozenset) and affects and affects <= set(FAULT_TARGET_KINDS)
+        return "" if fine else f"its `affects` is no set of {', '.join(FAULT_TARGET_KINDS)}"
 
     def senseless(self, instance: Instance) -> tuple[str, str] | None:
         """A key ("" = the whole) that makes no sense on an instance of a kind that it affects, and why."""

@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from simscen.core.belief import Belief
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Imu, Reading
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.sensor_data import Imu, Reading
 from simscen.faults._keys import misplaced_key
 from simscen.faults._odometry import OdometryDistortion
 from simscen.faults._ranging import with_distances

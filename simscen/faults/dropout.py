@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from simscen.core.motion import Twist
-from simscen.core.sensing import Reading
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Reading
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Probability

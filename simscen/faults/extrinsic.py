@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from simscen.core.geometry import Pose3
-from simscen.core.sensing import Image, Imu, Reading, Scan
+from simscen.core.messages.sensor_data import Image, Imu, Reading, Scan
 from simscen.faults._keys import misplaced_key
 from simscen.faults._ranging import seen_as
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance

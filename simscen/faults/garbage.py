@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal, TypeVar
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Image, Imu, Odometry, Reading, Scan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Image, Imu, Odometry, Reading, Scan
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Probability

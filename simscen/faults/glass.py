@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from simscen.core.sensing import Reading, Scan
+from simscen.core.messages.sensor_data import Reading, Scan
 from simscen.faults._ranging import seen_as
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec

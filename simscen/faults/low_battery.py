@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, PositiveSpeed

@@ -9,10 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from simscen.core.belief import Belief
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Image, Imu, Reading, Scan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.sensor_data import Image, Imu, Reading, Scan
 from simscen.faults._keys import misplaced_key
 from simscen.faults._odometry import OdometryDistortion
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance

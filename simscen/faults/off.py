@@ -6,10 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from simscen.core.belief import Belief
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Reading
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.sensor_data import Reading
 from simscen.faults._belief import with_correction
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec

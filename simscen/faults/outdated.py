@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Array
-from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.places import Ring

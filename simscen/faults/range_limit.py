@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from simscen.core.sensing import Image, Reading, Scan
+from simscen.core.messages.sensor_data import Image, Reading, Scan
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength

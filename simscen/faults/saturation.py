@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.faults._sides import motion_of, sideless, sides
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
 from simscen.spec.base import Spec

@@ -9,8 +9,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from simscen.core.motion import Twist
-from simscen.core.sensing import Imu, Reading
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Imu, Reading
 from simscen.faults._odometry import OdometryDistortion
 from simscen.faults._ranging import with_distances
 from simscen.faults.base import Disturbance, Fault, FaultSetting

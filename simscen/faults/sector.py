@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from simscen.core.sensing import Reading, Scan
+from simscen.core.messages.sensor_data import Reading, Scan
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Length

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.faults._odometry import OdometryDistortion
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec

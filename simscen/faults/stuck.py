@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from simscen.core.belief import Belief
-from simscen.core.motion import STOP, Twist
-from simscen.core.sensing import Reading
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.sensor_data import Reading
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 

@@ -7,11 +7,11 @@ sensor comes, and what comes with the last beat of a run has nobody left to dist
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from simscen.core.case import Case
-from simscen.core.disturbance import Disturbance, Happening
-from simscen.core.events import Event, EventKind
-from simscen.core.trace import Trace
-from simscen.core.verdict import Finding, Verdict
+from simscen.core.records.case import Case
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import Finding, Verdict
 from simscen.criteria.findings import missed, undecided
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.judge.finding_text import DISTURBANCE
@@ -19,7 +19,7 @@ from simscen.judge.finding_text import DISTURBANCE
 WHAT = "disturbance did not happen"
 
 
-def disturbance_outcomes(trace: Trace, case: Case) -> tuple[Happening, ...]:
+def disturbance_outcomes(trace: Trace, case: Case) -> tuple[DisturbanceOutcome, ...]:
     """What became of each disturbance of the scenario, in its order: events, then faults."""
     return tuple(
         _event(trace, case, ordered, entry) if ordered.kind == "event" else _fault(trace, ordered, entry)
@@ -28,7 +28,7 @@ def disturbance_outcomes(trace: Trace, case: Case) -> tuple[Happening, ...]:
 
 
 def missing_disturbances(
-    trace: Trace, happened: Sequence[Happening], others: Sequence[Verdict] = ()
+    trace: Trace, happened: Sequence[DisturbanceOutcome], others: Sequence[Verdict] = ()
 ) -> tuple[tuple[Verdict, int], ...]:
     """A verdict for each required disturbance that did not happen, and the line it is written in.
 
@@ -47,7 +47,7 @@ def missing_disturbances(
     return tuple(found)
 
 
-def _excused(one: Happening, happened: Sequence[Happening]) -> bool:
+def _excused(one: DisturbanceOutcome, happened: Sequence[DisturbanceOutcome]) -> bool:
     """Whether it never had its turn in its story, and the step that it waited for has a verdict of its own."""
     after = one.ordered.after
     if after is None or one.fired:
@@ -64,7 +64,7 @@ def _numbered(ordered: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance
         counts[one.kind] += 1
 
 
-def _finding(trace: Trace, one: Happening) -> Finding:
+def _finding(trace: Trace, one: DisturbanceOutcome) -> Finding:
     told = f"{one.ordered.name} ({one.ordered.trigger})"
     if not has_ended(trace):
         because = f"{told}, until the log stops at t = {trace.seconds(trace.end):.2f} s"
@@ -76,25 +76,25 @@ def _of_entry(trace: Trace, kind: EventKind, entry: int) -> list[Event]:
     return [event for event in trace.of_kind(kind) if event.data.get("entry") == entry]
 
 
-def _event(trace: Trace, case: Case, ordered: Disturbance, entry: int) -> Happening:
+def _event(trace: Trace, case: Case, ordered: Disturbance, entry: int) -> DisturbanceOutcome:
     """Each of its actions has to have changed something at least once, and the run to have gone on after that."""
     started = _of_entry(trace, EventKind.EVENT_STARTED, entry)
     fired = tuple(event.tick for event in started)
     ended = _of_entry(trace, EventKind.EVENT_ENDED, entry)
     if not started:
-        return Happening(ordered, (), False, _waited(trace, case, ordered) + _never(trace))
+        return DisturbanceOutcome(ordered, (), False, _waited(trace, case, ordered) + _never(trace))
     in_time = [event for event in ended if event.tick < trace.end]
     if not in_time:
-        return Happening(ordered, fired, False, _too_late(trace), fired[0])
+        return DisturbanceOutcome(ordered, fired, False, _too_late(trace), fired[0])
     told = [_effects(event) for event in in_time]
     for number in range(len(told[0])):
         if not any(effects[number][0] for effects in told):
-            return Happening(ordered, fired, False, told[0][number][1], in_time[0].tick)
+            return DisturbanceOutcome(ordered, fired, False, told[0][number][1], in_time[0].tick)
     if not told[0]:
-        return Happening(ordered, fired, True, "as was waited for", in_time[0].tick)
+        return DisturbanceOutcome(ordered, fired, True, "as was waited for", in_time[0].tick)
     first = next(k for k, effects in enumerate(told) if any(did for did, _ in effects))
     what = "; ".join(what for did, what in told[first] if did)
-    return Happening(ordered, fired, True, what, in_time[first].tick)
+    return DisturbanceOutcome(ordered, fired, True, what, in_time[first].tick)
 
 
 def _waited(trace: Trace, case: Case, ordered: Disturbance) -> str:
@@ -118,11 +118,11 @@ def _effects(ended: Event) -> list[tuple[bool, str]]:
     return [(bool(one["happened"]), str(one["what"])) for one in effects if isinstance(one, dict)]
 
 
-def _fault(trace: Trace, ordered: Disturbance, entry: int) -> Happening:
+def _fault(trace: Trace, ordered: Disturbance, entry: int) -> DisturbanceOutcome:
     started = _of_entry(trace, EventKind.FAULT_STARTED, entry)
     fired = tuple(event.tick for event in started)
     if not started:
-        return Happening(ordered, (), False, _never(trace))
+        return DisturbanceOutcome(ordered, (), False, _never(trace))
     sensor, ended = started[0].data.get("sensor"), _of_entry(trace, EventKind.FAULT_ENDED, entry)
     touched = [event.tick for event in _of_entry(trace, EventKind.FAULT_TOOK_EFFECT, entry) if event.tick < trace.end]
     if touched:
@@ -130,12 +130,12 @@ def _fault(trace: Trace, ordered: Disturbance, entry: int) -> Happening:
         number = sum(count for count in counts if isinstance(count, int))
         times = (" once" if number == 1 else f" {number} times") if len(ended) == len(started) else ""
         later = f", first at t = {trace.seconds(touched[0]):.2f} s" if touched[0] > fired[0] else ""
-        return Happening(ordered, fired, True, f"disturbed {sensor}{times}{later}", touched[0])
+        return DisturbanceOutcome(ordered, fired, True, f"disturbed {sensor}{times}{later}", touched[0])
     if fired[0] >= trace.end:
-        return Happening(ordered, fired, False, _too_late(trace), fired[0])
+        return DisturbanceOutcome(ordered, fired, False, _too_late(trace), fired[0])
     until = f"to t = {trace.seconds(ended[0].tick):.2f} s" if ended else "on"
     why = f"it changed no message of {sensor} from t = {trace.seconds(fired[0]):.2f} s {until}"
-    return Happening(ordered, fired, False, why, fired[0])
+    return DisturbanceOutcome(ordered, fired, False, why, fired[0])
 
 
 def _never(trace: Trace) -> str:

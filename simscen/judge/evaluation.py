@@ -4,12 +4,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from simscen.core.case import Case
-from simscen.core.events import EventKind
-from simscen.core.evidence import WHOLE, Coverage, Evidence
-from simscen.core.result import Outcome
-from simscen.core.trace import Trace
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.case import Case
+from simscen.core.records.events import EventKind
+from simscen.core.records.evidence import COMPLETE_COVERAGE, Evidence, LogCoverage
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import MissingEvidence, undecided
 from simscen.criteria.registry import AnyCriterion, verdict_names
@@ -19,7 +19,7 @@ _STATUSES = (Status.PASS, Status.FAIL, Status.INCONCLUSIVE, Status.ERROR)
 
 
 def judge(
-    criteria: Sequence[AnyCriterion], trace: Trace, case: Case, coverage: Coverage = WHOLE
+    criteria: Sequence[AnyCriterion], trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_COVERAGE
 ) -> tuple[Verdict, ...]:
     """Return one verdict for each criterion, in order.
 
@@ -51,7 +51,7 @@ def required_evidence(entry: AnyCriterion) -> frozenset[Evidence]:
     return frozenset(Evidence) if own is None else frozenset(own)
 
 
-def missing_evidence_finding(entry: AnyCriterion, coverage: Coverage) -> Finding | None:
+def missing_evidence_finding(entry: AnyCriterion, coverage: LogCoverage) -> Finding | None:
     """Return the finding of a criterion whose evidence is missing; None if it can be judged."""
     lacking = coverage.lacking(required_evidence(entry))
     if not lacking:
@@ -61,7 +61,7 @@ def missing_evidence_finding(entry: AnyCriterion, coverage: Coverage) -> Finding
     return Finding(Status.INCONCLUSIVE, entry.kind, because, "", detail=tuple(reasons))
 
 
-def partial_evidence_reason(entry: AnyCriterion, coverage: Coverage) -> str:
+def partial_evidence_reason(entry: AnyCriterion, coverage: LogCoverage) -> str:
     """Return why a pass proves nothing: its evidence is there only for a part of the time; "" if it is complete."""
     wanted = required_evidence(entry)
     return "; ".join(dict.fromkeys(reason for evidence, reason in coverage.partial.items() if evidence in wanted))
@@ -78,7 +78,7 @@ def findings_defect(findings: object) -> str:
     return next((defect for finding in findings if (defect := _defect(finding))), "")
 
 
-def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: Coverage) -> tuple[Finding, ...]:
+def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCoverage) -> tuple[Finding, ...]:
     criterion = entry.chosen
     assert isinstance(criterion, Criterion)
     try:

@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 
-from simscen.core.expectation import Expectation
-from simscen.core.result import Outcome
-from simscen.core.verdict import Status, Verdict
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.verdict import ExpectedFailure, Status, Verdict
 from simscen.criteria.findings import held, missed
 from simscen.judge.finding_text import DISTURBANCE
 
@@ -13,7 +12,7 @@ EXPECTED = "expected"
 
 
 def apply_expectation(
-    expected: Expectation | None, verdicts: Sequence[Verdict], came_out: Outcome, whole: bool
+    expected: ExpectedFailure | None, verdicts: Sequence[Verdict], came_out: Outcome, whole: bool
 ) -> tuple[Outcome, Verdict | None]:
     """The outcome of a run that is `expected` to fail, and the verdict on that; the run's own where nothing is.
 
@@ -38,7 +37,7 @@ def apply_expectation(
     return (Outcome.FAILED if others else Outcome.FAILED_AS_EXPECTED), verdict
 
 
-def _is_meant(verdict: Verdict, expected: Expectation) -> bool:
+def _is_meant(verdict: Verdict, expected: ExpectedFailure) -> bool:
     return verdict.id in expected.criteria if expected.criteria else verdict.criterion != DISTURBANCE
 
 

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from math import isfinite
 
-from simscen.core.disturbance import Happening
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.disturbances import DisturbanceOutcome
+from simscen.core.records.verdict import Finding, Status, Verdict
 
 DISTURBANCE = "disturbance"
 """What the verdicts on events and faults are called that did not happen; the id is the name of the event or fault."""
@@ -53,14 +53,14 @@ def sentence(verdict: Verdict, finding: Finding, tick_rate: int) -> str:
     return ", ".join(part for part in parts if part)
 
 
-def disturbance_times(one: Happening, tick_rate: int) -> str:
+def disturbance_times(one: DisturbanceOutcome, tick_rate: int) -> str:
     """When an event or fault began, e.g. "t = 10.00 s, 12.50 s and 3 more"; "never"."""
     times = [f"{tick / tick_rate:.2f} s" for tick in one.fired[:MAX_TIMES_SHOWN]]
     more = f" and {len(one.fired) - MAX_TIMES_SHOWN} more" if len(one.fired) > MAX_TIMES_SHOWN else ""
     return f"t = {', '.join(times)}{more}" if times else "never"
 
 
-def disturbance_line(one: Happening, tick_rate: int) -> str:
+def disturbance_line(one: DisturbanceOutcome, tick_rate: int) -> str:
     """The whole line: "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
     came = (
         disturbance_times(one, tick_rate) if one.fired else "",

@@ -5,12 +5,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TypeVar
 
-from simscen.core.disturbance import Happening
-from simscen.core.events import Event
-from simscen.core.expectation import Expectation
-from simscen.core.result import Outcome, RunFailure, RunResult
-from simscen.core.trace import Trace
-from simscen.core.verdict import Verdict
+from simscen.core.records.disturbances import DisturbanceOutcome
+from simscen.core.records.events import Event
+from simscen.core.records.run_result import Outcome, RunFailure, RunResult
+from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import ExpectedFailure, Verdict
 from simscen.criteria.timeline import has_ended
 from simscen.judge.expected_failure import apply_expectation
 from simscen.judge.finding_text import DISTURBANCE
@@ -22,7 +21,7 @@ OF_ALL = ("object.", "pedestrian.", "event.", "mark", "run.")
 
 
 def combine_robots(
-    results: Mapping[str, RunResult], traces: Mapping[str, Trace], expected: Expectation | None = None
+    results: Mapping[str, RunResult], traces: Mapping[str, Trace], expected: ExpectedFailure | None = None
 ) -> RunResult:
     """One result: all passes where each does; verdicts, metrics and faults are called `robot/name`.
 
@@ -95,11 +94,11 @@ def _shared(event: Event) -> bool:
     return str(event.kind).startswith(OF_ALL)
 
 
-def _happenings(result: RunResult, kind: str) -> list[Happening]:
+def _happenings(result: RunResult, kind: str) -> list[DisturbanceOutcome]:
     return [one for one in result.disturbances if one.ordered.kind == kind]
 
 
-def _faults(results: Mapping[str, RunResult]) -> list[Happening]:
+def _faults(results: Mapping[str, RunResult]) -> list[DisturbanceOutcome]:
     return [
         replace(one, ordered=replace(one.ordered, name=f"{name}/{one.ordered.name}"))
         for name, result in results.items()

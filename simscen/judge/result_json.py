@@ -6,9 +6,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from simscen.core.disturbance import Disturbance, Happening
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.finding_text import sentence
 
 FORMAT = 2
@@ -88,7 +88,7 @@ def read_key(data: dict[str, Any]) -> RunKey:
     return RunKey(data["scenario"], data["seed"], variation, stack_name)
 
 
-def _happening_data(one: Happening, tick_rate: int) -> dict[str, Any]:
+def _happening_data(one: DisturbanceOutcome, tick_rate: int) -> dict[str, Any]:
     return {
         **asdict(one.ordered),
         "fired": list(one.fired),
@@ -99,9 +99,9 @@ def _happening_data(one: Happening, tick_rate: int) -> dict[str, Any]:
     }
 
 
-def _read_happening(data: dict[str, Any]) -> Happening:
+def _read_happening(data: dict[str, Any]) -> DisturbanceOutcome:
     ordered = Disturbance(data["name"], data["kind"], data["when"], data["required"], data["line"])
-    return Happening(ordered, tuple(data["fired"]), data["happened"], data["effect"], data["tick"])
+    return DisturbanceOutcome(ordered, tuple(data["fired"]), data["happened"], data["effect"], data["tick"])
 
 
 # MERGED: Verdicts as plain data that JSON can hold, and back.

@@ -3,12 +3,11 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from simscen.core.case import Case
-from simscen.core.evidence import WHOLE, Coverage
-from simscen.core.expectation import Expectation
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
-from simscen.core.trace import Trace
-from simscen.core.verdict import Status, Verdict
+from simscen.core.records.case import Case
+from simscen.core.records.evidence import COMPLETE_COVERAGE, LogCoverage
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import ExpectedFailure, Status, Verdict
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.plugin_metric import AnyMeasure
 from simscen.criteria.registry import AnyCriterion
@@ -29,9 +28,9 @@ def judge_run(
     trace: Trace,
     case: Case,
     lines: tuple[int, ...] = (),
-    coverage: Coverage = WHOLE,
+    coverage: LogCoverage = COMPLETE_COVERAGE,
     metrics: Sequence[AnyMeasure] = (),
-    expected: Expectation | None = None,
+    expected: ExpectedFailure | None = None,
 ) -> RunResult:
     """Return the result of a run.
 

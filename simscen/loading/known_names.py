@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from simscen.core.goalnames import in_loop
-from simscen.core.world import World
+from simscen.core.environment.world_model import World
+from simscen.core.messages.goal_names import loop_goal_name
 from simscen.criteria.registry import verdict_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.world import WorldSpec
@@ -48,7 +48,7 @@ def goal_names(loaded: LoadedScenario) -> list[str]:
 def own_goal_names(loaded: LoadedScenario) -> list[str]:
     """The goals of the scenario, in every loop: as written, or after their place, or goal-1, goal-2, …"""
     loops = range(1, loaded.spec.navigation.loops + 1)
-    return [in_loop(name, loop) for loop in loops for name in loaded.spec.goal_names]
+    return [loop_goal_name(name, loop) for loop in loops for name in loaded.spec.goal_names]
 
 
 def event_names(loaded: LoadedScenario) -> list[str]:

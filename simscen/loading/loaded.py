@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from simscen.core.expectation import Expectation
-from simscen.core.externalcommand import ExternalCommand
-from simscen.core.problems import Problem
-from simscen.core.result import RunKey, title
+from simscen.core.errors import Problem
+from simscen.core.external_command import ExternalCommand
+from simscen.core.records.run_result import RunKey, scenario_title
+from simscen.core.records.verdict import ExpectedFailure
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.yaml.tree import Key, MappingNode, Position, key_position, value_position
 from simscen.model.robot import RobotSpec
@@ -128,9 +128,9 @@ class LoadedScenario:
         return robot is None or not self.robot_name or robot == self.robot_name
 
     @property
-    def title(self) -> str:
+    def scenario_title(self) -> str:
         """What it is called: its id, with its variation."""
-        return title(self.id, self.variation)
+        return scenario_title(self.id, self.variation)
 
     @property
     def stack_name(self) -> str:
@@ -143,13 +143,13 @@ class LoadedScenario:
         return "" if self.choice is None else self.choice.seen_from(self.root)
 
     @property
-    def expectation(self) -> Expectation | None:
+    def expectation(self) -> ExpectedFailure | None:
         """That it is known to fail, with the line that says so, where that is in its own file."""
         said = self.spec.expected
         if said is None:
             return None
         place = self.key_place_of("expected")
-        return Expectation(said.fail, tuple(said.criteria), place.line if place.path == self.path else 0)
+        return ExpectedFailure(said.fail, tuple(said.criteria), place.line if place.path == self.path else 0)
 
     def key(self, seed: int) -> RunKey:
         """The key of its run with this seed."""

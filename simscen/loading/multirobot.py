@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.stacks.choice import EXTERNAL, StackChoice, replace_stack
 from simscen.loading.yaml.library import merge_mappings
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child

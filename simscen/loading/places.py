@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, RootModel
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import Reference, references

@@ -3,7 +3,7 @@
 from collections.abc import Container, Iterable, Iterator, Mapping
 from typing import Any
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.spec_walk import Keys, walk
 from simscen.spec.choice import Choice

@@ -5,8 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from simscen.core.errors import InvalidInput, UsageError
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.loading import multirobot
 from simscen.loading.checks.runner import check_robot_names, check_scenario
 from simscen.loading.files.assets import Assets, load_judged_masks

@@ -2,13 +2,13 @@
 
 from typing import Literal
 
-from simscen.core.expectation import Expectation
+from simscen.core.records.verdict import ExpectedFailure
 from simscen.model.scenario import RobotEntry, ScenarioSpec, WorldOrFile
 
 
-def expectation_of(spec: ScenarioSpec) -> Expectation | None:
+def expectation_of(spec: ScenarioSpec) -> ExpectedFailure | None:
     """That a run is known to fail, wherever that is written."""
-    return None if spec.expected is None else Expectation(spec.expected.fail, tuple(spec.expected.criteria))
+    return None if spec.expected is None else ExpectedFailure(spec.expected.fail, tuple(spec.expected.criteria))
 
 
 class CriteriaSpec(ScenarioSpec):

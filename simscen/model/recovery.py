@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from simscen.core.navigation import RecoveryBehavior
+from simscen.core.messages.navigation import RecoveryBehavior
 from simscen.spec.base import Spec
 from simscen.spec.bytype import ByType
 from simscen.spec.component import Typed

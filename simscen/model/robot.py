@@ -6,8 +6,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from simscen.core.geometry import Pose3
-from simscen.core.mecanum import MecanumWheels
-from simscen.core.readings import READINGS
+from simscen.core.geometry.kinematics import MecanumWheels
+from simscen.core.records.disturbances import READING_KINDS
 from simscen.model.latency import RobotLatency
 from simscen.spec.base import Ranged, Spec, by_default
 from simscen.spec.choice import Choice
@@ -195,7 +195,7 @@ class SensorSpec(Component):
     """A sensor: what it says, and how often. Its component is called with a simscen.sensors.sensor.SensorSetting."""
 
     says: ClassVar[str]
-    """The kind of its readings: Scan, Odometry, Imu, Bump or Image of simscen.core.sensing."""
+    """The kind of its readings: Scan, Odometry, Imu, Bump or Image of simscen.core.messages.sensor_data."""
     localizes: ClassVar[bool] = False
     """Whether a localizer matches its scans with the map; all scans show a costmap what is around."""
 
@@ -207,10 +207,10 @@ class SensorSpec(Component):
     @classmethod
     def broken_promise(cls) -> str:
         """Why it is no specification of a sensor; "" for one that is."""
-        return super().broken_promise() or ("" if getattr(cls, "says", None) in READINGS else _UNSAID)
+        return super().broken_promise() or ("" if getattr(cls, "says", None) in READING_KINDS else _UNSAID)
 
 
-_UNSAID = f"its `says` is none of {', '.join(READINGS)}"
+_UNSAID = f"its `says` is none of {', '.join(READING_KINDS)}"
 
 
 class Lidar(Ranged, SensorSpec):

@@ -4,14 +4,14 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, StringConstraints
 
-from simscen.core.externalcommand import ANSWER_LIMIT, START_LIMIT, words_of
+from simscen.core.external_command import ANSWER_TIMEOUT_S, START_TIMEOUT_S, split_command
 from simscen.model.anystack import StackName
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveDuration
 
 
 def _words(text: str) -> str:
-    words_of(text)
+    split_command(text)
     return text
 
 
@@ -39,9 +39,9 @@ class StackCommandSpec(Spec):
     """Variables that it gets besides those, or in place of those, that simscen was called with."""
     cwd: Folder | None = None
     """The folder it starts in, absolute or below `~`; default: where simscen is called."""
-    start_limit: Annotated[PositiveDuration, Field(le=3600)] = START_LIMIT
+    start_limit: Annotated[PositiveDuration, Field(le=3600)] = START_TIMEOUT_S
     """Wall time until it has said what it wants to hear."""
-    answer_limit: Annotated[PositiveDuration, Field(le=3600)] = ANSWER_LIMIT
+    answer_limit: Annotated[PositiveDuration, Field(le=3600)] = ANSWER_TIMEOUT_S
     """Wall time for each answer after that."""
 
 

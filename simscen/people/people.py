@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.environment.pedestrians import PedestrianAction, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2
-from simscen.core.walker import Deed, Walker
 from simscen.people import forces
 from simscen.people.forces import RELAXATION_TIME, Numbers
 from simscen.people.limits import Limits, limits, within
@@ -57,7 +57,7 @@ class People:
     def __len__(self) -> int:
         return len(self._people)
 
-    def add(self, walker: Walker) -> None:
+    def add(self, walker: WalkingPedestrian) -> None:
         """Let somebody come; one of the same name goes."""
         self._people[walker.name] = Person.of(walker)
         self._people = dict(sorted(self._people.items()))
@@ -79,7 +79,7 @@ class People:
         who = self._people[name].who
         return max(forces.MOST_OF_SPEED * who.speed, THREATENING_SPEED)
 
-    def step(self, around: Surroundings, seconds: float) -> list[Deed]:
+    def step(self, around: Surroundings, seconds: float) -> list[PedestrianAction]:
         """Let time pass, during which everybody walks in a straight line; says what they did."""
         people = list(self._people.values())
         if not people:
@@ -104,10 +104,10 @@ class People:
 
     def _reactions(
         self, people: list[Person], around: Surroundings, seconds: float
-    ) -> tuple[list[SeenRobot | None], list[Deed]]:
+    ) -> tuple[list[SeenRobot | None], list[PedestrianAction]]:
         """The robot that each person reacts to now."""
         reacting: list[SeenRobot | None] = []
-        deeds: list[Deed] = []
+        deeds: list[PedestrianAction] = []
         for person in people:
             visible: dict[str, SeenRobot] = {}
             if person.who.reacts_within and "robots" not in person.who.blind_to:

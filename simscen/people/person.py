@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
+from simscen.core.environment.pedestrians import PedestrianAction, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2, wrap
-from simscen.core.walker import Deed, Walker
 from simscen.people.forces import MOST_OF_SPEED, RELAXATION_TIME
 from simscen.people.seen import SeenRobot
 
@@ -48,7 +48,7 @@ class Wish:
 class Person:
     """Somebody and their state; `velocity` in m/s in the world."""
 
-    who: Walker
+    who: WalkingPedestrian
     x: float
     y: float
     yaw: float
@@ -64,7 +64,7 @@ class Person:
     spent: bool = False
 
     @classmethod
-    def of(cls, who: Walker) -> "Person":
+    def of(cls, who: WalkingPedestrian) -> "Person":
         """At rest where they start."""
         return cls(who, who.pose.x, who.pose.y, who.pose.yaw, there=not who.goals)
 
@@ -85,13 +85,13 @@ class Person:
 
     # goals
 
-    def arrive(self) -> list[Deed]:
+    def arrive(self) -> list[PedestrianAction]:
         """Notice a corner of the way or a goal that is reached, and turn to the next."""
         while len(self.way) > 1 and math.dist(self.place, self.way[0]) <= CORNER_RADIUS:
             self.way.pop(0)
         if self.there or math.dist(self.place, self.destination) > GOAL_RADIUS:
             return []
-        deed = Deed(self.who.name, "reached", str(self.goal + 1))
+        deed = PedestrianAction(self.who.name, "reached", str(self.goal + 1))
         self._next_goal()
         return [deed]
 
@@ -118,7 +118,7 @@ class Person:
         bearing = math.atan2(robot.pose.y - self.y, robot.pose.x - self.x)
         return abs(wrap(bearing - self.yaw)) <= FIELD_OF_VIEW
 
-    def take(self, visible: dict[str, SeenRobot], seconds: float) -> list[Deed]:
+    def take(self, visible: dict[str, SeenRobot], seconds: float) -> list[PedestrianAction]:
         """React to one of the robots that no wall hides, go on doing so, or lose interest."""
         if self.reacts_to is not None:
             self.reacted += seconds
@@ -129,7 +129,7 @@ class Person:
                 return []
             self.spent = tired
             about, self.reacts_to = self.reacts_to, None
-            return [Deed(self.who.name, "calmed", about)]
+            return [PedestrianAction(self.who.name, "calmed", about)]
         if self.spent and self.who.behavior != "scared":
             return []
         near = sorted((math.dist(self.place, robot.pose[:2]), name) for name, robot in visible.items()
@@ -137,7 +137,7 @@ class Person:
         if not near:
             return []
         self.reacts_to = near[0][1]
-        return [Deed(self.who.name, "reacted", self.reacts_to)]
+        return [PedestrianAction(self.who.name, "reacted", self.reacts_to)]
 
     def wish(self, robot: SeenRobot | None) -> Wish:
         """What they want, reacting to `robot` or not."""

@@ -11,7 +11,7 @@ from simscen.cli.diagnostics import as_text
 from simscen.cli.session.selection import Checks, checked
 from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import InvalidInput, SimscenError, UsageError
-from simscen.core.result import Outcome
+from simscen.core.records.run_result import Outcome
 from simscen.loading.files.discovery import default_root
 from simscen.pytesting.failure import ScenarioFailed, as_seen
 from simscen.pytesting.runner import runner_of
@@ -21,8 +21,8 @@ from simscen.run.session import Options, seeds_of
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from simscen.core.problems import Problem
-    from simscen.core.sessionevents import RunFinished
+    from simscen.core.errors import Problem
+    from simscen.core.records.session_events import RunFinished
     from simscen.loading.loaded import LoadedScenario
 
 OF_PYTEST = frozenset(

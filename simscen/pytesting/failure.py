@@ -4,8 +4,8 @@ from typing import Any
 
 from _pytest._code.code import ReprEntryNative, ReprExceptionInfo, ReprFileLocation, ReprTraceback
 
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished
 from simscen.report.complaints import broken, complaints, scenario_file
 from simscen.report.line import text_of
 from simscen.report.lines import complained

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.session_events import RunFinished
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
 from simscen.pytesting.names import OUT

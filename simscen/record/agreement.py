@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simscen.core.trace import Trace
+from simscen.core.records.trace import Trace
 
 TOLERANCE = 1e-5
 """m and rad by which true poses may differ. Without fused multiply-add they differ by less than 1e-12 after 90 s."""

@@ -5,7 +5,7 @@ from types import TracebackType
 from typing import Protocol
 
 from simscen.core.errors import RunError
-from simscen.core.trace import Moment
+from simscen.core.records.trace import Moment
 
 WAITS = 0.9
 """Seconds for which the moments of a run wait: less than a log of twenty may lose when it is killed."""

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from mcap import records
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.grid import OccupancyGrid
-from simscen.core.trace import Trace
+from simscen.core.records.trace import Trace
 from simscen.record import event_text, frames, header, topics, unpack
 from simscen.record.header import LogHeader
 from simscen.record.rows import Rows

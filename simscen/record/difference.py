@@ -4,8 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.core.samples import Samples
-from simscen.core.trace import Trace
+from simscen.core.records.trace import Samples, Trace
 
 _POSE = ("x", "y", "yaw")
 _COLUMNS = {

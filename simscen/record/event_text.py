@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from simscen.core.events import Event, EventKind
+from simscen.core.records.events import Event, EventKind
 
 INFO, WARN, ERROR = 20, 30, 40
 _LEVELS = {

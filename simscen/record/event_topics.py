@@ -1,8 +1,8 @@
 """What happened once: /simscen/events, /rosout and /goal_pose."""
 
-from simscen.core.case import Case
-from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2, Pose3
+from simscen.core.records.case import Case
+from simscen.core.records.events import Event, EventKind
 from simscen.record import event_text, frames, pack, pack_rare, topics
 from simscen.record.out import Out
 from simscen.record.simtime import SimTime

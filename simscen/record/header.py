@@ -8,11 +8,11 @@ from pathlib import PurePosixPath
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import to_json
 
-from simscen.core.case import Case
+from simscen.core.clock import Clock
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose3
-from simscen.core.grid import OccupancyGrid
-from simscen.core.result import RunKey
-from simscen.core.time import Clock
+from simscen.core.records.case import Case
+from simscen.core.records.run_result import RunKey
 
 FORMAT = "1"
 STACK = "simscen.stack"

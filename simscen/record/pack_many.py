@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
-from simscen.core.grid import OccupancyGrid
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.record.cdr import HEADER, Template
 from simscen.record.simtime import Stamp
 

@@ -5,9 +5,9 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
+from simscen.core.clock import Clock
 from simscen.core.errors import RunError
-from simscen.core.time import Clock
-from simscen.core.trace import Moment
+from simscen.core.records.trace import Moment
 from simscen.record import header
 from simscen.record.header import LogHeader
 from simscen.record.logfile import LogFile

@@ -9,9 +9,8 @@ from typing import IO
 from mcap.exceptions import McapError
 from zstandard import ZstdError
 
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
-from simscen.core.trace import Trace
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.records.trace import Trace
 from simscen.record.contents import Contents, Foreign
 from simscen.record.header import LogHeader
 from simscen.record.logfile import PARTIAL_SUFFIX

@@ -1,8 +1,8 @@
 """All that a log says of one robot."""
 
+from simscen.core.environment.scenery import Scenery
 from simscen.core.geometry import Pose3
-from simscen.core.scenery import Scenery
-from simscen.core.trace import Moment
+from simscen.core.records.trace import Moment
 from simscen.record import frames, pack_many, pack_rare, topics
 from simscen.record.event_topics import EventTopics
 from simscen.record.header import LogHeader

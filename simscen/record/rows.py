@@ -9,11 +9,10 @@ import struct
 
 import numpy as np
 
-from simscen.core.events import Event
 from simscen.core.geometry import Array
-from simscen.core.navigation import Path
-from simscen.core.samples import Samples, Ticks
-from simscen.core.trace import Trace
+from simscen.core.messages.navigation import Path
+from simscen.core.records.events import Event
+from simscen.core.records.trace import Samples, Ticks, Trace
 
 _tick = struct.Struct("d").pack
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from simscen.core.case import Case
-from simscen.core.events import Event, EventKind, Value
+from simscen.core.environment.costmap_filters import Filter
+from simscen.core.environment.scenery import FilterZone, Scenery
 from simscen.core.geometry import Pose3
-from simscen.core.scenery import Scenery, Zone
-from simscen.core.zones import Filter
+from simscen.core.records.case import Case
+from simscen.core.records.events import Event, EventKind, Value
 from simscen.record import frames, topics
 from simscen.record.frames import RobotFrames
 from simscen.record.markers import ARROW, LINE_LIST, TEXT, TRIANGLE_LIST, Colour, Marker, boxes, marker_array, rims
@@ -41,7 +41,7 @@ class SceneTopics:
         self._doors = {thing.name for thing in scenery.things if thing.closed is not None}
         self._things: dict[str, Event] = {}
         own = (zone for zone in scenery.zones if zone.robot == robot)
-        self._zones: dict[tuple[str, str], Zone] = {(zone.filter, zone.region): zone for zone in own}
+        self._zones: dict[tuple[str, str], FilterZone] = {(zone.filter, zone.region): zone for zone in own}
         self.begun = False
         """Whether anything was written; from then on it need be told only of beats in which something happened."""
 
@@ -73,13 +73,13 @@ class SceneTopics:
             self._zones[what, event.name] = replace(known, speed_limit=limit if isinstance(limit, float) else 0.0)
         return True
 
-    def _known(self, what: Filter, region: str) -> Zone | None:
+    def _known(self, what: Filter, region: str) -> FilterZone | None:
         """A zone as it was at the start, or one of a region that was none."""
         for zone in self._scenery.zones:
             if (zone.filter, zone.region, zone.robot) == (what, region, self._robot):
                 return zone
         outline = self._case.regions.get(region)
-        return Zone(what, region, outline) if outline else None
+        return FilterZone(what, region, outline) if outline else None
 
     def _shown_things(self) -> Iterator[Marker]:
         for name, event in self._things.items():
@@ -126,7 +126,7 @@ def _corners(part: Value) -> list[tuple[float, float]]:
     return found
 
 
-def _zone(zone: Zone) -> Iterator[Marker]:
+def _zone(zone: FilterZone) -> Iterator[Marker]:
     keepout = zone.filter == "keepout"
     group, colour = f"{zone.filter} zones", KEEPOUT if keepout else SPEED
     told = zone.region if keepout or not zone.speed_limit else f"{zone.region}: {zone.speed_limit:g} m/s"

@@ -3,7 +3,7 @@
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import to_json
 
-from simscen.core.scenery import Scenery
+from simscen.core.environment.scenery import Scenery
 from simscen.record.header import LogHeader
 
 NAME = "scenery.json"

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.grid import OccupancyGrid
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.record import topics
 from simscen.record.cdr import Cursor
 from simscen.record.frames import RobotFrames

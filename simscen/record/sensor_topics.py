@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from simscen.core.geometry import Pose3
-from simscen.core.sensing import Bump, Image, Imu, Odometry, Readings, Scan
+from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readings, Scan
 from simscen.record import frames, pack, pack_rare, topics
 from simscen.record.out import Line, Out, Together
 from simscen.record.pack_many import LaserScanPacker, TransformsPacker
@@ -21,7 +21,7 @@ _PLAIN = {
     "Imu": ("imu", topics.IMU_TYPE),
     "Bump": ("bumper", topics.BUMPER_TYPE),
 }
-"""Kind of reading, a class of simscen.core.sensing → its plain topic, and the type of it."""
+"""Kind of reading, a class of simscen.core.messages.sensor_data → its plain topic, and the type of it."""
 
 
 class SensorTopics:

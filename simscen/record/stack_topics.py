@@ -1,8 +1,8 @@
 """What the stack made of it: /amcl_pose, its particles, /plan, /local_plan, both costmaps and /cmd_vel."""
 
-from simscen.core.belief import Belief
 from simscen.core.geometry import Pose3
-from simscen.core.trace import Decision
+from simscen.core.messages.localization import Belief
+from simscen.core.records.trace import Decision
 from simscen.record import frames, pack, pack_many, pack_rare, topics
 from simscen.record.frames import RobotFrames
 from simscen.record.out import Out

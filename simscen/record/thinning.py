@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 
-from simscen.core.foreseen import Places
 from simscen.core.geometry import Pose3
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry
-from simscen.core.trace import Truth
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.scripted_poses import PosesAtTick
+from simscen.core.messages.sensor_data import Odometry
+from simscen.core.records.trace import Truth
 
 COMMAND_RATE = 20
 STANDSTILL_RATE = 1
@@ -32,7 +32,7 @@ class Thinning:
         self._due = 0
         self._moved_at = -1
         self._moved: Mapping[str, Pose3] = {}
-        self._whole: tuple[int, Places] | None = None
+        self._whole: tuple[int, PosesAtTick] | None = None
         """The sample before, if all things of it are kept: `_objects` does not know of it yet."""
 
     def keeps_command(self, tick: int, command: Twist) -> bool:
@@ -57,17 +57,17 @@ class Thinning:
 
     def _kept(self, tick: int, truth: Truth) -> Mapping[str, Pose3]:
         objects = truth.objects
-        if type(objects) is Places and self._all_moved(objects):
+        if type(objects) is PosesAtTick and self._all_moved(objects):
             self._whole, self._at_rest = (tick, objects), objects
             return objects
         if self._whole is not None:
             before, places = self._whole
             self._objects.update({name: (before, pose) for name, pose in places.items()})
         kept = self._each(tick, objects)
-        self._whole = (tick, objects) if type(objects) is Places and len(kept) == len(objects) else None
+        self._whole = (tick, objects) if type(objects) is PosesAtTick and len(kept) == len(objects) else None
         return kept
 
-    def _all_moved(self, objects: Places) -> bool:
+    def _all_moved(self, objects: PosesAtTick) -> bool:
         """Whether everything is elsewhere than in the sample before, of which everything is kept."""
         if self._whole is None:
             return False

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from simscen.core.foreseen import Places
+from simscen.core.clock import Clock
 from simscen.core.geometry import Pose3
-from simscen.core.sensing import Odometry, Scan
-from simscen.core.time import Clock
-from simscen.core.trace import Moment, Trace
+from simscen.core.geometry.scripted_poses import PosesAtTick
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.records.trace import Moment, Trace
 from simscen.record import event_text
 from simscen.record.pack_many import ground_poses
 from simscen.record.rows import Rows, Series, lifted
@@ -59,7 +59,7 @@ class TraceBuilder:
                 rows.events.append(event_text.from_json(event_text.to_json(event)))
 
     def _add_objects(self, tick: int, moved: Mapping[str, Pose3]) -> None:
-        if type(moved) is Places:
+        if type(moved) is PosesAtTick:
             self._rows.together(moved.foreseen.names).append(tick, moved.table)
             return
         for name, pose in moved.items():

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from simscen.core.foreseen import Foreseen, Places
-from simscen.core.trace import Truth
+from simscen.core.geometry.scripted_poses import PosesAtTick, PredictedPoses
+from simscen.core.records.trace import Truth
 from simscen.record import frames, pack, topics
 from simscen.record.out import Out, Together
 from simscen.record.pack_ahead import Bytes, TransformsAhead
@@ -34,7 +34,7 @@ class TruthTopics:
         """Write the sample of `tick`, which is at `now` nanoseconds."""
         moved = self._thinning.moved(tick, truth) if truth.objects else {}
         stamp, fields = self._time.stamp(tick), (truth.pose, truth.twist, truth.clearance)
-        if type(moved) is Places:
+        if type(moved) is PosesAtTick:
             ahead = self._ahead
             if ahead is None or ahead.foreseen is not moved.foreseen:
                 ahead = self._ahead = self._lay_out(moved.foreseen)
@@ -51,7 +51,7 @@ class TruthTopics:
         links = [(frames.MAP, frames.of_object(name), stamp, pose) for name, pose in moved.items()]
         self._moves.write(now, self._transforms([(frames.MAP, self._frame, stamp, truth.pose), *links]))
 
-    def _lay_out(self, foreseen: Foreseen) -> "_Ahead":
+    def _lay_out(self, foreseen: PredictedPoses) -> "_Ahead":
         """The messages at each of its moments at which all things have moved."""
         before, names = self._ahead, foreseen.names
         if before is not None and before.foreseen.names == names:
@@ -74,7 +74,7 @@ class TruthTopics:
 class _Ahead(NamedTuple):
     """All messages for things whose poses were worked out ahead, and those on /tf as they are `packed`."""
 
-    foreseen: Foreseen
+    foreseen: PredictedPoses
     transforms: TransformsAhead
     layout: Together
     packed: Bytes

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import OccupancyGrid
 from simscen.record.cdr import Cursor
 from simscen.record.simtime import Stamp
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from simscen.core.comparison import Against, Comparison, Difference, Outcomes
+from simscen.core.records.stack_comparison import BaselineComparison, Comparison, MetricDifference, OutcomeCounts
 from simscen.report.line import Line, Piece
 from simscen.report.text import one_line
 
@@ -25,13 +25,13 @@ def compared(comparison: Comparison, prefix: str = "", columns: int | None = Non
     yield ()
 
 
-def counted(outcomes: Outcomes) -> str:
+def counted(outcomes: OutcomeCounts) -> str:
     """3/5: passed of those that came to an end; then, with an exclamation mark, how many did not."""
     errors = f" {outcomes.errors}!" if outcomes.errors else ""
     return f"{outcomes.passed}/{outcomes.decided}{errors}"
 
 
-def left_out(against: Against) -> str:
+def left_out(against: BaselineComparison) -> str:
     """What is not compared, and why; "" for nothing."""
     told = []
     if against.broken:
@@ -41,14 +41,14 @@ def left_out(against: Against) -> str:
     return "left out: " + ", ".join(told) if told else ""
 
 
-def parted(against: Against) -> str:
+def parted(against: BaselineComparison) -> str:
     """Of how many pairs only one arrived; "" for none."""
     if not against.parted:
         return ""
     return f"of {_pairs(against.parted)} only one run arrived, so how these drove is not compared"
 
 
-def headline(baseline: str, against: Against) -> str:
+def headline(baseline: str, against: BaselineComparison) -> str:
     """Dwb against ref: 10 pairs, passed 8 and 9 …"""
     won = sum(flip.passed == against.stack for flip in against.flips)
     lost = len(against.flips) - won
@@ -60,7 +60,7 @@ def headline(baseline: str, against: Against) -> str:
     return f"{told}, {won} better, {lost} worse (p = {against.p:.2g})"
 
 
-def numbers(one: Difference) -> tuple[str, str, str, str]:
+def numbers(one: MetricDifference) -> tuple[str, str, str, str]:
     """The two means, their difference, and its interval; what is below 1 m or 1 s with a digit more."""
     digits = 3 if one.unit and max(abs(one.baseline), abs(one.value)) < 1 else 2
     interval = "" if one.interval is None else " … ".join(f"{bound:+.{digits}f}" for bound in one.interval)
@@ -90,7 +90,7 @@ def _outcomes(comparison: Comparison, prefix: str, columns: int | None) -> Itera
         yield (Piece("  ! = could not be completed, and counts neither way", "quiet"),)
 
 
-def _against(baseline: str, against: Against, prefix: str) -> Iterator[Line]:
+def _against(baseline: str, against: BaselineComparison, prefix: str) -> Iterator[Line]:
     yield (Piece(f"  {headline(baseline, against)}", "name"),)
     for flip in against.flips[:MOST_FLIPS]:
         better = flip.passed == against.stack
@@ -108,7 +108,7 @@ def _against(baseline: str, against: Against, prefix: str) -> Iterator[Line]:
             yield (Piece(f"    {note}", "quiet"),)
 
 
-def _differences(baseline: str, against: Against) -> Iterator[Line]:
+def _differences(baseline: str, against: BaselineComparison) -> Iterator[Line]:
     if not against.differences:
         return
     stacks = shortened(baseline), shortened(against.stack)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from html import escape
 
-from simscen.core.comparison import Against, Comparison, Difference, Outcomes
+from simscen.core.records.stack_comparison import BaselineComparison, Comparison, MetricDifference, OutcomeCounts
 from simscen.report.compared import MOST_FLIPS, counted, headline, left_out, numbers, parted
 from simscen.report.text import one_line
 
@@ -54,12 +54,12 @@ def as_markdown(comparison: Comparison, cell: Callable[[str], str]) -> list[str]
     return [*lines, "", EXPLAINED]
 
 
-def _cell(outcomes: Outcomes) -> str:
+def _cell(outcomes: OutcomeCounts) -> str:
     look = "odd" if outcomes.errors else "bad" if outcomes.failed else "good"
     return f'<td class="count {look}">{counted(outcomes)}</td>'
 
 
-def _against(baseline: str, against: Against) -> str:
+def _against(baseline: str, against: BaselineComparison) -> str:
     flips = "".join(
         f'<tr class="{"" if flip.passed == against.stack else "bad"}">'
         f"<td>{'better' if flip.passed == against.stack else 'worse'}</td><td>{_text(flip.scenario)}</td>"
@@ -79,14 +79,14 @@ def _against(baseline: str, against: Against) -> str:
     )
 
 
-def _difference(one: Difference) -> str:
+def _difference(one: MetricDifference) -> str:
     name, *cells = _cells(one)
     clear = one.interval is not None and not one.interval[0] <= 0.0 <= one.interval[1]
     listed = "".join(f'<td class="margin">{cell}</td>' for cell in cells)
     return f"<tr{' class=clear' if clear else ''}><td>{name}</td>{listed}</tr>"
 
 
-def _cells(one: Difference) -> tuple[str, ...]:
+def _cells(one: MetricDifference) -> tuple[str, ...]:
     """A row of the table of differences."""
     before, after, difference, interval = numbers(one)
     name = f"{one.metric}, {one.unit}".removesuffix(", ")

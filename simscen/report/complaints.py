@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from simscen.core.result import Outcome, RunKey
-from simscen.core.sessionevents import RunFinished
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.session_events import RunFinished
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.finding_text import sentence, violations
 from simscen.report.text import one_line, visible
 

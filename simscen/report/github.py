@@ -4,8 +4,8 @@ from types import TracebackType
 from typing import TextIO
 from urllib.parse import quote
 
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunFinished, SessionEvent, SessionFinished
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.finding_text import tightest_margin
 from simscen.report.checkout import in_checkout
 from simscen.report.comparedpage import as_markdown

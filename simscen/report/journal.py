@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.errors import UsageError
-from simscen.core.result import RunKey
-from simscen.core.sessionevents import RunFinished, RunStarted, SessionEvent, SessionFinished
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import RunFinished, RunStarted, SessionEvent, SessionFinished
 from simscen.report.journaldata import FORMAT, NAME, Planned, planned_data, run_data
 from simscen.report.rebuild import session_lines
 

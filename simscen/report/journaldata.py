@@ -4,8 +4,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from simscen.core.result import RunKey
-from simscen.core.sessionevents import Artifacts, RunFinished
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.judge.result_json import from_data, read_key, result_data
 from simscen.report.results import relative
 

@@ -3,9 +3,9 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from simscen.core.result import Outcome, RunResult
-from simscen.core.sessionevents import RunFinished
-from simscen.core.verdict import Status, Verdict
+from simscen.core.records.run_result import Outcome, RunResult
+from simscen.core.records.session_events import RunFinished
+from simscen.core.records.verdict import Status, Verdict
 from simscen.judge.finding_text import tightest_margin
 from simscen.report.complaints import broken, complaints, excused
 from simscen.report.line import Line, Piece, Role

@@ -10,8 +10,8 @@ from typing import Literal
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished
 from simscen.judge.finding_text import disturbance_line, subject
 from simscen.report.complaints import Complaint, complaints, excused, failure, place, scenario_file
 from simscen.report.text import command, one_line, visible

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from simscen.core.result import AGAIN, Outcome, RunKey
-from simscen.core.sessionevents import RunFinished, SessionFinished, SessionStarted
+from simscen.core.records.run_result import REPEAT_SUFFIX, Outcome, RunKey
+from simscen.core.records.session_events import RunFinished, SessionFinished, SessionStarted
 from simscen.judge.finding_text import disturbance_line, tightest_margin
 from simscen.report.complaints import broken, complaints, excused, failure, label, place, scenario_file
 from simscen.report.line import Line, Piece, Role
@@ -43,7 +43,9 @@ class Naming:
         every_seed = session.total != (len(session.ids) or session.scenarios) * max(1, len(stacks))
         prefix = _common_folder(session.ids)
         longest = max((len(one) for one in session.ids), default=0) - len(prefix)
-        stack = ".".join(part for part in (max(stacks, key=len, default=""), AGAIN if session.twice else "") if part)
+        stack = ".".join(
+            part for part in (max(stacks, key=len, default=""), REPEAT_SUFFIX if session.twice else "") if part
+        )
         extra = [*(["seed 1234"] if every_seed else []), *([stack] if stack else [])]
         width = longest + (len(f" ({', '.join(extra)})") if extra else 0)
         room = width if columns is None else max(NARROWEST, columns - BESIDE_NAME)

@@ -11,8 +11,8 @@ from rich.live import Live
 from rich.style import Style
 from rich.text import Text
 
-from simscen.core.result import RunKey
-from simscen.core.sessionevents import (
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import (
     RunFinished,
     RunProgress,
     RunStarted,

@@ -3,7 +3,7 @@
 from types import TracebackType
 from typing import TextIO
 
-from simscen.core.sessionevents import RunFinished, SessionEvent, SessionFinished
+from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.report.plain import Reporter
 from simscen.report.results import to_json
 from simscen.report.text import no_marker_in_json

@@ -3,7 +3,7 @@
 from types import TracebackType
 from typing import Protocol, TextIO
 
-from simscen.core.sessionevents import SessionEvent
+from simscen.core.records.session_events import SessionEvent
 from simscen.report.line import Line, text_of
 from simscen.report.look import Look, can_encode
 from simscen.report.telling import Telling

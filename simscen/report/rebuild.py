@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
-from simscen.core.result import RunFailure, RunKey, unfinished
-from simscen.core.sessionevents import RunFinished, SessionStarted, started
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.records.run_result import RunFailure, RunKey, error_result
+from simscen.core.records.session_events import RunFinished, SessionStarted, session_started
 from simscen.report.checkout import from_here
 from simscen.report.journaldata import FORMAT, NAME, Planned, read_planned, read_run
 
@@ -36,9 +35,9 @@ class Past:
         """An answer for every planned run: an error where simscen ended before there was one."""
         return [self.answered.get(run.key) or self._unanswered(run) for run in self.planned]
 
-    def started(self, folder: Path) -> SessionStarted:
+    def session_started(self, folder: Path) -> SessionStarted:
         """The event that the session began with."""
-        return started(self.version, [run.key for run in self.planned], self.workers, folder, self.stacks)
+        return session_started(self.version, [run.key for run in self.planned], self.workers, folder, self.stacks)
 
     @property
     def stacks(self) -> tuple[str, ...]:
@@ -49,7 +48,7 @@ class Past:
         kind = "interrupted" if run.key in self.begun else "not-run"
         why = "before it was finished" if run.key in self.begun else "before it began"
         failure = RunFailure(kind, f"simscen ended {why}")
-        return RunFinished(unfinished(run.key, run.path, failure, run.stack), again=run.again, file=run.file)
+        return RunFinished(error_result(run.key, run.path, failure, run.stack), again=run.again, file=run.file)
 
 
 def read_journal(folder: Path) -> Past:

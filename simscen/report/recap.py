@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from simscen.core.result import Outcome, RunKey
-from simscen.core.sessionevents import RunFinished, SessionFinished
+from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.session_events import RunFinished, SessionFinished
 from simscen.report.complaints import broken, complaints
 from simscen.report.line import Line, Piece, Role
 from simscen.report.lines import SIGNS, counted, pointers

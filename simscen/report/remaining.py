@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from simscen.core.sessionevents import RunFinished, RunStarted, SessionEvent, SessionStarted
+from simscen.core.records.session_events import RunFinished, RunStarted, SessionEvent, SessionStarted
 
 ENOUGH = 2
 """Runs that must have ended before what they took says anything of the others."""

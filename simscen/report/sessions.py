@@ -7,7 +7,7 @@ from itertools import islice
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput
-from simscen.core.result import RunKey
+from simscen.core.records.run_result import RunKey
 from simscen.report.journaldata import NAME
 from simscen.report.rebuild import read_journal
 

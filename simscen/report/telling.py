@@ -3,8 +3,8 @@
 from collections import Counter
 from collections.abc import Callable, Iterator
 
-from simscen.core.result import RunKey
-from simscen.core.sessionevents import (
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import (
     RunFinished,
     RunProgress,
     RunStarted,

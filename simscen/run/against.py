@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput
-from simscen.core.result import Outcome, RunFailure, RunResult
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.run_result import Outcome, RunFailure, RunResult
+from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import from_json
 from simscen.run.outfolder import run_folder
 

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field, replace
 
-from simscen.core.events import Event
-from simscen.core.trace import Late, Moment, Truth
+from simscen.core.records.events import Event
+from simscen.core.records.trace import DeferredTruth, Moment, Truth
 from simscen.record.backlog import Log
 from simscen.run.ending import Ending
 from simscen.run.faultrig import FaultRig
@@ -31,7 +31,7 @@ class Agent:
     """Whether anything is due for it at this beat."""
     next: int = field(default=0, init=False)
     """The tick of its next beat."""
-    _sample: Truth | Late | None = field(default=None, init=False)
+    _sample: Truth | DeferredTruth | None = field(default=None, init=False)
     moment: Moment = field(init=False)
     """What it made of its last beat."""
 

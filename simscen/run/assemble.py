@@ -3,12 +3,12 @@
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from simscen.core.belief import Belief
-from simscen.core.chance import Streams
-from simscen.core.events import Event, EventKind
-from simscen.core.sensing import Odometry
-from simscen.core.surface import Patch
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
+from simscen.core.environment.world_model import Patch
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.sensor_data import Odometry
+from simscen.core.random_streams import Streams
+from simscen.core.records.events import Event, EventKind
 from simscen.model.anystack import ExternalStackSpec
 from simscen.run.agent import Agent
 from simscen.run.commandlink import CommandLink

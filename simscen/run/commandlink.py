@@ -1,6 +1,6 @@
 """cmd_vel between stack and base, for runs in which commands come late or get lost."""
 
-from simscen.core.motion import STOP, Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 
 
 class CommandLink:

@@ -2,8 +2,8 @@
 
 from typing import cast
 
-from simscen.core.chance import Streams
-from simscen.core.events import Event, EventKind, Value
+from simscen.core.random_streams import Streams
+from simscen.core.records.events import Event, EventKind, Value
 from simscen.core.stage import Situation
 from simscen.model.disturbances import FaultEntry, Step
 from simscen.run.faultrig import FaultRig

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable
 
-from simscen.core.events import Event, EventKind
-from simscen.core.time import Clock
-from simscen.core.trace import Decision
+from simscen.core.clock import Clock
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Decision
 
 TIME_LIMIT = "time limit"
 

@@ -12,13 +12,13 @@ from typing import NoReturn
 
 import numpy as np
 
-from simscen.core.belief import Belief
-from simscen.core.chance import Streams
-from simscen.core.errors import BROKEN, RunError
-from simscen.core.events import Event, EventKind
-from simscen.core.motion import Twist
-from simscen.core.readings import BELIEF, COMMAND, WHEELS
-from simscen.core.sensing import Odometry, Reading, Readings
+from simscen.core.errors import BROKEN_COMPONENT, RunError
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.sensor_data import Odometry, Reading, Readings
+from simscen.core.random_streams import Streams
+from simscen.core.records.disturbances import BELIEF, COMMAND, WHEELS
+from simscen.core.records.events import Event, EventKind
 from simscen.faults.base import Disturbance, FaultSetting
 from simscen.model.disturbances import FaultEntry
 from simscen.run.commandlink import CommandLink
@@ -199,7 +199,7 @@ class FaultRig:
 
     def _broke(self, index: int, what: str) -> NoReturn:
         entry = self._faults[index]
-        raise RunError(BROKEN, f"fault `{entry.label}` {what}{entry.added_by}")
+        raise RunError(BROKEN_COMPONENT, f"fault `{entry.label}` {what}{entry.added_by}")
 
     def _count(self, active: _Active) -> None:
         if active.over:

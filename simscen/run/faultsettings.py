@@ -5,10 +5,10 @@ from functools import cache
 
 import numpy as np
 
-from simscen.core.rays import RayCaster
-from simscen.core.readings import INSTANCES
-from simscen.core.shapes import TriangleMesh
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
+from simscen.core.geometry.ray_fans import RayCaster
+from simscen.core.geometry.shapes import TriangleMesh
+from simscen.core.records.disturbances import KIND_BY_INSTANCE
 from simscen.faults.base import FaultSetting, Sight
 from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import RobotSpec
@@ -35,7 +35,7 @@ class FaultSettings:
             separation=getattr(self._robot.drive, "wheel_separation", 0.0),
             clock=self._clock,
             now=self._now,
-            kind=sensor.says if sensor is not None else INSTANCES[entry.sensor],
+            kind=sensor.says if sensor is not None else KIND_BY_INSTANCE[entry.sensor],
             sight=None if sensor is None else self._sight(entry.sensor, sensor.chosen),
         )
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from simscen.core.chance import Streams
-from simscen.core.errors import BROKEN, RunError
-from simscen.core.grid import OccupancyGrid
-from simscen.core.readings import INSTANCES, MAP
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.errors import BROKEN_COMPONENT, RunError
+from simscen.core.random_streams import Streams
+from simscen.core.records.disturbances import KIND_BY_INSTANCE, MAP
 from simscen.faults.base import FaultSetting
 from simscen.model.disturbances import FaultEntry
 from simscen.run.prepare import Prepared
@@ -30,7 +30,11 @@ def _of_one(prepared: Prepared, streams: Streams) -> Prepared:
     faults, grid = prepared.spec.faults, prepared.map
     mapped: list[int] = []
     for index, (entry, name) in enumerate(zip(faults, stream_names(faults), strict=True)):
-        if grid is not None and INSTANCES.get(entry.sensor) == MAP and entry.sensor not in prepared.robot.sensors:
+        if (
+            grid is not None
+            and KIND_BY_INSTANCE.get(entry.sensor) == MAP
+            and entry.sensor not in prepared.robot.sensors
+        ):
             disturbed = _disturbed(grid, entry, streams.generator(f"fault{name}#1"), prepared)
             mapped += [] if _same(grid, disturbed) else [index]
             grid = disturbed
@@ -43,7 +47,9 @@ def _disturbed(
     clock = Clock(prepared.spec.physics.tick_rate)
     disturbed: object = entry.fault.begin(chance, FaultSetting(clock=clock, kind=MAP)).map(grid)
     if not isinstance(disturbed, OccupancyGrid):
-        raise RunError(BROKEN, f"fault `{entry.label}` makes {type(disturbed).__name__} of a map{entry.added_by}")
+        raise RunError(
+            BROKEN_COMPONENT, f"fault `{entry.label}` makes {type(disturbed).__name__} of a map{entry.added_by}"
+        )
     return disturbed
 
 

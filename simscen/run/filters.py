@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from simscen.core.filtermasks import FilterMasks
-from simscen.core.world import Polygon
-from simscen.core.zones import Filter, Zones, ZoneSwitch
+from simscen.core.environment.costmap_filters import Filter, FilterMasks, Zones, ZoneSwitch
+from simscen.core.environment.world_model import Polygon
 from simscen.model.stackbase import StackBase
 
 

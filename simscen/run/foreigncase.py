@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from simscen.core.case import Case
+from simscen.core.environment.costmap_filters import MaskBlocks
+from simscen.core.errors import Problem
 from simscen.core.geometry import Pose2
-from simscen.core.maskcells import MaskCells
-from simscen.core.problems import Problem
+from simscen.core.records.case import Case
 from simscen.loading.files.criteriafile import LoadedCriteria
 from simscen.model.world import WorldSpec
 from simscen.run.goals import expected_of, goals_of
@@ -35,7 +35,7 @@ def case_of(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
     )
 
 
-def masks_of(criteria: LoadedCriteria) -> dict[str, MaskCells]:
+def masks_of(criteria: LoadedCriteria) -> dict[str, MaskBlocks]:
     """The filter masks that the file's criteria judge by. Raises InvalidInput."""
 
     def sourced(problem: Problem) -> Problem:

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from simscen.actions.goals import NewGoal
-from simscen.core.goalnames import in_loop
-from simscen.core.navigation import Goal
+from simscen.core.messages.goal_names import loop_goal_name
+from simscen.core.messages.navigation import Goal
 from simscen.model.navigation import failure_of
 from simscen.model.scenario import GoalEntry, ScenarioSpec
 from simscen.model.stackbase import StackBase
@@ -19,7 +19,9 @@ def goals_of(spec: ScenarioSpec) -> tuple[Goal, ...]:
         passed = [_passed(goal, entry, spec.navigation.radius) for goal, entry in zip(once, spec.goals, strict=True)]
         once = [*passed[:-1], *once[-1:]]
     return tuple(
-        replace(goal, name=in_loop(goal.name, loop)) for loop in range(1, spec.navigation.loops + 1) for goal in once
+        replace(goal, name=loop_goal_name(goal.name, loop))
+        for loop in range(1, spec.navigation.loops + 1)
+        for goal in once
     )
 
 

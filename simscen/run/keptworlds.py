@@ -14,11 +14,11 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import to_json
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.navigation import Goal
-from simscen.core.shapes import TriangleMesh
-from simscen.core.world import BuiltWorld, World
+from simscen.core.geometry.shapes import TriangleMesh
+from simscen.core.messages.navigation import Goal
 from simscen.run.keptfiles import KeptFiles
 from simscen.run.versions import arithmetic, code, versions
 from simscen.worlds.build import build

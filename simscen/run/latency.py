@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import TypeVar
 
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
 from simscen.model.latency import Latency
 from simscen.model.robot import RobotSpec, SensorSpec
 from simscen.model.stack import StackSpec

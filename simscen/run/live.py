@@ -6,20 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from simscen.core.belief import Belief
-from simscen.core.chance import Streams
-from simscen.core.events import Event, EventKind, Value
+from simscen.core.clock import Clock
+from simscen.core.environment.costmap_filters import ZoneSwitch
+from simscen.core.environment.pedestrians import WalkingPedestrian
+from simscen.core.environment.world_model import Patch, Polygon, World
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal, Path
-from simscen.core.sensing import Readings, Scan
-from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
-from simscen.core.surface import Patch
-from simscen.core.time import Clock
-from simscen.core.trace import Decision, Truth
-from simscen.core.walker import Walker
-from simscen.core.world import Polygon, World
-from simscen.core.zones import ZoneSwitch
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.sensor_data import Readings, Scan
+from simscen.core.random_streams import Streams
+from simscen.core.records.events import Event, EventKind, Value
+from simscen.core.records.trace import Decision, Truth
 from simscen.run.filters import Filters
 from simscen.run.walking import Walking
 from simscen.sim.outline import parts
@@ -201,7 +200,7 @@ class LiveStage:
         self._simulation.remove(name)
         self.tell(Event(0, EventKind.OBJECT_REMOVED, name))
 
-    def walk(self, walker: Walker) -> None:
+    def walk(self, walker: WalkingPedestrian) -> None:
         """Let somebody come; one of the same name is replaced."""
         if self._simulation.object_pose(walker.name):
             self.remove(walker.name)

@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from simscen.core.foreseen import Foreseen, Places
 from simscen.core.geometry import Array, Pose3, Vector
-from simscen.core.rays import Fan, RayCaster, Singles
-from simscen.core.shapes import Body, Shape, TriangleMesh
+from simscen.core.geometry.ray_fans import RayCaster, RayFan, Singles
+from simscen.core.geometry.scripted_poses import PosesAtTick, PredictedPoses
+from simscen.core.geometry.shapes import Body, Shape, TriangleMesh
 from simscen.sim.robot import Robot
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
@@ -33,7 +33,7 @@ class LiveRays(RayCaster):
         self._look((0.0, 0.0, 0.0), math.inf)
         return self._scene.cast(origins, directions, reach)
 
-    def sweep(self, fan: Fan, pose: Pose3, reach: float) -> Singles:
+    def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
         """See core.rays.RayCaster."""
         self._look(pose[:3], reach)
         return self._scene.sweep(fan, pose, reach)
@@ -46,13 +46,13 @@ class LiveRays(RayCaster):
             self._extent = max([_extent(mesh) for mesh in self._meshes.values()], default=0.0)
             self._near = looked = None
         where, homes = robot.objects(), robot.homes
-        names = self._names(where.foreseen, place, reach) if type(where) is Places else self._meshes
+        names = self._names(where.foreseen, place, reach) if type(where) is PosesAtTick else self._meshes
         # The same ones for as long as nothing has moved.
         if looked is None or names is not looked[0] or where is not looked[1] or homes is not looked[2]:
             self._looked = names, where, homes
             self._scene.set_moving({name: (self._meshes[name], where[name]) for name in names}, homes)
 
-    def _names(self, foreseen: Foreseen, place: Vector, reach: float) -> Iterable[str]:
+    def _names(self, foreseen: PredictedPoses, place: Vector, reach: float) -> Iterable[str]:
         """All but those that scripts keep out of reach."""
         near = self._near
         if near is None or not near.holds(foreseen, place, reach):
@@ -79,12 +79,12 @@ class LiveRays(RayCaster):
 class Near(NamedTuple):
     """What rays from a place may meet within their reach for as long as scripts are `foreseen`."""
 
-    foreseen: Foreseen
+    foreseen: PredictedPoses
     place: Vector
     reach: float
     names: list[str]
 
-    def holds(self, foreseen: Foreseen, place: Vector, reach: float) -> bool:
+    def holds(self, foreseen: PredictedPoses, place: Vector, reach: float) -> bool:
         """Whether rays from another place meet no others."""
         return foreseen is self.foreseen and math.dist(place, self.place) + reach <= self.reach
 

@@ -9,7 +9,7 @@ command; it sees nothing else. All robots decide on what is, before any of them 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from simscen.core.events import Event
+from simscen.core.records.events import Event
 from simscen.run.agent import Agent
 from simscen.run.director import Director
 from simscen.run.ending import end_of

@@ -3,11 +3,9 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from simscen.core.errors import InvalidInput
-from simscen.core.filtermasks import FilterMasks
-from simscen.core.grid import OccupancyGrid
-from simscen.core.maskcells import MaskCells, cells_of
-from simscen.core.problems import Problem
+from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks, mask_blocks
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.loaded import JudgedMask, LoadedMap, LoadedScenario
 from simscen.loading.yaml.tree import Key, MappingNode, value_position
 from simscen.run.worldsource import load_map
@@ -31,13 +29,13 @@ def load_masks(loaded: LoadedScenario) -> FilterMasks:
     return FilterMasks(keepout, spec.over(grid))
 
 
-def load_judged_masks(masks: Mapping[str, JudgedMask], tree: MappingNode, sourced: Sourced) -> dict[str, MaskCells]:
+def load_judged_masks(masks: Mapping[str, JudgedMask], tree: MappingNode, sourced: Sourced) -> dict[str, MaskBlocks]:
     """The masks that criteria judge by. Raises InvalidInput, at the line that names it, for one that is unusable."""
     return {name: _judged(mask, tree, sourced) for name, mask in masks.items()}
 
 
-def _judged(mask: JudgedMask, tree: MappingNode, sourced: Sourced) -> MaskCells:
-    cells = cells_of(_grid(mask.map, mask.keys, tree, sourced))
+def _judged(mask: JudgedMask, tree: MappingNode, sourced: Sourced) -> MaskBlocks:
+    cells = mask_blocks(_grid(mask.map, mask.keys, tree, sourced))
     if len(cells.blocks) > MOST_BLOCKS:
         message = f"mask image {mask.map.image.name} falls into {len(cells.blocks)} rectangles of equal cells"
         hint = f"criteria judge by masks of {MOST_BLOCKS} at most; is it a photograph, or a map with noise?"

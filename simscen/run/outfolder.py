@@ -7,8 +7,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from simscen.core.errors import UsageError
-from simscen.core.outputs import require_plain
-from simscen.core.result import RunKey
+from simscen.core.files import require_regular_file
+from simscen.core.records.run_result import RunKey
 
 DEFAULT = Path("simscen-out")
 RUNS = "runs"
@@ -40,7 +40,7 @@ def run_folder(folder: Path, key: RunKey) -> Path:
 
 def probe_writable(path: Path) -> None:
     """Raise OSError unless a plain file can be written at `path`; leaves no trace."""
-    require_plain(path)
+    require_regular_file(path)
     existed = path.exists()
     with path.open("ab"):
         pass
@@ -53,7 +53,7 @@ def write_atomically(path: Path, data: bytes) -> None:
 
     Raises OSError, also where something other than a plain file would be replaced.
     """
-    require_plain(path)
+    require_regular_file(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from simscen.core.run import Run
+from simscen.core.records.run import Run
 from simscen.judge.result_json import to_json
 from simscen.record.backlog import Log
 from simscen.run.external.build import for_robot

@@ -6,14 +6,14 @@ Plain data and numpy arrays only, so that it can be made once in the warm proces
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from simscen.core.belief import Estimate
-from simscen.core.case import CLEARANCE_RANGE, Case
-from simscen.core.filtermasks import FilterMasks
+from simscen.core.environment.costmap_filters import FilterMasks
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.navigation import Goal
-from simscen.core.shapes import TriangleMesh
-from simscen.core.world import BuiltWorld
+from simscen.core.geometry.shapes import TriangleMesh
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Goal
+from simscen.core.records.case import CLEARANCE_RANGE, Case
 from simscen.criteria.base import Criterion
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of

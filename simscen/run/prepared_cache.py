@@ -4,7 +4,7 @@ import hashlib
 import pickle
 from dataclasses import replace
 
-from simscen.core.world import BuiltWorld
+from simscen.core.environment.world_model import BuiltWorld
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.keptworlds import KeptWorlds
 from simscen.run.prepare import Prepared, prepare

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedRobot
 from simscen.loading.yaml.tree import value_position
 from simscen.model.robot import RobotSpec

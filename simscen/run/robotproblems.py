@@ -1,7 +1,6 @@
 """What only building a robot can tell of its file."""
 
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.robotfile import RobotFile
 from simscen.run.worldsource import robot_of
 from simscen.sim.ground import refuse_dragging

@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from simscen.core.polygons import distance_to_segment
-from simscen.core.world import Polygon
+from simscen.core.environment.world_model import Polygon
+from simscen.core.geometry.polygons import distance_to_segment
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.robot import RobotSpec
 from simscen.run.worldsource import load_robot

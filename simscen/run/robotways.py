@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from simscen.core.shapes import Solid
-from simscen.core.world import World
+from simscen.core.environment.world_model import World
+from simscen.core.geometry.shapes import Solid
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.worldsource import load_robot
 from simscen.sim.robot_body import RobotBody

@@ -4,11 +4,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.core.maskcells import cells_of
-from simscen.core.scenery import Cells, Floor, Ground, Scenery, Thing, Zone
-from simscen.core.shapes import Body, TriangleMesh
-from simscen.core.terrain import facing_up, normals, terrain
-from simscen.core.world import World
+from simscen.core.environment.costmap_filters import mask_blocks
+from simscen.core.environment.drivable_surfaces import drivable_solids, face_normals, upward_faces
+from simscen.core.environment.scenery import (
+    CompressedGrid,
+    DrivableSurface,
+    FilterZone,
+    FrictionRegion,
+    MovableObject,
+    Scenery,
+)
+from simscen.core.environment.world_model import World
+from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.run.prepare import Prepared
 from simscen.sim.outline import convex_hull, footprint, parts
 from simscen.worlds.shortest import Z_RANGE
@@ -26,42 +33,42 @@ def scenery_of(prepared: Prepared) -> Scenery:
         places=dict(world.places),
         things=tuple(_thing(body, world) for body in world.bodies),
         ground=tuple(_ground(prepared.built.mesh, reach)),
-        floors=tuple(Floor(name, world.regions[name], friction) for name, friction in world.friction.items()),
+        floors=tuple(FrictionRegion(name, world.regions[name], friction) for name, friction in world.friction.items()),
         zones=tuple(zone for name, part in each.items() for zone in _zones(part, name)),
-        map=None if same else Cells.of(prepared.built.map),
+        map=None if same else CompressedGrid.of(prepared.built.map),
     )
 
 
-def _thing(body: Body, world: World) -> Thing:
+def _thing(body: Body, world: World) -> MovableObject:
     outlines = parts(body.solids, Z_RANGE) or ([footprint(body.solids)] if body.solids else [])
     rounded = tuple(tuple((round(x, MILLIMETRES), round(y, MILLIMETRES)) for x, y in outline) for outline in outlines)
     closed, opened = world.doors.get(body.name, (None, None))
-    return Thing(body.name, body.pose.plane, rounded, closed, opened, body.mass)
+    return MovableObject(body.name, body.pose.plane, rounded, closed, opened, body.mass)
 
 
-def _ground(mesh: TriangleMesh, reach: float) -> Iterator[Ground]:
+def _ground(mesh: TriangleMesh, reach: float) -> Iterator[DrivableSurface]:
     """What of the static world wheels may roll on, which are `reach` metres tall at most."""
-    owners = sorted(terrain(mesh, reach))
+    owners = sorted(drivable_solids(mesh, reach))
     if not owners:
         return  # as most worlds: normals of many thousand faces take a while
-    up, slopes = facing_up(mesh), normals(mesh)
+    up, slopes = upward_faces(mesh), face_normals(mesh)
     for owner in owners:
         own = mesh.owners == owner
         corners = mesh.vertices[mesh.faces[own]].reshape(-1, 3)
         normal = max(slopes[own & up].tolist(), key=lambda one: -one[2])  # its steepest part
         uphill = (round(-normal[0] / normal[2], MILLIMETRES) + 0.0, round(-normal[1] / normal[2], MILLIMETRES) + 0.0)
         outline = convex_hull(np.round(corners[:, :2], MILLIMETRES))
-        yield Ground(mesh.names[owner], outline, round(float(corners[:, 2].max()), MILLIMETRES), uphill)
+        yield DrivableSurface(mesh.names[owner], outline, round(float(corners[:, 2].max()), MILLIMETRES), uphill)
 
 
-def _zones(part: Prepared, robot: str) -> Iterator[Zone]:
+def _zones(part: Prepared, robot: str) -> Iterator[FilterZone]:
     """What its stack is told from the start."""
     regions, masks = part.built.world.regions, part.masks
     for region in part.stack.keepout:
-        yield Zone("keepout", region, regions[region], robot=robot)
+        yield FilterZone("keepout", region, regions[region], robot=robot)
     for zone in part.stack.speed_zones:
-        yield Zone("speed", zone.region, regions[zone.region], zone.speed_limit, robot=robot)
+        yield FilterZone("speed", zone.region, regions[zone.region], zone.speed_limit, robot=robot)
     if masks.keepout is not None:
-        yield Zone("keepout", cells=cells_of(masks.keepout), robot=robot)
+        yield FilterZone("keepout", cells=mask_blocks(masks.keepout), robot=robot)
     if masks.speed is not None:
-        yield Zone("speed", cells=cells_of(masks.speed.grid), robot=robot)
+        yield FilterZone("speed", cells=mask_blocks(masks.speed.grid), robot=robot)

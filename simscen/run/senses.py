@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Mapping, Sequence
 
-from simscen.core.sensing import Reading, Readings
+from simscen.core.messages.sensor_data import Reading, Readings
 from simscen.sensors.sensor import Sensor
 
 

@@ -1,7 +1,7 @@
 """What senses on a robot, by name: as logs and external stacks are told."""
 
 from simscen.core.geometry import Pose3
-from simscen.core.sensing import Odometry
+from simscen.core.messages.sensor_data import Odometry
 from simscen.model.robot import Mount, RobotSpec
 from simscen.run.prepare import Prepared
 from simscen.stack.localizers.ground_truth import TRUTH

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
-from simscen.core.chance import LARGEST_SEED
 from simscen.core.errors import Exit, UsageError
-from simscen.core.result import Outcome, RunFailure, RunKey
-from simscen.core.sessionevents import Listener, RunFinished, RunProgress, RunStarted
+from simscen.core.random_streams import LARGEST_SEED
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey
+from simscen.core.records.session_events import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.run.against import agreed

@@ -5,8 +5,8 @@ from collections.abc import Callable, Collection
 import numpy as np
 
 from simscen.core.geometry import Array, Pose3
-from simscen.core.rays import RayCaster
-from simscen.core.sensing import Image, Scan
+from simscen.core.geometry.ray_fans import RayCaster
+from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.robot import Camera, Mount
 from simscen.sensors.sensor import SensorView
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput, RunError
-from simscen.core.run import Run
-from simscen.core.time import Clock
-from simscen.core.trace import Trace
+from simscen.core.records.run import Run
+from simscen.core.records.trace import Trace
 from simscen.judge.multi_robot import combine_robots
 from simscen.judge.result_json import to_json
 from simscen.judge.run_result import judge_run

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from simscen.core.events import Event
+from simscen.core.records.events import Event
 from simscen.core.stage import Situation
 
 

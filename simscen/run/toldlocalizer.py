@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from simscen.core.belief import Belief, Estimate
-from simscen.core.sensing import Imu, Odometry, Scan
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.stack.protocols import Localizer
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from simscen.core.geometry import Pose2, Pose3, wrap
-from simscen.core.motion import STOP, Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.robot import Ackermann
 from simscen.run.robotmodel import robot_model
 from simscen.sensors.kinematics import kinematics_of

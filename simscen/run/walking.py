@@ -5,13 +5,13 @@ from functools import cached_property
 
 import numpy as np
 
-from simscen.core.events import Event, EventKind, Value
+from simscen.core.clock import Clock
+from simscen.core.environment.pedestrians import PedestrianAction, WalkingPedestrian
+from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.polygons import distance_to_polygon
-from simscen.core.shapes import Body, Cylinder, MotionPath, Solid
-from simscen.core.time import Clock
-from simscen.core.walker import Deed, Walker
-from simscen.core.world import BuiltWorld
+from simscen.core.geometry.polygons import distance_to_polygon
+from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
+from simscen.core.records.events import Event, EventKind, Value
 from simscen.people.people import People, Point
 from simscen.people.seen import SeenRobot, SeenThing, Surroundings
 from simscen.people.walls import Walls
@@ -62,7 +62,7 @@ class Walking:
     def _people(self) -> People:
         return People(self._walls, self._way)
 
-    def come(self, walker: Walker) -> Body:
+    def come(self, walker: WalkingPedestrian) -> Body:
         """Let somebody come; the body they have."""
         people = self._people
         people.add(walker)
@@ -108,7 +108,7 @@ class Walking:
             for tell in self.tell:
                 tell(event)
 
-    def _event(self, deed: Deed) -> Event:
+    def _event(self, deed: PedestrianAction) -> Event:
         data: dict[str, Value] = {"behavior": self._behaviors[deed.name], "robot": deed.about}
         if deed.what == "reached":
             data = {"goal": int(deed.about)}

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simscen.core.filesread import files_read, note_read
+from simscen.core.environment.world_model import World
+from simscen.core.files import collect_read_files, record_read_file
 from simscen.core.geometry import Pose2
-from simscen.core.shapes import Solid
-from simscen.core.world import World
+from simscen.core.geometry.shapes import Solid
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.run.worldsource import load_world
 from simscen.worlds.plainways import PlainWays, plain_ways
@@ -34,12 +34,12 @@ class WorldCache:
         """The world of a scenario; files that it was made of are noted as read. Raises InvalidInput."""
         known = next((entry for entry in self._worlds if entry[0] == loaded.world), None)
         if known is None:
-            with files_read() as read:
+            with collect_read_files() as read:
                 world = load_world(loaded)
             known = loaded.world, world, read
             self._worlds.append(known)
         for file in sorted(known[2]):
-            note_read(file)
+            record_read_file(file)
         return known[1]
 
     def plain_ways(self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]) -> PlainWays | None:

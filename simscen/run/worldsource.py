@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simscen.core.errors import InvalidInput
-from simscen.core.grid import OccupancyGrid
-from simscen.core.problems import Problem
-from simscen.core.shapes import Mesh
-from simscen.core.world import World
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import World
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.geometry.shapes import Mesh
 from simscen.loading.loaded import LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.tree import key_position

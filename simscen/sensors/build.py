@@ -1,8 +1,8 @@
 """From a robot's specification to its sensors."""
 
-from simscen.core.chance import Streams
-from simscen.core.rays import RayCaster
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
+from simscen.core.geometry.ray_fans import RayCaster
+from simscen.core.random_streams import Streams
 from simscen.model.robot import RobotSpec, SensorSpec
 from simscen.sensors.installed import InstalledSensor
 from simscen.sensors.sensor import Sensor, SensorSetting, SensorView

@@ -1,6 +1,6 @@
 """A bumper around the hull."""
 
-from simscen.core.sensing import Bump
+from simscen.core.messages.sensor_data import Bump
 from simscen.model.robot import Bumper
 from simscen.sensors.sensor import SensorSetting
 

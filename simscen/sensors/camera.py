@@ -1,6 +1,6 @@
 """A colour and depth camera; its pictures come from the engine's renderer."""
 
-from simscen.core.sensing import Image
+from simscen.core.messages.sensor_data import Image
 from simscen.model.robot import Camera
 from simscen.sensors.sensor import SensorSetting
 

@@ -1,7 +1,7 @@
 """An inertial unit at the base frame's origin."""
 
 from simscen.core.geometry import rotated
-from simscen.core.sensing import Imu
+from simscen.core.messages.sensor_data import Imu
 from simscen.model.robot import InertialUnit
 from simscen.sensors.normals import Normals
 from simscen.sensors.sensor import SensorSetting

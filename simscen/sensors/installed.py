@@ -7,10 +7,10 @@ from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 
-from simscen.core import sensing
-from simscen.core.errors import BROKEN, RunError
-from simscen.core.motion import Twist
-from simscen.core.sensing import Reading
+from simscen.core.errors import BROKEN_COMPONENT, RunError
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages import sensor_data
+from simscen.core.messages.sensor_data import Reading
 from simscen.model.robot import SensorSpec
 from simscen.sensors.sensor import SensorSetting
 
@@ -25,7 +25,7 @@ class InstalledSensor:
     def __init__(self, kind: str, spec: SensorSpec, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
         self._kind, self._spec = kind, spec
-        self._reading: type = getattr(sensing, spec.says)
+        self._reading: type = getattr(sensor_data, spec.says)
         self._inner: Any = self._ask(lambda: spec.implementation()(spec, setting))
         if not callable(getattr(self._inner, "read", None)):
             self._broke(f"{type(self._inner).__name__} has no `read`, which every sensor has")
@@ -53,7 +53,7 @@ class InstalledSensor:
             raise RunError("crashed", f"{self._who}: {type(error).__name__}: {error} ({place})") from error
 
     def _broke(self, what: str) -> NoReturn:
-        raise RunError(BROKEN, f"{self._who} {what}")
+        raise RunError(BROKEN_COMPONENT, f"{self._who} {what}")
 
     @property
     def _who(self) -> str:

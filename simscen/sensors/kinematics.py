@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.robot import Drive, Mecanum, Omnidirectional, SkidSteer
 
 Rolled = tuple[float, ...]

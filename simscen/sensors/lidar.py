@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, Pose3, rotated
-from simscen.core.rays import Fan, Singles
-from simscen.core.sensing import Scan
+from simscen.core.geometry.ray_fans import RayFan, Singles
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.robot import Lidar
 from simscen.sensors.sensor import SensorSetting
 
@@ -29,7 +29,7 @@ class LidarSensor:
         self._increment = spec.field_of_view / max(1, spec.beams if full else spec.beams - 1)
         self._first = -spec.field_of_view / 2 if spec.beams > 1 else 0.0
         self._mount = Pose2(spec.mount.x, spec.mount.y, spec.mount.yaw)
-        self._fan = Fan(self._first + spec.mount.yaw, self._increment, spec.beams)
+        self._fan = RayFan(self._first + spec.mount.yaw, self._increment, spec.beams)
         # What is beyond this is beyond the lidar's range whatever the noise, and when it is rounded to a whole step.
         self._reach = spec.max_range + CERTAIN * spec.noise + spec.resolution
         self._lens = spec.mount.x, spec.mount.y, spec.mount.z

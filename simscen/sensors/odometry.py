@@ -4,8 +4,8 @@ import math
 from operator import sub
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Odometry
 from simscen.model.robot import WheelOdometry
 from simscen.sensors.kinematics import kinematics_of
 from simscen.sensors.normals import Normals

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Pose3
-from simscen.core.rays import RayCaster
-from simscen.core.sensing import Reading
+from simscen.core.geometry.ray_fans import RayCaster
+from simscen.core.messages.sensor_data import Reading
 from simscen.model.robot import Drive
 
 Vector = tuple[float, float, float]

@@ -4,7 +4,7 @@ import math
 
 import pybullet
 
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.robot import Ackermann
 from simscen.sim.inertia import GRAVITY
 from simscen.sim.ramp import Ramp

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import pybullet
 
 from simscen.core.geometry import Pose3, wrap
-from simscen.core.motion_path import Track, Way
-from simscen.core.shapes import Body, Mesh, MotionPath
+from simscen.core.geometry.motion_paths import PathSampler, SweptSegment
+from simscen.core.geometry.shapes import Body, Mesh, MotionPath
 from simscen.sim.inertia import GRAVITY
 
 FALLING = 0.1 * GRAVITY
@@ -32,7 +32,7 @@ class Actor:
     body: Body
     path: MotionPath | None
     since: int
-    ways: Sequence[Way]
+    ways: Sequence[SweptSegment]
     speed: float
     size: float
     radius: float
@@ -48,7 +48,7 @@ class Actor:
     """What the engine last said of its centre of mass, and the pose that comes of it."""
     resting: bool = False
     """Whether it has not moved at all since the engine was asked before."""
-    track: Track | None = None
+    track: PathSampler | None = None
     """Its path as it is asked for."""
     scripted: dict[int, Pose3] = field(default_factory=dict)
     """Where its path has it at the ticks that were asked for last."""
@@ -84,7 +84,7 @@ class Actor:
                 self.scripted.clear()
             if self.track is None:
                 assert self.path is not None
-                self.track = Track(self.path, self.body.pose.z)
+                self.track = PathSampler(self.path, self.body.pose.z)
             self.scripted[tick] = there = self.track.at((tick - self.since) / rate)
         return there
 

@@ -8,8 +8,8 @@ import numpy as np
 import pybullet
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion_path import Way, top_speed, ways
-from simscen.core.shapes import Body, MotionPath
+from simscen.core.geometry.motion_paths import SweptSegment, swept_segments, top_speed
+from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.sim import engine
 from simscen.sim.about import About, look_about
 from simscen.sim.actor import FALLING, Actor, Vector
@@ -80,8 +80,8 @@ class Actors:
 
     def _made(self, body: Body, tick: int, led: bool = False) -> Actor:
         radius, height = reach(body.solids)
-        stays = (Way(body.pose.x, body.pose.y, body.pose.x, body.pose.y),)
-        on, speed = (stays, 0.0) if body.path is None else (ways(body.path), top_speed(body.path, radius))
+        stays = (SweptSegment(body.pose.x, body.pose.y, body.pose.x, body.pose.y),)
+        on, speed = (stays, 0.0) if body.path is None else (swept_segments(body.path), top_speed(body.path, radius))
         hollow = engine.hollow(body.solids, body.mass > 0 and body.path is None)
         surface = engine.fused(body.solids, self._triangulate) if hollow else None
         return Actor(body, body.path, tick, on, speed, math.hypot(radius, height), radius, surface, led)

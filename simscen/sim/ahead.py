@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from simscen.core.foreseen import Foreseen, Places
 from simscen.core.geometry import Pose3
-from simscen.core.tracks import Tracks
+from simscen.core.geometry.scripted_poses import BatchPathSampler, PosesAtTick, PredictedPoses
 from simscen.sim.actor import Actor
 
 AHEAD = 4
@@ -18,10 +17,10 @@ class Ahead:
 
     def __init__(self, travelling: Sequence[Actor], tick_rate: int) -> None:
         self._travelling, self._rate = travelling, tick_rate
-        self._foreseen: Foreseen | None = None
-        self._tracks: Tracks | None = None
+        self._foreseen: PredictedPoses | None = None
+        self._tracks: BatchPathSampler | None = None
 
-    def at(self, tick: int) -> Places | None:
+    def at(self, tick: int) -> PosesAtTick | None:
         """Where everything is at a tick; None where that was not worked out."""
         return None if self._foreseen is None else self._foreseen.at(tick)
 
@@ -35,9 +34,9 @@ class Ahead:
             return
         if self._tracks is None:
             paths = [(actor.path, actor.body.pose.z) for actor in self._travelling]
-            self._tracks = Tracks([(path, z) for path, z in paths if path is not None])
+            self._tracks = BatchPathSampler([(path, z) for path, z in paths if path is not None])
         ticks = range(tick, tick + max(1, AHEAD * self._rate // period) * period, period)
         since = np.array([actor.since for actor in self._travelling])
         table = self._tracks.at((np.array(ticks)[:, np.newaxis] - since) / self._rate)
         names = tuple(actor.body.name for actor in self._travelling)
-        self._foreseen = Foreseen(ticks, names, table, {**everything})
+        self._foreseen = PredictedPoses(ticks, names, table, {**everything})

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.events import Event
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.shapes import Body, TriangleMesh
-from simscen.core.trace import Truth
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Body, TriangleMesh
+from simscen.core.records.events import Event
+from simscen.core.records.trace import Truth
 from simscen.sim import engine
 from simscen.sim.robot import Vector
 from simscen.sim.robot_body import RobotBody

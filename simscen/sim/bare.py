@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import pybullet
 
-from simscen.core.facemesh import compact
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.shapes import Solid, TriangleMesh
+from simscen.core.geometry.meshes import submesh
+from simscen.core.geometry.shapes import Solid, TriangleMesh
 from simscen.sim import engine
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import Vehicle
@@ -28,7 +28,7 @@ class BareWorld:
         engine.touch(client, ground, -1, engine.GROUND, engine.EVERYTHING)
         if isinstance(static, TriangleMesh):
             for lot in engine.tiles(static.vertices, engine.above_floor(static.vertices, static.faces)):
-                mesh = self._stand(engine.concave_shape(client, compact(static.vertices, lot)))
+                mesh = self._stand(engine.concave_shape(client, submesh(static.vertices, lot)))
                 pybullet.changeDynamics(mesh, -1, collisionMargin=0.0, physicsClientId=client)
         else:
             for solid in static:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import pybullet
 
-from simscen.core.case import CLEARANCE_RANGE
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import TriangleMesh
+from simscen.core.geometry.shapes import TriangleMesh
+from simscen.core.records.case import CLEARANCE_RANGE
 from simscen.sim.actors import NEVER, Actors
 from simscen.sim.drives import Base
 from simscen.sim.outline import extremes

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.shapes import Sphere
+from simscen.core.geometry.shapes import Sphere
 from simscen.sim.inertia import GRAVITY
 from simscen.sim.outline import extremes
 from simscen.sim.robot_body import RobotBody

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import pybullet
 
-from simscen.core.events import Event, EventKind
+from simscen.core.records.events import Event, EventKind
 
 PATIENCE = 0.1
 """Seconds without contact after which a collision is over; a bouncing robot collides once."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.robot import Ackermann, Differential, Mecanum, Omnidirectional, SkidSteer
 from simscen.sim.ackermann import AckermannDrive
 from simscen.sim.mecanum import MecanumDrive

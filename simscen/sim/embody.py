@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Solid
+from simscen.core.geometry.shapes import Solid
 from simscen.model.robot import RobotSpec
 from simscen.sim.ground import refuse_dragging
 from simscen.sim.inertia import MassProperties, of_solids

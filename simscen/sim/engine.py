@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 
-from simscen.core.facemesh import compact
+from simscen.core.environment.drivable_surfaces import FLOOR_HEIGHT_M
 from simscen.core.geometry import Array, Pose3
-from simscen.core.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
-from simscen.core.terrain import FLOOR
+from simscen.core.geometry.meshes import submesh
+from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
 from simscen.sim.hull import few_corners
 from simscen.sim.inertia import GRAVITY
 from simscen.sim.outline import extremes
@@ -100,12 +100,12 @@ def tiles(vertices: Array, faces: Faces) -> list[Faces]:
 
 def above_floor(vertices: Array, faces: Faces) -> Faces:
     """Those faces that do not lie on the ground."""
-    standing: Faces = faces[(vertices[faces, 2] > FLOOR).any(axis=1)]
+    standing: Faces = faces[(vertices[faces, 2] > FLOOR_HEIGHT_M).any(axis=1)]
     return standing
 
 
 def _concave(client: int, vertices: Array, faces: Faces) -> int:
-    body = fixed(client, concave_shape(client, compact(vertices, faces)))
+    body = fixed(client, concave_shape(client, submesh(vertices, faces)))
     # Bullet would thicken the triangles by 1 mm.
     pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
     return body

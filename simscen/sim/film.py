@@ -7,7 +7,7 @@ import numpy as np
 import pybullet
 
 from simscen.core.geometry import Array, Pose3
-from simscen.core.shapes import Body, Solid, TriangleMesh
+from simscen.core.geometry.shapes import Body, Solid, TriangleMesh
 from simscen.sim import engine
 
 FACES_AT_ONCE = 20_000

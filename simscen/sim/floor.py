@@ -5,8 +5,8 @@ floor is one plane; where a patch lies on it, the wheels that are there get its 
 friction of its own, a patch multiplies it.
 """
 
-from simscen.core.polygons import holds
-from simscen.core.surface import Patch
+from simscen.core.environment.world_model import Patch
+from simscen.core.geometry.polygons import polygon_contains
 
 
 class Floor:
@@ -36,6 +36,6 @@ class Floor:
         """At a place: that of the uppermost patch there, else 1."""
         found = 1.0
         for patch, (left, low, right, high) in self._patches.values():
-            if left <= x <= right and low <= y <= high and holds(patch.outline, (x, y)):
+            if left <= x <= right and low <= y <= high and polygon_contains(patch.outline, (x, y)):
                 found = patch.friction
         return found

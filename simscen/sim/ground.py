@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
 from simscen.model.robot import Omnidirectional, RobotSpec
 
 GROUND_CLEARANCE = 0.005

@@ -5,7 +5,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.shapes import Mesh
+from simscen.core.geometry.shapes import Mesh
 
 MANY_CORNERS = 256
 """Vertices up to which a mesh is taken as it is."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array, Pose3
-from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 
 Vector = tuple[float, float, float]
 GRAVITY = 9.81

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from simscen.core.polygons import holds
+from simscen.core.geometry.polygons import polygon_contains
 from simscen.sim.inertia import MassProperties, combined
 from simscen.sim.outline import convex_hull, extremes
 from simscen.sim.robot_body import RobotBody
@@ -40,4 +40,4 @@ def stands(body: RobotBody) -> bool:
     """Whether its centre of mass is above what its wheels and casters span; a base without wheels never tips."""
     feet = [(wheel.x, wheel.y) for wheel in body.wheels] + [(c.pose.x, c.pose.y) for c in body.casters]
     x, y, _ = centre(body)
-    return len(feet) < 3 or body.drive.type == "mecanum" or holds(convex_hull(np.array(feet)), (x, y))
+    return len(feet) < 3 or body.drive.type == "mecanum" or polygon_contains(convex_hull(np.array(feet)), (x, y))

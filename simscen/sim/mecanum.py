@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from simscen.core.mecanum import MecanumWheels
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import MecanumWheels, Twist
 from simscen.model.robot import Mecanum
 from simscen.sim.planar import OmnidirectionalDrive, PlanarBase
 from simscen.sim.robot_body import RobotBody

@@ -5,10 +5,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from simscen.core.decorators import cached_on_instance
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Array, Pose3
-from simscen.core.remembered import remembered
-from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
-from simscen.core.world import Polygon
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 
 FEW = 200
 """Points up to which it does not pay to look which of them may be corners."""
@@ -32,7 +32,7 @@ def parts(solids: Iterable[Solid], z_range: tuple[float, float]) -> list[Polygon
     return [outline for solid in solids if (outline := _outline(solid.shape, solid.pose, z_range))]
 
 
-@remembered
+@cached_on_instance
 def _outline(shape: Shape, pose: Pose3, z_range: tuple[float, float]) -> Polygon:
     """None (no corners) if it does not reach into the heights. Of a row of chairs it is one for all of them."""
     corners = pose.apply(extremes(shape))

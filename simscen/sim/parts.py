@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.facemesh import CONVEX_FACES
+from simscen.core.decorators import cached_on_instance
 from simscen.core.geometry import Array
-from simscen.core.remembered import remembered
-from simscen.core.shapes import TriangleMesh
+from simscen.core.geometry.meshes import MAX_CONVEX_FACES
+from simscen.core.geometry.shapes import TriangleMesh
 
 EDGE = 4.0
 """m of a tile. Twice the usual reach: a robot has a handful of tiles about it, of some hundred faces each."""
@@ -57,11 +57,11 @@ class Parts:
         return found
 
 
-@remembered
+@cached_on_instance
 def parts_of(mesh: TriangleMesh) -> Parts:
     """The parts of a mesh."""
     corners = mesh.vertices[mesh.faces]
-    large = np.bincount(mesh.owners, minlength=len(mesh.names))[mesh.owners] > CONVEX_FACES
+    large = np.bincount(mesh.owners, minlength=len(mesh.names))[mesh.owners] > MAX_CONVEX_FACES
     tiles = np.where(large[:, None], np.floor(corners[:, :, :2].mean(axis=1) / EDGE), 0.0)
     order = np.lexsort((tiles[:, 1], tiles[:, 0], mesh.owners))
     keys = np.column_stack((mesh.owners, tiles))[order]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 import pybullet
 
 from simscen.core.geometry import Pose2, Pose3, wrap
-from simscen.core.motion import STOP, Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.sim import engine
 from simscen.sim.inertia import GRAVITY, MassProperties, combined
 from simscen.sim.ramp import Ramp

@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 
-from simscen.core.facemesh import compact, is_convex
+from simscen.core.environment.drivable_surfaces import FLOOR_HEIGHT_M
 from simscen.core.geometry import Array, Pose3
-from simscen.core.shapes import TriangleMesh
-from simscen.core.terrain import FLOOR
+from simscen.core.geometry.meshes import is_convex, submesh
+from simscen.core.geometry.shapes import TriangleMesh
 from simscen.sim import engine, outline
 from simscen.sim.clients import CLIENTS
 from simscen.sim.enclosure import TILT, winds_along_a_line, winds_around
@@ -58,7 +58,7 @@ class Proximity:
         self._nearest: Around | None = None
         self._distance = math.inf
         self._pose, self._centre = Pose3(), (math.inf, math.inf)
-        self._standing: npt.NDArray[np.int64] = np.flatnonzero(self._parts.high[:, 2] > FLOOR)
+        self._standing: npt.NDArray[np.int64] = np.flatnonzero(self._parts.high[:, 2] > FLOOR_HEIGHT_M)
         low, high = self._parts.low[self._standing], self._parts.high[self._standing]
         self._extents = np.ascontiguousarray((low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
 
@@ -145,10 +145,10 @@ class Proximity:
         if hulls and (own := hulls[self._parts.owners[part]]):
             return [engine.convex_shape(self._client, vertices[own])]
         faces = self._mesh.faces[self._parts.faces(part)]
-        if self._parts.whole(part) and is_convex(solid := compact(vertices, faces)):
+        if self._parts.whole(part) and is_convex(solid := submesh(vertices, faces)):
             return [engine.convex_shape(self._client, solid.vertices)]
         lots = engine.tiles(vertices, engine.above_floor(vertices, faces))
-        return [engine.concave_shape(self._client, compact(vertices, lot)) for lot in lots]
+        return [engine.concave_shape(self._client, submesh(vertices, lot)) for lot in lots]
 
     def around(self, place: tuple[float, float, float], but: Collection[int] = ()) -> list[int]:
         """The solids that a place is inside of, by number, without those in `but`."""
@@ -172,7 +172,7 @@ class Proximity:
 
     def convex(self, owner: int) -> bool:
         """Whether a solid is convex."""
-        return is_convex(compact(self._mesh.vertices, self._faces(owner)))
+        return is_convex(submesh(self._mesh.vertices, self._faces(owner)))
 
     def _faces(self, owner: int) -> npt.NDArray[np.int32]:
         return self._mesh.faces[self._parts.faces_of(owner)]

@@ -1,6 +1,6 @@
 """What a base's firmware makes of velocity commands: clipped, and never faster than it can accelerate."""
 
-from simscen.core.motion import STOP, Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.robot import Limits
 
 

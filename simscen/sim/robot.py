@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.errors import RunError
-from simscen.core.events import Event
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.shapes import Body, TriangleMesh
-from simscen.core.trace import Late, Truth
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Body, TriangleMesh
+from simscen.core.records.events import Event
+from simscen.core.records.trace import DeferredTruth, Truth
 from simscen.sim.actors import NEVER, Actors
 from simscen.sim.camera import picture
 from simscen.sim.clearance import Clearance
@@ -163,7 +163,7 @@ class Robot:
         tick = self._scene.tick
         return self._truth(tick, self._sound(tick))
 
-    def sample(self, ticks: int) -> Truth | Late:
+    def sample(self, ticks: int) -> Truth | DeferredTruth:
         """The same, to be looked at later; it is asked again after so many ticks. Raises as `truth`."""
         tick = self._scene.tick
         state = self._sound(tick)

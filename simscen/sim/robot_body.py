@@ -3,9 +3,9 @@
 import math
 from dataclasses import dataclass
 
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Solid, Sphere
-from simscen.core.world import Polygon
+from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.model.robot import Drive, Limits, RobotSpec
 from simscen.sim.inertia import MassProperties
 from simscen.sim.outline import circle, footprint

@@ -7,7 +7,7 @@ several in a row take half the time.
 from collections.abc import Mapping
 
 from simscen.core.geometry import Pose3
-from simscen.core.trace import Truth
+from simscen.core.records.trace import Truth
 from simscen.sim.clearance import Clearance
 from simscen.sim.state import State
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import pybullet
 
-from simscen.core.case import CLEARANCE_RANGE
+from simscen.core.environment.world_model import Patch
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Body, MotionPath, TriangleMesh
-from simscen.core.surface import Patch
+from simscen.core.geometry.shapes import Body, MotionPath, TriangleMesh
+from simscen.core.records.case import CLEARANCE_RANGE
 from simscen.sim import engine
 from simscen.sim.actors import Actors
 from simscen.sim.clients import CLIENTS

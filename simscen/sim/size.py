@@ -3,8 +3,7 @@
 import math
 from pathlib import Path
 
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
 from simscen.sim.outline import reach
 from simscen.sim.robot_body import RobotBody
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 from simscen.core.geometry import Pose3, Vector
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 
 _made = tuple.__new__  # a twist without the calls of its class
 

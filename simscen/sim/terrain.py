@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 
-from simscen.core.facemesh import compact, is_convex
+from simscen.core.environment.drivable_surfaces import Owners, drivable_solids
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.shapes import Body, TriangleMesh
-from simscen.core.terrain import Owners, terrain
+from simscen.core.geometry.meshes import is_convex, submesh
+from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.sim import engine
 
 SKY = 1000.0
@@ -36,7 +36,7 @@ class Terrain:
     def __init__(self, client: int, static: TriangleMesh, reach: float) -> None:
         """`reach` is the highest step in m that any robot could get onto: the radius of its wheels."""
         self._client = client
-        self.owners: Owners = terrain(static, reach)
+        self.owners: Owners = drivable_solids(static, reach)
         self.names: dict[int, str | None] = {}
         self.rest = static
         """What stands in the world besides: walls to wheels."""
@@ -53,12 +53,12 @@ class Terrain:
 
     def _add(self, static: TriangleMesh, owner: int) -> None:
         whole = static.faces[static.owners == owner]
-        solid = compact(static.vertices, whole)
+        solid = submesh(static.vertices, whole)
         if is_convex(solid):
             shapes = [engine.convex_shape(self._client, solid.vertices)]
         else:
             lots = engine.tiles(static.vertices, engine.above_floor(static.vertices, whole))
-            shapes = [engine.concave_shape(self._client, compact(static.vertices, lot)) for lot in lots]
+            shapes = [engine.concave_shape(self._client, submesh(static.vertices, lot)) for lot in lots]
         friction = static.frictions[owner] if static.frictions else 1.0
         for shape in shapes:
             body = engine.fixed(self._client, shape)
@@ -99,10 +99,12 @@ class Terrain:
         return Pose3.planar(pose, base + lift).compose(tilt)
 
 
-def stands(terrain: Mapping[int, str | None], rolling: Mapping[int, float], other: int, link: int, up: float) -> bool:
+def stands(
+    drivable_solids: Mapping[int, str | None], rolling: Mapping[int, float], other: int, link: int, up: float
+) -> bool:
     """Whether a contact is that of a wheel or caster with the ground, rather than a collision.
 
     `rolling` are those links, and the least `up` at which they stand: the z of the unit normal towards the robot.
     `other` is the engine's number of what the robot's `link` touches.
     """
-    return other in terrain and link in rolling and up >= rolling[link]
+    return other in drivable_solids and link in rolling and up >= rolling[link]

@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Cylinder, Solid, Sphere
-from simscen.core.world import Polygon
+from simscen.core.geometry.shapes import Box, Cylinder, Solid, Sphere
 from simscen.model.robot import Ackermann, Differential, Drive, Mecanum, Omnidirectional, SkidSteer
 from simscen.sim.inertia import GRAVITY, MassProperties, of_shape
 from simscen.sim.outline import footprint

@@ -8,7 +8,7 @@ import numpy as np
 import pybullet
 
 from simscen.core.geometry import Pose2, Pose3, Vector, rotated
-from simscen.core.shapes import Solid, Sphere
+from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.sim import engine
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.state import State

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.facelots import FaceLots, lots_of
-from simscen.core.remembered import remembered
-from simscen.core.shapes import TriangleMesh
+from simscen.core.decorators import cached_on_instance
+from simscen.core.geometry.meshes import FaceTiles, tile_faces
+from simscen.core.geometry.shapes import TriangleMesh
 from simscen.sim import engine
 from simscen.sim.parts import parts_of
 
@@ -72,6 +72,6 @@ def ready(mesh: TriangleMesh) -> None:
         _lots_of(mesh)
 
 
-@remembered
-def _lots_of(mesh: TriangleMesh) -> FaceLots:
-    return lots_of(mesh.vertices, engine.above_floor(mesh.vertices, mesh.faces), EDGE)
+@cached_on_instance
+def _lots_of(mesh: TriangleMesh) -> FaceTiles:
+    return tile_faces(mesh.vertices, engine.above_floor(mesh.vertices, mesh.faces), EDGE)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pybullet
 
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.robot import Differential, SkidSteer
 from simscen.sim.ramp import Ramp
 from simscen.sim.robot_body import RobotBody

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, ValidationError, core_schema
 
-from simscen.core.navigation import RecoveryBehavior
+from simscen.core.messages.navigation import RecoveryBehavior
 from simscen.spec.component import Typed
 from simscen.spec.lazy import LazySpec
 from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped

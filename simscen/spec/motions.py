@@ -9,7 +9,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import AfterValidator, Field, model_validator
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.shapes import MotionPath
+from simscen.core.geometry.shapes import MotionPath
 from simscen.spec.base import Spec
 from simscen.spec.named_places import PlaceOrPoint
 from simscen.spec.quantities import Angle, Duration, Length, PositiveSpeed

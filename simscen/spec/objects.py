@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Cylinder, Extrusion, Shape, Solid
+from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Shape, Solid
 from simscen.spec.base import Spec
 from simscen.spec.places import Ring
 from simscen.spec.quantities import NonNegativeLength, PositiveLength

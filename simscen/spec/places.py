@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field, PrivateAttr, StringConstraints
 
 from simscen.core.geometry import Pose2
-from simscen.core.polygons import flaw
+from simscen.core.geometry.polygons import polygon_defect
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Length
 
@@ -22,7 +22,7 @@ Point = Annotated[list[Length], Field(min_length=2, max_length=2)]
 
 
 def _without_flaw(ring: list[Point]) -> list[Point]:
-    wrong = flaw([(x, y) for x, y in ring])
+    wrong = polygon_defect([(x, y) for x, y in ring])
     if wrong:
         raise ValueError(f"the polygon {wrong}")
     return ring

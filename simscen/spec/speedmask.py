@@ -10,8 +10,8 @@ from simscen.spec.base import Spec
 from simscen.spec.references import MaskFile
 
 if TYPE_CHECKING:
-    from simscen.core.filtermasks import SpeedLimits
-    from simscen.core.grid import OccupancyGrid
+    from simscen.core.environment.costmap_filters import SpeedLimits
+    from simscen.core.environment.occupancy_grid import OccupancyGrid
 
 
 class SpeedMask(Spec):
@@ -32,6 +32,6 @@ class SpeedMask(Spec):
 
     def over(self, grid: OccupancyGrid) -> SpeedLimits:
         """The limits that it makes of the cells in its file."""
-        from simscen.core.filtermasks import SpeedLimits
+        from simscen.core.environment.costmap_filters import SpeedLimits
 
         return SpeedLimits(grid, self.type == "percent", self.base, self.multiplier)

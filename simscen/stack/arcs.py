@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 
 NO_TURN = 1e-6
 """rad/s below which an arc is a straight line."""

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from simscen.core.chance import Streams
-from simscen.core.goalnames import Mode
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
+from simscen.core.messages.goal_names import Mode
+from simscen.core.random_streams import Streams
 from simscen.model.latency import Latency
 from simscen.model.recovery import Recovery
 from simscen.model.stack import InProcessStack, StackSpec

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.sensing import Scan
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.costmap.obstacle_layer import ScanAmongMoving

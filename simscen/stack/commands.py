@@ -1,7 +1,7 @@
 """From what the controller wants to what is sent to the base."""
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.underway import Underway
 from simscen.stack.velocity_smoother import VelocitySmoother

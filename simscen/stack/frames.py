@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.core.world import Polygon
 
 
 class Frames(NamedTuple):

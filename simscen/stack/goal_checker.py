@@ -7,8 +7,8 @@ Here the robot goes on until it is well inside, or until it stands anywhere insi
 import math
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Goal
 from simscen.model.checkers import SimpleGoalChecker as Spec
 from simscen.stack.setting import Setting
 

@@ -1,7 +1,7 @@
 """The plan as a controller follows it: in the odom frame, in which its costmap is."""
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import Goal, Path
+from simscen.core.messages.navigation import Goal, Path
 from simscen.stack.frames import Frames, placed
 from simscen.stack.protocols import Controller
 from simscen.stack.replanning import PlanInForce

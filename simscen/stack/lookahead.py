@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.stack.arcs import NO_TURN, poses_along
 from simscen.stack.footprint import Footprint, distance_at, distances, lethal_near
 from simscen.stack.protocols import CostmapView

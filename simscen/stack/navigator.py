@@ -10,9 +10,9 @@ map or inside a mapped wall fails after the first retry: no recovery changes tha
 
 from typing import NamedTuple
 
-from simscen.core.events import Event, EventKind, Value
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import ErrorCode, Goal
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import ErrorCode, Goal
+from simscen.core.records.events import Event, EventKind, Value
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.forgetting import Forgetting
 from simscen.stack.frames import Frames

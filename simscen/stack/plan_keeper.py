@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.events import Event, EventKind, Value
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.records.events import Event, EventKind, Value
 from simscen.model.planners import PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.prediction.foreseen import foreseen, meets

@@ -13,17 +13,16 @@ from typing import Protocol, TypeGuard, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.belief import Belief, Estimate
-from simscen.core.filtermasks import FilterMasks
+from simscen.core.decorators import fast_dataclass
+from simscen.core.environment.costmap_filters import FilterMasks, Zones
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.navigation import ErrorCode, Goal, Path
-from simscen.core.oftenmade import often_made
-from simscen.core.sensing import Imu, Odometry, Readings, Scan
-from simscen.core.trace import Decision
-from simscen.core.world import Polygon
-from simscen.core.zones import Zones
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.sensor_data import Imu, Odometry, Readings, Scan
+from simscen.core.records.trace import Decision
 from simscen.stack.prediction.moving import NOTHING, Moving
 
 
@@ -121,7 +120,7 @@ LETHAL = 254
 """nav2_costmap_2d's cost of an obstacle."""
 
 
-@often_made(eq=False)
+@fast_dataclass(eq=False)
 class CostmapView:
     """A costmap at a moment: the global one in the map frame, which planners see, or the local one in the odom frame.
 

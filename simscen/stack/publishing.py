@@ -6,11 +6,11 @@ from typing import Literal
 
 import numpy as np
 
-from simscen.core.belief import Belief
+from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import UNKNOWN, OccupancyGrid
-from simscen.core.navigation import Path
-from simscen.core.trace import CostGrid
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Path
+from simscen.core.records.trace import CostGrid
 from simscen.stack.arcs import SHOWN, arc
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames, placed

@@ -3,14 +3,14 @@
 from functools import partial
 from typing import Any
 
-from simscen.core.belief import Estimate
-from simscen.core.events import Event
+from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import ErrorCode, Goal, Path
-from simscen.core.sensing import Bump, Image, Imu, Odometry, Readings, Scan
-from simscen.core.trace import Decision
-from simscen.core.zones import Zones
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readings, Scan
+from simscen.core.records.events import Event
+from simscen.core.records.trace import Decision
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import Commands
 from simscen.stack.costmap.costmaps import Costmaps

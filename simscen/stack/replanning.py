@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import Path
+from simscen.core.messages.navigation import Path
 from simscen.stack.controllers.tracking import PathTracker
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import distances

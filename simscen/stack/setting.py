@@ -6,13 +6,13 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from simscen.core.belief import Estimate
-from simscen.core.chance import Streams
+from simscen.core.clock import Clock
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.goalnames import Mode
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.time import Clock
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.goal_names import Mode
+from simscen.core.messages.localization import Estimate
+from simscen.core.random_streams import Streams
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from simscen.core.events import Event, EventKind
+from simscen.core.records.events import Event, EventKind
 
 AFTER = 1.0
 """Seconds that it stands for the same reason until that is told; a plan or a scan may well be a little late."""

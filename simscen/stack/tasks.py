@@ -1,9 +1,9 @@
 """The list of goals: what is accepted, reached, passed, failed, canceled, and how the whole task ended."""
 
-from simscen.core.events import Event, EventKind, Value
-from simscen.core.goalnames import Mode
-from simscen.core.navigation import ErrorCode, Goal, TaskResult
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
+from simscen.core.messages.goal_names import Mode
+from simscen.core.messages.navigation import ErrorCode, Goal, TaskResult
+from simscen.core.records.events import Event, EventKind, Value
 
 Events = tuple[Event, ...]
 

@@ -8,7 +8,7 @@ the room there is in a narrow gap. A disturbance observer, and feedforward: what
 import math
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 
 FORGETS = 0.5
 """Metres driven in which what was learnt fades by a factor of e: turns and ground change."""

@@ -2,7 +2,7 @@
 
 import math
 
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.stack.protocols import RobotModel
 

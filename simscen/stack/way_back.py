@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import STOP, Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.stack.arcs import poses_along
 from simscen.stack.footprint import Mask, lethal_near
 from simscen.stack.protocols import CostmapView, RobotModel

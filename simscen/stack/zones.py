@@ -1,8 +1,8 @@
 """Where the robot must drive slowly (nav2's speed filter)."""
 
+from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
-from simscen.core.polygons import distance_to_polygon
-from simscen.core.zones import Zones
+from simscen.core.geometry.polygons import distance_to_polygon
 from simscen.stack.protocols import Surroundings
 
 

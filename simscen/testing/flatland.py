@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.belief import Estimate
-from simscen.core.chance import Streams
-from simscen.core.events import Event
+from simscen.core.clock import Clock
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import Goal, Path
-from simscen.core.sensing import Odometry, Reading, Scan
-from simscen.core.time import Clock
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.sensor_data import Odometry, Reading, Scan
+from simscen.core.random_streams import Streams
+from simscen.core.records.events import Event
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
 from simscen.stack.protocols import RobotModel, Stack, Surroundings

@@ -5,18 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.belief import Belief
-from simscen.core.chance import Streams
-from simscen.core.events import Event
+from simscen.core.clock import Clock
+from simscen.core.environment.costmap_filters import ZoneSwitch
+from simscen.core.environment.pedestrians import WalkingPedestrian
+from simscen.core.environment.world_model import Patch, Polygon
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import Goal, Path
-from simscen.core.shapes import Body, MotionPath
-from simscen.core.surface import Patch
-from simscen.core.time import Clock
-from simscen.core.walker import Walker
-from simscen.core.world import Polygon
-from simscen.core.zones import ZoneSwitch
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.geometry.shapes import Body, MotionPath
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Goal, Path
+from simscen.core.random_streams import Streams
+from simscen.core.records.events import Event
 
 
 @dataclass
@@ -76,7 +75,7 @@ class PuppetStage:
         """Write it down."""
         self.done.append(("spawn", body))
 
-    def walk(self, walker: Walker) -> None:
+    def walk(self, walker: WalkingPedestrian) -> None:
         """Write it down."""
         self.done.append(("walk", walker))
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.rays import RayCaster
+from simscen.core.geometry.ray_fans import RayCaster
 from simscen.model.robot import Differential
 
 SPEED, TURN = 0.3, 0.2

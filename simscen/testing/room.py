@@ -9,12 +9,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from simscen.core.belief import Belief, Estimate
-from simscen.core.chance import Streams
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.sensing import Imu, Odometry, Scan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.sensor_data import Imu, Odometry, Scan
+from simscen.core.random_streams import Streams
 from simscen.model.localizers import LocalizerSpec
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings
 from simscen.stack.setting import Setting

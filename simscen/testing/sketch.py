@@ -5,15 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.case import CLEARANCE_RANGE, Case
-from simscen.core.disturbance import Disturbance
-from simscen.core.events import Event, EventKind
+from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.core.maskcells import MaskCells
-from simscen.core.navigation import Goal, Path
-from simscen.core.passage import Passage
-from simscen.core.samples import Samples, Ticks
-from simscen.core.trace import Trace
+from simscen.core.messages.navigation import Goal, Path
+from simscen.core.records.case import CLEARANCE_RANGE, Case, Passage
+from simscen.core.records.disturbances import Disturbance
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Samples, Ticks, Trace
 
 TICK_RATE, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
 
@@ -130,7 +128,7 @@ def sketch_case(words: Mapping[str, Any]) -> Case:
             Passage(goal, ((ax, ay), (bx, by)), (one, other))
             for goal, (ax, ay), (bx, by), one, other in words.get("passages", [])
         ),
-        masks={name: MaskCells(**_mask(mask)) for name, mask in words.get("masks", {}).items()},
+        masks={name: MaskBlocks(**_mask(mask)) for name, mask in words.get("masks", {}).items()},
         expected=words.get("expected", {}),
         disturbances=tuple(Disturbance(**ordered) for ordered in words.get("disturbances", [])),
     )

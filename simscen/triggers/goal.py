@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from simscen.core.events import EventKind
-from simscen.core.goalnames import named
+from simscen.core.messages.goal_names import matches_goal_name
+from simscen.core.records.events import EventKind
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.references import GoalName
@@ -28,4 +28,4 @@ class GoalStatus(Spec, Condition):
     def holds(self, now: Situation) -> bool:
         """Enough such reports have come."""
         kind = EventKind(f"goal.{self.status}")
-        return sum(e.kind == kind and named(e.name, self.name) for e in now.events) >= self.count
+        return sum(e.kind == kind and matches_goal_name(e.name, self.name) for e in now.events) >= self.count

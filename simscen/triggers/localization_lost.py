@@ -2,8 +2,8 @@
 
 import math
 
-from simscen.core.belief import Belief
 from simscen.core.geometry import wrap
+from simscen.core.messages.localization import Belief
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngle, PositiveLength

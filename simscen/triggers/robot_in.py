@@ -1,6 +1,6 @@
 """`robot_in`: the robot is inside a region."""
 
-from simscen.core.polygons import distance_to_polygon
+from simscen.core.geometry.polygons import distance_to_polygon
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.references import RegionName

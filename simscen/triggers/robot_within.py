@@ -3,7 +3,7 @@
 from pydantic import model_validator
 
 from simscen.core.geometry import Pose2
-from simscen.core.polygons import distance_to_polygon
+from simscen.core.geometry.polygons import distance_to_polygon
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.named_places import PlaceOrPoint

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from simscen.core.errors import BROKEN, RunError
+from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.spec.choice import Choice
 from simscen.spec.lazy import LazySpec
 from simscen.spec.places import RobotName
@@ -87,7 +87,7 @@ class Test(Choice):
         assert isinstance(condition, Condition)
         answer: object = condition.holds(now)
         if not isinstance(answer, bool | np.bool_):
-            raise RunError(BROKEN, f"a condition says neither True nor False, but {answer!r}{self.added_by}")
+            raise RunError(BROKEN_COMPONENT, f"a condition says neither True nor False, but {answer!r}{self.added_by}")
         return bool(answer)
 
 

@@ -4,8 +4,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from simscen.core.events import EventKind
-from simscen.core.goalnames import named
+from simscen.core.messages.goal_names import matches_goal_name
+from simscen.core.records.events import EventKind
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.references import GoalName
@@ -30,4 +30,4 @@ class Waypoint(Spec, Condition):
 
     def holds(self, now: Situation) -> bool:
         """Enough of them."""
-        return sum(e.kind in BEHIND and named(e.name, self.name) for e in now.events) >= self.count
+        return sum(e.kind in BEHIND and matches_goal_name(e.name, self.name) for e in now.events) >= self.count

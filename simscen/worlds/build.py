@@ -1,6 +1,6 @@
 """A world made ready: once for each world and lidar height, shared by all its runs."""
 
-from simscen.core.world import BuiltWorld, World
+from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.worlds.mapsize import RESOLUTION
 from simscen.worlds.meshing import fuse
 from simscen.worlds.slicing import map_of

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array
-from simscen.core.grid import OccupancyGrid
-from simscen.core.shapes import TriangleMesh
+from simscen.core.geometry.shapes import TriangleMesh
 from simscen.worlds.raster import Cells, filled, ranges, touched
 from simscen.worlds.section import Section, section
 

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
-from simscen.core.world import World
+from simscen.core.environment.world_model import World
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 from simscen.worlds.upright import upright
 
 ZRange = tuple[float, float]

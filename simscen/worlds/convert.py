@@ -11,10 +11,10 @@ from itertools import pairwise
 import numpy as np
 from pydantic import ValidationError
 
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import wrap
-from simscen.core.motion_path import pose_at
-from simscen.core.shapes import Body, MotionPath, Solid
-from simscen.core.world import World
+from simscen.core.geometry.motion_paths import pose_at
+from simscen.core.geometry.shapes import Body, MotionPath, Solid
 from simscen.model.world import Movable, Obstacle, Travel, WorldSpec
 from simscen.worlds.forms import DIGITS, Form, forms_of
 

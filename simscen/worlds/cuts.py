@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Array
-from simscen.core.polygons import holds
-from simscen.core.shapes import Solid
-from simscen.core.world import Polygon
+from simscen.core.geometry.polygons import polygon_contains
+from simscen.core.geometry.shapes import Solid
 from simscen.worlds.clearance import standing_outlines
 from simscen.worlds.meshing import fuse
 from simscen.worlds.plan_distance import winds_about
@@ -32,7 +32,7 @@ def _some_inside(segments: Array, corners: Polygon) -> bool:
     (left, low), (right, high) = np.min(corners, axis=0), np.max(corners, axis=0)
     x, y = segments[:, 0].T
     near = segments[(x >= left) & (x <= right) & (y >= low) & (y <= high), 0]
-    return any(holds(corners, (px, py)) for px, py in near.tolist())
+    return any(polygon_contains(corners, (px, py)) for px, py in near.tolist())
 
 
 def _cross(segments: Array, a: Array, b: Array) -> bool:

@@ -12,8 +12,8 @@ import numpy as np
 from embreex import rtcore_scene
 
 from simscen.core.geometry import Array
-from simscen.core.packets import WIDE, Packets
-from simscen.core.shapes import Mesh, TriangleMesh
+from simscen.core.geometry.ray_fans import PACKET_SIZE, RayPackets
+from simscen.core.geometry.shapes import Mesh, TriangleMesh
 
 _LIBRARY = ctypes.PyDLL(rtcore_scene.__file__)  # whose names are also those of the libraries that it needs
 _TRIANGLES, _ROBUST, _COHERENT, _ALL = 0, 1 << 2, 1 << 16, 0xFFFFFFFF
@@ -51,7 +51,7 @@ class _Query(ctypes.Structure):
 
 _QUERY = _Query(_COHERENT, _ALL)
 _HOW = c_void_p(ctypes.addressof(_QUERY))
-_NUMBERS = np.full(WIDE + _ALIGNED // 4, -1, dtype=np.int32)
+_NUMBERS = np.full(PACKET_SIZE + _ALIGNED // 4, -1, dtype=np.int32)
 _EACH = c_void_p(_NUMBERS.ctypes.data + -_NUMBERS.ctypes.data % _ALIGNED)
 """That each ray of a packet is meant."""
 
@@ -91,7 +91,7 @@ class Scene:
         if error != _FINE:
             raise RuntimeError(f"Embree cannot take {count} triangles (its error {error})")
 
-    def cut(self, rays: Packets, some: slice = slice(None)) -> None:
+    def cut(self, rays: RayPackets, some: slice = slice(None)) -> None:
         """Rays end where they meet something; of `some` packets alone."""
         intersect, scene = _LIBRARY.rtcIntersect16, self._scene
         for packet in rays.addresses[some]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from simscen.core.geometry import Array, Pose3
-from simscen.core.shapes import Solid
+from simscen.core.geometry.shapes import Solid
 from simscen.worlds.upright import upright
 
 

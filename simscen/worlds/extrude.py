@@ -3,11 +3,10 @@
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.errors import InvalidInput
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Array, Pose3
-from simscen.core.grid import OccupancyGrid
-from simscen.core.problems import Problem
-from simscen.core.shapes import Mesh, Solid
+from simscen.core.geometry.shapes import Mesh, Solid
 
 Cells = npt.NDArray[np.bool_]
 Runs = npt.NDArray[np.int64]

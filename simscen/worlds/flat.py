@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable
 
-from simscen.core.shapes import Solid
-from simscen.core.terrain import FLOOR
+from simscen.core.environment.drivable_surfaces import FLOOR_HEIGHT_M
+from simscen.core.geometry.shapes import Solid
 from simscen.worlds.upright import upright
 
 
 def is_flat(solids: Iterable[Solid], reach: float) -> bool:
     """Whether it is plain without a look at triangles that wheels get onto no solid."""
     prisms = [upright(solid) for solid in solids]
-    return all(prism is not None and (prism.top > reach or prism.top <= FLOOR) for prism in prisms)
+    return all(prism is not None and (prism.top > reach or prism.top <= FLOOR_HEIGHT_M) for prism in prisms)

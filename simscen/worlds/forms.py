@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.shapes import Box, Cylinder, Extrusion, Solid
+from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid
 from simscen.spec.places import PoseSpec
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rings import MOST_CORNERS, OpenCut, area, pieces_of, rings_of

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.grid import OCCUPIED, UNKNOWN
-from simscen.core.shapes import Solid, TriangleMesh
-from simscen.core.world import BuiltWorld
+from simscen.core.environment.occupancy_grid import OCCUPIED, UNKNOWN
+from simscen.core.environment.world_model import BuiltWorld
+from simscen.core.geometry.shapes import Solid, TriangleMesh
 from simscen.worlds.meshing import fuse
 
 Extent = tuple[float, float, float, float, float, float]

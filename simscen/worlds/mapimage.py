@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.errors import InvalidInput
-from simscen.core.filesread import note_read
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.files import record_read_file
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -60,7 +59,7 @@ def _bytes_of(path: Path) -> bytes:
             raise BadImage("not a regular file")
         if status.st_size > MOST_BYTES:
             raise BadImage(f"map too large: {status.st_size} bytes, more than {MOST_BYTES}")
-        note_read(path.resolve())
+        record_read_file(path.resolve())
         return path.read_bytes()
     except OSError as error:
         reason = (error.strerror or "cannot be read").lower()

@@ -11,9 +11,9 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.facemesh import CONVEX_FACES
 from simscen.core.geometry import Array
-from simscen.core.shapes import (
+from simscen.core.geometry.meshes import MAX_CONVEX_FACES
+from simscen.core.geometry.shapes import (
     Box,
     Capsule,
     Cone,
@@ -50,7 +50,7 @@ def fuse(solids: Iterable[Solid]) -> TriangleMesh:
     for owner, solid in enumerate(solids):
         if solid.shape not in meshes:
             mesh = triangulate(solid.shape)
-            meshes[solid.shape] = mesh, len(mesh.faces) <= CONVEX_FACES and _convex(solid.shape)
+            meshes[solid.shape] = mesh, len(mesh.faces) <= MAX_CONVEX_FACES and _convex(solid.shape)
         mesh, convex = meshes[solid.shape]
         vertices.append(solid.pose.apply(mesh.vertices))
         faces.append(mesh.faces + np.int32(count))

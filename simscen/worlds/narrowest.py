@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.shapes import TriangleMesh
+from simscen.core.geometry.shapes import TriangleMesh
 from simscen.worlds.clearance import ClearanceField, clearance_field
 from simscen.worlds.slicing import empty_grid
 

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.facemesh import compact, is_convex
+from simscen.core.environment.drivable_surfaces import Owners, drivable_solids, face_normals
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.shapes import Box, Mesh, Solid, TriangleMesh
-from simscen.core.terrain import Owners, normals, terrain
+from simscen.core.geometry.meshes import is_convex, submesh
+from simscen.core.geometry.shapes import Box, Mesh, Solid, TriangleMesh
 from simscen.worlds.flat import is_flat
 from simscen.worlds.meshing import fuse
 
@@ -36,7 +36,7 @@ def obstacles_of(solids: tuple[Solid, ...], reach: float, slope: float, step: fl
     if slope <= 0 or is_flat(solids, reach):
         return solids
     mesh = fuse(solids)
-    ground = frozenset(owner for owner in terrain(mesh, reach) if _is_plain(mesh, owner))
+    ground = frozenset(owner for owner in drivable_solids(mesh, reach) if _is_plain(mesh, owner))
     if not ground:
         return solids
     stays = [solid for number, solid in enumerate(solids) if number not in ground]
@@ -46,12 +46,12 @@ def obstacles_of(solids: tuple[Solid, ...], reach: float, slope: float, step: fl
 def _is_plain(mesh: TriangleMesh, owner: int) -> bool:
     """Whether a solid is convex, or a height field: of any other shape what is high above a low part is in the way."""
     mine = mesh.owners == owner
-    return is_convex(compact(mesh.vertices, mesh.faces[mine])) or bool((normals(mesh)[mine, 2] >= 0).all())
+    return is_convex(submesh(mesh.vertices, mesh.faces[mine])) or bool((face_normals(mesh)[mine, 2] >= 0).all())
 
 
 def _too_steep(mesh: TriangleMesh, ground: Owners, slope: float) -> Iterator[Solid]:
     """Each face of the ground that is too steep, as a prism down to its foot."""
-    up = normals(mesh)[:, 2]
+    up = face_normals(mesh)[:, 2]
     for face in np.flatnonzero(_of(mesh, ground) & (up > UPRIGHT) & (up < math.cos(slope) - 1e-9)).tolist():
         corners = mesh.vertices[mesh.faces[face]]
         foot = corners.copy()
@@ -70,7 +70,7 @@ _PRISM = np.array(
 
 def _edges(mesh: TriangleMesh, ground: Owners, step: float) -> Iterator[Solid]:
     """Upright faces of the ground as thin walls, where the ground beside them is lower by more than a step."""
-    chosen = np.flatnonzero(_of(mesh, ground) & (np.abs(normals(mesh)[:, 2]) <= UPRIGHT))
+    chosen = np.flatnonzero(_of(mesh, ground) & (np.abs(face_normals(mesh)[:, 2]) <= UPRIGHT))
     pieces = list(_pieces(mesh, chosen))
     if not pieces:
         return
@@ -116,7 +116,7 @@ class _Edge(NamedTuple):
 def _pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_Edge]:
     """The edges that upright faces are in plan, each once, in pieces."""
     seen = set()
-    across = normals(mesh)[:, :2]
+    across = face_normals(mesh)[:, :2]
     for face in faces.tolist():
         outward, owner = across[face] / np.linalg.norm(across[face]), int(mesh.owners[face])
         along = np.array([-outward[1], outward[0]])

@@ -6,10 +6,10 @@ Solids that stand upright are looked at in plain numbers, like in `contain`.
 import math
 from collections.abc import Iterable, Sequence
 
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2
-from simscen.core.polygons import crosses, holds
-from simscen.core.shapes import Solid
-from simscen.core.world import Polygon
+from simscen.core.geometry.polygons import polygon_contains, segments_cross
+from simscen.core.geometry.shapes import Solid
 from simscen.worlds.contain import ZRange, is_near
 from simscen.worlds.upright import upright
 
@@ -38,13 +38,13 @@ def polygons_overlap(one: Sequence[tuple[float, float]], other: Sequence[tuple[f
 
     A corner on the other's border tells nothing, as where both are the same: then their middles do.
     """
-    if holds(one, other[0]) or holds(other, one[0]):
+    if polygon_contains(one, other[0]) or polygon_contains(other, one[0]):
         return True
     middles = [(sum(x for x, _ in ring) / len(ring), sum(y for _, y in ring) / len(ring)) for ring in (one, other)]
-    if any(holds(one, middle) and holds(other, middle) for middle in middles):
+    if any(polygon_contains(one, middle) and polygon_contains(other, middle) for middle in middles):
         return True
     edges = list(zip(other, (*other[1:], other[0]), strict=True))
-    return any(crosses(a, b, c, d) for a, b in zip(one, (*one[1:], one[0]), strict=True) for c, d in edges)
+    return any(segments_cross(a, b, c, d) for a, b in zip(one, (*one[1:], one[0]), strict=True) for c, d in edges)
 
 
 def _overlaps(solid: Solid, corners: Polygon, z_range: ZRange) -> bool:

@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion_path import pose_at
-from simscen.core.shapes import Body, Box, Solid
-from simscen.core.world import World
+from simscen.core.geometry.motion_paths import pose_at
+from simscen.core.geometry.shapes import Body, Box, Solid
 from simscen.model.world import Door, Movable, Obstacle, Ramp, Wall, WorldSpec
 from simscen.worlds.extents import rectangle
 from simscen.worlds.walls import wall_solids

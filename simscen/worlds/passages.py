@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
-from simscen.core.passage import Passage, Point
+from simscen.core.records.case import Passage, Point
 from simscen.ways.polyline import resampled
 from simscen.worlds.clearance import ClearanceField
 from simscen.worlds.taut import length

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
+from simscen.core.environment.world_model import BuiltWorld, Polygon
 from simscen.core.geometry import Array
-from simscen.core.grid import FREE, OccupancyGrid
-from simscen.core.shapes import Body
-from simscen.core.world import BuiltWorld, Polygon
+from simscen.core.geometry.shapes import Body
 from simscen.worlds.meshing import fuse
 from simscen.worlds.section import outlines
 

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping, Set
 
 import numpy as np
 
-from simscen.core.facemesh import between
 from simscen.core.geometry import Array, Pose3, Vector
-from simscen.core.rays import Fan, Singles
-from simscen.core.shapes import Mesh, TriangleMesh
+from simscen.core.geometry.meshes import submesh_between_heights
+from simscen.core.geometry.ray_fans import RayFan, Singles
+from simscen.core.geometry.shapes import Mesh, TriangleMesh
 from simscen.worlds.raypart import Heights, Part, meeting, towards
 
 Placed = tuple[TriangleMesh, Pose3]
@@ -46,7 +46,7 @@ class Piles:
             meshes = {name: Mesh(pose.apply(mesh.vertices), mesh.faces) for name, (mesh, pose) in come.items()}
             self._piles += Pile(self._middle, meshes).small()
 
-    def sweep(self, fan: Fan, pose: Pose3, reach: float, heights: Heights) -> None:
+    def sweep(self, fan: RayFan, pose: Pose3, reach: float, heights: Heights) -> None:
         """Rays of a fan at `pose` that was turned to it end at what they meet here."""
         for pile in self._piles:
             if pile.away(pose[:3]) <= reach:
@@ -108,7 +108,7 @@ class Pile:
     def _scene(self, heights: Heights) -> Part:
         if self._part is None or heights != self._heights:
             one = _one(list(self._meshes.values()))
-            self._part = Part(between(one.vertices, one.faces, heights), self._middle)
+            self._part = Part(submesh_between_heights(one.vertices, one.faces, heights), self._middle)
             self._heights = heights
         return self._part
 
@@ -116,7 +116,7 @@ class Pile:
         """How far in metres from a place the nearest of it may be."""
         return math.dist(self._centre, place) - self._radius
 
-    def sweep(self, fan: Fan, pose: Pose3, heights: Heights) -> None:
+    def sweep(self, fan: RayFan, pose: Pose3, heights: Heights) -> None:
         """Rays of a fan at `pose` that was turned to it end at what they meet here."""
         for packets in towards(fan, pose, self._centre, self._radius):
             self._scene(heights).sweep(fan, pose[:3], packets)

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterable
 from itertools import product
 
-from simscen.core.shapes import Solid
+from simscen.core.geometry.shapes import Solid
 from simscen.worlds.contain import ZRange
 from simscen.worlds.upright import Upright, upright
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Mesh, Solid
+from simscen.core.geometry.shapes import Mesh, Solid
 
 Point = tuple[float, float]
 

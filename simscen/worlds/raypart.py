@@ -5,11 +5,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.decorators import cached_on_instance
 from simscen.core.geometry import Array, Pose3, Vector, rotated
-from simscen.core.packets import WIDE, Packets
-from simscen.core.rays import ALL, Fan, Singles
-from simscen.core.remembered import remembered
-from simscen.core.shapes import Mesh, TriangleMesh
+from simscen.core.geometry.ray_fans import ALL_PACKETS, PACKET_SIZE, RayFan, RayPackets, Singles
+from simscen.core.geometry.shapes import Mesh, TriangleMesh
 from simscen.worlds.embree import Scene
 
 Heights = tuple[float, float]
@@ -36,12 +35,12 @@ class Part:
 
     def distances(self, origins: Array, directions: Array, ends: float | Singles) -> Singles:
         """Distances (n,) in the mesh's own frame; where nothing is hit before a ray ends, that of its end."""
-        rays = Packets(len(origins))
+        rays = RayPackets(len(origins))
         rays.put(origins - self.middle, directions, ends)
         self._scene.cut(rays)
         return rays.distances()
 
-    def sweep(self, fan: Fan, place: Vector, packets: slice = ALL) -> None:
+    def sweep(self, fan: RayFan, place: Vector, packets: slice = ALL_PACKETS) -> None:
         """The rays of a fan that begin in a place and point where they were turned to end at what they meet here.
 
         Of some `packets` of them alone.
@@ -51,7 +50,7 @@ class Part:
         self._scene.cut(fan.rays, packets)
 
 
-@remembered
+@cached_on_instance
 def part_of(mesh: TriangleMesh) -> Part:
     """The scene of a mesh, for all that ask, and for what is forked; it goes with the mesh."""
     return Part(mesh)
@@ -90,7 +89,7 @@ class Mover:
         turn = self._turn
         return self.part.distances((origins - self.pose[:3]) @ turn, directions @ turn, ends)
 
-    def sweep(self, fan: Fan, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
+    def sweep(self, fan: RayFan, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
         """Rays of a fan at `pose`, whose x and y axes are `axes`, end at what they meet here.
 
         It is asked for those within the cone about the sphere around it, if any goes as far.
@@ -98,14 +97,14 @@ class Mover:
         for packets in towards(fan, pose, self.middle, self.part.radius):
             self._cut(fan, packets, pose, axes)
 
-    def _cut(self, fan: Fan, packets: slice, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
+    def _cut(self, fan: RayFan, packets: slice, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
         (px, py, pz, *_), (ahead, left), (x, y, z, i, j, k, w) = pose, axes, self.pose
         back = -i, -j, -k, w
         fan.turn(rotated(back, ahead), rotated(back, left), packets)
         self.part.sweep(fan, rotated(back, (px - x, py - y, pz - z)), packets)
 
 
-def towards(fan: Fan, pose: Pose3, middle: Vector, radius: float) -> list[slice]:
+def towards(fan: RayFan, pose: Pose3, middle: Vector, radius: float) -> list[slice]:
     """The packets of a fan at `pose` with rays within the cone about a sphere, if any of them goes as far."""
     (x, y, z), (px, py, pz, i, j, k, w) = middle, pose
     way = x - px, y - py, z - pz
@@ -113,7 +112,7 @@ def towards(fan: Fan, pose: Pose3, middle: Vector, radius: float) -> list[slice]
     ahead, left, _ = rotated((-i, -j, -k, w), way)
     cone = fan.towards(ahead, left, math.sqrt(far * far - radius * radius) if far > radius else -math.inf)
     ends = fan.rays.ends
-    found = [slice(rays.start // WIDE, -(-rays.stop // WIDE)) for rays in cone]
+    found = [slice(rays.start // PACKET_SIZE, -(-rays.stop // PACKET_SIZE)) for rays in cone]
     # `max` takes ten times as long.
     return [packets for packets in found if (some := ends[packets]).item(some.argmax()) >= far - radius]
 

@@ -7,8 +7,8 @@ from types import MappingProxyType
 import numpy as np
 
 from simscen.core.geometry import Array, Pose3, forward_and_left
-from simscen.core.rays import Fan, RayCaster, Singles
-from simscen.core.shapes import TriangleMesh
+from simscen.core.geometry.ray_fans import RayCaster, RayFan, Singles
+from simscen.core.geometry.shapes import TriangleMesh
 from simscen.worlds.piles import Piles, Placed
 from simscen.worlds.raypart import Heights, Mover, Part, meeting, part_of
 
@@ -71,7 +71,7 @@ class RayScene(RayCaster):
         answer[distances > limit] = np.inf
         return answer
 
-    def sweep(self, fan: Fan, pose: Pose3, reach: float) -> Singles:
+    def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
         """See core.rays.RayCaster: with as few operations as may be, for each takes 1 µs where it runs once a scan."""
         place, (ahead, left) = pose[:3], forward_and_left(pose[3:])
         fan.turn(ahead, left)

@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.errors import InvalidInput
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.files import require_regular_file
 from simscen.core.geometry import Pose2
-from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from simscen.core.outputs import require_plain
-from simscen.core.problems import Problem
 from simscen.model.rosmap import RosMapSpec
 from simscen.worlds.mapimage import CODE, read_image
 
@@ -81,7 +80,7 @@ def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
     Trinary with map_saver's greys and thresholds, or raw where cells hold more than free, occupied and unknown.
     """
     image_path = yaml_path.with_suffix(".pgm")
-    require_plain(image_path)
+    require_regular_file(image_path)
     trinary = bool(np.isin(grid.cells, (FREE, OCCUPIED, UNKNOWN)).all())
     height, width = grid.shape
     header = f"P5\n{width} {height}\n255\n".encode()

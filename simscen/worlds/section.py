@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
-from simscen.core.shapes import TriangleMesh
+from simscen.core.geometry.shapes import TriangleMesh
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import Goal
-from simscen.core.passage import Passage
-from simscen.core.shapes import TriangleMesh
-from simscen.core.world import BuiltWorld
+from simscen.core.geometry.shapes import TriangleMesh
+from simscen.core.messages.navigation import Goal
+from simscen.core.records.case import Passage
 from simscen.ways.lattice import Lattice, Numbers
 from simscen.worlds.clearance import HALF_DIAGONAL, clearance_field
 from simscen.worlds.narrowest import narrowest_of

@@ -3,12 +3,11 @@
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.errors import InvalidInput
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.environment.world_model import World
+from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from simscen.core.problems import Problem
-from simscen.core.shapes import TriangleMesh
-from simscen.core.world import World
+from simscen.core.geometry.shapes import TriangleMesh
 from simscen.worlds.mapsize import RESOLUTION, map_size, too_large
 from simscen.worlds.raster import Cells, filled, touched
 from simscen.worlds.section import Section, section

@@ -6,10 +6,10 @@ Commands that must answer at once cannot wait for numpy. Bases are those of `mes
 import math
 from typing import NamedTuple
 
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose3
-from simscen.core.polygons import distance_to_segment
-from simscen.core.shapes import Box, Cylinder, Extrusion, Solid
-from simscen.core.world import Polygon
+from simscen.core.geometry.polygons import distance_to_segment
+from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid
 from simscen.worlds.facets import facets
 
 

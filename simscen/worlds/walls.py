@@ -3,7 +3,7 @@
 import math
 from itertools import pairwise
 
-from simscen.core.shapes import Extrusion, Solid
+from simscen.core.geometry.shapes import Extrusion, Solid
 
 Point = tuple[float, float]
 

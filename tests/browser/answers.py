@@ -5,10 +5,10 @@ from pathlib import Path
 
 from PIL import Image
 
-from simscen.core.disturbance import Disturbance, Happening
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
-from simscen.core.sessionevents import Artifacts, RunFinished
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.session_events import Artifacts, RunFinished
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.report.suite.history import Before, Past
 
 EVIL = "\"'><script>document.title='owned'</script><img src=x onerror=alert(1)>"
@@ -21,7 +21,7 @@ def run(scenario: str, seed: int = 1, left: float = 0.5, seconds: float = 20.0, 
         status, "path_length", f"{10 - 10 * left:.2f} m", "≤ 10.00 m", 10 * left, "m", 10 - 10 * left, 2400, (1.0, 2.0),
         ("why: a pallet stood in the way",) if left < 0 else (),
     )  # fmt: skip
-    fell = Happening(Disturbance("pallet falls", "event", "time: 3 s"), (720,), True, "spawned pallet", 720)
+    fell = DisturbanceOutcome(Disturbance("pallet falls", "event", "time: 3 s"), (720,), True, "spawned pallet", 720)
     result = RunResult(
         RunKey(scenario, seed, str(told.get("variation", "")), str(told.get("stack", ""))),
         f"{scenario}.scenario.yaml",

@@ -1,10 +1,10 @@
 """A log whose every name tries to break out of a page."""
 
-from simscen.core.case import Case
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import Goal
-from simscen.core.result import RunKey, RunResult
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.messages.navigation import Goal
+from simscen.core.records.case import Case
+from simscen.core.records.run_result import RunKey, RunResult
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.evaluation import outcome_of_verdicts
 from simscen.record.header import LogHeader
 from simscen.record.replay import Log

@@ -14,7 +14,7 @@ from drive import drive
 from hostile import EVIL, hostile_log
 from rig import Opened, Opener
 
-from simscen.core.samples import Samples
+from simscen.core.records.trace import Samples
 from simscen.judge.result_json import from_json
 from simscen.record.replay import read_run
 from simscen.report.replay import write_replay

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
 from simscen.record.recorder import Recorder
 from simscen.record.replay import read_log
 

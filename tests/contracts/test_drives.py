@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.robot import Holonomic, RobotSpec
 from simscen.sim.alone import Alone
 from simscen.sim.embody import robot_body

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from simscen.core.belief import Estimate
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import Amcl, Ekf, GroundTruth, LocalizerSpec, OdometryOnly
 from simscen.testing import Promise, promises_of
 from simscen.testing.contracts.localizer import here, short

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import yaml
 
-from simscen.core.chance import Streams
+from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.sensing import Bump, Image, Odometry, Scan
-from simscen.core.shapes import Box, Solid
-from simscen.core.time import Clock
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Box, Solid
+from simscen.core.messages.sensor_data import Bump, Image, Odometry, Scan
+from simscen.core.random_streams import Streams
 from simscen.model.robot import RobotSpec
 from simscen.sensors.build import build_sensors
 from simscen.sim.alone import Alone

@@ -10,7 +10,7 @@ import pytest
 
 from simscen.cli.diagnostics import as_text
 from simscen.cli.session.selection import Checks
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.codes import CODES
 
 HERE = Path(__file__).parent / "meaningless"

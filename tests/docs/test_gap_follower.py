@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.externalcommand import ExternalCommand
-from simscen.core.result import Outcome
+from simscen.core.external_command import ExternalCommand
+from simscen.core.records.run_result import Outcome
 from simscen.loading.scenario import load_scenario
 from simscen.model.anystack import ExternalStackSpec
 from simscen.run.prepare import prepare

@@ -12,8 +12,7 @@ from mcap import records
 from mutate import mutant
 
 from simscen.cli.session.selection import Checks
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
 from simscen.judge.evaluation import judge
 from simscen.loading.resolved import spec_of_text
 from simscen.record.chunk import Channel

@@ -9,7 +9,7 @@ from grounds import ROBOT, cheapest, forest, maze, pair, rooms, view_of
 from scipy.spatial import cKDTree
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import Path
+from simscen.core.messages.navigation import Path
 from simscen.model.planners import Navfn, OmplPlanner, PlannerSpec, Smac2d
 from simscen.stack.planners import build, grid_planner
 from simscen.stack.planners.ends import find_ends

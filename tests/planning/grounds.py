@@ -6,8 +6,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import OccupancyGrid
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.planners.rates import Rates

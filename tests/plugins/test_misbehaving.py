@@ -5,7 +5,7 @@ from textwrap import dedent
 import pytest
 
 from simscen.core.errors import RunError
-from simscen.core.result import Outcome
+from simscen.core.records.run_result import Outcome
 from simscen.run.simulate import simulate_file
 
 ROBOT = """\
@@ -33,10 +33,10 @@ from typing import ClassVar
 import numpy as np
 
 from simscen.actions.base import Action
-from simscen.core.motion import Twist
-from simscen.core.sensing import Bump, Scan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Bump, Scan
 from simscen.core.stage import Effect
-from simscen.core.verdict import Finding, Status
+from simscen.core.records.verdict import Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.plugin_metric import Measure
 from simscen.faults.base import Disturbance, Fault

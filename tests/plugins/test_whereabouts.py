@@ -43,7 +43,7 @@ def test_the_users_own_packages_are_found_with_those_that_a_pth_file_leads_to(tm
     """As an editable installation in the user's site-packages lies there."""
     from_home, source = tmp_path / "home", tmp_path / "source"
     lay = packages.lay  # type: ignore[attr-defined]
-    text = "from simscen.core.verdict import Finding\nfrom simscen.criteria.base import Criterion\n"
+    text = "from simscen.core.records.verdict import Finding\nfrom simscen.criteria.base import Criterion\n"
     text += "from simscen.spec.base import Spec\n"
     text += "class Mine(Spec, Criterion):\n    def judge(self, trace, case): return []\n"
     lay(source, "elsewhere", "0", {}, mine=text)

@@ -11,8 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from simscen.cli.diagnostics import as_text
-from simscen.core.errors import UsageError
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem, UsageError
 from simscen.loading.keywords import keyword_matcher
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_scenario

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from simscen.actions.action import AnyAction
-from simscen.core.events import EventKind
-from simscen.core.readings import INSTANCES, MAP
-from simscen.core.trace import Moment
+from simscen.core.records.disturbances import KIND_BY_INSTANCE, MAP
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Moment
 from simscen.faults.fault import AnyFault
 from simscen.loading.checks.faults import instances, unfit_faults, unknown_sensors
 from simscen.loading.checks.registry import NameScope
@@ -104,7 +104,7 @@ def kinds_of(word: str) -> list[str]:
     return sorted(affects - {MAP})  # what befalls the map befalls the whole run
 
 
-NAMES = {kind: name for name, kind in INSTANCES.items()}
+NAMES = {kind: name for name, kind in KIND_BY_INSTANCE.items()}
 NAMES |= {"Scan": "lidar", "Odometry": "odom", "Imu": "imu", "Bump": "bumper", "Image": "camera"}
 FAULTS = [
     (f"{word} on {NAMES[kind]}", f"{{sensor: {NAMES[kind]}, {word}: {fault_example(word, kind)}, WHEN}}")

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_formulas import CASE, COMPARISONS, NUMBERS, RESPONSES, VALUES, inner, run
 
-from simscen.core.verdict import Status
+from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
 

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from simscen.core.events import Event, EventKind
-from simscen.core.samples import Samples
-from simscen.core.trace import Trace
-from simscen.core.verdict import Status
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Samples, Trace
+from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
 from simscen.testing.sketch import sketch, sketch_case

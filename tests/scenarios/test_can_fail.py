@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from simscen.core.result import Outcome
-from simscen.core.verdict import Status
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.verdict import Status
 from simscen.loading.scenario import load_scenario
 from simscen.run.prepare import prepare
 from simscen.run.simulate import simulate

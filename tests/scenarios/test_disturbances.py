@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.result import Outcome, RunResult
+from simscen.core.records.run_result import Outcome, RunResult
 from simscen.loading.scenario import load_scenario
 from simscen.run.prepare import prepare
 from simscen.run.simulate import simulate

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from simscen.bench.navigation.experiments import narrow_fields
-from simscen.core.events import EventKind
+from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
 from simscen.run.prepare import Prepared, prepare
 from simscen.run.simulate import simulate

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simscen.core.events import EventKind
-from simscen.core.motion import STOP
-from simscen.core.result import Outcome
-from simscen.core.sensing import Odometry, Scan
-from simscen.core.trace import Moment
+from simscen.core.geometry.kinematics import STOP
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.records.events import EventKind
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.trace import Moment
 from simscen.judge.result_json import to_json
 from simscen.judge.run_result import judge_run
 from simscen.loading.resolved import spec_of_text

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simscen.core.events import EventKind
-from simscen.core.result import Outcome
-from simscen.core.verdict import Status
+from simscen.core.records.events import EventKind
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.verdict import Status
 from simscen.loading.scenario import load_scenario
 from simscen.run.external.serving import served
 from simscen.run.prepare import Prepared, prepare

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from simscen.core.events import EventKind
+from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
 from simscen.run.prepare import prepare

@@ -8,9 +8,9 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from simscen.core.events import EventKind
-from simscen.core.result import Outcome
-from simscen.core.verdict import Status
+from simscen.core.records.events import EventKind
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.verdict import Status
 from simscen.judge.multi_robot import combine_robots
 from simscen.judge.result_json import from_json, to_json
 from simscen.judge.run_result import judge_run

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.trace import Moment
+from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
 from simscen.run.agent import Agent
 from simscen.run.prepare import prepare

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from simscen.core.events import EventKind
+from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
 from simscen.run.prepare import prepare

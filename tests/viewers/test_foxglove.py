@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simscen.core.events import EventKind
+from simscen.core.records.events import EventKind
 from simscen.record.replay import Log, read_run
 from simscen.report.viewers import foxglove_layout, rviz_config
 from simscen.run.simulate import simulate_file

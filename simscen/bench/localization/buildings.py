@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from simscen.core.chance import Streams
 from simscen.core.geometry import Array, Pose3
-from simscen.core.shapes import Box, Solid, TriangleMesh
+from simscen.core.geometry.shapes import Box, Solid, TriangleMesh
+from simscen.core.random_streams import Streams
 from simscen.worlds.meshing import fuse
 
 HEIGHT = 1.0

@@ -10,8 +10,8 @@ import numpy as np
 from simscen.bench.localization.consistency import anees, bounds, bounds_over, within_bounds
 from simscen.bench.localization.generated_logs import CIRCUMSTANCES, log
 from simscen.bench.localization.trial import MOMENTS, Trial, trial
-from simscen.core.chance import Streams
-from simscen.core.paired import mean_interval
+from simscen.core.random_streams import Streams
+from simscen.core.statistics import bootstrap_mean_interval
 from simscen.model.localizers import Amcl
 
 PARAMETERS: Mapping[str, Amcl] = {
@@ -138,4 +138,4 @@ def _by_building(trials: Sequence[Trial], values: Sequence[float]) -> list[float
 
 
 def _interval(values: Sequence[float]) -> Interval:
-    return mean_interval(values, Streams(1).generator("bootstrap"))
+    return bootstrap_mean_interval(values, Streams(1).generator("bootstrap"))

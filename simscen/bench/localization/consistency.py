@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from simscen.core.chisquare import mean_bounds, quantile
 from simscen.core.geometry import Array
-from simscen.core.trace import Trace
+from simscen.core.records.trace import Trace
+from simscen.core.statistics import chi2_quantile, nees_mean_bounds
 from simscen.criteria.trace_signals.nees import DIMENSIONS, nees_samples
 from simscen.criteria.trace_signals.nees import nees as squared_errors
 
@@ -40,12 +40,12 @@ def anees(values: Sequence[float]) -> float:
 
 def within_bounds(values: Sequence[float], dimensions: int = DIMENSIONS, probability: float = 0.95) -> float:
     """The share of NEES of errors that lie in the ellipsoid in which normal ones do with this probability."""
-    return float(np.mean(np.asarray(values) <= quantile(probability, dimensions)))
+    return float(np.mean(np.asarray(values) <= chi2_quantile(probability, dimensions)))
 
 
 def bounds(runs: int, dimensions: int = DIMENSIONS, probability: float = 0.95) -> tuple[float, float]:
     """Between which ANEES lies with this probability when the localizer is consistent: chi2(d N) / N."""
-    return mean_bounds(runs, dimensions, probability)
+    return nees_mean_bounds(runs, dimensions, probability)
 
 
 def bounds_over(

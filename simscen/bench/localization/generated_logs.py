@@ -9,12 +9,12 @@ import numpy.typing as npt
 from simscen.bench.localization.buildings import Building, building, lived_in, mesh_of
 from simscen.bench.localization.lidar import Sight, angles_of, hidden_by, measured, people_in
 from simscen.bench.localization.trajectory import CLEAN, STEP, ShutIn, Wheels, drive, reckoned, tour
-from simscen.core.belief import Estimate
-from simscen.core.chance import Streams
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry, Scan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.random_streams import Streams
 from simscen.model.robot import Lidar, WheelOdometry
 from simscen.record.foreign.sensed import Sensed
 from simscen.record.foreign.sensedrows import TICK_RATE

@@ -6,7 +6,7 @@ import numpy as np
 
 from simscen.bench.localization.buildings import HEIGHT, Building
 from simscen.core.geometry import Array
-from simscen.core.shapes import TriangleMesh
+from simscen.core.geometry.shapes import TriangleMesh
 from simscen.model.robot import Lidar
 from simscen.worlds.rays import RayScene
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.belief import Estimate
-from simscen.core.chance import Streams
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.sensing import Odometry, Scan
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.random_streams import Streams
 from simscen.model.stack import StackSpec
 from simscen.record.foreign.sensed import Sensed
 from simscen.record.foreign.sensedrows import TICK_RATE

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from simscen.bench.navigation.experiment import Drive, Experiment, write_scenario
-from simscen.core.chance import Streams
+from simscen.core.random_streams import Streams
 
 WIDTH = (1.4, 2.4)
 """Metres of a corridor: two robots of 0.44 m pass each other in the narrowest with 17 cm on each side."""

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.chance import Streams
 from simscen.core.geometry import Array, Pose2
+from simscen.core.random_streams import Streams
 
 HALF = 10.0
 """Metres from the middle of the arena, which is square, to its border."""

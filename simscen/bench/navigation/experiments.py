@@ -13,7 +13,7 @@ from simscen.bench.navigation import barn, localization_drives, nav2_sandbox
 from simscen.bench.navigation import dynamic_fields as movers
 from simscen.bench.navigation.experiment import Drive, Experiment, write_scenario
 from simscen.bench.navigation.obstacle_fields import CELL, HEIGHT, ObstacleField, obstacle_field
-from simscen.core.chance import Streams
+from simscen.core.random_streams import Streams
 
 NARROW = (0.30, 0.20, 0.10)
 """Metres that the widest way through a narrow field is wider than the robot."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.chance import Streams
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.shapes import Cylinder, Solid
+from simscen.core.geometry.shapes import Cylinder, Solid
+from simscen.core.random_streams import Streams
 
 CELL = 0.15
 """Metres between cylinders; their radius is half of it."""

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.bench.navigation.experiment import write_scenario
-from simscen.core.chance import Streams
+from simscen.core.random_streams import Streams
 
 FINE = 0.05
 """Metres: the cells that a floor is drawn in, before it becomes as coarse as its map."""

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from simscen.bench.navigation.experiment import Drive, Experiment, write_scenario
-from simscen.core.chance import Streams
+from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Pose2
-from simscen.core.world import BuiltWorld
+from simscen.core.random_streams import Streams
 from simscen.worlds.shortest import ShortestWays
 
 ROOM = 0.12

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 from simscen.bench.navigation.world_statistics import ClusteredMean
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunFinished
-from simscen.core.verdict import Status
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished
+from simscen.core.records.verdict import Status
 from simscen.judge.metrics.compute import barn_score
 
 TIME_IS_UP = "time limit"

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from simscen.bench.speed.run_speed import PATROL, SEED
-from simscen.core.trace import Moment
+from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import Log
 from simscen.run.external.serving import served

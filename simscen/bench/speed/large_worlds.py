@@ -14,9 +14,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from simscen.bench.speed.run_speed import timed_run
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
-from simscen.core.shapes import Box, Solid
+from simscen.core.geometry.shapes import Box, Solid
 from simscen.loading.scenario import load_scenario
 from simscen.run.prepare import prepare
 from simscen.worlds.meshing import fuse

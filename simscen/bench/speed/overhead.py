@@ -11,8 +11,8 @@ from resource import RUSAGE_CHILDREN, getrusage
 from tempfile import TemporaryDirectory
 
 from simscen.bench.speed.run_speed import PATROL, SEED, Tell, nobody
-from simscen.core.result import RunKey
-from simscen.core.trace import Moment
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import Log
 from simscen.run.figure import Figure, Figures

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.shapes import Cylinder, Solid
+from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import Log
 from simscen.run.lockstep import Rig

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from simscen.bench.speed.run_speed import PATROL, Tell, bare_patrol, nobody
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.session_events import RunFinished
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.loading.scenario import load_scenario

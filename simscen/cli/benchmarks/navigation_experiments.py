@@ -12,7 +12,7 @@ from simscen.bench.navigation.experiment import Experiment
 from simscen.bench.navigation.office_maps import write_building
 
 if TYPE_CHECKING:
-    from simscen.core.world import BuiltWorld
+    from simscen.core.environment.world_model import BuiltWorld
 
 SHIPPED = ("house", "office", "warehouse")
 BARN = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"

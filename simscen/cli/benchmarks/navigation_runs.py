@@ -16,8 +16,8 @@ from simscen.cli.session.pending_runs import begin
 from simscen.cli.session.run_session import WARM_PROCESS
 from simscen.cli.session.selection import checked
 from simscen.core.errors import Exit, InvalidInput
-from simscen.core.result import Outcome, RunKey
-from simscen.core.sessionevents import RunFinished, SessionEvent
+from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.session_events import RunFinished, SessionEvent
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log

@@ -3,8 +3,8 @@
 from simscen.cli.catalog.commands_page import EXITS
 from simscen.cli.catalog.key_topics import keys_of_topics
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, topics
-from simscen.core.errors import BROKEN
-from simscen.core.navigation import ErrorCode
+from simscen.core.errors import BROKEN_COMPONENT
+from simscen.core.messages.navigation import ErrorCode
 from simscen.criteria.plugin_metric import AnyMeasure
 from simscen.criteria.trace_signals.catalog import SIGNALS, Signal
 from simscen.judge.metrics.catalog import METRICS, Metric
@@ -66,7 +66,7 @@ JUNIT = {
     TIMEOUT: "An external stack gave no answer within its limit of wall time.",
     PROTOCOL: "What an external stack said is not what the stack protocol allows.",
     FAILED: "An external stack said itself that it cannot go on.",
-    BROKEN: "Something that an installed package adds answered with what is no answer.",
+    BROKEN_COMPONENT: "Something that an installed package adds answered with what is no answer.",
 }
 """Type of a JUnit `<error>` → what has happened to the run; none of them is a verdict on the robot."""
 

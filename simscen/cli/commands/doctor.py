@@ -126,7 +126,7 @@ def speed() -> str:
 def run_twice() -> str:
     """Check that one simulated second passes twice with equal logs."""
     from simscen.cli.session.run_session import WARM_PROCESS
-    from simscen.core.result import Outcome
+    from simscen.core.records.run_result import Outcome
     from simscen.loading.scenario import load_scenario
     from simscen.run.session import Options, plan, run_session
 

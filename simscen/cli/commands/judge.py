@@ -15,7 +15,7 @@ from simscen.cli.session.judging import Judging, runs_without_log
 from simscen.cli.session.logs import logs_of
 from simscen.cli.session.output_files import verdict
 from simscen.core.errors import UsageError
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import result_data
 from simscen.record.foreign.wanted import TOPICS, Clock, Wanted
 from simscen.report.judged import in_a_line, in_full, summary, table

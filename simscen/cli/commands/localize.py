@@ -10,12 +10,11 @@ import typer
 from simscen.bench.localization.recorded_drive import Errors, Localized, errors_of, localize
 from simscen.cli.diagnostics import escaped, from_here, print_text
 from simscen.cli.session.output_files import save
-from simscen.core.belief import Estimate
-from simscen.core.chance import LARGEST_SEED
-from simscen.core.errors import InvalidInput, UsageError
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.problems import Problem
+from simscen.core.messages.localization import Estimate
+from simscen.core.random_streams import LARGEST_SEED
 from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
 from simscen.loading.files.robotfile import load_robot_file

@@ -9,8 +9,8 @@ import typer
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.logs import log_file, recorded_result
 from simscen.cli.session.output_files import save
+from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import UNKNOWN, OccupancyGrid
 from simscen.record.replay import Log, invalid, read_run
 from simscen.record.sceneryfile import scenery_of
 

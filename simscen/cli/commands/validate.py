@@ -13,8 +13,7 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, print_text
 from simscen.cli.session.selection import Checks
 from simscen.cli.session.stacks import stacks_of
-from simscen.core.errors import Exit
-from simscen.core.problems import Problem
+from simscen.core.errors import Exit, Problem
 from simscen.loading.files.discovery import BASE, ROBOT, SCENARIO, STACK, WORLD, default_root, discover
 from simscen.loading.files.kinds import STACKS, check_file, file_kind
 

@@ -12,9 +12,8 @@ from pydantic import ValidationError
 
 from simscen.cli.diagnostics import as_text, escaped, from_here, print_text
 from simscen.cli.session.output_files import save
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
-from simscen.core.world import World
+from simscen.core.environment.world_model import World
+from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.discovery import default_root
 from simscen.loading.files.worldfile import load_world_file, world_text
 from simscen.loading.loaded import LoadedWorld

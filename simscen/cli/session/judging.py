@@ -7,15 +7,14 @@ from pathlib import Path
 
 from simscen.cli.diagnostics import from_here
 from simscen.cli.session.logs import BROKEN_OFF, WHOLE, recorded_result
-from simscen.core.case import Case
-from simscen.core.errors import InvalidInput
-from simscen.core.evidence import Coverage, Evidence
+from simscen.core.environment.costmap_filters import MaskBlocks
+from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose2
-from simscen.core.maskcells import MaskCells
-from simscen.core.problems import Problem
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult, skipped, unfinished
-from simscen.core.sessionevents import Artifacts, RunFinished
-from simscen.core.trace import Trace
+from simscen.core.records.case import Case
+from simscen.core.records.evidence import Evidence, LogCoverage
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult, error_result, skipped_result
+from simscen.core.records.session_events import Artifacts, RunFinished
+from simscen.core.records.trace import Trace
 from simscen.judge.multi_robot import combine_robots
 from simscen.judge.run_result import judge_run
 from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
@@ -43,7 +42,7 @@ class Judging:
         self.foreign = 0
         self._wanted, self._scenario, self._world_path = wanted, scenario, world_path
         self._case: Case | None = None
-        self._named: Mapping[str, MaskCells] | None = None
+        self._named: Mapping[str, MaskBlocks] | None = None
         self._criteria: LoadedCriteria | None = None
         if scenario is not None:
             home = root if root is not None else default_root([scenario])
@@ -60,7 +59,7 @@ class Judging:
             if alone or isinstance(error, UnusableScenario):
                 raise
             told = "; ".join(": ".join(filter(None, (one.message, one.hint))) for one in error.problems)
-            result = unfinished(RunKey(log.stem, 0), str(log), RunFailure("invalid", told))
+            result = error_result(RunKey(log.stem, 0), str(log), RunFailure("invalid", told))
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
 
     def shown(self, log: Path) -> tuple[Log, RunResult]:
@@ -74,7 +73,7 @@ class Judging:
         self.foreign += 1
         if self._criteria is None:
             told, case = read_foreign(log, self._wanted, looks=True), Case(Pose2(0.0, 0.0), ())
-            result = skipped(RunKey(log.stem, 0), "", "nothing was judged: --scenario says by what")
+            result = skipped_result(RunKey(log.stem, 0), "", "nothing was judged: --scenario says by what")
             result = replace(result, simulated=told.trace.seconds(told.trace.end), tick_rate=told.trace.tick_rate)
         else:
             told, result = self._judged_foreign(log, looks=True)
@@ -109,7 +108,7 @@ class Judging:
         # What had to happen stands in the scenario of the log, at lines that the file of criteria does not have.
         case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
         case = replace(case, masks={**case.masks, **self._masks(criteria)})
-        return self._finished(log, key, read.trace, case, Coverage(), criteria)
+        return self._finished(log, key, read.trace, case, LogCoverage(), criteria)
 
     def _foreign(self, log: Path) -> RunFinished:
         self.foreign += 1
@@ -134,7 +133,7 @@ class Judging:
         coverage = replace(read.coverage, missing=missing)
         return read, self._finished(log, RunKey(log.stem, 0), read.trace, case, coverage, criteria).result
 
-    def _masks(self, criteria: LoadedCriteria) -> Mapping[str, MaskCells]:
+    def _masks(self, criteria: LoadedCriteria) -> Mapping[str, MaskBlocks]:
         """The filter masks that criteria name; those of a file that is the same for all robots are read once."""
         if criteria is self._criteria and self._named is not None:
             return self._named
@@ -156,7 +155,7 @@ class Judging:
         return self._case
 
     def _finished(
-        self, log: Path, key: RunKey, trace: Trace, case: Case, coverage: Coverage, criteria: LoadedCriteria
+        self, log: Path, key: RunKey, trace: Trace, case: Case, coverage: LogCoverage, criteria: LoadedCriteria
     ) -> RunFinished:
         """Judged by the file of criteria."""
         file, spec = str(self._scenario), criteria.spec
@@ -198,4 +197,4 @@ def _without_log(answer: RunFinished) -> RunFinished:
         return answer
     error = answer.result.error
     failure = RunFailure(error.kind if error else "crashed", "it left no log" + (f": {error.message}" if error else ""))
-    return RunFinished(unfinished(answer.key, answer.result.path, failure), file=answer.file)
+    return RunFinished(error_result(answer.key, answer.result.path, failure), file=answer.file)

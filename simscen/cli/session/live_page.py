@@ -7,8 +7,8 @@ from pathlib import Path
 
 from simscen.cli.diagnostics import print_text
 from simscen.cli.session.output_files import PAGE, Reports
-from simscen.core.result import RunKey
-from simscen.core.sessionevents import RunFinished, RunStarted, SessionEvent, SessionStarted
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import RunFinished, RunStarted, SessionEvent, SessionStarted
 from simscen.report.suite import Live
 
 LEAST_PAUSE = 1.0

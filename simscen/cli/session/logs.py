@@ -4,9 +4,8 @@ import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from simscen.core.errors import InvalidInput, NothingSelected
-from simscen.core.problems import Problem
-from simscen.core.result import RunResult
+from simscen.core.errors import InvalidInput, NothingSelected, Problem
+from simscen.core.records.run_result import RunResult
 from simscen.judge.multi_robot import combine_robots
 from simscen.judge.result_json import from_json
 from simscen.judge.run_result import judge_run

@@ -12,11 +12,11 @@ from functools import cached_property
 from pathlib import Path
 
 from simscen.cli.diagnostics import print_text
-from simscen.core.comparison import Comparison
 from simscen.core.errors import Exit, UsageError
-from simscen.core.outputs import require_no_input, require_plain
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunFinished, SessionFinished
+from simscen.core.files import require_not_input, require_regular_file
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished, SessionFinished
+from simscen.core.records.stack_comparison import Comparison
 from simscen.report.journaldata import NAME
 from simscen.report.junit import Family, to_xml
 from simscen.report.results import to_json
@@ -132,7 +132,7 @@ def require_writable(junit: Path | None, folder: Path | None, inputs: Iterable[P
         return
     try:
         _require_free_name(junit, folder)
-        require_no_input(junit, inputs)
+        require_not_input(junit, inputs)
         junit.parent.mkdir(parents=True, exist_ok=True)
         probe_writable(junit)
     except OSError as error:
@@ -184,8 +184,8 @@ def session_info_json(used: Mapping[str, object], wall: float | None = None) -> 
 def save(path: Path, write: Callable[[Path], None], inputs: Iterable[Path] = ()) -> None:
     """Let `write` make the file; raises UsageError where that cannot be done or would overwrite what was read."""
     try:
-        require_plain(path)
-        require_no_input(path, inputs)
+        require_regular_file(path)
+        require_not_input(path, inputs)
         path.parent.mkdir(parents=True, exist_ok=True)
         write(path)
     except OSError as error:

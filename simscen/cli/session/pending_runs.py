@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput, UsageError
-from simscen.core.result import Outcome, RunKey
-from simscen.core.sessionevents import RunFinished, SessionStarted, started
+from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.session_events import RunFinished, SessionStarted, session_started
 from simscen.core.version import __version__
 from simscen.loading.loaded import LoadedScenario
 from simscen.report.journal import Journal
@@ -33,10 +33,10 @@ class PendingRuns:
     workers: int
     stacks: tuple[str, ...] = ()
 
-    def started(self, folder: Path) -> SessionStarted:
+    def session_started(self, folder: Path) -> SessionStarted:
         """The first event of the session."""
         keys = [*(job.key for job in self.jobs), *(answer.key for answer in self.kept)]
-        return started(__version__, keys, self.workers, folder, self.stacks)
+        return session_started(__version__, keys, self.workers, folder, self.stacks)
 
 
 def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> PendingRuns:

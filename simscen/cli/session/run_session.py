@@ -17,8 +17,8 @@ from simscen.cli.session.selection import Selection, load_all
 from simscen.cli.session.stacks import commands_of
 from simscen.cli.session.terminal import Format, Screen, screen
 from simscen.core.errors import Exit, UsageError
-from simscen.core.result import RunKey
-from simscen.core.sessionevents import Listener, SessionEvent
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import Listener, SessionEvent
 from simscen.judge.metrics.stack_comparison import compare_stacks
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all

@@ -7,9 +7,8 @@ from pathlib import Path
 
 from simscen.cli.diagnostics import escaped, from_here
 from simscen.cli.session.stacks import Stacks, stacks_of
-from simscen.core.errors import InvalidInput, NothingSelected, UsageError
-from simscen.core.filesread import files_read
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, NothingSelected, Problem, UsageError
+from simscen.core.files import collect_read_files
 from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.files.robotfile import load_robot_file
 from simscen.loading.files.worldfile import load_world_file
@@ -134,7 +133,7 @@ class Checks:
         loaded, undefined = self.stacks.with_command(loaded.having(lenient=self.lenient))
         if undefined and self.runs:
             return None, [*loaded.notes, *undefined]
-        with files_read() as read:
+        with collect_read_files() as read:
             problems = [*loaded.notes, *([] if self.fast else checked(loaded, self.cache, self.pictures))]
         problems += [replace(problem, severity="warning") for problem in undefined]
         loaded = loaded.having(read=tuple(sorted(read)))

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 
 from simscen.cli.diagnostics import escaped, from_here
 from simscen.cli.process import caller_environment, config_file
-from simscen.core.errors import InvalidInput, UsageError
-from simscen.core.externalcommand import ExternalCommand
-from simscen.core.problems import Problem
-from simscen.core.result import RunKey
+from simscen.core.errors import InvalidInput, Problem, UsageError
+from simscen.core.external_command import ExternalCommand
+from simscen.core.records.run_result import RunKey
 from simscen.loading.files.discovery import STACK, default_root
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario

@@ -11,7 +11,7 @@ from typing import TextIO
 
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
-from simscen.core.sessionevents import SessionEvent
+from simscen.core.records.session_events import SessionEvent
 from simscen.report.console import text_reporter
 from simscen.report.github import github_reporter
 from simscen.report.machine import json_reporter

@@ -12,7 +12,7 @@ from PIL import Image
 
 import simscen.sim.simulation
 import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
-from simscen.core.run import Run
+from simscen.core.records.run import Run
 from simscen.record.replay import read_run
 from simscen.report.picture.compose import write_picture
 from simscen.report.picture.scene import Scene, with_robots

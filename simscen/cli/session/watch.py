@@ -16,9 +16,8 @@ from typing import Any, TextIO
 from simscen.cli.diagnostics import print_text
 from simscen.cli.session.run_session import Asked, session
 from simscen.cli.session.selection import Selection
-from simscen.core.errors import Exit, InvalidInput, SimscenError, UsageError
-from simscen.core.problems import Problem
-from simscen.core.sessionevents import RunFinished, SessionEvent
+from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
+from simscen.core.records.session_events import RunFinished, SessionEvent
 from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.filesof import files_of

@@ -6,8 +6,8 @@ import math
 from abc import abstractmethod
 from typing import TYPE_CHECKING
 
-from simscen.core.evidence import Evidence
-from simscen.core.verdict import Finding, Status
+from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.clearance import SEARCH_MARGIN_M
 from simscen.criteria.findings import undecided
@@ -25,8 +25,8 @@ from simscen.criteria.trace_signals.catalog import signal_evidence
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
     from simscen.criteria.stl.condition import Condition
 
 

@@ -21,7 +21,7 @@ from simscen.core.geometry import Array
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from simscen.core.samples import Ticks
+    from simscen.core.records.trace import Ticks
 
     Indices = npt.NDArray[np.int64]
     Flags = npt.NDArray[np.bool_]

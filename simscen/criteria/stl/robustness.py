@@ -25,8 +25,8 @@ from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.sampling import usual_period
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 TIE_MARGIN = sys.float_info.min
 """Robustness of a signal that equals its bound, with the sign of the verdict."""

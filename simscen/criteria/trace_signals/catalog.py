@@ -7,16 +7,16 @@ from collections.abc import Callable, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from simscen.core.evidence import Evidence
 from simscen.core.geometry import Array
+from simscen.core.records.evidence import Evidence
 from simscen.criteria.trace_signals import distances, readers
 from simscen.criteria.trace_signals.ground_truth import BELIEF_TIMEOUT_S
 from simscen.criteria.trace_signals.sampling import SignalArguments, SignalQuery
 from simscen.spec.quantities import UNITS
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 SignalName = Literal[
     "clearance", "speed", "forward_speed", "turn_rate", "yaw_rate", "acceleration", "angular_acceleration", "jerk",

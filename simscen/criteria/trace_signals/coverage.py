@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.evidence import Evidence
+from simscen.core.records.evidence import Evidence
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.trace_signals.ground_truth import check_finite
 
 if TYPE_CHECKING:
-    from simscen.core.samples import Ticks
-    from simscen.core.trace import Trace
+    from simscen.core.records.trace import Ticks, Trace
 
 MAX_GAP_S = 1.0
 """Longest time without a sample of the truth; in a longer one, anything may have happened."""

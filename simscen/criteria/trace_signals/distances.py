@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.events import EventKind
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.samples import Ticks
-from simscen.core.separation import separation
+from simscen.core.geometry.separation import separation
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Ticks
 from simscen.criteria.trace_signals.ground_truth import check_samples
 from simscen.criteria.trace_signals.readers import goal_distance, poses_of
 from simscen.criteria.trace_signals.sampling import SignalQuery, SignalUnavailable
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 if TYPE_CHECKING:
-    from simscen.core.trace import Trace
+    from simscen.core.records.trace import Trace
 
 
 _TINY = sys.float_info.min

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.events import EventKind
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.core.samples import Samples, Ticks
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Samples, Ticks
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from simscen.core.trace import Trace
+    from simscen.core.records.trace import Trace
 
     Flags = npt.NDArray[np.bool_]
 else:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.samples import Samples
+from simscen.core.records.trace import Samples
 from simscen.criteria.trace_signals.ground_truth import check_samples, truth
 
 if TYPE_CHECKING:
-    from simscen.core.trace import Trace
+    from simscen.core.records.trace import Trace
 
 DIMENSIONS = 3
 """x, y and yaw: what NEES is on average when the covariance says the truth."""

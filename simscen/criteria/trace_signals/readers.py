@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.events import EventKind
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.goalnames import named
-from simscen.core.samples import Samples, Ticks
+from simscen.core.messages.goal_names import matches_goal_name
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Samples, Ticks
 from simscen.criteria.timeline import spans
 from simscen.criteria.trace_signals.ground_truth import (
     BELIEF_TIMEOUT_S,
@@ -36,8 +36,8 @@ from simscen.criteria.trace_signals.sampling import (
 from simscen.criteria.trace_signals.sparc_ldlj import CUTOFF_HZ, MIN_RATE_HZ
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 LOCALIZED_STD_M = 0.5
 """A robot whose position has a larger standard deviation is not localized; Nav2 starts with this value."""
@@ -319,14 +319,14 @@ def _age(trace: Trace, came: Ticks) -> Array:
 def _current_goals(trace: Trace, case: Case) -> Array:
     """Return x, y, yaw of the goal accepted last, (n, 3); of the first goal, (1, 3), if none ever is."""
     clock = sample_ticks(trace)
-    named = {goal.name: goal.pose for goal in reversed(case.every_goal)}
+    matches_goal_name = {goal.name: goal.pose for goal in reversed(case.every_goal)}
     ticks, poses = [], []
     for event in trace.of_kind(EventKind.GOAL_ACCEPTED):
         pose = tuple(event.data.get(key) for key in ("x", "y", "yaw"))
         known = all(isinstance(part, int | float) for part in pose)
-        if known or event.name in named:
+        if known or event.name in matches_goal_name:
             ticks.append(event.tick)
-            poses.append(pose if known else named[event.name])
+            poses.append(pose if known else matches_goal_name[event.name])
     if not poses and not case.goals:
         raise SignalUnavailable("there was no goal")
     if not poses:
@@ -342,7 +342,9 @@ def _between(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: 
     """Return flags between each event of kind `start` (with `name`, if given) and the next matching one of `ends`."""
     intervals: list[tuple[int, float]] = []
     for event in trace.of_kind(start):
-        if name in (None, event.name) or (start is EventKind.GOAL_ACCEPTED and named(event.name, str(name))):
+        if name in (None, event.name) or (
+            start is EventKind.GOAL_ACCEPTED and matches_goal_name(event.name, str(name))
+        ):
             later = (e.tick for e in trace.of_kind(*ends) if _ends(e.kind, e.name, event.name) and e.tick > event.tick)
             intervals.append((event.tick, next(later, np.inf)))
     return _flags(trace, intervals)

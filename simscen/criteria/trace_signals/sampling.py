@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.samples import Samples, Ticks
+from simscen.core.records.trace import Samples, Ticks
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
 
 MAX_INTERPOLATED_GAP_S = 0.25
 """Longest gap across which uneven samples are interpolated."""

@@ -5,11 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from simscen.core.case import Case
 from simscen.core.geometry import Array
-from simscen.core.passage import Passage
-from simscen.core.polygons import distance_to_segment, turn
-from simscen.core.trace import Trace
+from simscen.core.geometry.polygons import distance_to_segment, signed_double_area
+from simscen.core.records.case import Case, Passage
+from simscen.core.records.trace import Trace
 from simscen.judge.diagnosis.objects import MovableObject
 
 SEARCH_STEP_M = 0.005
@@ -69,7 +68,7 @@ def _ahead(trace: Trace, case: Case, goal: str, tick: int) -> list[Passage]:
     if distance_to_segment(*here, *found[nearest].ends) > ON_PATH_DISTANCE_M:
         return found
     ends, beyond = found[nearest].ends, found[nearest + 1 :]
-    passed = beyond and turn(*ends, here) * turn(*ends, beyond[0].middle) > 0
+    passed = beyond and signed_double_area(*ends, here) * signed_double_area(*ends, beyond[0].middle) > 0
     return beyond if passed else found[nearest:]
 
 

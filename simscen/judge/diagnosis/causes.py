@@ -8,10 +8,10 @@ Where nothing is known, nothing is said.
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import replace
 
-from simscen.core.case import Case
-from simscen.core.events import Event, EventKind
-from simscen.core.trace import Trace
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.case import Case
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.diagnosis.collision import diagnose_collision
 from simscen.judge.diagnosis.goal_failure import diagnose_goal_failure
 from simscen.judge.diagnosis.localization import diagnose_localization

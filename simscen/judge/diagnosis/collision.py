@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from simscen.core.events import Event, EventKind
-from simscen.core.trace import Trace
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Trace
 from simscen.judge.diagnosis.objects import MovableObject, movable_objects
 
 OBJECT_MOVING_SPEED_M_S = 0.0625

@@ -5,10 +5,10 @@ from collections import Counter
 
 import numpy as np
 
-from simscen.core.case import Case
-from simscen.core.events import EventKind
-from simscen.core.navigation import ErrorCode, Goal
-from simscen.core.trace import Trace
+from simscen.core.messages.navigation import ErrorCode, Goal
+from simscen.core.records.case import Case
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Trace
 from simscen.criteria.error_codes import code_of
 from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes, outcome_start
 from simscen.judge.diagnosis.blocked_path import diagnose_blocked_path

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from simscen.core.events import EventKind
-from simscen.core.trace import Trace
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Trace
 
 ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
 """Faults whose error stays in the odometry when they are over."""

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose2
-from simscen.core.trace import Trace
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Trace
 
 
 @dataclass(frozen=True)

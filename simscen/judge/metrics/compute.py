@@ -8,12 +8,12 @@ from itertools import accumulate
 
 import numpy as np
 
-from simscen.core.case import CLEARANCE_RANGE, Case
-from simscen.core.events import EventKind
-from simscen.core.evidence import WHOLE, Coverage
 from simscen.core.geometry import Array
-from simscen.core.trace import Trace
-from simscen.core.verdict import Status
+from simscen.core.records.case import CLEARANCE_RANGE, Case
+from simscen.core.records.events import EventKind
+from simscen.core.records.evidence import COMPLETE_COVERAGE, LogCoverage
+from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import Status
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
 from simscen.criteria.goal_outcomes import goal_outcomes
 from simscen.criteria.goals_reached import GoalsReached
@@ -58,7 +58,7 @@ class MetricValues:
     undefined: Mapping[str, str]
 
 
-def compute_metrics(trace: Trace, case: Case, coverage: Coverage = WHOLE) -> MetricValues:
+def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_COVERAGE) -> MetricValues:
     """Return all metrics of the catalog.
 
     A metric is undefined, with the reason, if the log lacks its evidence for all or part of the run, or if a signal
@@ -92,7 +92,7 @@ def _or_reason(names: Sequence[str], compute: Callable[[], Values]) -> Values:
         return dict.fromkeys(names, str(reason))
 
 
-def _lacking(name: str, coverage: Coverage) -> str:
+def _lacking(name: str, coverage: LogCoverage) -> str:
     """Return which evidence of a metric the log lacks, in words; "" if it has all of it."""
     wanted = METRICS[name].evidence
     if lacking := coverage.lacking(wanted):

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from simscen.core.events import EventKind
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.trace import Trace
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Trace
 from simscen.criteria.trace_signals.ground_truth import Drive, teleport_samples, truth
 
 CURVATURE_SPACING_M = 0.3

@@ -3,16 +3,16 @@
 import math
 from collections.abc import Sequence
 
-from simscen.core.case import Case
-from simscen.core.evidence import Coverage, Evidence
-from simscen.core.trace import Trace
+from simscen.core.records.case import Case
+from simscen.core.records.evidence import Evidence, LogCoverage
+from simscen.core.records.trace import Trace
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
 from simscen.criteria.plugin_metric import AnyMeasure
 from simscen.judge.metrics.compute import MetricValues
 
 
 def add_plugin_metrics(
-    computed: MetricValues, metrics: Sequence[AnyMeasure], trace: Trace, case: Case, coverage: Coverage
+    computed: MetricValues, metrics: Sequence[AnyMeasure], trace: Trace, case: Case, coverage: LogCoverage
 ) -> MetricValues:
     """Return the metrics with those that a scenario asks for added.
 
@@ -27,7 +27,7 @@ def add_plugin_metrics(
     return MetricValues(values, undefined)
 
 
-def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: Coverage) -> float | str:
+def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: LogCoverage) -> float | str:
     """Return the value, or why there is none."""
     wanted = entry.measure.evidence
     lacking = coverage.lacking(frozenset(Evidence) if wanted is None else wanted)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.trace import Trace
+from simscen.core.records.trace import Trace
 from simscen.criteria.trace_signals.ground_truth import pose_error, truth
 from simscen.criteria.trace_signals.nees import nees_samples
 from simscen.judge.metrics.path import Values

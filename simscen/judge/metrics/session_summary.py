@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from simscen.core.intervals import wilson
-from simscen.core.result import Outcome, RunResult
+from simscen.core.records.run_result import Outcome, RunResult
+from simscen.core.statistics import wilson_interval
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def summarize_session(results: Iterable[RunResult]) -> SessionSummary:
     return SessionSummary(
         runs=len(runs),
         success_rate=successes / len(runs) if runs else None,
-        success_interval=wilson(successes, len(runs)) if runs else None,
+        success_interval=wilson_interval(successes, len(runs)) if runs else None,
         spl=_mean(spl),
         soft_spl=_mean(soft_spl),
         spl_runs=len(spl),

@@ -5,11 +5,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from simscen.core.chance import Streams
-from simscen.core.comparison import Against, Comparison, Difference, Flip, Outcomes
-from simscen.core.paired import mean_interval, sign_test
-from simscen.core.result import Outcome, RunKey, RunResult
-from simscen.core.verdict import Status
+from simscen.core.random_streams import Streams
+from simscen.core.records.run_result import Outcome, RunKey, RunResult
+from simscen.core.records.stack_comparison import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
+from simscen.core.records.verdict import Status
+from simscen.core.statistics import bootstrap_mean_interval, sign_test
 from simscen.judge.expected_failure import EXPECTED
 from simscen.judge.finding_text import sentence, violations
 from simscen.judge.metrics.catalog import METRICS
@@ -44,7 +44,7 @@ def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Compa
     )
 
 
-def _row(test: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> dict[str, Outcomes]:
+def _row(test: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> dict[str, OutcomeCounts]:
     own = [run for key, run in runs.items() if key.test == test]
     return {name: _outcomes(run for run in own if run.key.stack_name == name) for name in stacks}
 
@@ -58,12 +58,12 @@ def _came_out(run: RunResult) -> Outcome:
     return Outcome.PASSED if held or run.outcome is Outcome.PASSED else Outcome.FAILED
 
 
-def _outcomes(runs: Iterable[RunResult]) -> Outcomes:
+def _outcomes(runs: Iterable[RunResult]) -> OutcomeCounts:
     count = Counter(_came_out(run) for run in runs)
-    return Outcomes(count[Outcome.PASSED], count[Outcome.FAILED], count[Outcome.ERROR])
+    return OutcomeCounts(count[Outcome.PASSED], count[Outcome.FAILED], count[Outcome.ERROR])
 
 
-def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> Against:
+def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> BaselineComparison:
     first, second = (
         {(key.test, key.seed): run for key, run in sorted(runs.items()) if key.stack_name == name}
         for name in (baseline, other)
@@ -73,7 +73,7 @@ def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> Aga
     alike = [(one, two) for one, two in whole if _arrived(one) == _arrived(two)]
     flips = tuple(flip for pair in whole if (flip := _flip(pair)))
     won = sum(flip.passed == other for flip in flips)
-    return Against(
+    return BaselineComparison(
         stack=other,
         pairs=len(whole),
         broken=len(pairs) - len(whole),
@@ -131,7 +131,7 @@ def _why(run: RunResult) -> str:
     return f"{told[0]}{more}" if told else run.ended
 
 
-def _difference(name: str, pairs: Sequence[Pair]) -> Difference | None:
+def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
     """None where no pair has the metric."""
     both = [(one.metrics.get(name), two.metrics.get(name)) for one, two in pairs]
     known = [(one, two) for one, two in both if one is not None and two is not None]
@@ -139,14 +139,14 @@ def _difference(name: str, pairs: Sequence[Pair]) -> Difference | None:
         return None
     differences = [two - one for one, two in known]
     lower, higher = sum(value < 0 for value in differences), sum(value > 0 for value in differences)
-    return Difference(
+    return MetricDifference(
         metric=name,
         unit=METRICS[_kind(name)].unit if _kind(name) in METRICS else "",
         pairs=len(known),
         baseline=sum(one for one, _ in known) / len(known),
         value=sum(two for _, two in known) / len(known),
         difference=sum(differences) / len(known),
-        interval=mean_interval(differences, Streams(_SEED).generator(f"comparison.{name}")),
+        interval=bootstrap_mean_interval(differences, Streams(_SEED).generator(f"comparison.{name}")),
         lower=lower,
         equal=len(known) - lower - higher,
         higher=higher,
@@ -171,7 +171,7 @@ def comparison_data(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def _against_data(against: Against) -> dict[str, Any]:
+def _against_data(against: BaselineComparison) -> dict[str, Any]:
     return {
         "stack": against.stack,
         "pairs": against.pairs,
@@ -183,5 +183,5 @@ def _against_data(against: Against) -> dict[str, Any]:
     }
 
 
-def _difference_data(one: Difference) -> dict[str, Any]:
+def _difference_data(one: MetricDifference) -> dict[str, Any]:
     return {**asdict(one), "interval": None if one.interval is None else list(one.interval)}

@@ -6,7 +6,7 @@ from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
-from simscen.core.goalnames import named
+from simscen.core.messages.goal_names import matches_goal_name
 from simscen.loading.checks.registry import MEANING, Finding, Keys
 from simscen.loading.known_names import own_goal_names
 from simscen.loading.loaded import LoadedScenario
@@ -175,7 +175,7 @@ class PossibleRun:
 
     def goal_count(self, goal: str | None) -> int:
         """Return how many goals of this name (None: any name) the robot can get."""
-        own = [name for name in own_goal_names(self.loaded) if named(name, goal)]
+        own = [name for name in own_goal_names(self.loaded) if matches_goal_name(name, goal)]
         more = sum(
             1 if step.when is None else step.when.times
             for step in self.steps

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from simscen.core.readings import BELIEF, COMMAND, INSTANCES, MAP, WHEELS
+from simscen.core.records.disturbances import BELIEF, COMMAND, KIND_BY_INSTANCE, MAP, WHEELS
 from simscen.faults.base import Instance
 from simscen.loading.checks.registry import MEANING, NAMES, Finding, NameScope
 from simscen.loading.loaded import LoadedScenario
@@ -32,7 +32,7 @@ def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance
     frequency = loaded.spec.stack.controller_frequency
     others = {
         name: Instance(kind, frequency if kind == COMMAND else 0.0, robot.drive if kind == WHEELS else None)
-        for name, kind in INSTANCES.items()
+        for name, kind in KIND_BY_INSTANCE.items()
     }
     sensors = {
         name: Instance(sensor.says, getattr(sensor.chosen, "rate", 0.0), sensor.chosen)

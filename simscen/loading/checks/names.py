@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from simscen.core.goalnames import LOOP
+from simscen.core.messages.goal_names import LOOP_NAME
 from simscen.loading.checks.registry import NAMES, Finding, Keys, NameScope
 from simscen.loading.known_names import NOUNS, event_names, known_names, own_goal_names, world_object_names
 from simscen.loading.schema.messages import quoted, suggestion
@@ -113,7 +113,7 @@ def duplicate_names_of_actions(scope: NameScope) -> Iterator[Finding]:
 def reserved_goal_names(scope: NameScope) -> Iterator[Finding]:
     """Find goals with names such as `shelf#2`, which further loops use."""
     for index, goal in enumerate(scope.loaded.spec.goals):
-        if goal.name is not None and LOOP.fullmatch(goal.name):
+        if goal.name is not None and LOOP_NAME.fullmatch(goal.name):
             message = f"{quoted(goal.name)} is reserved for the goals of further loops"
             yield Finding(("goals", index, "name"), message, "choose a name that does not end in # and a number")
 

@@ -21,8 +21,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-from simscen.core.problems import Problem
-from simscen.core.world import World
+from simscen.core.environment.world_model import World
+from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.loading.yaml.tree import Key, MappingNode, key_position, value_position
 from simscen.model.scenario import ScenarioSpec

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable
 
-from simscen.core.problems import Problem
-from simscen.core.world import World
+from simscen.core.environment.world_model import World
+from simscen.core.errors import Problem
 from simscen.loading.checks import actions, criteria, events, faults, ineffective, names, robots, settings, world_file
 from simscen.loading.checks.registry import MEANING, NAMES, ROBOT_NAMES, WORLD_FILE, NameScope, WrittenScenario
 from simscen.loading.loaded import LoadedScenario, LoadedWorld

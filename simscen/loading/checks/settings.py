@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
 from simscen.loading.checks.registry import NAMES, Finding, Keys, NameScope
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import MappingNode, existing_keys

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from pydantic import BaseModel
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.core.version import PACKAGE
 from simscen.loading.files.paths import PathProblem
 from simscen.loading.loaded import JudgedMask, LoadedMap, LoadedRobot, LoadedWorld

@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
 from simscen.loading import multirobot
 from simscen.loading.files.assets import Assets, load_judged_masks
 from simscen.loading.files.paths import PathSandbox

@@ -4,8 +4,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from simscen.core.errors import InvalidInput, NothingSelected
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, NothingSelected, Problem
 from simscen.loading.files.paths import exists, is_folder
 from simscen.loading.scenario import scenario_id
 from simscen.loading.schema.messages import quoted

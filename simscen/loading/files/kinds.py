@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.checks.runner import check_world_file
 from simscen.loading.files.assets import GAZEBO, URDF, Assets, is_ros_map
 from simscen.loading.files.discovery import BASE, ROBOT, SCENARIO, STACK, WORLD

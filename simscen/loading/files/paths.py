@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.textfile import os_error_reason
 

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.assets import Assets, shipped_robots
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.loaded import LoadedRobot

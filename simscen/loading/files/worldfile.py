@@ -6,8 +6,7 @@ from typing import Any
 
 import yaml
 
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.assets import Assets
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.loaded import LoadedWorld

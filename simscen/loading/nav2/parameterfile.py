@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.textfile import read_text
 from simscen.loading.yaml.tree import MappingNode, Node, Position

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.files.paths import PathProblem
 from simscen.loading.nav2.mapping import Known, Translation
 from simscen.loading.nav2.nodes import translate, unknown_nodes

@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.schema import common_mistakes, messages
 from simscen.loading.schema.lookup import keys_of, models_at, needs_nothing, types_at
 from simscen.loading.yaml import textfile

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from simscen.core.externalcommand import ExternalCommand
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
+from simscen.core.external_command import ExternalCommand
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, child
 
 SCENARIO_KEYS = ("keepout", "keepout_mask", "speed_zones", "speed_mask")

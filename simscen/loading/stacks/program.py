@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from simscen.core.externalcommand import ANSWER_LIMIT, START_LIMIT, ExternalCommand, words_of
+from simscen.core.external_command import ANSWER_TIMEOUT_S, START_TIMEOUT_S, ExternalCommand, split_command
 from simscen.loading.files.paths import exists
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
@@ -24,13 +24,13 @@ def parse_command(
     environment: Mapping[str, str],
     folder: Path,
     own: Mapping[str, str] | None = None,
-    limits: tuple[float, float] = (START_LIMIT, ANSWER_LIMIT),
+    limits: tuple[float, float] = (START_TIMEOUT_S, ANSWER_TIMEOUT_S),
 ) -> ExternalCommand:
     """The command that a line means in a folder: `own` variables are set on top of the user's `environment`.
 
     Raises ValueError when it cannot be read or its program is not there to be run.
     """
-    program, *arguments = words_of(text)
+    program, *arguments = split_command(text)
     program = str(Path(program).expanduser()) if program.startswith("~") else program
     env = {**environment, **(own or {})}
     if program == OWN and why_not_executable(program, env, folder):

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.nav2.parameterfile import is_nav2_parameter_file
 from simscen.loading.nav2.stack import KEY as NAV2_PARAMS

@@ -5,9 +5,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from simscen.core.errors import InvalidInput
-from simscen.core.externalcommand import ExternalCommand
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.external_command import ExternalCommand
 from simscen.loading.files.paths import PathSandbox, exists
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.multirobot import external_stack_name

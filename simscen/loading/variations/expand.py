@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from itertools import combinations, product
 from typing import TYPE_CHECKING
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.schema.messages import quoted
 from simscen.loading.schema.validate import check
 from simscen.loading.variations.naming import NAME_HINT, derive_name, make_unique, name_error, short_names

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.tree import Position
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.files.paths import PathProblem, PathSandbox
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.textfile import read_text

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import yaml
 from yaml import events as ev
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.yaml.scalars import parse_scalar
 from simscen.loading.yaml.textfile import LOOKALIKES, describe_lookalike, find_lookalike
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode

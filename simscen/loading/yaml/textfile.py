@@ -6,7 +6,7 @@ import re
 import stat
 from pathlib import Path
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 
 MAX_FILE_BYTES = 1 << 20
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.samples import Ticks
+from simscen.core.records.trace import Ticks
 from simscen.record.foreign.messages import Posed
 from simscen.record.foreign.timebase import Stamped
 

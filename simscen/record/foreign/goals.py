@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from simscen.core.events import Event, EventKind
+from simscen.core.records.events import Event, EventKind
 from simscen.record.foreign.messages import GoalState
 
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.core.events import Event, EventKind
-from simscen.core.evidence import Coverage
-from simscen.core.grid import OccupancyGrid
-from simscen.core.trace import Trace
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.evidence import LogCoverage
+from simscen.core.records.trace import Trace
 from simscen.record.foreign.bagfolder import messages_of
 from simscen.record.foreign.collected import collect, roles_of
 from simscen.record.foreign.reading import Reading
@@ -30,7 +30,7 @@ class ForeignLog:
     """
 
     trace: Trace
-    coverage: Coverage
+    coverage: LogCoverage
     notes: Sequence[str]
     seen: Seen = field(default_factory=Seen)
     map: OccupancyGrid | None = None
@@ -56,7 +56,7 @@ def read_foreign(path: Path, wanted: Wanted, looks: bool = False) -> ForeignLog:
         else:
             reading.notes.append("the log breaks off, so nothing passes on it")
         trace = reading.rows.trace(wanted.tick_rate, end)
-        coverage = Coverage(reading.missing, reading.partial, recorded_by_simscen=False)
+        coverage = LogCoverage(reading.missing, reading.partial, recorded_by_simscen=False)
         if watched is None:
             return ForeignLog(trace, coverage, reading.notes)
         return ForeignLog(trace, coverage, reading.notes, watched.seen(reading.time, found), watched.map)

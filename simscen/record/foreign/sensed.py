@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import Twist
-from simscen.core.samples import Ticks
-from simscen.core.sensing import Odometry, Scan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.records.trace import Ticks
 from simscen.record.foreign.carmen import carmen_rows
 from simscen.record.foreign.sensedcsv import csv_rows
 from simscen.record.foreign.sensedros import ros_rows

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.samples import Ticks
+from simscen.core.records.trace import Ticks
 from simscen.record.foreign.unusable import Unusable
 from simscen.record.simtime import SECOND
 

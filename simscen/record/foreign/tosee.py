@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.grid import OccupancyGrid
 from simscen.record import topics
 from simscen.record.foreign.collected import Collected
 from simscen.record.foreign.mcapfile import Raw

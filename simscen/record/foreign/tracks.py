@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.samples import Ticks
+from simscen.core.records.trace import Ticks
 from simscen.record.foreign.collected import Collected
 from simscen.record.foreign.frames import Transforms
 from simscen.record.foreign.messages import NO_COVARIANCE, Posed

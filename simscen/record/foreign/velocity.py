@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.samples import Ticks
+from simscen.core.records.trace import Ticks
 
 SPAN = 0.2
 """Seconds over which a difference of positions becomes a velocity: a motion capture trembles by millimetres."""

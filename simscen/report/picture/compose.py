@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from simscen.core.events import EventKind
 from simscen.core.geometry import Array
-from simscen.core.result import Outcome
+from simscen.core.records.events import EventKind
+from simscen.core.records.run_result import Outcome
 from simscen.report.picture import goals, grid, ground, happenings, palette, things, ways, zones
 from simscen.report.picture.canvas import COARSE, Bounds, Canvas, Note, Part, font, shown, write
 from simscen.report.picture.labels import Label, place

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image
 
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2
-from simscen.core.world import Polygon
 from simscen.report.picture.canvas import Canvas, Note, shown
 from simscen.report.picture.palette import AMBER, FAINT_INK, GREEN, INK, PAGE, ROBOT, RULE
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.events import Event, EventKind
-from simscen.core.goalnames import named
-from simscen.core.navigation import Goal
-from simscen.core.verdict import Status
+from simscen.core.messages.goal_names import matches_goal_name
+from simscen.core.messages.navigation import Goal
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.verdict import Status
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Canvas, shown
 from simscen.report.picture.labels import Label
@@ -69,7 +69,7 @@ def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     for goal in goals:
         fate = fate_of(goal, scene)
         there = names.setdefault((goal.pose.x, goal.pose.y), [])
-        known = any(named(goal.name, other.partition(":")[0]) for other in there)
+        known = any(matches_goal_name(goal.name, other.partition(":")[0]) for other in there)
         if not known or fate.told:  # the second loop comes to the same place
             there.append(f"{goal.name}: {fate.told}" if fate.told else goal.name)
     for goal in goals:

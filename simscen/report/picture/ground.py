@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from simscen.core.environment.occupancy_grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array
-from simscen.core.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import SAMPLES, Bounds, Canvas
 

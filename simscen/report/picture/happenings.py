@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.core.events import EventKind
-from simscen.core.verdict import Status
+from simscen.core.records.events import EventKind
+from simscen.core.records.verdict import Status
 from simscen.judge.finding_text import comparison, subject
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Canvas, shown

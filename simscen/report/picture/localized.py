@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array
-from simscen.core.grid import OccupancyGrid
 from simscen.report.picture import ground, palette
 from simscen.report.picture.canvas import Canvas, Note
 from simscen.report.picture.compose import LARGEST

@@ -4,16 +4,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from simscen.core.events import Event, EventKind
+from simscen.core.environment.scenery import MovableObject
 from simscen.core.geometry import Array, Pose2
-from simscen.core.scenery import Thing
-from simscen.core.trace import Trace
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Trace
 
 _UNKNOWN_RADIUS = 0.2
 Outlines = tuple[Array, ...]
 
 
-def outlines(trace: Trace, things: Sequence[Thing]) -> dict[str, Outlines]:
+def outlines(trace: Trace, things: Sequence[MovableObject]) -> dict[str, Outlines]:
     """The outlines, each (n, 2), of each object in its own frame: what was spawned, and else the world's things."""
     found = {thing.name: tuple(map(np.array, thing.outlines)) for thing in things if thing.outlines}
     found.update({event.name: of_event(event) for event in trace.of_kind(EventKind.OBJECT_SPAWNED)})

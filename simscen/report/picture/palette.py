@@ -5,8 +5,8 @@ bluish green, bad vermilion, odd amber, which differ in blue and lightness as we
 dark blue to light orange. What failed has a cross beside its colour, what passed a tick.
 """
 
-from simscen.core.result import Outcome
-from simscen.core.verdict import Status
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.verdict import Status
 
 Colour = tuple[int, int, int]
 

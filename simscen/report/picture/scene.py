@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from simscen.core.case import Case
-from simscen.core.grid import OccupancyGrid
-from simscen.core.result import RunResult
-from simscen.core.scenery import Scenery
-from simscen.core.trace import Trace
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.scenery import Scenery
+from simscen.core.records.case import Case
+from simscen.core.records.run_result import RunResult
+from simscen.core.records.trace import Trace
 
 
 @dataclass(frozen=True, eq=False)

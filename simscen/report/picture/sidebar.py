@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 
 from PIL import Image, ImageDraw
 
-from simscen.core.result import Outcome
-from simscen.core.verdict import Status
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.verdict import Status
 from simscen.judge.finding_text import comparison, subject, time_and_place
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Note, font, shown, write

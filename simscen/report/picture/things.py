@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.core.events import EventKind
+from simscen.core.environment.scenery import MovableObject
 from simscen.core.geometry import Array, Pose2
-from simscen.core.samples import Samples
-from simscen.core.scenery import Thing
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Samples
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Canvas, shown
 from simscen.report.picture.labels import Label
@@ -70,7 +70,7 @@ def _way(canvas: Canvas, scene: Scene, samples: Samples, shape: Outlines) -> Non
             canvas.polygon(_pose(samples, k).apply(outline), (*colour, 30), colour, 0.8)
 
 
-def _ends(canvas: Canvas, door: Thing, shape: Outlines) -> None:
+def _ends(canvas: Canvas, door: MovableObject, shape: Outlines) -> None:
     """Where the panel of a door can be, and its hinge."""
     for end in (door.closed, door.opened):
         for corners in () if end is None else map(end.apply, shape):

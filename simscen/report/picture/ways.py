@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from simscen.core.events import EventKind
 from simscen.core.geometry import Array, Pose2
-from simscen.core.samples import Samples
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Samples
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Canvas, shown
 from simscen.report.picture.labels import Label

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.core.events import Event, EventKind
+from simscen.core.environment.costmap_filters import MaskBlocks
+from simscen.core.environment.scenery import DrivableSurface, FilterZone
 from simscen.core.geometry import Array
-from simscen.core.maskcells import MaskCells
-from simscen.core.scenery import Ground, Zone
+from simscen.core.records.events import Event, EventKind
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Canvas, shown
 from simscen.report.picture.labels import Label
@@ -32,7 +32,7 @@ def draw_ground(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         yield Label(RANK, x, y, named, palette.FAINT_INK, 11, _reach(canvas, outline), spare=True)
 
 
-def _chevrons(canvas: Canvas, ground: Ground, outline: Array) -> None:
+def _chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> None:
     steep = math.hypot(*ground.uphill)
     if steep < 0.01:
         return
@@ -80,7 +80,7 @@ def draw_zones(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             yield Label(2, x, y, shown(scene.called(told)), colour, 12, min(18.0, _reach(canvas, outlines[0])))
 
 
-def _in_force(scene: Scene) -> Iterator[tuple[Zone, str]]:
+def _in_force(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
     """Zones that were on at any time, each with what it says and when it does."""
     own = {(str(zone.filter), zone.region): zone for zone in scene.scenery.zones if zone.robot == scene.name}
     switched: dict[tuple[str, str], list[Event]] = {}
@@ -92,13 +92,13 @@ def _in_force(scene: Scene) -> Iterator[tuple[Zone, str]]:
             yield zone, _told(scene, zone, switched.get(key, []))
 
 
-def _fresh(scene: Scene, key: tuple[str, str]) -> Zone | None:
+def _fresh(scene: Scene, key: tuple[str, str]) -> FilterZone | None:
     """A zone that the stack was told of on the way."""
     outline = scene.case.regions.get(key[1])
-    return Zone("speed" if key[0] == "speed" else "keepout", key[1], outline) if outline else None
+    return FilterZone("speed" if key[0] == "speed" else "keepout", key[1], outline) if outline else None
 
 
-def _told(scene: Scene, zone: Zone, events: list[Event]) -> str:
+def _told(scene: Scene, zone: FilterZone, events: list[Event]) -> str:
     """What a zone is and when: "gate: keep out, on at 2.0 s", "ward: at most 0.25 m/s"."""
     limits = [zone.speed_limit, *(event.data.get("speed_limit") for event in events)]
     limit = next((value for value in reversed(limits) if isinstance(value, int | float) and value), 0.0)
@@ -108,9 +108,9 @@ def _told(scene: Scene, zone: Zone, events: list[Event]) -> str:
     return f"{zone.region}: {', '.join([what, *changes])}" if zone.region else ", ".join([f"{what} (mask)", *changes])
 
 
-def _blocks(zone: Zone) -> list[Array]:
+def _blocks(zone: FilterZone) -> list[Array]:
     """The cells of a mask that say something, as rectangles."""
-    cells = zone.cells or MaskCells(1.0)
+    cells = zone.cells or MaskBlocks(1.0)
     wanted = [block for block in cells.blocks if block[4] == 100 or zone.filter == "speed"]
     boxes = [[(c, r), (c + w, r), (c + w, r + h), (c, r + h)] for c, r, w, h, _ in wanted]
     return [cells.origin.apply(np.array(box, dtype=np.float64) * cells.resolution) for box in boxes]

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from simscen.core.events import Event, EventKind
-from simscen.core.trace import Trace
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Trace
 from simscen.judge.multi_robot import OF_ALL
 from simscen.report.replay.lines import Lines
 from simscen.report.text import one_line

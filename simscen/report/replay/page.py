@@ -16,7 +16,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from simscen.core.result import RunResult
+from simscen.core.records.run_result import RunResult
 from simscen.core.version import PACKAGE
 from simscen.record.replay import Log
 from simscen.report.picture.palette import variables

@@ -4,10 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.case import Case
-from simscen.core.samples import Samples
-from simscen.core.trace import Trace
-from simscen.core.verdict import Verdict
+from simscen.core.records.case import Case
+from simscen.core.records.trace import Samples, Trace
+from simscen.core.records.verdict import Verdict
 from simscen.model.scenario import ScenarioSpec
 from simscen.record.replay import Log
 from simscen.report.replay.columns import Columns

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from simscen.core.events import Event, EventKind
-from simscen.core.result import RunResult
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.run_result import RunResult
 from simscen.record.replay import Log
 from simscen.report.replay.columns import Columns
 from simscen.report.replay.happened import happened

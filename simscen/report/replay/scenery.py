@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from simscen.core.scenery import Scenery
+from simscen.core.environment.scenery import Scenery
 from simscen.record.replay import Log
 from simscen.record.sceneryfile import scenery_of
 from simscen.report.replay.columns import Columns

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.navigation import Path
-from simscen.core.trace import Trace
+from simscen.core.messages.navigation import Path
+from simscen.core.records.trace import Trace
 from simscen.record import frames
 from simscen.record.seen import Messages, Seen
 from simscen.report.replay.columns import Columns

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.case import Case
 from simscen.core.geometry import Array
-from simscen.core.trace import Trace
-from simscen.core.verdict import Finding, Verdict
+from simscen.core.records.case import Case
+from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import Finding, Verdict
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.stl.criterion import TemporalCriterion
 from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_signal

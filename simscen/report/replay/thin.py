@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
-from simscen.core.samples import Ticks
+from simscen.core.records.trace import Ticks
 
 Chosen = npt.NDArray[np.int64]
 

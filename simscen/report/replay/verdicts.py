@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from simscen.core.result import RunResult
-from simscen.core.verdict import Finding, Verdict
+from simscen.core.records.run_result import RunResult
+from simscen.core.records.verdict import Finding, Verdict
 from simscen.judge.finding_text import DISTURBANCE, comparison, disturbance_times, subject
 from simscen.report.replay.lines import Lines
 from simscen.report.text import one_line

@@ -6,7 +6,7 @@ from html import escape
 from pathlib import PurePath
 from urllib.parse import quote
 
-from simscen.core.result import Outcome, RunKey
+from simscen.core.records.run_result import Outcome, RunKey
 from simscen.report.results import relative
 from simscen.report.text import one_line
 

@@ -3,8 +3,8 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished
 from simscen.report.suite.bits import SIGNS, text
 from simscen.report.suite.history import Past, changes
 from simscen.report.suite.run import theme

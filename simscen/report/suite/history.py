@@ -7,8 +7,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from simscen.core.result import Outcome, RunKey
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import read_key
 from simscen.report.sessions import sessions_in
 

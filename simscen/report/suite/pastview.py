@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from urllib.parse import quote
 
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished
 from simscen.report.suite.bits import anchor, sparkline, text
 from simscen.report.suite.history import Past, changes
 from simscen.report.suite.run import run_label

@@ -4,8 +4,8 @@ import base64
 from collections.abc import Sequence
 from pathlib import Path
 
-from simscen.core.result import RunKey
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import RunFinished
 from simscen.report.suite.bits import link, text
 
 PNG = b"\x89PNG\r\n\x1a\n"

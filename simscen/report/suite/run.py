@@ -5,9 +5,9 @@ from html import escape
 from pathlib import Path
 from textwrap import dedent
 
-from simscen.core.result import Outcome, RunKey
-from simscen.core.sessionevents import RunFinished
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.session_events import RunFinished
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.finding_text import comparison, disturbance_times, subject, tightest_margin, time_and_place
 from simscen.report.complaints import broken, complaints, excused, failure, place
 from simscen.report.line import text_of

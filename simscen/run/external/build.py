@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput
-from simscen.core.time import Clock
 from simscen.loading.stacks.userconfig import undefined_stack
 from simscen.model.anystack import ExternalStackSpec
 from simscen.run.external.hello import Ordered

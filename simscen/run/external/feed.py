@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.belief import Estimate
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
-from simscen.core.grid import OccupancyGrid
-from simscen.core.sensing import Odometry, Reading, Readings, Scan
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.sensor_data import Odometry, Reading, Readings, Scan
 from simscen.peer import messages
 from simscen.record import frames, pack, pack_many, pack_rare, topics
 from simscen.record.out import Layouts, Line, Together

@@ -6,10 +6,10 @@ the whole task ended is not its to say. So a log cannot contradict itself, whate
 
 from typing import Any
 
-from simscen.core.events import Event, EventKind, Value
-from simscen.core.goalnames import Mode
-from simscen.core.navigation import ErrorCode, Goal, error_code
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
+from simscen.core.messages.goal_names import Mode
+from simscen.core.messages.navigation import ErrorCode, Goal, error_code
+from simscen.core.records.events import Event, EventKind, Value
 from simscen.run.external.errors import NotAllowed
 from simscen.stack.tasks import Task
 

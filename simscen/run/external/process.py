@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.errors import RunError
-from simscen.core.externalcommand import ExternalCommand
+from simscen.core.external_command import ExternalCommand
 from simscen.peer import wire
 from simscen.run.external import errors
 from simscen.run.process.confine import environment

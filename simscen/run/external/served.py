@@ -15,18 +15,18 @@ from typing import Any, get_args
 
 import numpy as np
 
-from simscen.core.belief import Estimate
-from simscen.core.chance import Streams
-from simscen.core.events import EventKind, Value
-from simscen.core.filtermasks import FilterMasks, SpeedLimits
+from simscen.core.clock import Clock
+from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.goalnames import Mode
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal as CoreGoal
-from simscen.core.sensing import Bump, Image, Imu, Odometry, Reading, Scan
-from simscen.core.time import Clock
-from simscen.core.trace import Decision
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.goal_names import Mode
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Goal as CoreGoal
+from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Scan
+from simscen.core.random_streams import Streams
+from simscen.core.records.events import EventKind, Value
+from simscen.core.records.trace import Decision
 from simscen.model.stack import StackSpec
 from simscen.peer import Goal, Peer, Step, messages, wire
 from simscen.peer.client import EVENTS, Message

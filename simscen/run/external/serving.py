@@ -4,7 +4,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from simscen.core.externalcommand import ExternalCommand
+from simscen.core.external_command import ExternalCommand
 from simscen.model.anystack import ExternalStackSpec
 from simscen.model.stack import StackSpec
 from simscen.model.stackbase import GoalTolerances, StackBase

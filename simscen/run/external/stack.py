@@ -4,15 +4,15 @@ from collections.abc import Callable
 from pathlib import Path as FilePath
 from typing import Any, TypeVar
 
-from simscen.core.belief import Estimate
 from simscen.core.errors import RunError
-from simscen.core.events import EventKind
-from simscen.core.externalcommand import ExternalCommand
+from simscen.core.external_command import ExternalCommand
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP
-from simscen.core.navigation import Goal, Path
-from simscen.core.sensing import Odometry, Readings
-from simscen.core.trace import Decision
+from simscen.core.geometry.kinematics import STOP
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.sensor_data import Odometry, Readings
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Decision
 from simscen.peer import wire
 from simscen.record import topics
 from simscen.record.simtime import SimTime

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from simscen.core.belief import Belief
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.navigation import Path
-from simscen.core.trace import CostGrid, LogLine
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Path
+from simscen.core.records.trace import CostGrid, LogLine
 from simscen.peer import wire
 from simscen.peer.cdr import Reader
 from simscen.peer.messages import read

@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from simscen.core.goalnames import Mode
+from simscen.core.messages.goal_names import Mode
 from simscen.peer import wire
 from simscen.run.external.errors import NotAllowed
 from simscen.run.external.topics import Offer

@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput, RunError
-from simscen.core.result import RunFailure, RunResult, skipped, unfinished
-from simscen.core.sessionevents import Artifacts, RunFinished
+from simscen.core.records.run_result import RunFailure, RunResult, error_result, skipped_result
+from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.judge.result_json import from_json
 from simscen.record.logfile import PARTIAL_SUFFIX
 from simscen.run.process.confine import MEMORY_BYTES
@@ -25,7 +25,7 @@ def answer_to(job: Job, end: ProcessEnd | PreparerDeath) -> RunFinished:
     result = (
         _result(job, printed)
         if failure is None
-        else unfinished(job.key, job.scenario.path, failure, job.scenario.stack)
+        else error_result(job.key, job.scenario.path, failure, job.scenario.stack)
     )
     return RunFinished(
         result,
@@ -39,13 +39,13 @@ def answer_to(job: Job, end: ProcessEnd | PreparerDeath) -> RunFinished:
 
 def not_done(job: Job, failure: RunFailure) -> RunFinished:
     """The answer to a run that was never finished, or never begun."""
-    result = unfinished(job.key, job.scenario.path, failure, job.scenario.stack)
+    result = error_result(job.key, job.scenario.path, failure, job.scenario.stack)
     return _told(job, result)
 
 
 def not_to_do(job: Job, reason: str) -> RunFinished:
     """The answer to a run that its scenario says to skip."""
-    result = skipped(job.key, job.scenario.path, reason, job.scenario.stack)
+    result = skipped_result(job.key, job.scenario.path, reason, job.scenario.stack)
     return _told(job, result)
 
 
@@ -61,7 +61,7 @@ def _result(job: Job, said: str) -> RunResult:
         return replace(from_json((job.folder / "result.json").read_text(encoding="utf-8")), key=job.key)
     except (OSError, ValueError) as error:
         failure = RunFailure("crashed", f"its result cannot be read: {error}", said)
-        return unfinished(job.key, job.scenario.path, failure, job.scenario.stack)
+        return error_result(job.key, job.scenario.path, failure, job.scenario.stack)
 
 
 def _artifacts(folder: Path) -> Artifacts:

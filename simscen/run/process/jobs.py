@@ -9,7 +9,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from simscen.core.result import Outcome, RunKey
+from simscen.core.records.run_result import Outcome, RunKey
 from simscen.loading.loaded import LoadedScenario
 
 _LENGTH = struct.Struct("<I")

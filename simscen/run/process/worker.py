@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
 from simscen.core.errors import InvalidInput, RunError
-from simscen.core.trace import Moment
+from simscen.core.records.trace import Moment
 from simscen.run.process.confine import die_with_parent, limit_resources, offer_to_the_oom_killer
 from simscen.run.process.jobs import Job, line
 from simscen.run.process.orphans import adopt_orphans, has_descendants

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from simscen.core.goalnames import named
-from simscen.core.navigation import ErrorCode
+from simscen.core.messages.goal_names import matches_goal_name
+from simscen.core.messages.navigation import ErrorCode
 from simscen.criteria.result import ErrorCodeIs, Result
 from simscen.model.navigation import failure_of
 from simscen.model.scenario import ScenarioSpec
@@ -19,7 +19,7 @@ def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
     """
     through = spec.navigation.mode == "navigate_through_poses"
     entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
-    if any(named(goal, name) and failure_of(entry.expect) for name, entry in entries):
+    if any(matches_goal_name(goal, name) and failure_of(entry.expect) for name, entry in entries):
         return True
     results = [entry.chosen for entry in spec.pass_ if entry.severity == "fail"]
     failing = any(isinstance(result, Result) and result.status == "FAILED" for result in results)

@@ -4,13 +4,12 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from simscen.core.filtermasks import FilterMasks, kept_out
+from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks, in_keepout_mask
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2
-from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
-from simscen.core.maskcells import MaskCells
-from simscen.core.polygons import deep_inside
-from simscen.core.separation import separation_of_boxes
-from simscen.core.world import Polygon
+from simscen.core.geometry.polygons import depth_inside_polygon
+from simscen.core.geometry.separation import separation_from_boxes
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.speed import Speed
 from simscen.loading.checks.registry import Finding, Keys
@@ -34,7 +33,7 @@ def stack_masks(scene: Scene) -> FilterMasks:
     return load_masks(scene.loaded)
 
 
-def judged_masks(scene: Scene) -> Mapping[str, MaskCells]:
+def judged_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
     """Return the masks of criteria, by file. Raises InvalidInput for a mask that cannot be read."""
     return load_judged_masks(scene.loaded.judged_masks, scene.loaded.tree, scene.loaded.sourced)
 
@@ -61,7 +60,7 @@ def check_stack_zones(scene: Scene) -> Iterator[Finding]:
 
 
 def _inside_region(corners: Polygon) -> Forbids:
-    return lambda pose, within: deep_inside(pose, corners) > within
+    return lambda pose, within: depth_inside_polygon(pose, corners) > within
 
 
 def forbidden_test(mask: OccupancyGrid) -> Forbids:
@@ -70,7 +69,7 @@ def forbidden_test(mask: OccupancyGrid) -> Forbids:
     def forbids(pose: Pose2, within: float) -> bool:
         steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, CELL_M))) + 1)
         around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-        return bool(kept_out(mask, around + np.array((pose.x, pose.y))).all())
+        return bool(in_keepout_mask(mask, around + np.array((pose.x, pose.y))).all())
 
     return forbids
 
@@ -123,7 +122,7 @@ def keepout_masks_on_goals(scene: Scene) -> Iterator[Finding]:
         if not len(mask.forbidden):
             continue
         start = mask.seen_from(np.array([scene.start]))
-        if separation_of_boxes(start, scene.outline, mask.forbidden)[0] < 0:
+        if separation_from_boxes(start, scene.outline, mask.forbidden)[0] < 0:
             yield Finding(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
             continue
         forbids = forbidden_test(mask.grid)

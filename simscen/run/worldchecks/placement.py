@@ -9,11 +9,11 @@ from simscen.actions.pedestrian import Pedestrian
 from simscen.actions.robot import Kidnap
 from simscen.actions.spawn import Spawn
 from simscen.actions.teleport import Teleport
+from simscen.core.environment.world_model import Polygon
+from simscen.core.errors import Problem
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.navigation import Goal
-from simscen.core.problems import Problem
-from simscen.core.shapes import Solid
-from simscen.core.world import Polygon
+from simscen.core.geometry.shapes import Solid
+from simscen.core.messages.navigation import Goal
 from simscen.loading.checks.registry import Finding, Keys
 from simscen.run.worldchecks.expected_failures import expects_start_failure
 from simscen.run.worldchecks.scene import SILL_M, START, TOUCH_M, WORLD, Scene

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from simscen.core.geometry import Pose2
-from simscen.core.shapes import Solid
+from simscen.core.geometry.shapes import Solid
 from simscen.loading.checks.registry import Finding
 from simscen.run.worldchecks.placement import blocked_poses
 from simscen.run.worldchecks.regions import robot_routes

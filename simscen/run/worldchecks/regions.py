@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.polygons import deep_inside, distance_to_polygon
-from simscen.core.world import Polygon
+from simscen.core.geometry.polygons import depth_inside_polygon, distance_to_polygon
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.localization_error import LocalizationError
 from simscen.loading.checks.events import MAX_OVERSHOOT
@@ -105,7 +105,9 @@ def keepout_regions_on_goals(scene: Scene) -> Iterator[Finding]:
         if polygons_overlap(corners, placed(scene.outline, scene.start)):
             yield Finding(keys, f"keepout can never hold: the robot starts in `{region}`")
             continue
-        inside = [goal.name for _, goal in scene.targets if deep_inside(goal.pose, corners) > goal.xy_tolerance]
+        inside = [
+            goal.name for _, goal in scene.targets if depth_inside_polygon(goal.pose, corners) > goal.xy_tolerance
+        ]
         if inside:
             yield Finding(keys, f"keepout cannot hold if goal `{inside[0]}` is reached: it is in `{region}`")
 

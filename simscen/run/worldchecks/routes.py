@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from simscen.core.geometry import Pose2
-from simscen.core.shapes import Solid
+from simscen.core.geometry.shapes import Solid
 from simscen.run.worldcache import around
 from simscen.run.worldchecks.scene import Scene
 from simscen.worlds.plainways import PlainWays, plain_ways

@@ -7,10 +7,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from simscen.core.errors import UsageError
-from simscen.core.outputs import require_plain
-from simscen.core.problems import Problem
-from simscen.core.world import World
+from simscen.core.environment.world_model import World
+from simscen.core.errors import Problem, UsageError
+from simscen.core.files import require_regular_file
 from simscen.loading.checks.runner import check_scenario
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.run.robotsize import robot_size_of
@@ -85,7 +84,7 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
     image = picture(build(scene.world, height), height, [placed(scene.outline, pose) for pose in poses], gaps)
     file = folder / f"{scene.loaded.title}.png"
     try:
-        require_plain(file)
+        require_regular_file(file)
         file.parent.mkdir(parents=True, exist_ok=True)
         image.save(file)
     except OSError as error:

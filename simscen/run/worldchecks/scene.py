@@ -9,11 +9,11 @@ import numpy as np
 from pydantic import BaseModel
 
 from simscen.actions.robot import Kidnap
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import Polygon, World
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.navigation import Goal
-from simscen.core.shapes import Body, Solid
-from simscen.core.world import Polygon, World
+from simscen.core.geometry.shapes import Body, Solid
+from simscen.core.messages.navigation import Goal
 from simscen.loading.checks.registry import Keys, Stage
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import MappingNode

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from simscen.core.goalnames import named as is_named
-from simscen.core.navigation import Goal
+from simscen.core.messages.goal_names import matches_goal_name as is_named
+from simscen.core.messages.navigation import Goal
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.checks.registry import Finding
 from simscen.model.robot import RobotSpec

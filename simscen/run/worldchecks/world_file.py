@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
-from simscen.core.problems import Problem
-from simscen.core.world import World
+from simscen.core.environment.world_model import World
+from simscen.core.errors import Problem
 from simscen.loading.checks.registry import Finding, Stage
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from simscen.assets.folders import Folders, Trouble
-from simscen.core.errors import InvalidInput
+from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
-from simscen.core.problems import Problem
-from simscen.core.shapes import Solid
+from simscen.core.geometry.shapes import Solid
 from simscen.model.robot import Mecanum, Omnidirectional, RobotSpec
 from simscen.sim.ground import GROUND_CLEARANCE
 from simscen.sim.inertia import MassProperties, combined

@@ -4,7 +4,7 @@ import math
 from xml.etree import ElementTree as ET
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Capsule, Cylinder, Solid, Sphere
+from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from simscen.sim.outline import extremes
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.undercarriage import Wheel

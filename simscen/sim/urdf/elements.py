@@ -11,7 +11,7 @@ from simscen.assets.addresses import PACKAGES
 from simscen.assets.folders import Absent, Folders, Trouble
 from simscen.assets.markup import Source
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
+from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
 from simscen.sim.inertia import MassProperties
 from simscen.sim.urdf.files import MESH_BYTES
 from simscen.sim.urdf.markup import Element, Unusable

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from simscen.assets.folders import Folders, Trouble
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
 from simscen.sim.urdf.markup import CODE, Element, parse
 
 URDF_BYTES = 2 * 2**20

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing_extensions import Self
 
 from simscen.assets import markup
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
 
 CODE = "SC400"
 """The stable code of every problem with a robot's URDF; the message tells them apart."""

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.model.robot import Drive
 from simscen.sim.outline import extremes
 from simscen.sim.urdf.tree import Tree

@@ -3,9 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from simscen.core.errors import InvalidInput
+from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
-from simscen.core.problems import Problem
 from simscen.sim.urdf.elements import Joint, Link, Meshes, joint_of, link_of
 from simscen.sim.urdf.markup import Element, Unusable
 

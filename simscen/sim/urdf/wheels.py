@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Cylinder, Sphere
+from simscen.core.geometry.shapes import Cylinder, Sphere
 from simscen.model.robot import Ackermann, Drive, Omnidirectional
 from simscen.sim.urdf.elements import Joint
 from simscen.sim.urdf.tree import Tree

@@ -3,8 +3,8 @@
 import math
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import ErrorCode
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import ErrorCode
 from simscen.model import recovery as model
 from simscen.stack.lookahead import time_free
 from simscen.stack.protocols import CostmapView, NavigationFailure

@@ -1,8 +1,8 @@
 """Driving back the way the robot came. Nav2 has nothing like it."""
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import ErrorCode
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import ErrorCode
 from simscen.model import recovery as model
 from simscen.stack.behaviors.motions import TIME_ALLOWANCE
 from simscen.stack.footprint import distance_at

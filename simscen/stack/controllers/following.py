@@ -1,7 +1,7 @@
 """What all controllers have in common: the path and the place on it, the full speed and a limit of it."""
 
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import ErrorCode, Path
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.stack.controllers.tracking import PathTracker
 from simscen.stack.protocols import NavigationFailure, RobotModel
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import ErrorCode
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import ErrorCode
 from simscen.stack.arcs import poses_along
 from simscen.stack.footprint import Footprint
 from simscen.stack.lookahead import time_free

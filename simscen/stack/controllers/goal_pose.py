@@ -3,8 +3,8 @@
 import math
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import Goal
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import Goal
 from simscen.stack.protocols import RobotModel
 
 ON_THE_SPOT, PASSED = 0.45, 0.8

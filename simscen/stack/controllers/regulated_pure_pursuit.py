@@ -3,8 +3,8 @@
 import math
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.controllers import RegulatedPurePursuit as RppSpec
 from simscen.stack.arcs import SHOWN, arc
 from simscen.stack.controllers.following import PathFollower

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import Path
+from simscen.core.messages.navigation import Path
 from simscen.stack.cusps import changes, forward_steps
 
 SEARCH_AHEAD = 1.5

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.stack.arcs import poses_along
 from simscen.stack.footprint import Footprint, distance_at
 from simscen.stack.lookahead import time_free

@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
+from simscen.core.decorators import cached_on_instance
+from simscen.core.environment.costmap_filters import Zones
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.remembered import remembered
-from simscen.core.sensing import Image, Scan
-from simscen.core.zones import Zones
+from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.denoise_layer import without_specks
 from simscen.stack.costmap.frame import Cells, Frame, Numbers
@@ -316,7 +316,7 @@ def ready(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:
     _costs(grid, tables, margin, spec.track_unknown_space)
 
 
-@remembered
+@cached_on_instance
 def _costs(grid: OccupancyGrid, tables: Inflation, margin: int, tracks: bool) -> Costs:
     """What cells of a map cost before anything is seen, where nothing is forbidden: once for all its runs."""
     return tables.costs(walls_within(grid, margin), free_layer(grid, tracks).unknown if tracks else None)

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
-from simscen.core.sensing import Image, Scan
-from simscen.core.zones import Zones
+from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.costmap.rolling import NO_FARTHER

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.sensing import Image
+from simscen.core.messages.sensor_data import Image
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.frame import Cells, Frame
 from simscen.stack.costmap.ground import above_ground

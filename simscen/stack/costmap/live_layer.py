@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.sensing import Image, Scan
+from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.depth_layer import Heights, seen_through, shown
 from simscen.stack.costmap.frame import Cells, Frame, Numbers

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.frame import Cells, Frame, Numbers
 from simscen.stack.localizers.beams import Plane, directions

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.filtermasks import kept_out
+from simscen.core.decorators import cached_on_instance
+from simscen.core.environment.costmap_filters import in_keepout_mask
+from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Array
-from simscen.core.grid import UNKNOWN, OccupancyGrid
-from simscen.core.remembered import remembered
-from simscen.core.world import Polygon
 from simscen.stack.costmap.frame import Frame
 from simscen.stack.costmap.inflation_layer import Squared, squared_distances
 
@@ -44,13 +44,13 @@ def static_layer(
     return StaticLayer(frame, lethal, (cells == UNKNOWN) & ~lethal & unknown)
 
 
-@remembered
+@cached_on_instance
 def free_layer(grid: OccupancyGrid, unknown: bool) -> StaticLayer:
     """The layer of a map in which nothing is forbidden: once for all its runs, which write into copies."""
     return static_layer(grid, (), unknown=unknown)
 
 
-@remembered
+@cached_on_instance
 def walls_within(grid: OccupancyGrid, reach: int) -> Squared:
     """For each cell of such a layer, see `squared_distances`: once for all its runs."""
     return squared_distances(free_layer(grid, True).lethal, reach)
@@ -70,7 +70,7 @@ def _forbidden(frame: Frame, keepout: tuple[Polygon, ...], mask: OccupancyGrid |
     if mask is not None:
         columns = np.arange(frame.shape[1])
         for row in range(frame.shape[0]):
-            lethal[row] |= kept_out(mask, frame.centres(np.column_stack((np.full_like(columns, row), columns))))
+            lethal[row] |= in_keepout_mask(mask, frame.centres(np.column_stack((np.full_like(columns, row), columns))))
     return lethal
 
 

@@ -1,7 +1,7 @@
 """A recovery behaviour behind its door."""
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.recovery import BehaviorSpec
 from simscen.stack.installed.watched import Watched
 from simscen.stack.protocols import Behavior, CostmapView

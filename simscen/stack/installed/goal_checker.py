@@ -1,8 +1,8 @@
 """A goal checker behind its door."""
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Goal
 from simscen.model.checkers import GoalCheckerSpec
 from simscen.stack.installed.watched import Watched
 from simscen.stack.protocols import GoalChecker

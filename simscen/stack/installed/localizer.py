@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from simscen.core.belief import Belief, Estimate
-from simscen.core.sensing import Imu, Odometry, Scan
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import LocalizerSpec
 from simscen.stack.installed.watched import Watched, all_finite
 from simscen.stack.protocols import Localizer

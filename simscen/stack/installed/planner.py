@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import Path
+from simscen.core.messages.navigation import Path
 from simscen.model.planners import PlannerSpec
 from simscen.stack.installed.watched import Watched
 from simscen.stack.protocols import LETHAL, CostmapView, Planner

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from simscen.core.belief import Belief, Estimate
-from simscen.core.events import Event, EventKind
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal, Path
-from simscen.core.sensing import Readings
-from simscen.core.trace import CostGrid, Decision
-from simscen.core.zones import Zones
+from simscen.core.environment.costmap_filters import Zones
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.sensor_data import Readings
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import CostGrid, Decision
 from simscen.model.stack import InProcessStack
 from simscen.stack.installed.localizer import checked_belief
 from simscen.stack.installed.watched import Watched

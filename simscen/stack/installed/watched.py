@@ -7,10 +7,10 @@ from typing import Any, ClassVar, NoReturn, ParamSpec, TypeVar
 
 import numpy as np
 
-from simscen.core.errors import BROKEN, RunError
+from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import ErrorCode, Path
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.spec.component import Component
 from simscen.stack.protocols import NavigationFailure
 from simscen.stack.setting import Setting
@@ -74,7 +74,7 @@ class Watched:
 
     def broke(self, what: str) -> NoReturn:
         """End the run: it answered with something that is no answer."""
-        raise RunError(BROKEN, f"{self.who} {what}")
+        raise RunError(BROKEN_COMPONENT, f"{self.who} {what}")
 
     def checked_path(self, path: object, what: str) -> Path:
         """A path of finite poses (n, 3)."""

@@ -6,9 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Array, Pose2
-from simscen.core.sensing import Imu, Odometry, Scan
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Amcl
 from simscen.stack.localizers.clusters import spread, summarise
 from simscen.stack.localizers.finder import UNSEEN, Finder

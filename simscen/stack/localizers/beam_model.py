@@ -10,8 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
 from simscen.core.geometry import Array
-from simscen.core.grid import FREE, OccupancyGrid
 from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField, by_blocks
 from simscen.stack.localizers.likelihood_field import PEAK_OF_SUMS, STRAYS_OF_SUMS

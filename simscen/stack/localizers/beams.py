@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 
 Plane = npt.NDArray[np.complex128]
 """Points or directions x + iy: turned by a product, placed by a sum."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.grid import OccupancyGrid
-from simscen.core.remembered import remembered
+from simscen.core.decorators import cached_on_instance
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.model import localizers as model
 from simscen.stack.localizers.amcl import AmclLocalizer
 from simscen.stack.localizers.beam_model import BeamModel, opaque_field
@@ -57,7 +57,7 @@ class Matching:
         self.search.ready()
 
 
-@remembered
+@cached_on_instance
 def matching(grid: OccupancyGrid, spec: model.Amcl) -> Matching:
     """It takes some 10 ms for a house, and 0.3 s for a map of 100 x 100 m."""
     grid = replace(grid)  # the grid holds the result: what held that grid in turn would wait for the garbage collector

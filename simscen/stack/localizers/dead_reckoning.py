@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Array, Pose2
-from simscen.core.sensing import Imu, Odometry, Scan
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
 from simscen.stack.localizers.planar_motion import grown
 from simscen.stack.odometry_history import believable

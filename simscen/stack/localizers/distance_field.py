@@ -7,8 +7,8 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.environment.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array
-from simscen.core.grid import FREE, UNKNOWN, OccupancyGrid
 from simscen.stack.localizers.beams import Cells, Plane
 from simscen.stack.nearest import BEYOND, FARTHEST, squared_cells, squared_within
 

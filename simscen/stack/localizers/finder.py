@@ -5,9 +5,9 @@ from collections import deque
 
 import numpy as np
 
-from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.core.sensing import Scan
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane
 from simscen.stack.localizers.clusters import errors_about
 from simscen.stack.localizers.global_search import APART, GlobalSearch, View

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.stack.localizers.beams import Plane, evenly
 from simscen.stack.localizers.distance_field import DistanceField, Float32
 from simscen.stack.localizers.likelihood_field import surfaces

@@ -11,8 +11,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.environment.occupancy_grid import OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Array
-from simscen.core.grid import OCCUPIED, OccupancyGrid
 from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField, Float32, by_blocks
 

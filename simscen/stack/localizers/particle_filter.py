@@ -8,9 +8,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
-from simscen.core.sensing import Scan
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.localizers import Amcl
 from simscen.stack.localizers.beams import Beams, select_beams
 from simscen.stack.localizers.clusters import BINS_IN_TOUCH, in_touch, summarise

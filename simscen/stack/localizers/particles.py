@@ -7,9 +7,9 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.belief import Estimate
+from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.core.grid import FREE, OccupancyGrid
+from simscen.core.messages.localization import Estimate
 
 
 @dataclass(frozen=True, eq=False)

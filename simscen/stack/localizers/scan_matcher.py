@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.particles import columns, wrapped
 from simscen.stack.localizers.surfaces import Surface, surfaces_of
 

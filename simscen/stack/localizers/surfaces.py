@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane, directions, evenly
 
 BASELINE = 0.15

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scipy.ndimage import label
 
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import ErrorCode
+from simscen.core.messages.navigation import ErrorCode
 from simscen.stack.planners.finish import spaced
 from simscen.stack.planners.rates import Rates
 from simscen.stack.protocols import NavigationFailure

@@ -3,7 +3,7 @@
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import ErrorCode, Path
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.planners import Navfn, Smac2d
 from simscen.stack.planners.corners import around_corners
 from simscen.stack.planners.ends import Ends, find_ends

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import Path
+from simscen.core.messages.navigation import Path
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 LARGE = 1_000_000

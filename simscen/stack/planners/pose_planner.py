@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import ErrorCode, Path
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.cusps import cusps
 from simscen.stack.footprint import Footprint

@@ -2,7 +2,7 @@
 
 import math
 
-from simscen.core.oftenmade import often_made
+from simscen.core.decorators import fast_dataclass
 from simscen.stack.prediction.clusters import BOTH, Piece, Places, fitted
 from simscen.stack.prediction.stance import Stance
 from simscen.stack.prediction.tracks import Track
@@ -21,7 +21,7 @@ RADIUS_GAIN = 0.3
 """How much a new look at a whole piece changes the radius of a track."""
 
 
-@often_made(eq=False)
+@fast_dataclass(eq=False)
 class Seen:
     """A scan at a tick, in pieces of its hits `places` (m,), by a lidar that is at `lidar` in the odom frame.
 

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import STOP, Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.guards import Prediction
 from simscen.stack.footprint import Discs
 from simscen.stack.prediction.moving import WIDEST, Moving, Reals

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array
-from simscen.core.oftenmade import often_made
 
 GAP, SPARSE = 0.15, 2.5
 """Two hits belong together when they are no farther apart than this many metres, or times the spacing of beams."""
@@ -36,7 +36,7 @@ Places = npt.NDArray[np.complex128]
 """Points (n,) as complex numbers, x + iy: to turn them is one multiplication."""
 
 
-@often_made(eq=False)
+@fast_dataclass(eq=False)
 class Hits:
     """What the `beams` of a scan hit, in order: `ranges` and `places` (m,).
 
@@ -64,7 +64,7 @@ class Hits:
         return abs(there - here) <= max(self.sparse * near, GAP) + ROUNDING
 
 
-@often_made(eq=False)
+@fast_dataclass(eq=False)
 class Runs:
     """Hits of which neighbours that are not far apart make a run: things that stand apart.
 

@@ -3,9 +3,9 @@
 import math
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import Path
-from simscen.core.sensing import Scan
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import Path
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
 from simscen.stack.prediction.avoidance import Avoidance

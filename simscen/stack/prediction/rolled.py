@@ -10,7 +10,7 @@ from collections.abc import Callable
 from math import cos, remainder, sin, tau
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.sensing import Imu, Odometry
+from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.stack.odometry_history import KEPT
 
 FASTEST = 100.0

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.stack.protocols import RobotModel
 
 STEP, HORIZON = 0.1, 3.0

@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
+from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array, Pose2
-from simscen.core.oftenmade import often_made
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.stack.prediction.clusters import Indices, Mask, Places
 
 MARGIN, RELATIVE = 0.25, 0.02
@@ -110,7 +110,7 @@ def _least(values: Array, width: int) -> Array:
     return values
 
 
-@often_made(eq=False)
+@fast_dataclass(eq=False)
 class Earlier:
     """What a scan saw through, and where its lidar was in the odom frame."""
 
@@ -142,7 +142,7 @@ class Earlier:
         return np.asarray(self.free.take(beam) > distance)
 
 
-@often_made(eq=False)
+@fast_dataclass(eq=False)
 class Looked:
     """The beams (n,) of an earlier scan that went towards places, and how far away these were in m.
 

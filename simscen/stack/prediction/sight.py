@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.stack.prediction.clusters import Places
 from simscen.stack.prediction.seen_through import SAME, Earlier
 from simscen.stack.prediction.stance import Stance

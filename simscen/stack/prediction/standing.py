@@ -3,7 +3,7 @@
 import math
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.motion import STOP, Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.stack.protocols import RobotModel
 
 THERE, TURNED = 0.08, 0.15

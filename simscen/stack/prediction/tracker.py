@@ -8,7 +8,7 @@ nothing continues ends: soon where the lidar sees through the place, later where
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.prediction.association import Seen, associate, begin
 from simscen.stack.prediction.clusters import Hits, Mask, Places, Runs, answers, clusters, runs, shares

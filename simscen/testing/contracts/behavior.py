@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure
 from simscen.testing.contracts.component import ComponentContract, copied, heard, same, view_of

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from simscen.core.navigation import ErrorCode
+from simscen.core.messages.navigation import ErrorCode
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.spec.component import Component
 from simscen.stack.costmap.costmap import Costmap

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.stack.arcs import poses_along
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Controller, CostmapView, NavigationFailure

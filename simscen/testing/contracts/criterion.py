@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from simscen.core.case import Case
-from simscen.core.trace import Trace
-from simscen.core.verdict import Finding, Status
+from simscen.core.records.case import Case
+from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.testing.contracts.component import heard
 from simscen.testing.promise import Contract, demand, promise

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import Goal
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import Goal
 from simscen.stack.protocols import GoalChecker
 from simscen.testing.contracts.component import ComponentContract, heard
 from simscen.testing.promise import demand, promise

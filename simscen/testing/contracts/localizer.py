@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Imu, Odometry
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.stack.protocols import Localizer
 from simscen.testing.contracts.component import heard
 from simscen.testing.promise import Contract, demand, promise

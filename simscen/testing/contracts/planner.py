@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import ErrorCode, Path
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.testing.contracts.component import ComponentContract, copied, heard, same, scribble, view_of

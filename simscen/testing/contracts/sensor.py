@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core import sensing
-from simscen.core.sensing import Reading
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
+from simscen.core.messages import sensor_data
+from simscen.core.messages.sensor_data import Reading
 from simscen.sensors.sensor import Sensor, SensorSetting
 from simscen.testing.contracts.component import heard
 from simscen.testing.contracts.fault import equal
@@ -55,7 +55,7 @@ class SensorContract(Contract):
         sensor, view, period = self.built()
         demand(sensor.name == NAME, f"is called {sensor.name!r}, not {NAME!r}")
         demand(sensor.period == period, f"has a period of {sensor.period!r} ticks, not {period}")
-        kind = getattr(sensing, self.spec.says)
+        kind = getattr(sensor_data, self.spec.says)
         for k, reading in enumerate(self.measured(sensor, view, period), start=1):
             demand(type(reading) is kind, f"says {type(reading).__name__}, not {self.spec.says}")
             signed = (reading.sensor, reading.tick)

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.belief import Estimate
-from simscen.core.chance import Streams
-from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP
-from simscen.core.navigation import Goal
-from simscen.core.sensing import Readings, Scan
-from simscen.core.trace import Decision
+from simscen.core.geometry.kinematics import STOP
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Goal
+from simscen.core.messages.sensor_data import Readings, Scan
+from simscen.core.random_streams import Streams
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Decision
 from simscen.stack.protocols import RobotModel, Stack, Surroundings
 from simscen.stack.setting import Setting
 from simscen.testing.contracts.component import heard

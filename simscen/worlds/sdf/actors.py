@@ -9,7 +9,7 @@ import math
 from dataclasses import replace
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Body, Cylinder, MotionPath, Solid
+from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.links import read_link
 from simscen.worlds.sdf.markup import Element

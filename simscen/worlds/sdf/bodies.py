@@ -8,7 +8,7 @@ everything that hangs on it static. Links without a joint between them are bodie
 from dataclasses import dataclass, field, replace
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Body, Solid
+from simscen.core.geometry.shapes import Body, Solid
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.links import LinkContent
 from simscen.worlds.sdf.markup import Element

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.shapes import Solid
+from simscen.core.geometry.shapes import Solid
 from simscen.worlds.meshing import fuse
 from simscen.worlds.sdf.ground import LEVEL
 

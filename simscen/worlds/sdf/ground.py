@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Solid
+from simscen.core.geometry.shapes import Box, Solid
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.report import Report

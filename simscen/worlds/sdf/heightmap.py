@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 
 from simscen.core.geometry import Array, Pose3
-from simscen.core.shapes import Mesh, Solid
+from simscen.core.geometry.shapes import Mesh, Solid
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.files import MESH_BYTES, Library
 from simscen.worlds.sdf.markup import Element

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Solid
+from simscen.core.geometry.shapes import Solid
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.placing import PlacedLink

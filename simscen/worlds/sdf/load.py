@@ -7,9 +7,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import Array
-from simscen.core.shapes import Body, Solid
-from simscen.core.world import World
+from simscen.core.geometry.shapes import Body, Solid
 from simscen.worlds.extents import plan_extents
 from simscen.worlds.mapsize import Bounds
 from simscen.worlds.sdf.actors import read_actor

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from simscen.assets.folders import Trouble
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
-from simscen.core.shapes import Mesh
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.geometry.shapes import Mesh
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.files import MESH_BYTES, Library
 from simscen.worlds.sdf.markup import Element

@@ -8,7 +8,7 @@ and crossings, which needs no triangulation and is exact for straight edges.
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.shapes import Extrusion, Solid
+from simscen.core.geometry.shapes import Extrusion, Solid
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.markup import Element
 

@@ -2,7 +2,7 @@
 
 from typing_extensions import assert_never
 
-from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Sphere
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Sphere
 from simscen.worlds.sdf.state import Scale
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Shape, Solid, Sphere
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Shape, Solid, Sphere
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.files import Library
 from simscen.worlds.sdf.ground import read_plane

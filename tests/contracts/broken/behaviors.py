@@ -3,7 +3,7 @@
 import random
 from typing import Any
 
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.recovery import BackUp, Spin
 from simscen.stack.protocols import NavigationFailure
 from tests.contracts.broken.cases import Wrapper, breaks

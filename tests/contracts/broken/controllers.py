@@ -4,7 +4,7 @@ import math
 import random
 from typing import Any
 
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import RegulatedPurePursuit
 from simscen.stack.protocols import NavigationFailure
 from tests.contracts.broken.cases import Wrapper, breaks

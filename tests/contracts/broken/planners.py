@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import Path
+from simscen.core.messages.navigation import Path
 from simscen.model.planners import OmplPlanner
 from simscen.stack.protocols import NavigationFailure
 from tests.contracts.broken.cases import Wrapper, breaks

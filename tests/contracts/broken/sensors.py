@@ -5,8 +5,8 @@ import random
 from dataclasses import replace
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Odometry
 from simscen.model.robot import Bumper, Lidar
 from tests.contracts.broken.cases import Wrapper, breaks
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.events import Event, EventKind
-from simscen.core.motion import Twist
-from simscen.core.trace import Decision
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Decision
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
 from tests.contracts.broken.cases import Wrapper, breaks

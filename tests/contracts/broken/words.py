@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from simscen.actions.base import Action
+from simscen.core.records.verdict import Finding, Status
 from simscen.core.stage import Effect
-from simscen.core.verdict import Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.plugin_metric import Measure
 from simscen.faults.base import Disturbance, Fault

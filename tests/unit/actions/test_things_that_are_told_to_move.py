@@ -6,10 +6,10 @@ import pytest
 from pydantic import ValidationError
 
 from simscen.actions.action import AnyAction
-from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2
-from simscen.core.motion_path import pose_at
-from simscen.core.shapes import MotionPath
+from simscen.core.geometry.motion_paths import pose_at
+from simscen.core.geometry.shapes import MotionPath
+from simscen.core.records.events import Event, EventKind
 from simscen.testing.puppetstage import PuppetStage
 
 WIDE_OPEN = Pose2(0.0, 0.0, math.pi / 2)

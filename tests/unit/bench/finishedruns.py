@@ -1,8 +1,8 @@
 """Runs that have come to an end, in each way."""
 
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
-from simscen.core.sessionevents import RunFinished
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.session_events import RunFinished
+from simscen.core.records.verdict import Finding, Status, Verdict
 
 
 def run(

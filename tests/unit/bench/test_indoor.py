@@ -11,8 +11,8 @@ from simscen.bench.localization.campaign import PARAMETERS, Share, summed_up
 from simscen.bench.localization.generated_logs import Log, log
 from simscen.bench.localization.recorded_drive import errors_of, localize
 from simscen.bench.localization.trial import MOMENTS, ROBOT, Trial
-from simscen.core.grid import FREE, UNKNOWN
-from simscen.core.sensing import Odometry, Scan
+from simscen.core.environment.occupancy_grid import FREE, UNKNOWN
+from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.model.localizers import Amcl
 from simscen.model.stack import StackSpec
 from simscen.record.foreign.sensedrows import TICK_RATE

@@ -11,9 +11,9 @@ from simscen.bench.navigation import corridors
 from simscen.bench.navigation.experiment import with_stack_parameters
 from simscen.bench.navigation.office_maps import FREE, building, write_building
 from simscen.bench.navigation.random_goals import FAULTS, MOVABLE, ROOM, degraded, random_drives, random_goals
+from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Body, Box, Solid
-from simscen.core.world import BuiltWorld, World
+from simscen.core.geometry.shapes import Body, Box, Solid
 from simscen.loading.files.worldfile import load_world_file
 from simscen.loading.scenario import load_scenario
 from simscen.run.worldsource import world_of

@@ -4,8 +4,8 @@ import pytest
 from finishedruns import ARRIVED, GAVE_UP, HIT, LATE, run
 
 from simscen.bench.navigation.summary import DriveOutcome, Trial, summarize
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,9 @@ from finishedruns import ARRIVED, HIT, run
 
 from simscen.bench.navigation.comparison import compare_drives
 from simscen.bench.navigation.summary import Trial, over_worlds, summarize
-from simscen.core.intervals import wilson
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished
+from simscen.core.statistics import wilson_interval
 
 SLOW = run(Outcome.PASSED, seconds=12.0)
 
@@ -25,7 +25,7 @@ def test_worlds_that_all_say_the_same_leave_wilsons_doubt() -> None:
 
 def test_worlds_in_which_every_second_drive_succeeds_leave_doubt_too() -> None:
     low, high = over_worlds([Trial(r, world=f"{n}") for n in range(6) for r in (ARRIVED, HIT)]) or (0.5, 0.5)
-    assert (low, high) == pytest.approx(wilson(3, 6))
+    assert (low, high) == pytest.approx(wilson_interval(3, 6))
 
 
 def test_a_world_with_more_drives_counts_as_often_as_it_was_driven_in_rate_and_interval() -> None:
@@ -74,7 +74,7 @@ def test_the_difference_is_that_of_the_two_rates_in_the_table_however_many_drive
 @pytest.mark.parametrize("runs", [ARRIVED, HIT])
 def test_stacks_that_never_differ_may_still_differ_in_other_worlds(runs: RunFinished) -> None:
     same = [Trial(runs, world=f"{n}") for n in range(10)]
-    most = 1.0 - wilson(10, 10)[0]
+    most = 1.0 - wilson_interval(10, 10)[0]
     assert compare_drives("fields", same, same).success.interval == pytest.approx((-most, most))
 
 

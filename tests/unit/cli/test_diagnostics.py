@@ -3,7 +3,7 @@ import io
 import pytest
 
 from simscen.cli.diagnostics import as_github, as_text, escaped, print_text
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 
 
 def _problem(source: str, col: int, **more: str) -> Problem:

@@ -9,7 +9,7 @@ from simscen.cli.catalog.reference_topics import NAV2, OF_OTHERS, known_names
 from simscen.cli.commands import explain
 from simscen.cli.commands.explain import explained
 from simscen.core.errors import Exit
-from simscen.core.navigation import ErrorCode
+from simscen.core.messages.navigation import ErrorCode
 from simscen.model.robot import Limits
 
 

@@ -7,7 +7,7 @@ from urllib.parse import unquote, urlparse
 import pytest
 
 from simscen.cli.session import live_page
-from simscen.core.sessionevents import SessionEvent
+from simscen.core.records.session_events import SessionEvent
 
 SCENARIO = """\
 simscen: 1

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.result import RunKey
+from simscen.core.records.run_result import RunKey
 from simscen.run.outfolder import make_folder, run_folder, write_atomically
 
 NOT_PLAIN = ("device", "fifo", "link", "dangling", "folder")

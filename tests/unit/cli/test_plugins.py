@@ -5,7 +5,7 @@ import json
 import pytest
 
 HELLO = '''
-from simscen.core.verdict import Finding, Status
+from simscen.core.records.verdict import Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.spec.base import Spec
 

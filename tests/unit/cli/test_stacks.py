@@ -24,8 +24,8 @@ pass: [{collisions: {max: 0}}]
 """
 DWB = "simscen: 1\nstack: {controller: {type: dwb}}\n"
 TAME = '''
-from simscen.core.motion import STOP
-from simscen.core.trace import Decision
+from simscen.core.geometry.kinematics import STOP
+from simscen.core.records.trace import Decision
 from simscen.model.stack import InProcessStack
 
 class Tame(InProcessStack):

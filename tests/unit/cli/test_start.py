@@ -20,7 +20,7 @@ HEAVY = [
     "embreex",
     "rich",
     "email",
-    "simscen.core.trace",
+    "simscen.core.records.trace",
 ]
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from simscen.cli.session.watch import Report, Watching, stamps_of
-from simscen.core.errors import Exit
-from simscen.core.problems import Problem
+from simscen.core.errors import Exit, Problem
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from simscen.core.grid import FREE, OCCUPIED
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED
 from simscen.loading.files.worldfile import load_world_file
 from simscen.worlds.rosmap import load_grid
 

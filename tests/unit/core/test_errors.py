@@ -4,8 +4,7 @@ import pickle
 
 import pytest
 
-from simscen.core.errors import InvalidInput, NothingSelected, RunError, SimscenError, UsageError
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, NothingSelected, Problem, RunError, SimscenError, UsageError
 
 PROBLEM = Problem("a.yaml", 3, 4, "SC001", "what is wrong", "how to mend it")
 

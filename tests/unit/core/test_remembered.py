@@ -3,7 +3,7 @@
 import gc
 import weakref
 
-from simscen.core.remembered import remembered
+from simscen.core.decorators import cached_on_instance
 
 
 class Thing:
@@ -13,7 +13,7 @@ class Thing:
 def test_each_thing_and_each_set_of_arguments_is_asked_about_once_and_forgotten_with_the_thing():
     asked = []
 
-    @remembered
+    @cached_on_instance
     def made(thing, more, last=0):
         asked.append((more, last))
         return thing, [more, last]

@@ -1,8 +1,8 @@
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from simscen.core.events import Event
-from simscen.core.navigation import ErrorCode
+from simscen.core.messages.navigation import ErrorCode
+from simscen.core.records.events import Event
 from simscen.criteria.error_codes import Code, code_of
 
 ADAPTER = TypeAdapter(Code)

@@ -10,8 +10,8 @@ import yaml
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from simscen.core.samples import Samples
-from simscen.core.verdict import Status
+from simscen.core.records.trace import Samples
+from simscen.core.records.verdict import Status
 from simscen.criteria.findings import InvalidTrace, at_least, at_most, counted
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge

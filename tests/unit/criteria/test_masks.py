@@ -9,10 +9,10 @@ import shapely.affinity
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from simscen.core.environment.costmap_filters import mask_blocks
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.maskcells import cells_of
-from simscen.core.verdict import Status
+from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
 from simscen.testing.sketch import sketch, sketch_case
@@ -29,7 +29,7 @@ def mask_of(chance, values, share):
 
 
 def judged(criterion, grid, truth, footprint=(), seconds=10.0):
-    mask = cells_of(grid)
+    mask = mask_blocks(grid)
     case = sketch_case({
         "footprint": footprint,
         "inscribed_radius": 0.2,

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.chisquare import mean_bounds
-from simscen.core.samples import Samples
-from simscen.core.verdict import Status
+from simscen.core.records.trace import Samples
+from simscen.core.records.verdict import Status
+from simscen.core.statistics import nees_mean_bounds
 from simscen.criteria.localization_consistency import LocalizationConsistency
 from simscen.criteria.smoothness import Smoothness
 from simscen.criteria.trace_signals.sparc_ldlj import sparc
@@ -89,10 +89,10 @@ def test_bounds_are_two_sided_only_when_both_sides_count(both_sides):
     findings = LocalizationConsistency(every=1.0, both_sides=both_sides).judge(trace, CASE)
     high = findings[0].value + findings[0].margin
     if both_sides:
-        assert high == pytest.approx(mean_bounds(11, 3, 0.95)[1])
-        assert findings[1].value - findings[1].margin == pytest.approx(mean_bounds(11, 3, 0.95)[0])
+        assert high == pytest.approx(nees_mean_bounds(11, 3, 0.95)[1])
+        assert findings[1].value - findings[1].margin == pytest.approx(nees_mean_bounds(11, 3, 0.95)[0])
     else:
-        assert high == pytest.approx(mean_bounds(11, 3, 0.90)[1])
+        assert high == pytest.approx(nees_mean_bounds(11, 3, 0.90)[1])
         assert len(findings) == 1
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.samples import Samples
-from simscen.core.verdict import Status
+from simscen.core.records.trace import Samples
+from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
 from simscen.testing.sketch import sketch, sketch_case

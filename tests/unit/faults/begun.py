@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from simscen.core.belief import Belief
+from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP
-from simscen.core.sensing import Image, Imu, Odometry, Scan
-from simscen.core.time import Clock
+from simscen.core.geometry.kinematics import STOP
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.sensor_data import Image, Imu, Odometry, Scan
 from simscen.faults.base import FaultSetting, Instance
 from simscen.faults.fault import AnyFault
 

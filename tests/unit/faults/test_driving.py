@@ -5,8 +5,8 @@ import pytest
 from begun import Hand, begun, odometry, senseless
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Odometry
 from simscen.model.robot import Differential, Omnidirectional
 
 WHEELED = Differential(type="differential", wheel_radius=0.1, wheel_separation=0.4)

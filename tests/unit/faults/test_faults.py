@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry, Scan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.faults.base import FaultSetting
 from simscen.faults.fault import AnyFault
 

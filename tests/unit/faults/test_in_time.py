@@ -5,7 +5,7 @@ import pytest
 from begun import Hand, begun, belief, image, imu, odometry, scan, senseless
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 
 
 def heard(fault: dict, ticks: int, period: int = 24, until: int | None = None) -> list[tuple[int, int]]:

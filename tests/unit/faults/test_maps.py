@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from begun import begun
 
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
 
 def grid() -> OccupancyGrid:

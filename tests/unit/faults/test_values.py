@@ -7,7 +7,7 @@ import pytest
 from begun import Hand, begun, belief, image, imu, odometry, scan, senseless
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 
 MANY = 10_000
 

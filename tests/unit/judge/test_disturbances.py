@@ -2,9 +2,9 @@ import json
 
 import pytest
 
-from simscen.core.disturbance import Disturbance
-from simscen.core.result import Outcome, RunKey
-from simscen.core.verdict import Status
+from simscen.core.records.disturbances import Disturbance
+from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.disturbances import disturbance_outcomes
 from simscen.judge.result_json import from_json, to_json

@@ -4,10 +4,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.events import Event, EventKind
-from simscen.core.result import Outcome
-from simscen.core.samples import Samples
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.trace import Samples
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.criteria.clearance import Clearance
 from simscen.criteria.findings import at_least, at_most
 from simscen.criteria.registry import AnyCriterion

@@ -2,9 +2,8 @@
 
 import pytest
 
-from simscen.core.expectation import Expectation
-from simscen.core.result import Outcome
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.verdict import ExpectedFailure, Finding, Status, Verdict
 from simscen.judge.evaluation import outcome_of_verdicts
 from simscen.judge.expected_failure import apply_expectation
 from simscen.judge.finding_text import DISTURBANCE
@@ -16,14 +15,14 @@ def verdict(name: str, status: Status, criterion: str = "", severity: str = "fai
     return Verdict(criterion or name, name, severity, (Finding(status, name, "1", "2"),))
 
 
-def judged(expected: Expectation | None, *verdicts: Verdict, whole: bool = True) -> tuple[Outcome, str]:
+def judged(expected: ExpectedFailure | None, *verdicts: Verdict, whole: bool = True) -> tuple[Outcome, str]:
     """The outcome, and what is told of the expectation."""
     came_out, on_that = apply_expectation(expected, verdicts, outcome_of_verdicts(verdicts), whole)
     return came_out, "" if on_that is None else on_that.findings[0].measured
 
 
-KNOWN = Expectation("NAV-1")
-SPEED = Expectation("NAV-1", ("speed",))
+KNOWN = ExpectedFailure("NAV-1")
+SPEED = ExpectedFailure("NAV-1", ("speed",))
 
 
 @pytest.mark.parametrize(
@@ -46,14 +45,14 @@ SPEED = Expectation("NAV-1", ("speed",))
     ],
 )
 def test_only_what_was_expected_to_fail_may_and_must(
-    expected: Expectation | None, statuses: tuple[Status, Status], came_out: Outcome, told: str
+    expected: ExpectedFailure | None, statuses: tuple[Status, Status], came_out: Outcome, told: str
 ) -> None:
     verdicts = [verdict(name, status) for name, status in zip(("speed", "clearance"), statuses, strict=True)]
     assert judged(expected, *verdicts) == (came_out, told)
 
 
 def test_all_that_is_named_must_fail() -> None:
-    both = Expectation("NAV-1", ("speed", "clearance"))
+    both = ExpectedFailure("NAV-1", ("speed", "clearance"))
     assert judged(both, verdict("speed", FAIL), verdict("clearance", PASS)) == (Outcome.FAILED, "clearance held")
 
 
@@ -61,7 +60,7 @@ def test_a_disturbance_that_did_not_happen_is_expected_only_by_its_name() -> Non
     missing = verdict("door", FAIL, DISTURBANCE)
     assert judged(KNOWN, missing, verdict("speed", FAIL)) == (Outcome.FAILED, "speed failed")
     assert judged(KNOWN, missing, verdict("speed", PASS)) == (Outcome.FAILED, "everything held")
-    assert judged(Expectation("NAV-1", ("door",)), missing)[0] is Outcome.FAILED_AS_EXPECTED
+    assert judged(ExpectedFailure("NAV-1", ("door",)), missing)[0] is Outcome.FAILED_AS_EXPECTED
 
 
 def test_a_warning_is_no_failure_to_expect() -> None:

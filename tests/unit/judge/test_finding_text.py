@@ -1,7 +1,7 @@
 import pytest
 
-from simscen.core.disturbance import Disturbance, Happening
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.finding_text import disturbance_line, disturbance_times, sentence, tightest_margin, violations
 
 
@@ -106,7 +106,7 @@ def test_what_keeps_a_verdict_from_passing_is_all_but_its_passes():
     ],
 )
 def test_of_times_the_first_five_are_told(ticks, text):
-    assert disturbance_times(Happening(Disturbance("gust", "event"), ticks, True, ""), 240) == text
+    assert disturbance_times(DisturbanceOutcome(Disturbance("gust", "event"), ticks, True, ""), 240) == text
 
 
 @pytest.mark.parametrize(
@@ -118,4 +118,4 @@ def test_of_times_the_first_five_are_told(ticks, text):
     ],
 )
 def test_a_disturbance_is_told_in_a_line(ticks, happened, text):
-    assert disturbance_line(Happening(Disturbance("gust", "event"), ticks, happened, "pushed it"), 240) == text
+    assert disturbance_line(DisturbanceOutcome(Disturbance("gust", "event"), ticks, happened, "pushed it"), 240) == text

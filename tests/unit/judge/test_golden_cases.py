@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from simscen.core.verdict import Finding, Status
+from simscen.core.records.verdict import Finding, Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
 from simscen.testing.sketch import sketch, sketch_case

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.core.evidence import Coverage, Evidence
+from simscen.core.records.evidence import Evidence, LogCoverage
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import partial_evidence_reason, required_evidence
 from simscen.judge.metrics.catalog import METRICS
@@ -74,7 +74,7 @@ NEAR_PEOPLE = {"min_person_distance", "intrusion_intimate", "intrusion_personal"
 def test_what_a_log_lacks_leaves_these_metrics_out_and_no_others(lacking, left_out):
     trace = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})
     whole = compute_metrics(trace, sketch_case({}))
-    for coverage in (Coverage({lacking: ""}), Coverage(partial={lacking: "not after t = 1 s"})):
+    for coverage in (LogCoverage({lacking: ""}), LogCoverage(partial={lacking: "not after t = 1 s"})):
         found = compute_metrics(trace, sketch_case({}), coverage)
         reasons = {f"the log does not say {lacking.value}", "not after t = 1 s"}
         assert {name for name, reason in found.undefined.items() if reason in reasons} == left_out
@@ -83,7 +83,7 @@ def test_what_a_log_lacks_leaves_these_metrics_out_and_no_others(lacking, left_o
 
 
 def test_only_what_decides_a_criterion_makes_its_pass_doubtful():
-    gaps = Coverage(partial={Evidence.CONTACTS: "no contacts before t = 3 s", BELIEF: "no belief after t = 9 s"})
+    gaps = LogCoverage(partial={Evidence.CONTACTS: "no contacts before t = 3 s", BELIEF: "no belief after t = 9 s"})
     assert (
         partial_evidence_reason(AnyCriterion.model_validate({"collisions": {}}), gaps) == "no contacts before t = 3 s"
     )

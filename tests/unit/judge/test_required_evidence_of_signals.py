@@ -2,8 +2,8 @@
 
 import pytest
 
-from simscen.core.evidence import Coverage, Evidence
-from simscen.core.verdict import Status
+from simscen.core.records.evidence import Evidence, LogCoverage
+from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.trace_signals.catalog import SIGNALS, signal_evidence
 from simscen.judge.evaluation import judge, required_evidence
@@ -32,14 +32,14 @@ def test_a_criterion_needs_what_its_signals_need(criterion, wanted):
     entry = AnyCriterion.model_validate(criterion)
     assert wanted in required_evidence(entry)
     assert required_evidence(entry) != frozenset(Evidence)
-    (verdict,) = judge([entry], sketch(DRIVE), sketch_case({}), Coverage({wanted: "no such topic"}))
+    (verdict,) = judge([entry], sketch(DRIVE), sketch_case({}), LogCoverage({wanted: "no such topic"}))
     assert verdict.status is Status.INCONCLUSIVE
     assert wanted.value in verdict.findings[0].measured
 
 
 @pytest.mark.parametrize("lacking", Evidence)
 def test_a_metric_that_the_log_cannot_tell_is_none_and_says_so(lacking):
-    measures = compute_metrics(sketch(DRIVE), sketch_case({}), Coverage({lacking: "no such topic"}))
+    measures = compute_metrics(sketch(DRIVE), sketch_case({}), LogCoverage({lacking: "no such topic"}))
     assert list(measures.values) == list(METRICS)
     assert {name for name, value in measures.values.items() if value is None} == set(measures.undefined)
     if lacking is Evidence.CONTACTS:

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from simscen.core.disturbance import Disturbance, Happening
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.result_json import from_json, result_data, to_json
 
 PLACED = Finding(Status.FAIL, "speed", "2.00 m/s", "≤ 1.00 m/s", -1.0, "m/s", 2.0, 600, (1.0, 2.0), ("why: gust",))
-GUST = Happening(Disturbance("gust", "event", "time: 2 s"), (480, 600), True, "pushed it", 480)
+GUST = DisturbanceOutcome(Disturbance("gust", "event", "time: 2 s"), (480, 600), True, "pushed it", 480)
 FAILED = RunResult(
     RunKey("a", 7),
     "a.scenario.yaml",

@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from simscen.core.result import Outcome, RunKey
+from simscen.core.records.run_result import Outcome, RunKey
 from simscen.criteria.clearance import Clearance
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.result_json import from_json, read_result, to_json

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.evidence import WHOLE, Coverage, Evidence
-from simscen.core.result import Outcome, RunKey
-from simscen.core.samples import Samples
-from simscen.core.verdict import Status
+from simscen.core.records.evidence import COMPLETE_COVERAGE, Evidence, LogCoverage
+from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.trace import Samples
+from simscen.core.records.verdict import Status
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.trace_signals.coverage import check_recorded_signals, time_gaps
@@ -17,7 +17,7 @@ from simscen.judge.evaluation import judge
 from simscen.judge.run_result import judge_run
 from simscen.testing.sketch import sketch, sketch_case
 
-FOREIGN = Coverage(recorded_by_simscen=False)
+FOREIGN = LogCoverage(recorded_by_simscen=False)
 RATE = 240
 
 
@@ -130,7 +130,7 @@ def test_a_belief_that_is_not_finite_breaks_only_what_needs_it_in_the_log_of_ano
     trace = replace(trace, belief=Samples(np.array([5]), belief))
     assert result(trace, {"speed": {"max": 1.0}}).outcome is Outcome.PASSED
     assert result(trace, {"localization_error": {"max": 1.0}}).outcome is Outcome.ERROR
-    assert result(trace, {"speed": {"max": 1.0}}, coverage=WHOLE).outcome is Outcome.ERROR
+    assert result(trace, {"speed": {"max": 1.0}}, coverage=COMPLETE_COVERAGE).outcome is Outcome.ERROR
 
 
 CUTS = {
@@ -141,7 +141,7 @@ CUTS = {
 
 
 @pytest.mark.parametrize("cut", CUTS)
-@pytest.mark.parametrize("coverage", [WHOLE, FOREIGN], ids=["own", "foreign"])
+@pytest.mark.parametrize("coverage", [COMPLETE_COVERAGE, FOREIGN], ids=["own", "foreign"])
 @pytest.mark.parametrize("signal", ["truth", "clearance"])
 def test_what_covers_only_a_part_of_the_run_does_not_pass(cut, coverage, signal):
     trace = drive(EVEN, wobble(EVEN))
@@ -183,4 +183,4 @@ def test_a_log_of_simscen_whose_samples_do_not_rise_is_an_error(signal, order):
     broken = replace(trace, **{signal: Samples(samples.ticks[order], samples.values[order])})
     with pytest.raises(InvalidTrace, match=f"the samples of the {signal} are not in the order of time after t = "):
         check_recorded_signals(broken)
-    assert result(broken, {"collisions": {}}, coverage=WHOLE).outcome is Outcome.ERROR
+    assert result(broken, {"collisions": {}}, coverage=COMPLETE_COVERAGE).outcome is Outcome.ERROR

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.files.criteriafile import load_criteria
 from simscen.loading.files.worldfile import load_world_file
 from simscen.loading.loaded import LoadedScenario

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.sensing import Imu, Scan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Imu, Scan
 from simscen.peer import messages
 from simscen.peer.cdr import Reader
 from simscen.record import pack, pack_many, pack_rare

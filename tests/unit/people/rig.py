@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from simscen.core.environment.pedestrians import PedestrianAction, WalkingPedestrian
 from simscen.core.geometry import Pose2
-from simscen.core.walker import Deed, Walker
 from simscen.people.people import People
 from simscen.people.seen import SeenRobot, Surroundings
 from simscen.people.walls import Walls
@@ -23,17 +23,17 @@ def corridor(width: float, length: float = 100.0) -> Walls:
     return walls(*([[-length, y], [length, y]] for y in (-width / 2, width / 2)))
 
 
-def people(*walkers: Walker, around: Walls | None = None) -> People:
+def people(*walkers: WalkingPedestrian, around: Walls | None = None) -> People:
     crowd = People(around or walls())
     for walker in walkers:
         crowd.add(walker)
     return crowd
 
 
-def walker(name: str, x: float, y: float, *goals: tuple[float, float], **more) -> Walker:
+def walker(name: str, x: float, y: float, *goals: tuple[float, float], **more) -> WalkingPedestrian:
     """Who faces their first goal, or east."""
     yaw = math.atan2(goals[0][1] - y, goals[0][0] - x) if goals else 0.0
-    return Walker(name, Pose2(x, y, more.pop("yaw", yaw)), goals, **more)
+    return WalkingPedestrian(name, Pose2(x, y, more.pop("yaw", yaw)), goals, **more)
 
 
 def robot(x: float, y: float, yaw: float = 0.0, speed: float = 0.0, name: str = "", radius: float = 0.2) -> SeenRobot:
@@ -41,10 +41,10 @@ def robot(x: float, y: float, yaw: float = 0.0, speed: float = 0.0, name: str = 
     return SeenRobot(name, Pose2(x, y, yaw), velocity, radius, SQUARE * radius / 0.2)
 
 
-def walk(crowd: People, seconds: float, *robots: SeenRobot) -> tuple[dict[str, np.ndarray], list[Deed]]:
+def walk(crowd: People, seconds: float, *robots: SeenRobot) -> tuple[dict[str, np.ndarray], list[PedestrianAction]]:
     """Everybody's x, y, yaw at each step, the first before it; and what they did. Robots drive on as they do."""
     tracks = {name: [pose] for name, pose in crowd.poses().items()}
-    deeds: list[Deed] = []
+    deeds: list[PedestrianAction] = []
     for number in range(round(seconds / STEP)):
         now = tuple(_driven(one, number * STEP) for one in robots)
         deeds += crowd.step(Surroundings(now), STEP)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from simscen.core.walker import Walker
+from simscen.core.environment.pedestrians import WalkingPedestrian
 from simscen.people import forces
 from tests.unit.people.rig import STEP, corridor, people, walk, walker, walls
 
@@ -155,7 +155,7 @@ def test_the_same_people_walk_the_same_way_to_the_bit():
 
 @pytest.mark.parametrize("name", ["a first", "m between", "z last"])
 def test_one_more_changes_nobody_before_they_meet(name):
-    def run(*more: Walker) -> np.ndarray:
+    def run(*more: WalkingPedestrian) -> np.ndarray:
         crowd = people(*(walker(f"m{k}", 1.1 * k, k % 3 - 1.0, (9.0 - k, 0.0), group="g" if k > 4 else None)
                          for k in range(8)), *more, around=corridor(8.0))  # fmt: skip
         tracks, _ = walk(crowd, 6.0)

@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 from hypothesis import strategies as st
 
-from simscen.core.belief import Belief
-from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.navigation import Path
-from simscen.core.sensing import Odometry, Scan
-from simscen.core.trace import Decision, Moment, Truth
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Path
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Decision, Moment, Truth
 
 ticks = st.integers(0, 10**6)
 floats = st.floats(allow_infinity=False)

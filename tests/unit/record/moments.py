@@ -4,16 +4,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.core.belief import Belief
-from simscen.core.case import Case
-from simscen.core.events import Event
+from simscen.core.clock import Clock
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal, Path
-from simscen.core.sensing import Bump, Image, Imu, Odometry, Reading, Scan
-from simscen.core.time import Clock
-from simscen.core.trace import Decision, Moment, Truth
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Scan
+from simscen.core.records.case import Case
+from simscen.core.records.events import Event
+from simscen.core.records.trace import Decision, Moment, Truth
 from simscen.record.header import LogHeader
 
 CLOCK = Clock(240)

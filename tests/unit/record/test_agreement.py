@@ -6,8 +6,7 @@ import math
 import pytest
 from moments import CLOCK, moments
 
-from simscen.core.samples import Samples
-from simscen.core.trace import Trace
+from simscen.core.records.trace import Samples, Trace
 from simscen.record.agreement import first_disagreement
 from simscen.record.tracebuilder import TraceBuilder
 

@@ -6,7 +6,7 @@ import pytest
 from moments import moments
 
 from simscen.core.errors import RunError
-from simscen.core.trace import Moment
+from simscen.core.records.trace import Moment
 from simscen.record.backlog import Backlog
 
 SOME = list(moments(2.0))

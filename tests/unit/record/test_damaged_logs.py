@@ -18,7 +18,7 @@ from mcap.writer import Writer
 from moments import CASE, CLOCK, about, moments
 
 from simscen.core.errors import InvalidInput
-from simscen.core.trace import Trace
+from simscen.core.records.trace import Trace
 from simscen.record.recorder import Recorder
 from simscen.record.replay import Log, read_log
 from simscen.record.tracebuilder import TraceBuilder

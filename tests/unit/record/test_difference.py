@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from moments import CLOCK, moments
 
-from simscen.core.events import Event
-from simscen.core.samples import Samples
-from simscen.core.trace import Trace
+from simscen.core.records.events import Event
+from simscen.core.records.trace import Samples, Trace
 from simscen.record.difference import first_difference
 from simscen.record.tracebuilder import TraceBuilder
 

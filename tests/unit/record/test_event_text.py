@@ -1,6 +1,6 @@
 """Events as JSON and as lines."""
 
-from simscen.core.events import Event
+from simscen.core.records.events import Event
 from simscen.record import event_text
 
 

@@ -22,11 +22,11 @@ from foreign_logs import (
 from rosbags.rosbag2 import StoragePlugin
 
 from simscen.cli.main import main
-from simscen.core.case import Case
-from simscen.core.evidence import Coverage, Evidence
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import Goal
-from simscen.core.verdict import Status
+from simscen.core.messages.navigation import Goal
+from simscen.core.records.case import Case
+from simscen.core.records.evidence import Evidence, LogCoverage
+from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge, required_evidence
 from simscen.loading.yaml.parser import parse_yaml
@@ -98,7 +98,7 @@ def test_no_criterion_passes_on_a_log_without_what_decides_it(tmp_path: Path, ex
     log = read_foreign(write_mcap(tmp_path / "a.mcap", drive()), Wanted(truth="/mocap", goals=("shelf",)))
     assert required_evidence(entry), "something decides it"
     for evidence in required_evidence(entry):
-        (verdict,) = judge([entry], log.trace, case, Coverage({evidence: "taken away"}))
+        (verdict,) = judge([entry], log.trace, case, LogCoverage({evidence: "taken away"}))
         assert verdict.status is Status.INCONCLUSIVE
         assert evidence.value in verdict.findings[0].measured
     (verdict,) = judge([entry], log.trace, case, log.coverage)

@@ -10,7 +10,7 @@ from mcap import records
 from mcap.writer import Writer
 
 from simscen.core.errors import InvalidInput
-from simscen.core.verdict import Status
+from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
 from simscen.record.foreign.mcapfile import is_own

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from moments import CLOCK, about
 
-from simscen.core.foreseen import Foreseen
 from simscen.core.geometry import Pose3
-from simscen.core.motion import STOP
-from simscen.core.trace import Decision, Moment, Trace, Truth
+from simscen.core.geometry.kinematics import STOP
+from simscen.core.geometry.scripted_poses import PredictedPoses
+from simscen.core.records.trace import Decision, Moment, Trace, Truth
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
 
@@ -28,7 +28,7 @@ def foreseen(moves: tuple[str, ...], stays: dict[str, Pose3], pauses: float, see
     moments = []
     for first in range(0, len(table), AHEAD):
         ticks = range(begin + first * EVERY, begin + (first + AHEAD) * EVERY, EVERY)
-        ahead = Foreseen(ticks, moves, table[first : first + AHEAD], everything)
+        ahead = PredictedPoses(ticks, moves, table[first : first + AHEAD], everything)
         places = [ahead.at(tick) for tick in ticks]
         assert all(places)
         assert ahead.at(ticks[-1] + 1) is None
@@ -69,7 +69,7 @@ def test_a_run_is_written_as_if_each_pose_had_been_looked_at(stays: dict[str, Po
 def test_what_is_foreseen_is_a_mapping_by_name_in_order() -> None:
     table = np.arange(2 * 14.0).reshape(2, 2, 7)
     everything = {"a": Pose3(), "b": Pose3(9.0), "c": Pose3()}
-    places = Foreseen(range(12, 24, 6), ("a", "c"), table, everything).at(18)
+    places = PredictedPoses(range(12, 24, 6), ("a", "c"), table, everything).at(18)
     assert places == {"a": Pose3(*range(14, 21)), "b": Pose3(9.0), "c": Pose3(*range(21, 28))}
     assert places is not None
     assert (list(places), len(places), type(places["a"])) == (["a", "b", "c"], 3, Pose3)

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from moments import CASE, about
 
-from simscen.core.case import Case
+from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
-from simscen.core.time import Clock
+from simscen.core.records.case import Case
 from simscen.record import header
 from simscen.record.header import LogHeader
 

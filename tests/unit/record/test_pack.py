@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from schemas_from_rosbags import humble
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.sensing import Scan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Scan
 from simscen.record import pack, pack_many, pack_rare
 from simscen.record.simtime import Stamp
 

@@ -20,9 +20,9 @@ from schemas_from_rosbags import humble
 
 from simscen.core.errors import RunError
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP
-from simscen.core.sensing import Odometry, Scan
-from simscen.core.trace import Decision, Moment
+from simscen.core.geometry.kinematics import STOP
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.records.trace import Decision, Moment
 from simscen.record.recorder import Recorder
 
 HERE = Path(__file__).parent

@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from moments import CASE, CLOCK, about, moments
 
-from simscen.core.navigation import Path as Plan
-from simscen.core.samples import Samples
-from simscen.core.trace import Moment, Trace
+from simscen.core.messages.navigation import Path as Plan
+from simscen.core.records.trace import Moment, Samples, Trace
 from simscen.record.recorder import Recorder
 from simscen.record.replay import read_log
 from simscen.record.tracebuilder import TraceBuilder

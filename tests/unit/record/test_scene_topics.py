@@ -10,12 +10,12 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from moments import CLOCK, about, moments
 
-from simscen.core.events import Event, EventKind
+from simscen.core.environment.costmap_filters import MaskBlocks
+from simscen.core.environment.scenery import DrivableSurface, FilterZone, MovableObject, Scenery
 from simscen.core.geometry import Pose2
-from simscen.core.maskcells import MaskCells
-from simscen.core.motion import STOP
-from simscen.core.scenery import Ground, Scenery, Thing, Zone
-from simscen.core.trace import Decision, Moment
+from simscen.core.geometry.kinematics import STOP
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Decision, Moment
 from simscen.record.recorder import Recorder
 from simscen.record.replay import read_log
 from simscen.record.sceneryfile import NAME, scenery_to_json
@@ -23,12 +23,12 @@ from simscen.record.sceneryfile import NAME, scenery_to_json
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 SCENERY = Scenery(
     places={"dock": Pose2(4.0, 2.0, 0.0)},
-    things=(Thing("gate", Pose2(0.0, 0.0, 0.0), (SQUARE,), Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 1.5)),),
-    ground=(Ground("ramp", SQUARE, 0.25),),
+    things=(MovableObject("gate", Pose2(0.0, 0.0, 0.0), (SQUARE,), Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 1.5)),),
+    ground=(DrivableSurface("ramp", SQUARE, 0.25),),
     zones=(
-        Zone("speed", "ward", SQUARE, 0.25),
-        Zone("keepout", cells=MaskCells(0.5, Pose2(1.0, 1.0, 0.0), ((0, 0, 4, 2, 100),))),
-        Zone("keepout", "of another", SQUARE, robot="other"),
+        FilterZone("speed", "ward", SQUARE, 0.25),
+        FilterZone("keepout", cells=MaskBlocks(0.5, Pose2(1.0, 1.0, 0.0), ((0, 0, 4, 2, 100),))),
+        FilterZone("keepout", "of another", SQUARE, robot="other"),
     ),
 )
 

@@ -3,7 +3,7 @@
 import pytest
 from moments import CASE, CLOCK, about, moments
 
-from simscen.core.trace import Trace
+from simscen.core.records.trace import Trace
 from simscen.criteria.trace_signals.catalog import SIGNALS, read_signal
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.record.recorder import Recorder

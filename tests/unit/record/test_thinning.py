@@ -1,9 +1,9 @@
 """What is kept of a run."""
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import STOP, Twist
-from simscen.core.sensing import Odometry
-from simscen.core.trace import Truth
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.sensor_data import Odometry
+from simscen.core.records.trace import Truth
 from simscen.record.thinning import Thinning, Throttle
 
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from moments import CLOCK, moments
 
-from simscen.core.events import Event
 from simscen.core.geometry import Pose3, wrap_array
-from simscen.core.motion import STOP
-from simscen.core.sensing import Odometry, Scan
-from simscen.core.trace import Decision, Moment, Trace, Truth
+from simscen.core.geometry.kinematics import STOP
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.records.events import Event
+from simscen.core.records.trace import Decision, Moment, Trace, Truth
 from simscen.record.tracebuilder import TraceBuilder
 
 RUN = list(moments(2.0))

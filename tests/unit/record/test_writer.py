@@ -11,7 +11,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from simscen.core.geometry import Pose3
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.record import pack, topics
 from simscen.record.out import Publisher, Together
 from simscen.record.schemas import load

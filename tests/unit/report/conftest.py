@@ -2,9 +2,16 @@
 
 import pytest
 
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
-from simscen.core.sessionevents import Artifacts, RunFinished, RunProgress, RunStarted, SessionFinished, SessionStarted
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.session_events import (
+    Artifacts,
+    RunFinished,
+    RunProgress,
+    RunStarted,
+    SessionFinished,
+    SessionStarted,
+)
+from simscen.core.records.verdict import Finding, Status, Verdict
 
 PATH = "scenarios/faults/lidar_off.scenario.yaml"
 

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from simscen.core.comparison import Against, Comparison, Difference, Flip, Outcomes
-from simscen.core.sessionevents import SessionFinished, SessionStarted
+from simscen.core.records.session_events import SessionFinished, SessionStarted
+from simscen.core.records.stack_comparison import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
 from simscen.report.compared import compared, numbers, shortened
 from simscen.report.console import text_reporter
 from simscen.report.github import markdown
@@ -16,8 +16,8 @@ from simscen.report.results import to_json
 from simscen.report.suite import Session, to_html
 
 FLIP = Flip("navigation/goal", 3, "ref", "mine", "clearance: 0.03 m < 0.05 m, at t = 4.10 s, (2.59, 4.42)")
-TIME = Difference("time_to_goal", "s", 8, 25.341, 28.23, 2.889, (0.78, 4.954), 1, 0, 7, 0.070)
-REPLANS = Difference("replans", "", 2, 3.0, 3.0, 0.0, None, 0, 2, 0, 1.0)
+TIME = MetricDifference("time_to_goal", "s", 8, 25.341, 28.23, 2.889, (0.78, 4.954), 1, 0, 7, 0.070)
+REPLANS = MetricDifference("replans", "", 2, 3.0, 3.0, 0.0, None, 0, 2, 0, 1.0)
 EXPECTED = """\
 
   passed                     ref     mine
@@ -43,10 +43,10 @@ def comparison() -> Comparison:
     return Comparison(
         {"ref": "reference", "mine": "./nav '<b>'"},
         {
-            "navigation/goal": {"ref": Outcomes(10), "mine": Outcomes(6, 3, 0)},
-            "obstacles/cart_crosses": {"ref": Outcomes(1), "mine": Outcomes(0, 0, 1)},
+            "navigation/goal": {"ref": OutcomeCounts(10), "mine": OutcomeCounts(6, 3, 0)},
+            "obstacles/cart_crosses": {"ref": OutcomeCounts(1), "mine": OutcomeCounts(0, 0, 1)},
         },
-        (Against("mine", 10, 1, 1, 2, (FLIP,), 1.0, (TIME, REPLANS)),),
+        (BaselineComparison("mine", 10, 1, 1, 2, (FLIP,), 1.0, (TIME, REPLANS)),),
     )
 
 
@@ -73,7 +73,7 @@ def test_a_long_name_keeps_its_ends() -> None:
 
 
 def test_of_many_flips_the_first_are_told_and_the_rest_counted(comparison) -> None:
-    many = Against("mine", 30, 0, 0, 0, (FLIP,) * 25, 0.0, ())
+    many = BaselineComparison("mine", 30, 0, 0, 0, (FLIP,) * 25, 0.0, ())
     told = lines(Comparison(comparison.stacks, comparison.outcomes, (many,)))
     assert sum("worse " in line for line in told) == 11  # ten, and the heading
     assert "    and 15 more, in results.json" in told
@@ -116,7 +116,7 @@ def test_in_results_json_it_is_data(comparison, passed) -> None:
 
 
 def test_what_is_small_has_a_digit_more() -> None:
-    near = Difference("min_clearance", "m", 6, 0.0716, 0.0309, -0.0407, (-0.0512, -0.0298), 6, 0, 0, 0.03)
+    near = MetricDifference("min_clearance", "m", 6, 0.0716, 0.0309, -0.0407, (-0.0512, -0.0298), 6, 0, 0, 0.03)
     assert numbers(near) == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
     assert numbers(TIME) == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")
     assert numbers(REPLANS)[0] == "3.00"

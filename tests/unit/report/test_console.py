@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 
 from simscen.cli.diagnostics import as_github
-from simscen.core.problems import Problem
-from simscen.core.result import RunKey
-from simscen.core.sessionevents import SessionStarted
+from simscen.core.errors import Problem
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import SessionStarted
 from simscen.report.console import text_reporter
 from simscen.report.github import annotations, github_reporter, markdown
 from simscen.report.machine import json_reporter

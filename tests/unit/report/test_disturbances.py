@@ -6,16 +6,18 @@ from xml.etree import ElementTree
 
 import pytest
 
-from simscen.core.disturbance import Disturbance, Happening
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.report.console import text_reporter
 from simscen.report.github import annotations
 from simscen.report.junit import to_xml
 from simscen.report.suite import Session, to_html
 
-FELL = Happening(Disturbance("pallet falls", "event", "time: 3 s", line=7), (720,), True, "spawned pallet", 720)
-AGAIN = Happening(Disturbance("push", "event", "…", line=8), tuple(range(240, 2000, 240)), True, "pushed", 240)
-NEVER = Happening(Disturbance("<b>::error::", "fault", "time: 90 s", line=9), (), False, "it never began")
+FELL = DisturbanceOutcome(
+    Disturbance("pallet falls", "event", "time: 3 s", line=7), (720,), True, "spawned pallet", 720
+)
+AGAIN = DisturbanceOutcome(Disturbance("push", "event", "…", line=8), tuple(range(240, 2000, 240)), True, "pushed", 240)
+NEVER = DisturbanceOutcome(Disturbance("<b>::error::", "fault", "time: 90 s", line=9), (), False, "it never began")
 
 
 @pytest.fixture

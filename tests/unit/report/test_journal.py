@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from simscen.core.errors import InvalidInput, UsageError
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunStarted, SessionFinished
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunStarted, SessionFinished
 from simscen.report.journal import Journal, require_free
 from simscen.report.journaldata import NAME, Planned
 from simscen.report.junit import to_xml

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
-from simscen.core.sessionevents import RunFinished
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.session_events import RunFinished
 from simscen.report.junit import to_xml
 
 JENKINS = {  # attributes that Jenkins' junit-10.xsd allows

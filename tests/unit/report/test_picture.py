@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.scenery import MovableObject, Scenery
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.result import RunKey
-from simscen.core.scenery import Scenery, Thing
+from simscen.core.records.run_result import RunKey
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
 from simscen.report.picture import grid, palette
@@ -140,7 +140,7 @@ def test_thin_walls_of_a_huge_map_stay_whole():
 def test_all_parts_of_a_thing_are_its_outline_and_the_unknown_is_a_disc():
     legs = (((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), ((2.0, 0.0), (3.0, 0.0), (2.0, 1.0)))
     trace = sketch({"seconds": 1, "truth": [[0, 0, 0]], "objects": {"ghost": [[0, 1, 1, 0]]}})
-    found = outlines(trace, [Thing("table", Pose2(0, 0), legs)])
+    found = outlines(trace, [MovableObject("table", Pose2(0, 0), legs)])
     assert [outline[:, 0].max() for outline in found["table"]] == [1.0, 3.0]
     assert np.hypot(*found["ghost"][0].T) == pytest.approx(np.full(32, 0.2))
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from simscen.core.environment.costmap_filters import MaskBlocks
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.scenery import DrivableSurface, FilterZone, FrictionRegion, MovableObject, Scenery
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.maskcells import MaskCells
-from simscen.core.result import RunKey
-from simscen.core.scenery import Floor, Ground, Scenery, Thing, Zone
+from simscen.core.records.run_result import RunKey
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
 from simscen.loading.scenario import load_scenario
@@ -75,12 +75,12 @@ def everything(**changes):
     result = judge_run(RunKey("room/all", 3), "room/all.scenario.yaml", criteria, trace, case)
     scenery = Scenery(
         places={"dock": Pose2(1, 1)},
-        things=(Thing("door", Pose2(5, 2), (PANEL,), Pose2(5, 2, np.pi / 2), Pose2(5, 2, 0.0)),),
-        ground=(Ground("ramp", ((7, 4), (9, 4), (9, 5), (7, 5)), 0.1, (0.05, 0.0)),),
-        floors=(Floor("bay", ((0, 0), (1, 0), (1, 1)), 0.4),),
+        things=(MovableObject("door", Pose2(5, 2), (PANEL,), Pose2(5, 2, np.pi / 2), Pose2(5, 2, 0.0)),),
+        ground=(DrivableSurface("ramp", ((7, 4), (9, 4), (9, 5), (7, 5)), 0.1, (0.05, 0.0)),),
+        floors=(FrictionRegion("bay", ((0, 0), (1, 0), (1, 1)), 0.4),),
         zones=(
-            Zone("keepout", "vault", ((2, 2), (4, 2), (4, 3), (2, 3))),
-            Zone("keepout", cells=MaskCells(0.5, Pose2(6, 5), ((0, 0, 2, 1, 100), (3, 0, 1, 1, 50)))),
+            FilterZone("keepout", "vault", ((2, 2), (4, 2), (4, 3), (2, 3))),
+            FilterZone("keepout", cells=MaskBlocks(0.5, Pose2(6, 5), ((0, 0, 2, 1, 100), (3, 0, 1, 1, 50)))),
         ),
     )
     return Scene(trace, case, room(), result, scenery)

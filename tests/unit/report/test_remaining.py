@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from simscen.core.result import RunKey
-from simscen.core.sessionevents import RunStarted, SessionStarted
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import RunStarted, SessionStarted
 from simscen.report.remaining import Remaining, _rounded
 
 

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simscen.core.case import Case
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.navigation import Goal
-from simscen.core.result import Outcome, RunKey, RunResult
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.messages.navigation import Goal
+from simscen.core.records.case import Case
+from simscen.core.records.run_result import Outcome, RunKey, RunResult
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.record.header import LogHeader
 from simscen.record.pack_many import occupancy_grid
 from simscen.record.replay import Log

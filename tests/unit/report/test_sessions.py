@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from simscen.core.result import Outcome, RunFailure, RunKey
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey
 from simscen.report.journal import Journal
 from simscen.report.journaldata import Planned
 from simscen.report.sessions import last_failed, sessions_in

@@ -8,8 +8,8 @@ from html.parser import HTMLParser
 import pytest
 from PIL import Image
 
-from simscen.core.result import Outcome, RunKey
-from simscen.core.sessionevents import Artifacts
+from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.session_events import Artifacts
 from simscen.report.results import to_json
 from simscen.report.suite import Live, Session, pictures, to_html
 from simscen.report.suite.bits import anchor

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.result import Outcome, RunFailure, RunKey
-from simscen.core.sessionevents import SessionFinished, SessionStarted, started
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey
+from simscen.core.records.session_events import SessionFinished, SessionStarted, session_started
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.report.console import text_reporter
 from simscen.report.line import text_of
 from simscen.report.live import ColourReporter, LiveReporter
@@ -135,7 +135,7 @@ def test_the_slowest_are_listed_by_wall_time(session, passed, failed, crashed):
 def test_second_runs_stand_in_the_same_column(passed):
     pair = [keyed(passed, 1, "navigation/goal"), keyed(passed, 1, "navigation/goal", again=True)]
     key = pair[0].key
-    _, first, second = told([started("0.1.0", [key, key.twin], 1, Path("out"), ()), *pair])
+    _, first, second = told([session_started("0.1.0", [key, key.twin], 1, Path("out"), ()), *pair])
     assert first.index("18.2 s") == second.index("18.2 s")
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import simscen.ros2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.record import pack
 from simscen.ros2 import cdr
 from simscen.ros2.domain import claim, surroundings

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from simscen.core.trace import Moment
+from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
 from simscen.run.prepare import prepare
 from simscen.run.simulate import simulate

@@ -1,6 +1,6 @@
 """What a base drives while commands come late or get lost."""
 
-from simscen.core.motion import STOP, Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.run.commandlink import CommandLink
 
 GO, FAST = Twist(0.3), Twist(0.5)

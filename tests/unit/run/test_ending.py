@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from simscen.core.events import Event, EventKind
-from simscen.core.motion import STOP
-from simscen.core.time import Clock
-from simscen.core.trace import Decision
-from simscen.core.verdict import Status
+from simscen.core.clock import Clock
+from simscen.core.geometry.kinematics import STOP
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Decision
+from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
 from simscen.run.ending import Ending

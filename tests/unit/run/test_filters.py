@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from simscen.core.filtermasks import FilterMasks
+from simscen.core.environment.costmap_filters import FilterMasks, ZoneSwitch
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.zones import ZoneSwitch
 from simscen.model.stack import StackSpec
 from simscen.run.filters import Filters
 

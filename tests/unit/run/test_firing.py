@@ -4,9 +4,9 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.time import Clock
+from simscen.core.geometry.kinematics import Twist
 from simscen.run.firing import Firing, Watch
 from simscen.testing.puppetstage import PuppetStage
 from simscen.triggers.trigger import Trigger

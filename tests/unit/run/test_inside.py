@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.core.events import EventKind
+from simscen.core.records.events import EventKind
 
 THICK = """\
 simscen: 1

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.verdict import Status
+from simscen.core.records.verdict import Status
 from simscen.loading.scenario import load_scenario
 from simscen.run.prepare import prepare
 from simscen.run.simulate import simulate

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.navigation import Goal
-from simscen.core.shapes import Box, Solid
-from simscen.core.world import World
+from simscen.core.geometry.shapes import Box, Solid
+from simscen.core.messages.navigation import Goal
 from simscen.loading.scenario import load_scenario
 from simscen.run import keptworlds
 from simscen.run.keptfiles import KeptFiles

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import InvalidInput
-from simscen.core.sensing import Odometry, Scan
+from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.loading.scenario import load_scenario
 from simscen.run.assemble import assemble
 from simscen.run.prepare import prepare

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simscen.core.events import EventKind
+from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
 from simscen.record.sceneryfile import NAME, scenery_of

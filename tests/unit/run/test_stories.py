@@ -2,8 +2,8 @@
 
 import pytest
 
-from simscen.core.events import EventKind
 from simscen.core.geometry import Pose2
+from simscen.core.records.events import EventKind
 from simscen.run.since import Since
 from simscen.testing.puppetstage import PuppetStage
 from simscen.triggers.trigger import Trigger

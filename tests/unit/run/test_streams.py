@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from simscen.core.chance import Streams
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry, Scan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.random_streams import Streams
 from simscen.faults.base import FaultSetting
 from simscen.model.disturbances import EventEntry, FaultEntry
 from simscen.run.commandlink import CommandLink

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.core.events import EventKind
+from simscen.core.records.events import EventKind
 
 WAIT = "{name: %s, when: {%s}, do: {push: {impulse: [0, 0.001]}}, required: false}"
 WHEN = {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.core.events import EventKind
+from simscen.core.records.events import EventKind
 
 STANDING = {
     "stack": "{localizer: {type: ground_truth}}",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.rays import RayCaster
+from simscen.core.geometry.ray_fans import RayCaster
 
 
 @dataclass

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from puppet import Puppet, SquareRoom
 
-from simscen.core.chance import Streams
-from simscen.core.sensing import Bump, Image, Imu, Odometry, Scan
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
+from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Scan
+from simscen.core.random_streams import Streams
 from simscen.model.robot import RobotSpec
 from simscen.sensors.build import build_sensors
 

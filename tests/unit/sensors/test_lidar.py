@@ -6,7 +6,7 @@ import pytest
 from puppet import Nothing, Puppet, SquareRoom, at
 
 from simscen.core.geometry import Pose3
-from simscen.core.rays import RayCaster
+from simscen.core.geometry.ray_fans import RayCaster
 from simscen.model.robot import Lidar, Mount
 from simscen.sensors.lidar import LidarSensor
 from simscen.sensors.sensor import SensorSetting

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simscen.core.chance import Streams
+from simscen.core.random_streams import Streams
 from simscen.sensors.normals import AT_ONCE, Normals
 
 

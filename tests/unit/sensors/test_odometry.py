@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from puppet import Puppet
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.robot import Ackermann, Differential, Omnidirectional, SkidSteer, WheelOdometry
 from simscen.sensors.odometry import WheelOdometrySensor, along_arc
 from simscen.sensors.sensor import SensorSetting

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.sim.alone import Alone
 from simscen.sim.embody import robot_body
 from simscen.worlds.meshing import fuse, triangulate

@@ -6,7 +6,7 @@ from pathlib import Path
 import yaml
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Box, Solid
+from simscen.core.geometry.shapes import Box, Solid
 from simscen.model.robot import RobotSpec
 
 ROBOTS = Path(__file__).parents[3] / "simscen/data/robots"

@@ -4,7 +4,7 @@ import pytest
 from playground import box
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Body, Cylinder, Extrusion, MotionPath, Solid
+from simscen.core.geometry.shapes import Body, Cylinder, Extrusion, MotionPath, Solid
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
 

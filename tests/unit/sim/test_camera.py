@@ -4,7 +4,7 @@ import numpy as np
 from playground import box
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Body, MotionPath
+from simscen.core.geometry.shapes import Body, MotionPath
 
 FIELD, WIDTH, HEIGHT = 1.2, 64, 48
 

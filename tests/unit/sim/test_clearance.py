@@ -8,9 +8,9 @@ from shapely.geometry import Point, Polygon
 from shapely.geometry import box as rectangle
 from shapely.ops import unary_union
 
-from simscen.core.case import CLEARANCE_RANGE
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Body, Box, Cylinder, Extrusion, MotionPath, Solid, Sphere
+from simscen.core.geometry.shapes import Body, Box, Cylinder, Extrusion, MotionPath, Solid, Sphere
+from simscen.core.records.case import CLEARANCE_RANGE
 
 RADIUS = 0.22  # of the turtlebot
 MILLIMETRE = 1e-3

@@ -6,8 +6,8 @@ import pytest
 from playground import box
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.shapes import Body, Cylinder, MotionPath, Solid
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
 
 RADIUS = 0.22
 WALL = box("wall", 1.05, 0, 0.1, 4)

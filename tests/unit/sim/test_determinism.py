@@ -11,8 +11,8 @@ import sys
 sys.path.insert(0, {folder!r})
 from playground import box, shipped
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.shapes import Body, MotionPath
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.sim.embody import robot_body
 from simscen.sim.alone import Alone
 from simscen.worlds.meshing import fuse, triangulate

@@ -8,7 +8,7 @@ from playground import box
 
 from simscen.core.errors import RunError
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Body
+from simscen.core.geometry.shapes import Body
 
 BOX = (box("box", 0, 0, 0.5, 0.5, 0.5),)
 

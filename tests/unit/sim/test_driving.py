@@ -8,7 +8,7 @@ from playground import box, travelled
 
 from simscen.core.errors import RunError
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 
 TICKS = 240
 

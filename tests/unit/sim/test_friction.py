@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from simscen.core.environment.world_model import Patch, disc_outline
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.surface import Patch, disc
+from simscen.core.geometry.kinematics import STOP, Twist
 
 TICKS, GRAVITY = 240, 9.81
 
@@ -55,7 +55,7 @@ def test_one_side_on_oil_turns_a_robot_that_brakes(simulate):
 def test_what_is_laid_later_lies_on_top_and_dries_up(simulate):
     simulation = simulate("turtlebot")
     simulation.lay("wet", Patch(EVERYWHERE, 0.3))
-    simulation.lay("oil", Patch(disc((0.0, 0.0), 1.0), 0.1, until=24))
+    simulation.lay("oil", Patch(disc_outline((0.0, 0.0), 1.0), 0.1, until=24))
     floor = simulation._scene.floor
     assert (floor.friction(0.5, 0.0), floor.friction(2.0, 0.0), floor.friction(99.0, 0.0)) == (0.1, 0.3, 1.0)
     simulation.step(25)

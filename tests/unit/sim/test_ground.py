@@ -7,8 +7,8 @@ import pytest
 from playground import box, shipped
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.shapes import Body, Box, Mesh, Solid
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Body, Box, Mesh, Solid
 from simscen.sim.climb import climb_of, grip_angle
 from simscen.sim.embody import robot_body
 from simscen.worlds.meshing import fuse
@@ -134,8 +134,8 @@ def test_a_height_field_carries_wheels_as_a_ramp_does(on_ground):
     number = np.arange(x.size, dtype=np.int32).reshape(x.shape)
     sw, se, nw, ne = (part.ravel() for rows in (number[:-1], number[1:]) for part in (rows[:, :-1], rows[:, 1:]))
     faces = np.concatenate((np.column_stack((sw, se, ne)), np.column_stack((sw, ne, nw))))
-    terrain = Solid(Mesh(np.column_stack((x.ravel(), y.ravel(), z.ravel())), faces), Pose3(), "terrain")
-    simulation = on_ground("turtlebot", [terrain], drive=(0.4, 0.0, 0.0))
+    drivable_solids = Solid(Mesh(np.column_stack((x.ravel(), y.ravel(), z.ravel())), faces), Pose3(), "terrain")
+    simulation = on_ground("turtlebot", [drivable_solids], drive=(0.4, 0.0, 0.0))
     assert driven(simulation, 5) == []
     assert simulation.truth().pose.z == pytest.approx(math.tan(math.radians(5)), abs=3e-3)
 
@@ -148,10 +148,10 @@ def test_a_base_that_never_leaves_the_plane_is_stopped_by_a_ramp(on_ground):
 
 def test_walls_leave_the_ground_flat(simulate):
     """Wheels touch nothing of a world of walls, so that its runs are what they were."""
-    from simscen.core.terrain import terrain
+    from simscen.core.environment.drivable_surfaces import drivable_solids
 
     mesh = fuse([box("wall", 1, 0, 0.1, 4), box("crate", -1, 0, 0.5, 0.5, 0.4), box("line", 0, 1, 1, 1, 0.004)])
-    assert terrain(mesh, 0.1) == frozenset()
+    assert drivable_solids(mesh, 0.1) == frozenset()
     simulation = simulate(solids=[box("wall", 1, 0, 0.1, 4)], drive=(0.2, 0, 0))
     simulation.drive(Twist(0.1, 0, 0))
     simulation.step(24)

@@ -4,7 +4,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Body, Cylinder, Mesh, Solid
+from simscen.core.geometry.shapes import Body, Cylinder, Mesh, Solid
 from simscen.sim.hull import MANY_CORNERS, STANDS_OUT, few_corners
 
 

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Solid, Sphere
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Solid, Sphere
 from simscen.sim.inertia import MassProperties, combined, of_shape, of_solids, volume
 from simscen.worlds.meshing import triangulate
 

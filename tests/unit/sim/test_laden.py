@@ -6,7 +6,7 @@ import pytest
 from playground import shipped
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP
+from simscen.core.geometry.kinematics import STOP
 from simscen.sim.climb import climb_of
 from simscen.sim.embody import robot_body
 from simscen.sim.laden import centre, laden, stands, weakened

@@ -5,7 +5,7 @@ import pytest
 from shapely.geometry import MultiPoint, Polygon
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Solid, Sphere
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Solid, Sphere
 from simscen.sim.outline import circle, convex_hull, extremes, footprint, parts
 
 

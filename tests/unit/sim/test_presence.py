@@ -8,11 +8,11 @@ from itertools import pairwise
 import pytest
 from playground import box, shipped
 
-from simscen.core.events import EventKind
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.motion_path import pose_at
-from simscen.core.shapes import Body, MotionPath
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.motion_paths import pose_at
+from simscen.core.geometry.shapes import Body, MotionPath
+from simscen.core.records.events import EventKind
 from simscen.sim.actor import Actor
 from simscen.sim.embody import robot_body
 from simscen.sim.presence import STRIDE, Absent, Looker

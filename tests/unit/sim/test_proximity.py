@@ -9,7 +9,7 @@ import trimesh
 from playground import box, shipped
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Cylinder, Extrusion, Mesh, Solid
+from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.sim.embody import robot_body
 from simscen.sim.enclosure import winds_along_a_line, winds_around
 from simscen.sim.engine import fixed, hull_shape, tiles

@@ -7,7 +7,7 @@ import pytest
 from playground import box
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Body, MotionPath
+from simscen.core.geometry.shapes import Body, MotionPath
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
 

@@ -3,7 +3,7 @@ from playground import shipped
 from shapely.geometry import Point, Polygon
 
 from simscen.core.errors import InvalidInput
-from simscen.core.shapes import Sphere
+from simscen.core.geometry.shapes import Sphere
 from simscen.model.robot import RobotSpec
 from simscen.sim.embody import robot_body
 

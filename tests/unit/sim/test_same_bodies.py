@@ -5,10 +5,10 @@ import random
 import pytest
 from playground import box
 
-from simscen.core.events import EventKind
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.shapes import Body, Extrusion, MotionPath, Solid
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Body, Extrusion, MotionPath, Solid
+from simscen.core.records.events import EventKind
 from simscen.sim.contacts import touches
 
 EVERY = 6

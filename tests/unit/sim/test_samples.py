@@ -3,10 +3,10 @@
 import pytest
 from playground import box
 
-from simscen.core.foreseen import Places
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Body, Box, MotionPath, Solid
-from simscen.core.trace import Truth
+from simscen.core.geometry.scripted_poses import PosesAtTick
+from simscen.core.geometry.shapes import Body, Box, MotionPath, Solid
+from simscen.core.records.trace import Truth
 
 PASSING = MotionPath((0.0, 6.0), (Pose2(4.0, 4.0), Pose2(2.0, -1.0)))
 CRATE = Body("crate", (Solid(Box((0.3, 0.3, 0.3))),), Pose3(2.2, 1.2, 0.15))
@@ -35,7 +35,7 @@ def test_samples_looked_at_later_are_those_of_the_moment(simulate, mass: float) 
     assert 0 < waited < len(late)
     looked_at = [sample if isinstance(sample, Truth) else sample.truth() for sample in late]
     assert looked_at == seen
-    assert sum(type(truth.objects) is Places for truth in looked_at) > 100  # worked out ahead, nearly always
+    assert sum(type(truth.objects) is PosesAtTick for truth in looked_at) > 100  # worked out ahead, nearly always
 
 
 def test_samples_among_things_that_sleep_and_are_pushed_are_those_of_the_moment(simulate) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 from playground import box
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.rays import Fan
-from simscen.core.shapes import Body
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.ray_fans import RayFan
+from simscen.core.geometry.shapes import Body
 from simscen.run.liverays import LiveRays
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
@@ -16,7 +16,7 @@ from simscen.worlds.rays import RayScene
 WALL = box("wall", 4.0, 0.0, 0.2, 8.0)
 CRATE = (box("crate", 0, 0, 0.3, 0.3, 0.3),)
 CRATES = [Body(f"crate {k}", CRATE, Pose3.planar(Pose2(1.0 + 0.5 * k, 0.4 * (k % 3), 0.3 * k)), 3.0) for k in range(6)]
-FAN = Fan(-math.pi, math.pi / 45, 90)
+FAN = RayFan(-math.pi, math.pi / 45, 90)
 
 
 def drive(simulate, every, looking):

@@ -5,10 +5,10 @@ import math
 import numpy as np
 from playground import box
 
-from simscen.core.foreseen import Places
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.rays import Fan
-from simscen.core.shapes import Body, MotionPath
+from simscen.core.geometry.ray_fans import RayFan
+from simscen.core.geometry.scripted_poses import PosesAtTick
+from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.run import liverays
 from simscen.run.liverays import LiveRays
 from simscen.worlds.meshing import fuse
@@ -17,7 +17,7 @@ from simscen.worlds.rays import RayScene
 WALL = box("wall", 4.0, 0.0, 0.2, 8.0)
 PARTS = (box("cart", 0.2, 0, 0.5, 0.3, 0.4),)
 MESH = fuse(PARTS)
-FAN = Fan(-math.pi, math.pi / 45, 90)
+FAN = RayFan(-math.pi, math.pi / 45, 90)
 REACH = 2.0
 CARTS = [f"cart {number}" for number in range(16)]
 
@@ -54,7 +54,7 @@ def test_a_scan_is_that_of_a_scene_that_was_told_of_everything(simulate, monkeyp
         assert np.array_equal(watched.sweep(FAN, pose, REACH), seen)
         if beat % 10 == 0:
             assert np.array_equal(watched.cast(*FAN.at(pose), REACH), told.cast(*FAN.at(pose), REACH))
-        ahead += type(objects) is Places
+        ahead += type(objects) is PosesAtTick
         met |= {name for name, there in objects.items() if math.dist(there[:2], pose[:2]) < REACH}
         simulation.step(24)
     assert ahead > 120, "worked out ahead, nearly always"

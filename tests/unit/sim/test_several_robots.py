@@ -7,7 +7,7 @@ import pytest
 from playground import box, shipped
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.run.liverays import LiveRays
 from simscen.sim.embody import robot_body
 from simscen.sim.simulation import Placed, Simulation

@@ -7,8 +7,8 @@ import pytest
 from playground import box
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.shapes import Body, MotionPath, Solid, Sphere
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Body, MotionPath, Solid, Sphere
 from simscen.sim.settled import Settling
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)

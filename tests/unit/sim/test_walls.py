@@ -8,8 +8,8 @@ import pytest
 from playground import box
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
-from simscen.core.shapes import Body, Cylinder, Solid
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Body, Cylinder, Solid
 from simscen.sim import walls
 
 FOREST = [

@@ -3,7 +3,7 @@
 import pytest
 
 CALM = '''
-from simscen.core.verdict import Finding
+from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most
 from simscen.spec.base import Spec

@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.motion_path import pose_at, top_speed
+from simscen.core.geometry.motion_paths import pose_at, top_speed
 from simscen.spec.motions import Motion
 
 HERE = Pose2(0.0, 0.0, 1.0)

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.belief import Estimate
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal
-from simscen.core.sensing import Image, Imu, Odometry, Reading, Readings
-from simscen.core.trace import Decision
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Goal
+from simscen.core.messages.sensor_data import Image, Imu, Odometry, Reading, Readings
+from simscen.core.records.trace import Decision
 from simscen.model.stack import StackSpec
 from simscen.testing.flatland import Drive, Flatland, box_robot, drive, round_robot
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import Path
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Path
 from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.stack.costmap.costmap import CostmapView
 from simscen.stack.cusps import cusps

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.filtermasks import FilterMasks, SpeedLimits
+from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import ErrorCode, Goal, Path
-from simscen.core.sensing import Scan
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.checkers import ProgressChecker as ProgressSpec
 from simscen.model.checkers import SimpleGoalChecker as CheckerSpec
 from simscen.model.costmaps import Costmap as CostmapSpec

@@ -12,8 +12,8 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal, Path
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Goal, Path
 from simscen.model.controllers import CONTROLLERS, ControllerSpec, DynamicWindow, RegulatedPurePursuit
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.mppi import Mppi

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from simscen.cli.catalog.json_schema import as_text, schema_of
-from simscen.core.chance import Streams
+from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import ErrorCode, Goal
-from simscen.core.time import Clock
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import ErrorCode, Goal
+from simscen.core.random_streams import Streams
 from simscen.loading.scenario import load_scenario
 from simscen.model.stack import StackSpec
 from simscen.stack.build import build_stack
@@ -28,10 +28,10 @@ import math
 
 import numpy as np
 
-from simscen.core.belief import Belief
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import Path
-from simscen.core.trace import Decision
+from simscen.core.messages.localization import Belief
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import Path
+from simscen.core.records.trace import Decision
 from simscen.model.controllers import ControllerSpec, RegulatedPurePursuit
 from simscen.model.checkers import GoalCheckerSpec
 from simscen.model.localizers import LocalizerSpec

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simscen.core.chance import Streams
 from simscen.core.errors import RunError
+from simscen.core.random_streams import Streams
 from simscen.plugin import STOP, CostGrid, Decision, InProcessStack, OccupancyGrid, Setting, Surroundings
 from simscen.stack.installed.stack import InstalledStack
 from simscen.testing.flatland import round_robot

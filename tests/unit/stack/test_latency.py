@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP
-from simscen.core.navigation import Goal
-from simscen.core.sensing import Readings, Scan
+from simscen.core.geometry.kinematics import STOP
+from simscen.core.messages.navigation import Goal
+from simscen.core.messages.sensor_data import Readings, Scan
 from simscen.model.latency import Latency
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec

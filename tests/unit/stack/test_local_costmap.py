@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import Goal
-from simscen.core.sensing import Odometry, Readings
-from simscen.core.trace import Decision
-from simscen.core.zones import Zones
+from simscen.core.messages.navigation import Goal
+from simscen.core.messages.sensor_data import Odometry, Readings
+from simscen.core.records.trace import Decision
 from simscen.model.costmaps import Costmap, LocalCostmap
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec

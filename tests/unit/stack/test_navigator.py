@@ -5,8 +5,8 @@ import math
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.checkers import ProgressChecker
 from simscen.model.costmaps import Costmap
 from simscen.model.localizers import GroundTruth

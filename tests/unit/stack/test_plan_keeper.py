@@ -3,11 +3,11 @@ import math
 import numpy as np
 import pytest
 
-from simscen.core.events import Event
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import ErrorCode, Goal, Path
-from simscen.core.sensing import Scan
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.sensor_data import Scan
+from simscen.core.records.events import Event
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.costmap import Costmap

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal
-from simscen.core.sensing import Imu, Odometry, Readings
-from simscen.core.trace import Decision
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Goal
+from simscen.core.messages.sensor_data import Imu, Odometry, Readings
+from simscen.core.records.trace import Decision
 from simscen.model.guards import VelocitySmoother
 from simscen.model.localizers import Ekf
 from simscen.model.stack import StackSpec

@@ -2,9 +2,9 @@
 
 import pytest
 
-from simscen.core.events import Event
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import Goal
+from simscen.core.messages.navigation import Goal
+from simscen.core.records.events import Event
 from simscen.model.latency import Latency
 from simscen.model.stack import StackSpec
 from simscen.stack.standstill import Standstill

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from simscen.core.events import Event
+from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
-from simscen.core.goalnames import in_loop, named
-from simscen.core.navigation import ErrorCode, Goal, error_code
-from simscen.core.time import Clock
+from simscen.core.messages.goal_names import loop_goal_name, matches_goal_name
+from simscen.core.messages.navigation import ErrorCode, Goal, error_code
+from simscen.core.records.events import Event
 from simscen.stack.tasks import Task
 
 A, B = Goal("a", Pose2(0, 0), via=True), Goal("b", Pose2(1, 0), via=True)
@@ -145,14 +145,14 @@ def test_a_follower_that_stops_says_that_a_waypoint_was_missed(mode, stop, code)
 
 
 def test_a_goal_has_its_name_in_every_loop():
-    assert [in_loop("shelf", loop) for loop in (1, 2, 12)] == ["shelf", "shelf#2", "shelf#12"]
-    assert named("shelf#2", "shelf")
-    assert named("shelf#2", "shelf#2")
-    assert named("shelf", None)
-    assert not named("shelf", "shelf#2")
-    assert not named("shelf#2", "shelf#3")
-    assert not named("shelf#b", "shelf")
-    assert not named("bookshelf#2", "shelf")
+    assert [loop_goal_name("shelf", loop) for loop in (1, 2, 12)] == ["shelf", "shelf#2", "shelf#12"]
+    assert matches_goal_name("shelf#2", "shelf")
+    assert matches_goal_name("shelf#2", "shelf#2")
+    assert matches_goal_name("shelf", None)
+    assert not matches_goal_name("shelf", "shelf#2")
+    assert not matches_goal_name("shelf#2", "shelf#3")
+    assert not matches_goal_name("shelf#b", "shelf")
+    assert not matches_goal_name("bookshelf#2", "shelf")
 
 
 def test_codes_of_several_poses_have_the_names_of_those_of_one():

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from simscen.core.belief import Belief
-from simscen.core.events import Event, EventKind
+from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal
-from simscen.core.time import Clock
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Goal
+from simscen.core.records.events import Event, EventKind
 from simscen.triggers.trigger import Trigger
 
 STILL, CLOCK = Twist(0.0), Clock(240)

@@ -2,9 +2,9 @@ import pickle
 
 import numpy as np
 
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Solid
-from simscen.core.world import World
+from simscen.core.geometry.shapes import Box, Solid
 from simscen.worlds.build import build
 
 

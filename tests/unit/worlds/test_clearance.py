@@ -3,7 +3,7 @@ import pytest
 import shapely
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Box, Cylinder, Solid, Sphere
+from simscen.core.geometry.shapes import Box, Cylinder, Solid, Sphere
 from simscen.worlds.clearance import MOST_LEVELS, clearance_field, standing_outlines
 from simscen.worlds.meshing import fuse
 from simscen.worlds.slicing import empty_grid

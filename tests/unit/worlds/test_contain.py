@@ -4,9 +4,9 @@ import time
 
 import numpy as np
 
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Cylinder, Solid
-from simscen.core.world import World
+from simscen.core.geometry.shapes import Box, Cylinder, Solid
 from simscen.worlds.contain import blocking_solid
 
 BODY = (0.05, 0.4)
@@ -44,8 +44,8 @@ def test_a_world_of_thousands_of_solids_is_searched_in_milliseconds():
 
 def test_asking_imports_no_heavy_library():
     code = (
-        "import sys; from simscen.worlds.contain import blocking_solid; from simscen.core.world import World;"
-        "from simscen.core.shapes import Box, Solid, Extrusion;"
+        "import sys; from simscen.worlds.contain import blocking_solid; from simscen.core.environment.world_model import World;"
+        "from simscen.core.geometry.shapes import Box, Solid, Extrusion;"
         "w = World('w', (Solid(Box((1, 1, 1)), name='b'), Solid(Extrusion(((0, 0), (1, 0), (0, 1)), 1.0))));"
         "assert blocking_solid(w, (5, 5), 0.1, (0, 1)) is None;"
         "assert blocking_solid(w, (0, 0), 0.1, (0, 1)) == 'b';"

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon, union_all
 
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion_path import pose_at
-from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, Mesh, MotionPath, Solid, Sphere
-from simscen.core.world import World
+from simscen.core.geometry.motion_paths import pose_at
+from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, Mesh, MotionPath, Solid, Sphere
 from simscen.model.world import WorldSpec
 from simscen.spec.motions import route
 from simscen.worlds.convert import convert

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Solid
+from simscen.core.geometry.shapes import Box, Solid
 from simscen.worlds.extents import plan_extents
 
 

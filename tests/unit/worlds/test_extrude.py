@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from simscen.core.environment.occupancy_grid import OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OCCUPIED, UNKNOWN, OccupancyGrid
-from simscen.core.world import World
 from simscen.worlds.extrude import walls_of
 from simscen.worlds.meshing import fuse
 from simscen.worlds.section import section

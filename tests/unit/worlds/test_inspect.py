@@ -1,8 +1,8 @@
 import pytest
 
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Body, Box, Cylinder, Solid
-from simscen.core.world import World
+from simscen.core.geometry.shapes import Body, Box, Cylinder, Solid
 from simscen.worlds.build import build
 from simscen.worlds.inspect import inspect
 

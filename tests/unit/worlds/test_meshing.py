@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from simscen.core.facemesh import CONVEX_FACES, compact, is_convex
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Solid, Sphere
+from simscen.core.geometry.meshes import MAX_CONVEX_FACES, is_convex, submesh
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Solid, Sphere
 from simscen.worlds.meshing import facets, fuse, triangulate
 
 L_SHAPE = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
@@ -66,9 +66,9 @@ def test_what_is_told_to_be_convex_is_its_own_hull_and_its_vertices_are_those_to
     mesh = fuse([Solid(shape, pose) for shape, pose in zip(shapes, poses, strict=True)])
     told = [hull is not None for hull in mesh.hulls]
     assert told == [True, True, False, False, False, False, True, False, False, True, False, False]
-    assert {len(triangulate(shape).faces) > CONVEX_FACES for shape, _ in VOLUMES[2:6]} == {True}
+    assert {len(triangulate(shape).faces) > MAX_CONVEX_FACES for shape, _ in VOLUMES[2:6]} == {True}
     for owner, hull in enumerate(mesh.hulls):
-        solid = compact(mesh.vertices, mesh.faces[mesh.owners == owner])
+        solid = submesh(mesh.vertices, mesh.faces[mesh.owners == owner])
         if hull is not None:
             assert np.array_equal(mesh.vertices[hull], solid.vertices)
             assert is_convex(solid)

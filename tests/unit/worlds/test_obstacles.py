@@ -5,7 +5,7 @@ import math
 import pytest
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Box, Mesh, Solid
+from simscen.core.geometry.shapes import Box, Mesh, Solid
 from simscen.worlds.meshing import fuse
 from simscen.worlds.obstacles import obstacles_of
 from simscen.worlds.ramps import wedge

@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
+from simscen.core.environment.occupancy_grid import OCCUPIED, OccupancyGrid
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.grid import OCCUPIED, OccupancyGrid
-from simscen.core.shapes import Box, Cylinder, Solid
-from simscen.core.world import World
+from simscen.core.geometry.shapes import Box, Cylinder, Solid
 from simscen.model.world import WorldSpec
 from simscen.worlds.own import build_own
 

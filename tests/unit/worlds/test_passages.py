@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Box, Solid
+from simscen.core.geometry.shapes import Box, Solid
 from simscen.worlds.meshing import fuse
 from simscen.worlds.shortest import ShortestWays
 

@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
+from simscen.core.environment.occupancy_grid import OCCUPIED, OccupancyGrid
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.grid import OCCUPIED, OccupancyGrid
-from simscen.core.shapes import Body, Box, Solid
-from simscen.core.world import World
+from simscen.core.geometry.shapes import Body, Box, Solid
 from simscen.worlds.build import build
 from simscen.worlds.extrude import walls_of
 from simscen.worlds.picture import BODY, FINER, FREE_GROUND, MAPPED_WALL, _view, picture

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.rays import Fan
-from simscen.core.shapes import Box, Cylinder, Solid
+from simscen.core.geometry.ray_fans import RayFan
+from simscen.core.geometry.shapes import Box, Cylinder, Solid
 from simscen.worlds import piles, raypart
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
@@ -18,7 +18,7 @@ CRATE = fuse([Solid(Box((0.6, 0.4, 0.5)), Pose3(z=0.25))])
 CHANCE = np.random.default_rng(21)
 HOMES = {f"thing {k:02}": Pose3.planar(Pose2(*CHANCE.uniform((-9, -9, -3), (9, 9, 3)))) for k in range(30)}
 LEVEL, NODDING = Pose3(0.5, 0.2, 0.18), Pose3.from_rpy(0.4, 0.1, 0.5, 0.05, -0.3, 1.0)
-FAN = Fan(-math.pi, math.pi / 90, 180)
+FAN = RayFan(-math.pi, math.pi / 90, 180)
 
 
 def placed(poses):

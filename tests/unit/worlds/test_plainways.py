@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.polygons import holds
-from simscen.core.shapes import Box, Solid
+from simscen.core.geometry.polygons import polygon_contains
+from simscen.core.geometry.shapes import Box, Solid
 from simscen.worlds.cuts import cut_overlaps
 from simscen.worlds.meshing import fuse
 from simscen.worlds.narrowest import narrowest
@@ -87,5 +87,5 @@ def test_a_footprint_overlaps_what_its_points_are_in(box: Solid, x: float, y: fl
         Pose2(box.pose.x, box.pose.y, 2 * math.atan2(box.pose.qz, box.pose.qw)),
     )
     grid = np.stack(np.meshgrid(np.linspace(-0.39, 0.39, 40), np.linspace(-0.19, 0.19, 20)), -1).reshape(-1, 2)
-    inside = any(holds(corners, (px, py)) for px, py in pose.apply(grid).tolist())
+    inside = any(polygon_contains(corners, (px, py)) for px, py in pose.apply(grid).tolist())
     assert told or not inside

@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Box, Cone, Extrusion, Solid, Sphere
+from simscen.core.geometry.shapes import Box, Cone, Extrusion, Solid, Sphere
 from simscen.worlds.meshing import fuse
 from simscen.worlds.plan_distance import distance_in_plan
 

@@ -3,7 +3,7 @@ import pytest
 import shapely
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Extrusion, Solid
+from simscen.core.geometry.shapes import Extrusion, Solid
 from simscen.worlds.meshing import fuse
 from simscen.worlds.raster import filled, ranges, touched
 from simscen.worlds.section import Section, section

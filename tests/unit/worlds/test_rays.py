@@ -11,8 +11,8 @@ from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.rays import Fan
-from simscen.core.shapes import Box, Cylinder, Extrusion, Solid, Sphere, TriangleMesh
+from simscen.core.geometry.ray_fans import RayFan
+from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid, Sphere, TriangleMesh
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 
@@ -176,7 +176,7 @@ def test_a_scene_survives_a_fork_and_others_are_built_there():
 
 COLLECTED = """
 import gc
-from simscen.core.shapes import Box, Solid
+from simscen.core.geometry.shapes import Box, Solid
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 for _ in range(200):
@@ -195,7 +195,7 @@ def test_a_scene_that_the_garbage_collector_takes_does_not_crash():
 @pytest.mark.parametrize(("first", "beams", "field"), [(-math.pi, 360, 2 * math.pi), (2.0, 91, 1.5), (0.3, 1, 0.1)])
 def test_a_fan_meets_what_its_rays_meet_one_by_one(first, beams, field):
     """Also a body that a full circle's first and last rays see, one that the lidar is in, and one out of reach."""
-    scene, fan = RayScene(fuse(ROOM)), Fan(first, field / beams, beams)
+    scene, fan = RayScene(fuse(ROOM)), RayFan(first, field / beams, beams)
     places = [(-2.5, 0.1, 0.3), (1.5, -1.5, 2.0), (0.05, 0.0, 1.0), (30.0, 0.0, 0.0)]
     scene.set_moving({f"cart {k}": (CART, Pose3.planar(Pose2(*place))) for k, place in enumerate(places)})
     for lens in (Pose3(0.0, 0.0, 0.3), Pose3.from_rpy(0.8, -0.4, 0.6, 0.1, -0.2, 2.5)):
@@ -213,7 +213,7 @@ def test_the_rays_of_a_fan_within_a_cone_are_told_as_counting_all_would_tell():
         (x, y), least = chance.normal(size=2), float(chance.uniform(-2.5, 2.5))
         angles = first + increment * np.arange(count)
         met = set(np.flatnonzero(x * np.cos(angles) + y * np.sin(angles) >= least).tolist())
-        told = [ray for rays in Fan(first, increment, count).towards(x, y, least) for ray in range(count)[rays]]
+        told = [ray for rays in RayFan(first, increment, count).towards(x, y, least) for ray in range(count)[rays]]
         assert met <= set(told)
         beside = set(told) - met
         assert all((ray - 1) % count in met or (ray + 1) % count in met or not met for ray in beside)
@@ -238,7 +238,7 @@ def test_a_body_farther_off_than_any_ray_reaches_is_left_out_until_it_comes_near
 def test_rays_that_rounding_tilts_meet_what_level_ones_meet(turns, tilt):
     """Embree took whole packets for nothing whose rays part by the sign of next to nothing."""
     ends = [Solid(Box((0.2, 10.0, 2.0)), Pose3(x, 0, 1)) for x in (-5, 5)]
-    scene, fan = RayScene(fuse([*ROOM, *ends])), Fan(-math.pi, math.pi / 180, 360)
+    scene, fan = RayScene(fuse([*ROOM, *ends])), RayFan(-math.pi, math.pi / 180, 360)
     half = turns * math.pi / 4
     for roll, pitch in ((tilt, -tilt), (-tilt, tilt), (-tilt, -tilt)):
         turned = Pose3(0.0, 0.0, 0.2, qz=math.sin(half), qw=math.cos(half))

@@ -5,9 +5,9 @@ import pytest
 import yaml
 from PIL import Image
 
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
 from simscen.model.rosmap import RosMapSpec
 from simscen.worlds.rosmap import cell_values, load_grid, save_map
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Capsule, Cone, Extrusion, Solid, Sphere
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Extrusion, Solid, Sphere
 from simscen.worlds.meshing import fuse
 from simscen.worlds.section import outlines, section
 

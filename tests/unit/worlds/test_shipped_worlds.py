@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import yaml
 
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED
 from simscen.core.geometry import Pose2
-from simscen.core.grid import FREE, OCCUPIED
-from simscen.core.navigation import Goal
+from simscen.core.messages.navigation import Goal
 from simscen.model.rosmap import RosMapSpec
 from simscen.worlds.build import build
 from simscen.worlds.meshing import fuse

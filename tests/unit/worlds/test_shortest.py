@@ -7,10 +7,10 @@ import pytest
 import shapely
 from scipy.sparse.csgraph import dijkstra
 
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.navigation import Goal
-from simscen.core.shapes import Box, Cylinder, Extrusion, Solid, Sphere
-from simscen.core.world import World
+from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid, Sphere
+from simscen.core.messages.navigation import Goal
 from simscen.worlds.build import build
 from simscen.worlds.meshing import fuse
 from simscen.worlds.shortest import ShortestWays, legs_between

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import shapely
 
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from simscen.core.shapes import Box, Cylinder, Extrusion, Mesh, Solid
-from simscen.core.world import World
+from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.slicing import map_of
 from simscen.worlds.walls import wall_solids

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Cylinder, Solid
+from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.ways.polyline import resampled
 from simscen.worlds.clearance import clearance_field
 from simscen.worlds.meshing import fuse

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Box, Cone, Cylinder, Extrusion, Solid, Sphere
+from simscen.core.geometry.shapes import Box, Cone, Cylinder, Extrusion, Solid, Sphere
 from simscen.worlds.extents import plan_extents, rectangle
 from simscen.worlds.meshing import fuse
 from simscen.worlds.plan_distance import distance_in_plan

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import shapely
 
-from simscen.core.shapes import Extrusion
+from simscen.core.geometry.shapes import Extrusion
 from simscen.worlds.walls import wall_solids
 
 

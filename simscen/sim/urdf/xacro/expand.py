@@ -8,8 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.assets.folders import Absent, Folders, Trouble
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
+from simscen.core.errors import InvalidInput, Problem
 from simscen.sim.urdf.files import URDF_BYTES
 from simscen.sim.urdf.markup import Element
 from simscen.sim.urdf.xacro.budget import Budget, Missing, Refused

@@ -3,8 +3,8 @@
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.controllers import DynamicWindow as DwbSpec
 from simscen.stack.controllers.dwb.critics import scores
 from simscen.stack.controllers.dwb.kinematics import kinematics_of, window

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as DwbSpec
 from simscen.stack.controllers.limits import Limits, limits_of
 from simscen.stack.protocols import RobotModel

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.stack.controllers.dwb.map_grid import Mask
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.stack.controllers.dwb.kinematics import Kinematics
 from simscen.stack.controllers.sums import add_up
 

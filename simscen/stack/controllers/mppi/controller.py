@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.mppi import Mppi as MppiSpec
 from simscen.stack.controllers.following import PathFollower
 from simscen.stack.controllers.free_way import FreeWay

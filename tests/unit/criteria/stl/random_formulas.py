@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import strategies as st
 
-from simscen.core.samples import Samples
+from simscen.core.records.trace import Samples
 from simscen.criteria.stl.condition import Condition
 from simscen.testing.sketch import sketch, sketch_case
 

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from simscen.core.evidence import Evidence
-from simscen.core.verdict import Status
+from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.stl.criterion import TemporalCriterion
 from simscen.judge.evaluation import judge

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_formulas import CASE, FORMULAS, NUMBERS, VALUES, horizon, run, validated
 
-from simscen.core.navigation import Path
-from simscen.core.samples import Samples
-from simscen.core.verdict import Status
+from simscen.core.messages.navigation import Path
+from simscen.core.records.trace import Samples
+from simscen.core.records.verdict import Status
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.stl.condition import Window

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.core.samples import Samples
+from simscen.core.records.trace import Samples
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.trace_signals.ground_truth import (
     check_finite,

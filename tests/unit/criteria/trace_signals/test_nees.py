@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.samples import Samples
+from simscen.core.records.trace import Samples
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.trace_signals.nees import DIMENSIONS, nees, nees_samples
 from simscen.testing.sketch import sketch

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 import shapely
 
-from simscen.core.events import Event, EventKind
-from simscen.core.navigation import Path
-from simscen.core.samples import Samples
-from simscen.core.trace import Trace
+from simscen.core.messages.navigation import Path
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Samples, Trace
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_signal
 from simscen.criteria.trace_signals.readers import points_in_polygon

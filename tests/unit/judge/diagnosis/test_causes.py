@@ -2,7 +2,7 @@
 
 from diagnosis_cases import STANDS, by, why
 
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.diagnosis.causes import explain_failures
 from simscen.testing.sketch import sketch, sketch_case
 

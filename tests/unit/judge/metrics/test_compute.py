@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from filterpy import stats
 
-from simscen.core.navigation import Path
-from simscen.core.samples import Samples
+from simscen.core.messages.navigation import Path
+from simscen.core.records.trace import Samples
 from simscen.criteria.trace_signals.sparc_ldlj import ldlj, sparc
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.compute import barn_score, compute_metrics

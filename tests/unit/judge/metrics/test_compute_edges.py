@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.samples import Samples
+from simscen.core.records.trace import Samples
 from simscen.criteria.trace_signals.sparc_ldlj import sparc
 from simscen.judge.metrics.compute import barn_score, compute_metrics
 from simscen.testing.sketch import sketch, sketch_case

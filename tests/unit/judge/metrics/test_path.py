@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.navigation import Path
-from simscen.core.samples import Samples
+from simscen.core.messages.navigation import Path
+from simscen.core.records.trace import Samples
 from simscen.criteria.trace_signals.ground_truth import drive
 from simscen.judge.metrics.path import path_metrics, path_segments
 from simscen.testing.sketch import sketch

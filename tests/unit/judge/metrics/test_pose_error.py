@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.samples import Samples
+from simscen.core.records.trace import Samples
 from simscen.judge.metrics.pose_error import pose_metrics
 from simscen.testing.sketch import sketch
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.judge.metrics.session_summary import session_summary_data, session_summary_line, summarize_session
 
 

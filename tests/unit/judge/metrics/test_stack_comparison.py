@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from simscen.core.comparison import Outcomes
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
-from simscen.core.verdict import Finding, Status, Verdict
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.stack_comparison import OutcomeCounts
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.stack_comparison import COMPARED_METRICS, compare_stacks, comparison_data
 
@@ -50,9 +50,9 @@ def test_outcomes_are_counted_for_each_scenario_and_stack_and_errors_by_themselv
     runs += [run("mine", 1), run("mine", 2, outcome=Outcome.FAILED), run("mine", 3, outcome=Outcome.ERROR)]
     comparison = compare_stacks([*runs, run("ref", scenario="b")], STACKS)
     assert comparison is not None
-    assert comparison.outcomes["a"] == {"ref": Outcomes(3, 0, 0), "mine": Outcomes(1, 1, 1)}
-    assert comparison.outcomes["b"]["mine"] == Outcomes()
-    assert comparison.total("ref") == Outcomes(4, 0, 0)
+    assert comparison.outcomes["a"] == {"ref": OutcomeCounts(3, 0, 0), "mine": OutcomeCounts(1, 1, 1)}
+    assert comparison.outcomes["b"]["mine"] == OutcomeCounts()
+    assert comparison.total("ref") == OutcomeCounts(4, 0, 0)
     assert comparison.outcomes["a"]["mine"].decided == 2
     assert dict(comparison.stacks) == {"ref": "reference", "mine": "./nav --fast"}
 

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.scenario import try_scenario
 
 Write = Callable[[str, str], Path]

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.files.kinds import check_file, file_kind
 
 Write = Callable[[str, str], Path]

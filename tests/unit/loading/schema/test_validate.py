@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.schema.validate import check
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.robot import RobotSpec

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_scenario
 from simscen.model.anystack import ExternalStackSpec

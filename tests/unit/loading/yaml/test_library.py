@@ -3,7 +3,7 @@ from typing import Any
 
 import pytest
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.yaml.library import Library
 

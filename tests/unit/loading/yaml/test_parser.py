@@ -3,7 +3,7 @@ import time
 
 import pytest
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.yaml.parser import MAX_DEPTH, parse_yaml
 from simscen.loading.yaml.tree import Node, key_position, value_position
 

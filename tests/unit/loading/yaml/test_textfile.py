@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.problems import Problem
+from simscen.core.errors import Problem
 from simscen.loading.yaml.textfile import read_text
 
 

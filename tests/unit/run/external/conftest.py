@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.externalcommand import ExternalCommand
-from simscen.core.run import Run
+from simscen.core.external_command import ExternalCommand
+from simscen.core.records.run import Run
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 from simscen.run.prepare import prepare

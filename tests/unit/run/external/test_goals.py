@@ -4,7 +4,7 @@ import pytest
 from stack_programs import DRIVE
 
 from simscen.core.errors import RunError
-from simscen.core.result import Outcome
+from simscen.core.records.run_result import Outcome
 
 HELLO = 'peer = Peer("mine", "2.1", topics=["/odom"])\n'
 STAND = "    step.drive(0.0, 0.0)\n"

@@ -4,7 +4,7 @@ import pytest
 from stack_programs import DRIVE
 
 from simscen.core.errors import RunError
-from simscen.core.result import Outcome
+from simscen.core.records.run_result import Outcome
 
 OLD = 'peer = Peer("mine", "2.1", topics=["/odom"])\n'
 KNOWS = OLD.replace(")\n", ', modes=["navigate_to_pose", "navigate_through_poses", "follow_waypoints"])\n')

@@ -12,8 +12,8 @@ import pytest
 from stack_programs import DRIVE
 
 from simscen.cli.session.run_session import WARM_PROCESS
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunStarted
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunStarted
 from simscen.report.junit import to_xml
 from simscen.run.session import Options, plan, run_session
 

@@ -10,7 +10,7 @@ from stack_programs import DRIVE
 
 from simscen.cli.session.run_session import WARM_PROCESS
 from simscen.core.errors import RunError
-from simscen.core.result import Outcome
+from simscen.core.records.run_result import Outcome
 from simscen.loading.scenario import load_scenario
 from simscen.run.perform import perform
 from simscen.run.prepare import prepare

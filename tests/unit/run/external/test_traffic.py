@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from stack_programs import DRIVE
 
-from simscen.core.events import EventKind
+from simscen.core.records.events import EventKind
 
 HELLO = 'peer = Peer("mine", topics=["/odom", "/scan"])\n'
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import Exit
-from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunFinished, RunProgress, RunStarted
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished, RunProgress, RunStarted
 from simscen.loading.scenario import load_scenario
 from simscen.run.process import supervisor
 from simscen.run.process.supervisor import Interrupted

@@ -10,8 +10,8 @@ import pytest
 
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.motion import Twist
-from simscen.core.shapes import Box, Mesh
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.shapes import Box, Mesh
 from simscen.model.robot import RobotSpec
 from simscen.sim.alone import Alone
 from simscen.sim.embody import robot_body

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import ErrorCode
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import ErrorCode
 from simscen.model import recovery as model
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.arcs import poses_along

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import ErrorCode
-from simscen.core.sensing import Scan
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import ErrorCode
+from simscen.core.messages.sensor_data import Scan
 from simscen.model import recovery as model
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.guards import CollisionMonitor as MonitorSpec

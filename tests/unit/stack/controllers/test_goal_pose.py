@@ -5,8 +5,8 @@ from collections import deque
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Goal
 from simscen.stack.controllers.goal_pose import GoalPose
 from simscen.testing.flatland import round_robot
 

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as Spec
 from simscen.stack.controllers.dwb.critics import scores
 from simscen.stack.controllers.dwb.kinematics import Kinematics, samples, window

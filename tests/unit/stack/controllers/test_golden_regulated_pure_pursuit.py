@@ -8,9 +8,9 @@ import pytest
 import yaml
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import ErrorCode, Goal
-from simscen.core.navigation import Path as Plan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import ErrorCode, Goal
+from simscen.core.messages.navigation import Path as Plan
 from simscen.model.controllers import RegulatedPurePursuit as Spec
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit

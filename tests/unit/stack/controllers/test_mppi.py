@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal, Path
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Goal, Path
 from simscen.model import mppi as model
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.arcs import poses_along

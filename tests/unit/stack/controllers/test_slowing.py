@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
-from simscen.core.navigation import Goal, Path
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Goal, Path
 from simscen.model.controllers import RegulatedPurePursuit as Spec
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import Path
+from simscen.core.messages.navigation import Path
 from simscen.stack.controllers.tracking import PathTracker
 
 

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
+from simscen.core.environment.costmap_filters import Zones
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.sensing import Scan
-from simscen.core.zones import Zones
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import Surroundings

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.costmaps import Costmap as Spec
 from simscen.model.costmaps import DenoiseLayer
 from simscen.stack.costmap.costmap import Costmap

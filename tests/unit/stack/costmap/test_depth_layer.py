@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.sensing import Image, Scan
+from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import Surroundings

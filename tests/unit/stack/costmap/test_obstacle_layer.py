@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.frame import Frame
 from simscen.stack.costmap.obstacle_layer import crossed, hits

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.core.belief import Estimate
-from simscen.core.chance import Streams
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry, Scan
-from simscen.core.world import BuiltWorld
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.random_streams import Streams
 from simscen.loading.files.worldfile import load_world_file
 from simscen.model.localizers import Amcl
 from simscen.model.world import WorldSpec

@@ -11,10 +11,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from hard_drives import crowded, kidnapped
 
-from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import Amcl, Ekf
 from simscen.model.localizers import Localizer as Spec
 from simscen.testing.room import USUAL, Drive, Noise, drive, errors, localizer, nees, run, scan

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from simscen.core.belief import Belief, Estimate
-from simscen.core.chance import Streams
+from simscen.core.environment.occupancy_grid import UNKNOWN
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import UNKNOWN
-from simscen.core.motion import Twist
-from simscen.core.sensing import Odometry, Scan
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.random_streams import Streams
 from simscen.model.localizers import Amcl
 from simscen.stack.localizers.amcl import SURE_AFTER
 from simscen.stack.localizers.build import amcl

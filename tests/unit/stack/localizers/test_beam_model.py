@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from simscen.core.environment.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import FREE, UNKNOWN, OccupancyGrid
 from simscen.stack.localizers.beam_model import BeamModel, cast_rays, opaque_field
 from simscen.stack.localizers.beams import select_beams
 from simscen.testing.room import BEAMS, cast, drive, grid, scan

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.belief import Estimate
-from simscen.core.chance import Streams
 from simscen.core.geometry import Pose2
+from simscen.core.messages.localization import Estimate
+from simscen.core.random_streams import Streams
 from simscen.model import localizers as model
 from simscen.stack.localizers.amcl import AmclLocalizer
 from simscen.stack.localizers.dead_reckoning import DeadReckoning

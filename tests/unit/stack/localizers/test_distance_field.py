@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import distance_transform_edt
 
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.stack.localizers.distance_field import BEHIND, DistanceField, beyond_the_map
 
 

@@ -5,10 +5,10 @@ import pytest
 from measure_localizers import STD
 from scipy import stats
 
-from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Imu, Odometry
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.model.localizers import Ekf
 from simscen.stack.protocols import Localizer
 from simscen.testing.room import Noise, drive, errors, localizer, nees, run

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Array, Pose2
-from simscen.core.motion import Twist
-from simscen.core.sensing import Imu, Odometry
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.model.localizers import Ekf
 from simscen.testing.room import localizer, nees
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from simscen.core.belief import Estimate
+from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import UNKNOWN, OccupancyGrid
+from simscen.core.messages.localization import Estimate
 from simscen.stack.localizers.distance_field import beyond_the_map
 from simscen.stack.localizers.finder import Finder
 from simscen.stack.localizers.global_search import GlobalSearch

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from simscen.core.environment.occupancy_grid import OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import OCCUPIED, OccupancyGrid
 from simscen.stack.localizers.beams import Beams, select_beams
 from simscen.stack.localizers.likelihood_field import (
     BeamSkipping,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.stack.localizers.beams import Beams, Plane
 from simscen.stack.localizers.distance_field import beyond_the_map
 from simscen.stack.localizers.likelihood_field import obstacle_field

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.likelihood_field import obstacle_field
 from simscen.stack.localizers.misfit import MapMisfit, Misfit

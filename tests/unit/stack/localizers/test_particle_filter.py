@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
+from simscen.core.messages.localization import Estimate
 from simscen.model.localizers import Amcl
 from simscen.stack.localizers.build import matching
 from simscen.stack.localizers.motion_models import Differential

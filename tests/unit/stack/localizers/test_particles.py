@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from simscen.core.belief import Estimate
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.messages.localization import Estimate
 from simscen.stack.localizers.particles import FreeSpace, Particles
 
 GRID = OccupancyGrid(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.scan_matcher import ScanMatcher, Step, moved
 from simscen.testing.room import BEAMS, cast, scan
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import ErrorCode, Path
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.nearby import LARGE, nearby
 from simscen.stack.planners.ompl_planner import OmplPlanner

@@ -6,7 +6,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import ErrorCode
+from simscen.core.messages.navigation import ErrorCode
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.costmap import Costmap

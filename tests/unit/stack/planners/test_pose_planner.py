@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import ErrorCode
+from simscen.core.messages.navigation import ErrorCode
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as Spec
 from simscen.stack.costmap.costmap import Costmap

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import ErrorCode
+from simscen.core.messages.navigation import ErrorCode
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.planners.straight import BEYOND, dear_until, straight_on

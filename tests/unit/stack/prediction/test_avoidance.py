@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import Goal
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import Goal
 from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
 from simscen.model.controllerspec import ControllerSpec
 from simscen.model.costmaps import Costmap

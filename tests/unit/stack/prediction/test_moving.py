@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import Twist
+from simscen.core.geometry.kinematics import Twist
 from simscen.stack.prediction.moving import Moving, Thing
 from simscen.stack.prediction.rollouts import HORIZON, TIMES, Followed
 from simscen.testing.flatland import round_robot

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.sensing import Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.prediction.clusters import ENOUGH, answers, clusters, fitted, runs
 from simscen.stack.prediction.tracker import Tracker

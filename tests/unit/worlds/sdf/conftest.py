@@ -3,9 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.errors import InvalidInput
-from simscen.core.problems import Problem
-from simscen.core.world import World
+from simscen.core.environment.world_model import World
+from simscen.core.errors import InvalidInput, Problem
 from simscen.worlds.sdf import load_sdf
 
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"

@@ -1,7 +1,7 @@
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.shapes import Cylinder
+from simscen.core.geometry.shapes import Cylinder
 
 SKIN = "<skin><filename>walk.dae</filename></skin>"
 BOX = (

@@ -3,7 +3,7 @@ import os
 import pytest
 
 from simscen.core.errors import InvalidInput
-from simscen.core.shapes import Box, Sphere
+from simscen.core.geometry.shapes import Box, Sphere
 from simscen.worlds.sdf import load_sdf, tree
 
 CRATE = (

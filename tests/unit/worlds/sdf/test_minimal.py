@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Capsule, Cone, Ellipsoid, Extrusion
-from simscen.core.world import World
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Ellipsoid, Extrusion
 from simscen.worlds.sdf import load_sdf
 
 UNIT = Box((1.0, 1.0, 1.0))

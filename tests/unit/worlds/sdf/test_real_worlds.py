@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 from scipy.ndimage import distance_transform_edt
 
-from simscen.core.shapes import Cylinder, Mesh
-from simscen.core.world import World
+from simscen.core.environment.world_model import World
+from simscen.core.geometry.shapes import Cylinder, Mesh
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 from simscen.worlds.sdf import load_sdf

@@ -1,6 +1,6 @@
 import pytest
 
-from simscen.core.shapes import Box, Cylinder, Sphere
+from simscen.core.geometry.shapes import Box, Cylinder, Sphere
 
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
 

@@ -1,0 +1,1 @@
+"""The simulated environment as plain data: world, map, costmap filters, terrain, pedestrians."""

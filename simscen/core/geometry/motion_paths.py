@@ -1,0 +1,196 @@
+"""Where something on a scripted path is at a time."""
+
+import math
+from bisect import bisect_right
+from typing import NamedTuple
+
+from simscen.core.geometry import Pose2, Pose3, wrap
+from simscen.core.geometry.shapes import MotionPath
+
+SMOOTH_PEAK_SPEED_RATIO = 1.5
+"""How much faster than evenly something is in the middle of a way that it is eased along."""
+Step = tuple[float, float, float]
+_made = tuple.__new__  # a pose without the calls of its class
+
+
+def pose_at(path: MotionPath, seconds: float) -> Pose2:
+    """The pose on the path, `seconds` after it was set off."""
+    times = path.times
+    if len(times) == 1:
+        return path.poses[0]
+    local = min(max(_local(path, path.elapsed(seconds)), times[0]), times[-1])
+    leg = min(bisect_right(times, local), len(times) - 1) - 1
+    begin, end = path.poses[leg], path.poses[leg + 1]
+    lasts = times[leg + 1] - times[leg]
+    part = (local - times[leg]) / lasts if lasts > 0 else 1.0
+    if path.ease == "spline":
+        return _on_curve(path, leg, part)
+    if path.ease == "smooth":
+        part = part * part * (3.0 - 2.0 * part)
+    return Pose2(
+        begin.x + part * (end.x - begin.x),
+        begin.y + part * (end.y - begin.y),
+        wrap(begin.yaw + part * wrap(end.yaw - begin.yaw)),
+    )
+
+
+class PathSampler:
+    """A path at a height `z`, asked at one time after the other: what is the same along a leg is worked out once."""
+
+    def __init__(self, path: MotionPath, z: float) -> None:
+        self._path, self._z = path, z
+        self._first, self._last = path.times[0], path.times[-1]
+        self._even = len(path.times) > 1 and path.ease == "linear"
+        self._once = path.mode == "once"
+        self._begin, self._end = math.inf, -math.inf
+        self._leg: PathSegment
+
+    def at(self, seconds: float) -> Pose3:
+        """`pose_at`, upright in space."""
+        path, z = self._path, self._z
+        if not self._even:
+            return Pose3.planar(pose_at(path, seconds), z)
+        running = seconds - path.start
+        local = path.phase + running if running > 0 else path.phase
+        if not self._once:
+            local = _local(path, local)
+        if local < self._first:
+            local = self._first
+        elif local > self._last:
+            local = self._last
+        if not self._begin <= local < self._end:
+            number = min(bisect_right(path.times, local), len(path.times) - 1) - 1
+            self._leg, self._begin = PathSegment.of(path, number), path.times[number]
+            self._end = path.times[number + 1] if number + 2 < len(path.times) else math.inf
+        begin, lasts, x, y, yaw, dx, dy, turn, qz, qw = self._leg
+        part = (local - begin) / lasts if lasts > 0 else 1.0
+        x, y = x + part * dx, y + part * dy
+        if turn:
+            return Pose3.planar(Pose2(x, y, wrap(yaw + part * turn)), z)
+        return _made(Pose3, (x, y, z, 0.0, 0.0, qz, qw))
+
+
+class PathSegment(NamedTuple):
+    """From one pose of a path to the next: when it begins, how long it lasts, from where, and by how much.
+
+    `qz` and `qw` are the quaternion of the heading that it begins with.
+    """
+
+    begin: float
+    lasts: float
+    x: float
+    y: float
+    yaw: float
+    dx: float
+    dy: float
+    turn: float
+    qz: float
+    qw: float
+
+    @classmethod
+    def of(cls, path: MotionPath, number: int) -> "PathSegment":
+        """The leg of this number."""
+        (x, y, yaw), to = path.poses[number], path.poses[number + 1]
+        begin, end = path.times[number : number + 2]
+        *_, qz, qw = Pose3.planar(Pose2(x, y, wrap(yaw)))
+        return cls(begin, end - begin, x, y, yaw, to.x - x, to.y - y, wrap(to.yaw - yaw), qz, qw)
+
+
+def top_speed(path: MotionPath, reach: float = 0.0) -> float:
+    """A speed in m/s that nothing within `reach` metres of its origin ever exceeds; inf where it jumps.
+
+    It is the fastest that something eased or even ever moves, and no less for a spline.
+    """
+    speeds = [_speed(path, leg, reach) for leg in range(len(path.times) - 1)]
+    if path.mode == "loop" and _metres(_step(path.poses[-1], path.poses[0]), reach) > 0:
+        return math.inf
+    return max(speeds, default=0.0)
+
+
+class SweptSegment(NamedTuple):
+    """Straight from one place to another in the plane, but for what it may stray from that, all in metres."""
+
+    x: float
+    y: float
+    to_x: float
+    to_y: float
+    strays: float = 0.0
+
+
+def swept_segments(path: MotionPath) -> list[SweptSegment]:
+    """Where something on a path ever is: on its way from each pose to the next."""
+    (x, y, _), *_ = poses = path.poses
+    legs = range(len(path.times) - 1)
+    return [SweptSegment(*poses[leg][:2], *poses[leg + 1][:2], _strays(path, leg)) for leg in legs] or [
+        SweptSegment(x, y, x, y)
+    ]
+
+
+def _strays(path: MotionPath, leg: int) -> float:
+    """A cubic curve lies within its control points, which are a third of a leg's time from its ends."""
+    if path.ease != "spline":
+        return 0.0
+    third = (path.times[leg + 1] - path.times[leg]) / 3
+    return third * max(_metres(_velocity(path, k), 0.0) for k in (leg, leg + 1))
+
+
+def _speed(path: MotionPath, leg: int, reach: float) -> float:
+    step, seconds = _step(path.poses[leg], path.poses[leg + 1]), path.times[leg + 1] - path.times[leg]
+    if path.ease == "spline":
+        # The velocity along a cubic curve is a quadratic Bézier curve, which lies within its control points.
+        before, after = _velocity(path, leg), _velocity(path, leg + 1)
+        middle = [3.0 * way / seconds - a - b for way, a, b in zip(step, before, after, strict=True)]
+        return max(_metres(velocity, reach) for velocity in (before, (middle[0], middle[1], middle[2]), after))
+    metres = _metres(step, reach)
+    if metres == 0:
+        return 0.0
+    return metres / seconds * (SMOOTH_PEAK_SPEED_RATIO if path.ease == "smooth" else 1.0) if seconds > 0 else math.inf
+
+
+def _on_curve(path: MotionPath, leg: int, part: float) -> Pose2:
+    begin, end = path.poses[leg], path.poses[leg + 1]
+    lasts = path.times[leg + 1] - path.times[leg]
+    risen = part * part * (3.0 - 2.0 * part)
+    leaving, arriving = part * (1.0 - part) ** 2 * lasts, -(part**2) * (1.0 - part) * lasts
+    x, y, yaw = (
+        here + risen * way + leaving * before + arriving * after
+        for here, way, before, after in zip(
+            begin, _step(begin, end), _velocity(path, leg), _velocity(path, leg + 1), strict=True
+        )
+    )
+    return Pose2(x, y, wrap(yaw))
+
+
+def _velocity(path: MotionPath, k: int) -> Step:
+    """The velocity of a spline at pose k, in m/s and rad/s."""
+    last = len(path.poses) - 1
+    if 0 < k < last:
+        before, after = k - 1, k
+    elif path.mode == "loop":
+        before, after = last - 1, 0
+    else:
+        return 0.0, 0.0, 0.0
+    seconds = path.times[before + 1] - path.times[before] + path.times[after + 1] - path.times[after]
+    swept_segments = [_step(path.poses[leg], path.poses[leg + 1]) for leg in (before, after)]
+    x, y, yaw = ((a + b) / seconds for a, b in zip(*swept_segments, strict=True))
+    return x, y, yaw
+
+
+def _step(begin: Pose2, end: Pose2) -> Step:
+    return end.x - begin.x, end.y - begin.y, wrap(end.yaw - begin.yaw)
+
+
+def _metres(step: Step, reach: float) -> float:
+    return math.hypot(step[0], step[1]) + reach * abs(step[2])
+
+
+def _local(path: MotionPath, seconds: float) -> float:
+    """Where on the path it is, as a time of `times`."""
+    first, lasts = path.times[0], path.times[-1] - path.times[0]
+    since = seconds - first
+    if lasts <= 0 or since <= 0 or path.mode == "once":
+        return seconds
+    if path.mode == "loop":
+        return first + math.fmod(since, lasts)
+    phase = math.fmod(since, 2 * lasts)
+    return first + (phase if phase <= lasts else 2 * lasts - phase)

@@ -1,0 +1,204 @@
+"""Points and polygons in the plane."""
+
+import math
+from collections.abc import Sequence
+from itertools import combinations, pairwise
+
+from simscen.core.geometry import Pose2
+
+Corner = tuple[float, float]
+
+MIN_WIDTH_M = 1e-6
+"""m; what is thinner encloses no area."""
+
+
+def distance_to_polygon(point: Pose2, corners: Sequence[tuple[float, float]]) -> float:
+    """Distance in metres from a point to a filled polygon; 0 inside."""
+    edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
+    if polygon_contains(corners, (point.x, point.y)):
+        return 0.0
+    return min(distance_to_segment(point.x, point.y, a, b) for a, b in edges)
+
+
+def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
+    """Metres from the border of a polygon for a place in it; negative outside."""
+    if not polygon_contains(corners, (pose.x, pose.y)):
+        return -1.0
+    return min(
+        distance_to_segment(pose.x, pose.y, a, b) for a, b in zip(corners, (*corners[1:], corners[0]), strict=True)
+    )
+
+
+def polygon_defect(ring: Sequence[Corner]) -> str | None:
+    """What keeps a ring of corners from being the border of one area, as words that follow "it"; None for nothing.
+
+    Repeated corners are one, so that a ring may be closed by its first corner.
+    """
+    corners = without_repeated_corners(ring)
+    if _encloses_no_area(corners):
+        return "encloses no area"
+    edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
+    last = len(edges) - 1
+    for (i, (a, b)), (k, (c, d)) in combinations(enumerate(edges), 2):
+        meet = (
+            _folds_back(a, b, d)
+            if k == i + 1
+            else _folds_back(c, d, b)
+            if (i, k) == (0, last)
+            else _segments_touch(a, b, c, d)
+        )
+        if meet:
+            return "crosses or touches itself"
+    return None
+
+
+def without_repeated_corners(ring: Sequence[Corner]) -> tuple[Corner, ...]:
+    """The corners without those that repeat the one before."""
+    return tuple(corner for k, corner in enumerate(ring) if corner != ring[k - 1])
+
+
+def signed_double_area(a: Corner, b: Corner, c: Corner) -> float:
+    """Twice the area of the triangle; positive when the way from a over b to c turns left."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _encloses_no_area(corners: Sequence[Corner]) -> bool:
+    if len(corners) < 3:
+        return True
+    far = max(corners, key=lambda corner: math.dist(corner, corners[0]))
+    length = math.dist(far, corners[0])
+    return max(abs(signed_double_area(corners[0], far, corner)) for corner in corners) < MIN_WIDTH_M * length
+
+
+def _folds_back(a: Corner, b: Corner, c: Corner) -> bool:
+    """Whether the way from a to b goes back on itself to c."""
+    return signed_double_area(a, b, c) == 0 and (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0
+
+
+def _segments_touch(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
+    """Whether the segments a-b and c-d have a point in common."""
+    sides = (
+        signed_double_area(a, b, c),
+        signed_double_area(a, b, d),
+        signed_double_area(c, d, a),
+        signed_double_area(c, d, b),
+    )
+    if sides[0] * sides[1] < 0 and sides[2] * sides[3] < 0:
+        return True
+    ends = ((a, b, c), (a, b, d), (c, d, a), (c, d, b))
+    return any(side == 0 and _lies_between(*end) for side, end in zip(sides, ends, strict=True))
+
+
+def _lies_between(a: Corner, b: Corner, point: Corner) -> bool:
+    """Whether a point on the line through a and b lies between them."""
+    return all(min(a[k], b[k]) <= point[k] <= max(a[k], b[k]) for k in (0, 1))
+
+
+def distance_to_segment(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> float:
+    """Distance in metres from (x, y) to the segment from a to b."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    squared = dx * dx + dy * dy
+    along = ((x - a[0]) * dx + (y - a[1]) * dy) / squared if squared else 0.0
+    along = min(1.0, max(0.0, along))
+    return math.hypot(x - a[0] - along * dx, y - a[1] - along * dy)
+
+
+def polygon_contains(corners: Sequence[tuple[float, float]], point: tuple[float, float]) -> bool:
+    """Whether a point is inside a polygon; on its edge, either answer may come."""
+    return sum(_is_left_of(point, a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)) % 2 == 1
+
+
+def segments_cross(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
+    """Whether the segments a-b and c-d cross inside of both; to touch is not to cross."""
+    return (
+        signed_double_area(a, b, c) * signed_double_area(a, b, d) < 0
+        and signed_double_area(c, d, a) * signed_double_area(c, d, b) < 0
+    )
+
+
+def _is_left_of(point: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> bool:
+    """Whether a ray from the point along +x crosses the edge (half-open, so that corners count once)."""
+    if (a[1] > point[1]) == (b[1] > point[1]):
+        return False
+    return point[0] < a[0] + (point[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+
+
+# MERGED: A polygon cut into convex pieces.
+Piece = tuple[Corner, ...]
+
+
+def convex_pieces(ring: Sequence[Corner]) -> list[Piece]:
+    """Convex anticlockwise polygons that cover a ring without a flaw exactly once; a convex one stays whole.
+
+    Ears are clipped, then diagonals that no piece needs are taken out (Hertel and Mehlhorn, 1983): at most four times
+    as many pieces as needed. Raises ValueError for a ring that crosses itself.
+    """
+    corners = without_repeated_corners(ring)
+    if sum(signed_double_area(corners[0], a, b) for a, b in pairwise(corners)) < 0:
+        corners = corners[::-1]
+    if _is_convex(corners):
+        return [corners]
+    return _merge_triangles(_triangles(list(corners)))
+
+
+def _triangles(corners: list[Corner]) -> list[Piece]:
+    """Ear clipping (Meisters, 1975)."""
+    found: list[Piece] = []
+    while len(corners) > 2:
+        k = next((k for k in range(len(corners)) if _is_collinear(corners, k) or _is_ear(corners, k)), None)
+        if k is None:
+            raise ValueError("the polygon crosses itself")
+        if not _is_collinear(corners, k):
+            found.append(_triangle_at(corners, k))
+        del corners[k]
+    return found
+
+
+def _triangle_at(corners: Sequence[Corner], k: int) -> tuple[Corner, Corner, Corner]:
+    return corners[k - 1], corners[k], corners[(k + 1) % len(corners)]
+
+
+def _is_collinear(corners: Sequence[Corner], k: int) -> bool:
+    return signed_double_area(*_triangle_at(corners, k)) == 0
+
+
+def _is_ear(corners: Sequence[Corner], k: int) -> bool:
+    """Whether the triangle at corner k lies inside, with no other corner in it."""
+    a, b, c = _triangle_at(corners, k)
+    if signed_double_area(a, b, c) <= 0:
+        return False
+    others = (corner for corner in corners if corner not in (a, b, c))
+    return not any(
+        signed_double_area(a, b, p) >= 0 and signed_double_area(b, c, p) >= 0 and signed_double_area(c, a, p) >= 0
+        for p in others
+    )
+
+
+def _merge_triangles(triangles: Sequence[Piece]) -> list[Piece]:
+    pieces = dict(enumerate(triangles))
+    owner = {edge: number for number, piece in pieces.items() for edge in _edges(piece)}
+    for a, b in list(owner):
+        one, other = owner.get((a, b)), owner.get((b, a))
+        if one is None or other is None or one == other:
+            continue
+        joined = (*_rotated_to(pieces[one], b)[:-1], *_rotated_to(pieces[other], a)[:-1])
+        if _is_convex(joined):
+            pieces[one] = joined
+            owner |= dict.fromkeys(_edges(pieces.pop(other)), one)
+            del owner[a, b], owner[b, a]
+    return list(pieces.values())
+
+
+def _edges(piece: Piece) -> list[tuple[Corner, Corner]]:
+    return list(zip(piece, (*piece[1:], piece[0]), strict=True))
+
+
+def _rotated_to(piece: Piece, corner: Corner) -> Piece:
+    """The same polygon, beginning at a corner."""
+    k = piece.index(corner)
+    return (*piece[k:], *piece[:k])
+
+
+def _is_convex(corners: Sequence[Corner]) -> bool:
+    """Whether an anticlockwise ring without a flaw never turns right."""
+    return all(signed_double_area(*_triangle_at(corners, k)) >= 0 for k in range(len(corners)))

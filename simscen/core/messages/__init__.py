@@ -1,0 +1,1 @@
+"""Data that the simulator and a navigation stack exchange: sensor data, goals, pose estimates."""

@@ -1,0 +1,1 @@
+"""What a run records: trace, events, verdicts, results and session events."""

@@ -1,0 +1,31 @@
+import numpy as np
+import pytest
+
+from simscen.core.environment.costmap_filters import SpeedLimits
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.geometry import Pose2
+
+
+def limits(value, *, percent=True, base=0.0, multiplier=1.0):
+    grid = OccupancyGrid(np.full((2, 2), value, dtype=np.int8), 1.0)
+    return SpeedLimits(grid, percent, base, multiplier)
+
+
+@pytest.mark.parametrize(
+    ("value", "how", "limit"),
+    [
+        (40, {}, 0.2),
+        (40, {"base": 100.0, "multiplier": -1.0}, 0.3),
+        (40, {"percent": False, "multiplier": 0.01}, 0.4),
+        (0, {"base": 50.0}, None),  # SPEED_MASK_NO_LIMIT
+        (-1, {"base": 50.0}, None),
+        (100, {"base": 100.0, "multiplier": -1.0}, None),  # 0 means no limit in nav2_msgs/SpeedLimit
+        (50, {"base": 100.0}, None),  # 150 percent
+    ],
+)
+def test_a_cell_limits_as_nav2s_speed_filter_says(value, how, limit):
+    assert limits(value, **how).at(Pose2(1.0, 1.0), 0.5) == (None if limit is None else pytest.approx(limit))
+
+
+def test_nothing_is_limited_off_the_mask():
+    assert limits(40).at(Pose2(3.0, 1.0), 0.5) is None

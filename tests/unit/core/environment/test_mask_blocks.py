@@ -1,0 +1,37 @@
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+
+from simscen.core.environment.costmap_filters import mask_blocks
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.geometry import Pose2
+
+CELLS = arrays(
+    np.int8, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=8), elements=st.sampled_from([-1, 0, 40, 100])
+)
+
+
+@given(CELLS)
+def test_a_mask_in_blocks_has_every_cell_that_says_something_once(cells):
+    mask = mask_blocks(OccupancyGrid(cells, 0.1, Pose2(1.0, 2.0, 0.3)))
+    said = np.where(cells > 0, cells, 0)
+    again = mask.grid
+    rows, columns = again.shape
+    whole = np.zeros_like(cells)
+    whole[:rows, :columns] = again.cells
+    np.testing.assert_array_equal(whole, said)
+    assert sum(width * height for _, _, width, height, _ in mask.blocks) == np.count_nonzero(said)
+    assert (mask.resolution, mask.origin) == (0.1, Pose2(1.0, 2.0, 0.3))
+
+
+@given(CELLS)
+def test_what_a_mask_forbids_is_what_is_occupied(cells):
+    boxes = mask_blocks(OccupancyGrid(cells, 0.5)).forbidden
+    assert np.prod(boxes[:, 2:] - boxes[:, :2], axis=1).sum() == 0.25 * np.count_nonzero(cells == 100)
+
+
+def test_equal_cells_are_one_block():
+    cells = np.zeros((50, 60), dtype=np.int8)
+    cells[10:40, 20:50] = 100
+    assert mask_blocks(OccupancyGrid(cells, 0.1)).blocks == ((20, 10, 30, 30, 100),)

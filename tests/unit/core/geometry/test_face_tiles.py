@@ -1,0 +1,33 @@
+import numpy as np
+import pytest
+
+from simscen.core.geometry.meshes import submesh, tile_faces
+
+
+def grid(edge: int):
+    """Two triangles in each square metre of a floor."""
+    x, y = np.meshgrid(np.arange(edge + 1.0), np.arange(edge + 1.0))
+    vertices = np.column_stack((x.ravel(), y.ravel(), np.zeros(x.size)))
+    first = (np.arange(edge)[:, None] * (edge + 1) + np.arange(edge)).ravel()
+    lower = np.column_stack((first, first + 1, first + edge + 1))
+    return vertices, np.concatenate((lower, lower + np.array((1, edge + 1, 0)))).astype(np.int32)
+
+
+def test_the_lots_near_a_place_hold_every_face_that_is_so_near_and_none_of_the_far_corners():
+    vertices, faces = grid(40)
+    lots = tile_faces(vertices, faces, 4.0)
+    near = lots.near(10.5, 20.0, 9.0)
+    taken = {tuple(face) for number in np.flatnonzero(near) for face in lots.lot(number).tolist()}
+    inside = np.hypot(*(vertices[faces, :2] - (10.5, 20.0)).transpose(2, 0, 1)).min(axis=1) <= 9.0
+    assert {tuple(face) for face in faces[inside].tolist()} <= taken
+    assert len(taken) < 2 * 22 * 22
+
+
+@pytest.mark.parametrize("count", [3, 1000])
+def test_some_faces_of_a_mesh_come_with_their_own_vertices_in_the_order_of_the_mesh(count):
+    vertices, faces = grid(40)
+    some = np.random.default_rng(3).permutation(faces)[:count]
+    part = submesh(vertices, some)
+    assert np.array_equal(part.vertices[part.faces], vertices[some])
+    assert np.array_equal(part.vertices, vertices[np.unique(some)])
+    assert part.faces.dtype == np.int32

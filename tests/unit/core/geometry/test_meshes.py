@@ -1,0 +1,41 @@
+"""Whether a mesh is its own convex hull, by cubes and what was done to them."""
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry.meshes import CONVEX_TOLERANCE_M, is_convex
+from simscen.core.geometry.shapes import Mesh
+
+CORNERS = np.array([(x, y, z) for x in (0.0, 2.0) for y in (0.0, 2.0) for z in (0.0, 2.0)])
+FACES = np.array([(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
+                  (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)], dtype=np.int32)  # fmt: skip
+
+
+def cube(corner=(0.0, 0.0, 0.0), out=0.0, scale=1.0):
+    """A cube whose first corner has been moved, and where the middle of one edge stands out of it by so much."""
+    corners = CORNERS * scale
+    corners[0] += corner
+    middle = (corners[5] + corners[7]) / 2 + (0.0, 0.0, out)
+    # The edge from 5 to 7 lies in the faces (4, 7, 5) and (1, 5, 7).
+    kept = [face for face in FACES.tolist() if face not in ([4, 7, 5], [1, 5, 7])]
+    halves = [(4, 7, 8), (4, 8, 5), (1, 5, 8), (1, 8, 7)]
+    return Mesh(np.vstack((corners, middle)), np.array([*kept, *halves], dtype=np.int32))
+
+
+@pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
+def test_a_cube_is_convex_of_any_size_and_with_a_corner_drawn_out(scale):
+    assert is_convex(cube(scale=scale))
+    assert is_convex(Mesh(CORNERS * scale, FACES))
+    assert is_convex(Mesh(CORNERS * scale, np.vstack((FACES, [(0, 0, 1)])).astype(np.int32))), "a face without area"
+
+
+def test_what_is_pushed_in_or_turned_inside_out_is_not_convex():
+    assert not is_convex(Mesh(CORNERS, FACES[:, ::-1]))
+    assert not is_convex(cube(out=-0.1))
+    assert not is_convex(cube(corner=(1.5, 1.5, 1.5)))
+
+
+@pytest.mark.parametrize(("part", "convex"), [(0.4, True), (0.6, False)])
+def test_a_corner_may_stand_out_of_a_face_by_a_micrometre(part, convex):
+    # Of the faces that end in the middle of the edge, the edge's end is twice as far out as that is in.
+    assert is_convex(cube(out=-part * CONVEX_TOLERANCE_M)) == convex

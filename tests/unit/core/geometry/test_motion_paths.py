@@ -1,0 +1,152 @@
+import itertools
+import math
+import random
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+from simscen.core.geometry import Pose2, Pose3, wrap
+from simscen.core.geometry.motion_paths import PathSampler, pose_at, swept_segments, top_speed
+from simscen.core.geometry.shapes import MotionPath
+
+THERE = (Pose2(0, 0, 0), Pose2(2, 0, 0), Pose2(2, 1, math.pi / 2))
+
+
+def test_a_path_taken_once_stays_at_its_end():
+    path = MotionPath((0.0, 2.0, 3.0), THERE, "once", start=1.0)
+    assert pose_at(path, 0.5) == Pose2(0, 0, 0)
+    assert pose_at(path, 2.0) == Pose2(1, 0, 0)
+    assert pose_at(path, 3.5) == pytest.approx(Pose2(2, 0.5, math.pi / 4))
+    assert pose_at(path, 99.0) == THERE[-1]
+
+
+def test_a_loop_starts_over():
+    path = MotionPath((0.0, 2.0, 3.0), THERE, "loop")
+    assert pose_at(path, 3.0 + 1.0) == pytest.approx(Pose2(1, 0, 0))
+
+
+def test_back_and_forth_returns_the_way_it_came():
+    path = MotionPath((0.0, 2.0, 3.0), THERE, "back_and_forth")
+    assert pose_at(path, 3.0 + 1.0 + 0.5) == pytest.approx(pose_at(path, 1.5))
+    assert pose_at(path, 6.0 + 1.0) == pytest.approx(pose_at(path, 1.0))
+
+
+def test_headings_turn_the_shorter_way():
+    path = MotionPath((0.0, 1.0), (Pose2(0, 0, 3.0), Pose2(0, 0, -3.0)))
+    assert abs(pose_at(path, 0.5).yaw) == pytest.approx(math.pi)
+
+
+def test_a_single_waypoint_is_where_it_is():
+    assert pose_at(MotionPath((0.0,), (Pose2(1, 2, 3),), "loop"), 5.0) == Pose2(1, 2, 3)
+
+
+def test_top_speed_is_that_of_the_fastest_part():
+    path = MotionPath((0.0, 2.0, 3.0), THERE)
+    assert top_speed(path) == pytest.approx(1.0)
+    assert top_speed(path, reach=0.5) == pytest.approx(1.0 + 0.5 * math.pi / 2)
+
+
+def test_a_loop_that_does_not_close_jumps():
+    assert top_speed(MotionPath((0.0, 2.0), THERE[:2], "loop")) == math.inf
+    closed = MotionPath((0.0, 1.0, 2.0), (Pose2(0, 0, 0), Pose2(1, 0, 0), Pose2(0, 0, 0)), "loop")
+    assert top_speed(closed) == pytest.approx(1.0)
+
+
+ROUND = (Pose2(0, 0, 0), Pose2(2, 0, 1.5), Pose2(2, 1, 3.0), Pose2(0, 1, -2.0), Pose2(0, 0, 0))
+UNEVEN = (0.0, 1.0, 3.0, 3.5, 5.0)
+
+
+def hermite(path, closed):
+    """The same curve, by somebody else."""
+    values = np.array(path.poses)
+    values[:, 2] = np.unwrap(values[:, 2])
+    slopes = np.zeros_like(values)
+    times = np.array(path.times)
+    slopes[1:-1] = (values[2:] - values[:-2]) / (times[2:] - times[:-2])[:, None]
+    if closed:
+        around = values[1] - values[0] + values[-1] - values[-2]
+        slopes[0] = slopes[-1] = around / (times[1] - times[0] + times[-1] - times[-2])
+    return CubicHermiteSpline(times, values, slopes)
+
+
+@pytest.mark.parametrize("mode", ["once", "loop"])
+def test_a_spline_is_the_cubic_hermite_curve_that_it_is_said_to_be(mode):
+    path = MotionPath(UNEVEN, ROUND, mode, ease="spline")
+    expected = hermite(path, mode == "loop")
+    for seconds in np.linspace(0.0, 4.999, 97):
+        x, y, yaw = expected(seconds)
+        assert pose_at(path, seconds) == pytest.approx(Pose2(x, y, wrap(yaw)), abs=1e-12)
+
+
+def test_a_smooth_way_begins_and_ends_at_rest_and_is_half_as_fast_again_in_its_middle():
+    path = MotionPath((0.0, 2.0), (Pose2(0, 0), Pose2(3, 0)), ease="smooth")
+    assert pose_at(path, 0.5).x == pytest.approx(3 * (3 * 0.25**2 - 2 * 0.25**3))
+    speeds = np.diff([pose_at(path, t).x for t in np.linspace(0, 2, 2001)]) / 0.001
+    assert speeds[0] < 0.01 and speeds[-1] < 0.01
+    assert speeds.max() == pytest.approx(1.5 * 1.5, rel=1e-5)
+    assert top_speed(path) == pytest.approx(1.5 * 1.5)
+
+
+@pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
+@pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
+def test_nothing_is_ever_faster_than_the_top_speed(ease, mode):
+    path = MotionPath(UNEVEN, ROUND, mode, ease=ease)
+    step = 1 / 500
+    poses = [pose_at(path, step * k) for k in range(5500)]
+    speeds = [(a.distance(b) + 0.3 * abs(wrap(b.yaw - a.yaw))) / step for a, b in itertools.pairwise(poses)]
+    assert 0.5 * top_speed(path, 0.3) < max(speeds) <= top_speed(path, 0.3) + 1e-9
+
+
+@pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
+def test_a_spline_never_changes_its_velocity_at_once(mode):
+    path = MotionPath(UNEVEN, ROUND, mode, ease="spline")
+    step = 1e-4
+    poses = [pose_at(path, step * k) for k in range(110_000)]
+    velocity = np.diff([pose[:2] for pose in poses], axis=0) / step
+    assert np.abs(np.diff(velocity, axis=0)).max() < 0.02
+
+
+def test_phase_is_how_far_into_the_path_it_begins_and_start_when_it_goes_on():
+    whole = MotionPath((0.0, 2.0, 3.0), THERE, "back_and_forth")
+    late = MotionPath((0.0, 2.0, 3.0), THERE, "back_and_forth", start=1.5, phase=4.0)
+    assert pose_at(late, 0.0) == pose_at(late, 1.5) == pose_at(whole, 4.0)
+    assert pose_at(late, 2.5) == pose_at(whole, 5.0)
+    assert not late.over(1e9)
+    assert MotionPath((0.0, 2.0, 3.0), THERE, start=1.0, phase=1.0).over(3.0)
+    assert not MotionPath((0.0, 2.0, 3.0), THERE, start=1.0, phase=1.0).over(2.9)
+
+
+@pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
+@pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
+def test_a_track_is_where_its_path_is_bit_for_bit(mode, ease):
+    """In whatever order it is asked, with legs that last no time, that turn, and that do not."""
+    poses = (Pose2(0, 0, 3.0), Pose2(1, 0, 3.0), Pose2(1, 2, -3.0), Pose2(4, 2, -3.0), Pose2(0.3, 0, 3.0))
+    path = MotionPath((1.0, 2.0, 3.5, 3.5, 5.0), poses, mode, 0.7, ease, 0.2)
+    track, times = PathSampler(path, 0.4), [k * 0.1 for k in range(150)]
+    for seconds in [*times, *times[::-7]]:
+        assert track.at(seconds) == Pose3.planar(pose_at(path, seconds), 0.4)
+    assert PathSampler(MotionPath((0.0,), (Pose2(1, 2, 3),)), 0.0).at(5.0) == Pose3.planar(Pose2(1, 2, 3))
+
+
+@pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
+@pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
+def test_nothing_strays_farther_from_its_ways_than_they_say(ease, mode):
+    chance = random.Random(5)
+    strayed = []
+    for _ in range(20):
+        poses = tuple(Pose2(chance.uniform(-5, 5), chance.uniform(-5, 5), chance.uniform(-3, 3)) for _ in range(4))
+        path = MotionPath((0.0, *sorted(chance.uniform(0.1, 9) for _ in range(3))), poses, mode, ease=ease)
+        for moment in range(60):
+            x, y, _ = pose_at(path, 0.3 * moment)
+            away = [(beside(x, y, way), way.strays) for way in swept_segments(path)]
+            assert any(metres <= strays + 1e-9 for metres, strays in away)
+            strayed.append(min(metres for metres, _ in away))
+    assert (max(strayed) > 0.1) == (ease == "spline")
+
+
+def beside(x, y, way):
+    """How far a place is from a straight line between two."""
+    start, along = complex(way.x, way.y), complex(way.to_x - way.x, way.to_y - way.y)
+    share = (complex(x, y) - start) / along
+    return abs(complex(x, y) - start - min(max(share.real, 0.0), 1.0) * along)

@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simscen.core.geometry.polygons import convex_pieces, polygon_defect
+
+L = ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))
+
+
+@pytest.mark.parametrize(
+    ("ring", "expected"),
+    [
+        (L, None),
+        (L[::-1], None),
+        ((*L, L[0]), None),
+        (((0, 0), (1, 0), (1, 0), (1, 1)), None),
+        (((0, 0), (1, 0), (2, 0), (2, 2)), None),
+        ((*L, *L), "crosses or touches itself"),
+        (((0, 0), (1, 1), (1, 0), (0, 1)), "crosses or touches itself"),
+        (((0, 0), (2, 0), (2, 2), (1, 0), (0, 2)), "crosses or touches itself"),
+        (((0, 0), (2, 0), (2, 1), (2, 0), (2, 3), (0, 3)), "crosses or touches itself"),
+        (((0, 0), (1, 0), (2, 0)), "encloses no area"),
+        (((1, 1), (1, 1), (1, 1)), "encloses no area"),
+        (((0, 0), (1e-9, 0), (0, 1e-9)), "encloses no area"),
+    ],
+)
+def test_what_is_wrong_with_a_ring_is_said(ring, expected):
+    assert polygon_defect(ring) == expected
+
+
+RINGS = st.lists(st.tuples(st.integers(-6, 6), st.integers(-6, 6)), min_size=3, max_size=9, unique=True)
+
+
+@given(RINGS)
+def test_a_ring_is_sound_exactly_when_shapely_says_so(ring):
+    assert (polygon_defect(ring) is None) == shapely.Polygon(ring).is_valid
+
+
+@given(RINGS)
+def test_the_pieces_are_convex_anticlockwise_and_cover_the_ring_exactly_once(ring):
+    if polygon_defect(ring) is not None:
+        return
+    pieces = [shapely.Polygon(piece) for piece in convex_pieces(ring)]
+    assert all(piece.exterior.is_ccw for piece in pieces)
+    assert all(piece.convex_hull.area == pytest.approx(piece.area) for piece in pieces)
+    assert sum(piece.area for piece in pieces) == pytest.approx(shapely.Polygon(ring).area)
+    assert shapely.union_all(pieces).symmetric_difference(shapely.Polygon(ring)).area == pytest.approx(0, abs=1e-9)
+
+
+def test_a_convex_ring_stays_whole():
+    angles = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+    ring = tuple((float(np.cos(a)), float(np.sin(a))) for a in angles)
+    assert convex_pieces(ring) == [ring]
+    assert len(convex_pieces(L)) == 2

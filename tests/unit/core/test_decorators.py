@@ -1,0 +1,36 @@
+import pickle
+from dataclasses import FrozenInstanceError, field, fields, replace
+
+import pytest
+
+from simscen.core.decorators import fast_dataclass
+
+
+@fast_dataclass()
+class Told:
+    """Something."""
+
+    name: str
+    number: int = 3
+    things: dict[str, int] = field(default_factory=dict)
+
+
+def test_it_is_made_as_any_dataclass_is() -> None:
+    told = Told("a", things={"b": 1})
+    assert (told.name, told.number, told.things) == ("a", 3, {"b": 1})
+    assert told == Told(name="a", things={"b": 1}) != Told("a")
+    assert repr(Told("a", 4)) == "Told(name='a', number=4, things={})"
+    assert replace(told, number=5) == Told("a", 5, {"b": 1})
+    assert [each.name for each in fields(Told)] == ["name", "number", "things"]
+    assert pickle.loads(pickle.dumps(told)) == told
+    with pytest.raises(TypeError):
+        Told()  # type: ignore[call-arg]
+
+
+def test_what_a_factory_makes_is_each_ones_own() -> None:
+    assert Told("a").things is not Told("a").things
+
+
+def test_nobody_changes_it_afterwards() -> None:
+    with pytest.raises(FrozenInstanceError):
+        Told("a").number = 4  # type: ignore[misc]
