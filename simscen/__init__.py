@@ -37,7 +37,7 @@ def simulate(
     from pathlib import Path
 
     from simscen.cli.session.stacks import load_with
-    from simscen.run.prepare import prepare
+    from simscen.run.preparation.scenario import prepare
     from simscen.run.simulate import simulate as run
 
     home = None if root is None else Path(root)

@@ -10,8 +10,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from simscen.cli.requirements import unmet_requirements
-from simscen.run.process.confine import FILE_BYTES, MEMORY_BYTES, OPEN_FILES
-from simscen.run.versions import PACKAGES, cpu_flags
+from simscen.run.process.isolation import MAX_FILE_BYTES, MAX_MEMORY_BYTES, MAX_OPEN_FILES
+from simscen.run.reproducibility.environment import PACKAGES, cpu_flags
 
 SUPPORTED_PYTHONS = ((3, 10), (3, 11))
 MIN_DISK_BYTES = 500 << 20
@@ -96,16 +96,16 @@ def disk_space(folder: Path) -> str:
 
 def resource_limits() -> str:
     """Check that the limits of shell, container, and system allow a run."""
-    memory = min(_soft(resource.RLIMIT_AS), _cgroup_memory(), MEMORY_BYTES)
+    memory = min(_soft(resource.RLIMIT_AS), _cgroup_memory(), MAX_MEMORY_BYTES)
     files, length = _soft(resource.RLIMIT_NOFILE), _soft(resource.RLIMIT_FSIZE)
     if memory < MIN_MEMORY_BYTES:
         hint = "raise `ulimit -v` or the container's limit to 1 GiB for each job"
         raise CheckFailed(f"a run gets {_mib(memory)} of memory; {hint}")
     if files < MIN_OPEN_FILES:
-        raise CheckFailed(f"a process may open {files} files; raise `ulimit -n` to {OPEN_FILES}")
+        raise CheckFailed(f"a process may open {files} files; raise `ulimit -n` to {MAX_OPEN_FILES}")
     if length < MIN_DISK_BYTES:
         raise CheckFailed(f"a file may have {_mib(length)}; raise `ulimit -f`, or logs are truncated")
-    return f"a run may use {_mib(memory)} of memory, {min(files, OPEN_FILES)} files of {_mib(min(length, FILE_BYTES))}"
+    return f"a run may use {_mib(memory)} of memory, {min(files, MAX_OPEN_FILES)} files of {_mib(min(length, MAX_FILE_BYTES))}"
 
 
 def shared_memory() -> str:

@@ -16,7 +16,7 @@ from simscen.loading.files.discovery import default_root
 from simscen.pytesting.failure import ScenarioFailed, as_seen
 from simscen.pytesting.runner import runner_of
 from simscen.report.complaints import label
-from simscen.run.session import Options, seeds_of
+from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,13 +48,13 @@ class ScenarioFile(pytest.File):
         root, world_path = default_root([self.path]), config.getini("simscen_world_path")
         chosen = config.getoption("--simscen-stack") or config.getini("simscen_stack")
         checks = Checks(root, world_path, fast=True, stacks=stacks_of(chosen, root, world_path))
-        options = Options(seed=_seed(config), repeat=config.getoption("--simscen-repeat"))
+        options = SessionOptions(seed=_seed(config), repeat=config.getoption("--simscen-repeat"))
         for choice in checks.choices:
             scenarios, problems = checks.scenario(self.path, choice)
             _refuse(problems)
             for scenario in scenarios:
                 loaded = scenario.having(several_stacks=len(checks.choices) > 1)
-                for seed in seeds_of(loaded, options):
+                for seed in scenario_seeds(loaded, options):
                     every_seed = options.repeat > 1
                     yield ScenarioRun.made(self, loaded, seed, every_seed)
 

@@ -12,11 +12,11 @@ from simscen.core.records.session_events import RunFinished
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
 from simscen.pytesting.names import OUT
-from simscen.run.outfolder import DEFAULT, run_folder
-from simscen.run.process.answer import answer_to
-from simscen.run.process.jobs import Job, Replays
-from simscen.run.process.standby import Standby
-from simscen.run.process.whereabouts import whereabouts
+from simscen.run.process.jobs import Job, ReplayMode
+from simscen.run.process.plugin_path import plugin_path_arguments
+from simscen.run.process.supervisor import OnDemandRunner
+from simscen.run.sessions.output_folder import DEFAULT_FOLDER, run_folder
+from simscen.run.sessions.results import finished_run
 
 WARM_PROCESS = ("-m", "simscen.cli.session.warm_process")
 WALL_LIMIT = 300.0
@@ -29,17 +29,17 @@ class Runner:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._numbers = count()
-        self._standbys: dict[tuple[str, ...], Standby] = {}
+        self._standbys: dict[tuple[str, ...], OnDemandRunner] = {}
         self._closing = ExitStack()
 
     def run(self, scenario: LoadedScenario, seed: int) -> RunFinished:
         """The answer to a run."""
         key = scenario.key(seed)
-        job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT, Replays.FAILED)
-        told = whereabouts(plugins_of(scenario))
+        job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT, ReplayMode.FAILED)
+        told = plugin_path_arguments(plugins_of(scenario))
         if told not in self._standbys:
-            self._standbys[told] = self._closing.enter_context(Standby((*WARM_PROCESS, *told)))
-        return answer_to(job, self._standbys[told].run(job))
+            self._standbys[told] = self._closing.enter_context(OnDemandRunner((*WARM_PROCESS, *told)))
+        return finished_run(job, self._standbys[told].run(job))
 
     def close(self) -> None:
         """End the warm processes."""
@@ -61,5 +61,5 @@ def _folder(config: pytest.Config) -> Path:
     told = getattr(config, "workerinput", {}).get(OUT)
     if told is not None:
         return Path(told)
-    home = Path(config.getoption("--simscen-out") or config.getini(OUT) or DEFAULT)
+    home = Path(config.getoption("--simscen-out") or config.getini(OUT) or DEFAULT_FOLDER)
     return home / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}-pytest"

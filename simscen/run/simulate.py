@@ -19,21 +19,21 @@ from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import WAITS, Backlog, Log
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
-from simscen.run.assemble import assemble
-from simscen.run.blame import blamed
+from simscen.run.assembly import assemble
 from simscen.run.external.stack import ExternalStack
-from simscen.run.faultymap import with_faulty_map
-from simscen.run.lockstep import Rig, run_lockstep
-from simscen.run.logheader import log_header
-from simscen.run.prepare import Prepared, prepare
+from simscen.run.faults.map_faults import apply_map_faults
+from simscen.run.lockstep import RunSetup, run_lockstep
+from simscen.run.log_header import log_header
+from simscen.run.preparation.scenario import PreparedScenario, prepare
 from simscen.sim.alone import NAMELESS
+from simscen.spec.registry import Entry
 
-Attach = Callable[[Rig, Sequence[Log]], Sequence[Log]]
-"""Is shown the rig and the logs of its first robot before the first beat; what it returns listens to that, too."""
+Attach = Callable[[RunSetup, Sequence[Log]], Sequence[Log]]
+"""Is shown the setup and the logs of its first robot before the first beat; what it returns listens to that, too."""
 
 
 def simulate(
-    prepared: Prepared,
+    prepared: PreparedScenario,
     seed: int | None = None,
     *,
     log: Path | None = None,
@@ -52,16 +52,16 @@ def simulate(
     except (RunError, InvalidInput, MemoryError):
         raise
     except Exception as error:  # the boundary to code of others, which can raise anything
-        if (whose := blamed(error, prepared.plugins)) is None:
+        if (whose := plugin_error(error, prepared.plugins)) is None:
             raise
         traceback.print_exc()  # into the run's own log: what its author wants to see
         raise whose from error
 
 
 def _simulated(
-    prepared: Prepared, seed: int, log: Path | None, attach: Attach | None, printed: Path | None = None
+    prepared: PreparedScenario, seed: int, log: Path | None, attach: Attach | None, printed: Path | None = None
 ) -> Run:
-    prepared = with_faulty_map(prepared, seed)
+    prepared = apply_map_faults(prepared, seed)
     clock = Clock(prepared.spec.physics.tick_rate)
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
@@ -70,9 +70,9 @@ def _simulated(
         backlog = closing.enter_context(Backlog(waits, next(iter(written.values()), None)))
         kept = {name: one.thinning for name, one in written.items()}
         builders = {name: TraceBuilder(clock, kept.get(name)) for name in prepared.each}
-        rig = assemble(prepared, seed, printed)
-        closing.callback(rig.simulation.close)
-        agents = dict(zip(prepared.each, rig.agents, strict=True))
+        setup = assemble(prepared, seed, printed)
+        closing.callback(setup.simulation.close)
+        agents = dict(zip(prepared.each, setup.robots, strict=True))
         externals = {name: agent.stack for name, agent in agents.items() if isinstance(agent.stack, ExternalStack)}
         closing.callback(_close, externals.values())
         for name, stack in externals.items():
@@ -81,17 +81,17 @@ def _simulated(
             part = prepared.each[name]
             agent.stack.start(part.estimate, part.case.goals)
         logs = [(builders[name], written[name]) if written else (builders[name],) for name in agents]
-        for agent, own in zip(rig.agents, logs, strict=True):
+        for agent, own in zip(setup.robots, logs, strict=True):
             agent.logs = (backlog.before(*own),)
-        rig.agents[0].logs += tuple(attach(rig, logs[0])) if attach else ()
-        end = run_lockstep(rig)
+        setup.robots[0].logs += tuple(attach(setup, logs[0])) if attach else ()
+        end = run_lockstep(setup)
         backlog.flush()
         for stack in externals.values():
             stack.end(end.name)
         for stack in externals.values():
             stack.finish()
         _close(externals.values())
-        run = judged(prepared, seed, {name: builder.finish(end.tick) for name, builder in builders.items()}, log)
+        run = judge_traces(prepared, seed, {name: builder.finish(end.tick) for name, builder in builders.items()}, log)
         if recorder:
             recorder.close(end.tick, to_json(run.result), _stack_facts(externals))
     return _with_stacks(run, {name: stack.described for name, stack in externals.items()})
@@ -127,7 +127,7 @@ def simulate_file(
     return simulate(prepare(load_scenario(file, root or default_root([file]), world_path)), seed, log=log)
 
 
-def judged(prepared: Prepared, seed: int, traces: Mapping[str, Trace], log: Path | None = None) -> Run:
+def judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Trace], log: Path | None = None) -> Run:
     """The run that the traces of its robots show."""
     if not prepared.robots:
         return _judged(prepared, seed, traces[NAMELESS], log)
@@ -136,7 +136,7 @@ def judged(prepared: Prepared, seed: int, traces: Mapping[str, Trace], log: Path
     return replace(next(iter(runs.values())), result=result, robots=runs)
 
 
-def _judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None) -> Run:
+def _judged(prepared: PreparedScenario, seed: int, trace: Trace, log: Path | None) -> Run:
     """What came of one robot."""
     loaded = prepared.loaded
     places = [loaded.place_of("pass", index) for index in range(len(prepared.spec.pass_))]
@@ -153,3 +153,24 @@ def _judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None) -> Ru
         expected=loaded.expectation,
     )
     return Run(replace(result, stack=loaded.stack), trace, prepared.case, log)
+
+
+# MERGED: Whose mistake an exception is: the engine's, or that of an installed package that a run uses.
+def plugin_error(error: Exception, plugins: Sequence[Entry]) -> RunError | None:
+    """The error of the run where it passed through code of these packages, naming type and line; None elsewhere."""
+    own = {entry.value.partition(":")[0].partition(".")[0] for entry in plugins}
+    for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
+        module = str(frame.f_globals.get("__name__", ""))
+        if module.partition(".")[0] in own:
+            entry = _nearest(module, plugins)
+            place = f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
+            told = f"{type(error).__name__}: {error}".splitlines()[0]
+            return RunError("crashed", f"{entry.group} `{entry.name}` of {entry.origin}: {told} ({place})")
+    return None
+
+
+def _nearest(module: str, plugins: Sequence[Entry]) -> Entry:
+    """The one that is defined in this module, or the first of its package."""
+    package = module.partition(".")[0]
+    same = [entry for entry in plugins if entry.value.partition(":")[0].partition(".")[0] == package]
+    return next((entry for entry in same if entry.value.partition(":")[0] == module), same[0])

@@ -21,7 +21,7 @@ from simscen.record.recover import recover
 from simscen.record.replay import read_run
 from simscen.record.schemas import MessageType
 from simscen.record.writer import McapWriter
-from simscen.run.prepare import prepare
+from simscen.run.preparation.scenario import prepare
 
 CORPUS = Path(__file__).parent / "corpus"
 SCENARIO = """\

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from simscen.run.process.whereabouts import whereabouts
+from simscen.run.process.plugin_path import plugin_path_arguments
 from simscen.spec.registry import Entry, installed
 
 ROOT = Path(__file__).parents[2]
 ISOLATED = (
     f"import sys; sys.path.insert(0, {str(ROOT)!r});"
-    "from simscen.run.process.whereabouts import settle_in; settle_in(sys.argv[1]);"
+    "from simscen.run.process.plugin_path import settle_in; settle_in(sys.argv[1]);"
     "from simscen.spec.registry import installed;"
     "print([(entry.version, entry.load().__module__) for entry in installed('criterion')], sys.path.index({0!r}))"
 )
@@ -29,11 +29,11 @@ def isolated(told: str, folder: Path) -> str:
 
 
 def test_nothing_is_told_where_nothing_is_used() -> None:
-    assert whereabouts([]) == ()
+    assert plugin_path_arguments([]) == ()
 
 
 def test_a_package_on_the_path_is_found_behind_all_that_was_there(yardwork) -> None:
-    (told,) = whereabouts(installed("criterion"))
+    (told,) = plugin_path_arguments(installed("criterion"))
     found, place = isolated(told, yardwork).rsplit(" ", 1)
     assert found == "[('1.2', 'yardwork.dwell')]"
     assert int(place) > 2
@@ -66,7 +66,7 @@ def test_of_two_versions_the_one_is_taken_that_was_validated(tmp_path, packages)
 def test_the_folder_that_the_command_was_called_in_is_not_handed_over(yardwork, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [str(tmp_path), "", *sys.path])
-    (told,) = whereabouts(
+    (told,) = plugin_path_arguments(
         [Entry("criterion", "dwell", "yardwork.dwell:Dwell", "yardwork", "1.2", folder=str(yardwork))]
     )
     assert str(tmp_path) not in json.loads(told)["path"]

@@ -20,7 +20,7 @@ from simscen.faults.fault import AnyFault
 from simscen.loading.checks.faults import instances, unfit_faults, unknown_sensors
 from simscen.loading.checks.registry import NameScope
 from simscen.loading.scenario import load_scenario
-from simscen.run.prepare import prepare
+from simscen.run.preparation.scenario import prepare
 from simscen.run.simulate import simulate
 from simscen.spec.choice import Choice
 from simscen.spec.lazy import annotation_of

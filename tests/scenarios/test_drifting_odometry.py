@@ -7,7 +7,7 @@ import pytest
 from simscen.bench.navigation.experiments import narrow_fields
 from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
-from simscen.run.prepare import Prepared, prepare
+from simscen.run.preparation.scenario import PreparedScenario, prepare
 from simscen.run.simulate import simulate
 
 SLIPPING = """\
@@ -18,7 +18,7 @@ faults:
 """
 
 
-def seconds(prepared: Prepared, seed: int) -> float:
+def seconds(prepared: PreparedScenario, seed: int) -> float:
     """Until the robot was through."""
     trace = simulate(prepared, seed).trace
     kinds = [event.kind for event in trace.events]

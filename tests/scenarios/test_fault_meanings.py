@@ -17,7 +17,7 @@ from simscen.loading.resolved import spec_of_text
 from simscen.loading.scenario import load_scenario
 from simscen.record.difference import first_difference
 from simscen.record.replay import read_log
-from simscen.run.prepare import prepare
+from simscen.run.preparation.scenario import prepare
 from simscen.run.simulate import simulate
 
 ROOM = """\

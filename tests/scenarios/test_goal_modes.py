@@ -9,8 +9,8 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import Status
 from simscen.loading.scenario import load_scenario
-from simscen.run.external.serving import served
-from simscen.run.prepare import Prepared, prepare
+from simscen.run.external.build import with_external_reference
+from simscen.run.preparation.scenario import PreparedScenario, prepare
 from simscen.run.simulate import simulate
 
 HEAD = """\
@@ -49,7 +49,7 @@ goals:
 """
 
 
-def scenario(text: str, folder: Path) -> Prepared:
+def scenario(text: str, folder: Path) -> PreparedScenario:
     file = folder / "own.scenario.yaml"
     file.write_text(HEAD + text + ("" if "pass:" in text else PASS))
     return prepare(load_scenario(file, folder))
@@ -150,7 +150,7 @@ def test_a_success_that_is_not_expected_fails(tmp_path):
 @pytest.mark.parametrize("text", [THROUGH, WAYPOINTS, MISSED % "failed"], ids=["through", "waypoints", "missed"])
 def test_a_stack_behind_the_protocol_takes_goals_in_the_same_way(tmp_path, text):
     prepared = scenario(text, tmp_path)
-    here, there = simulate(prepared), simulate(served(prepared), printed=tmp_path / "stack.log")
+    here, there = simulate(prepared), simulate(with_external_reference(prepared), printed=tmp_path / "stack.log")
     assert there.result == here.result
     assert there.trace.events == here.trace.events
 

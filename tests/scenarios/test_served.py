@@ -11,8 +11,8 @@ import pytest
 from mcap.reader import make_reader
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.external.serving import served
-from simscen.run.prepare import prepare
+from simscen.run.external.build import with_external_reference
+from simscen.run.preparation.scenario import prepare
 from simscen.run.simulate import simulate
 
 ROOT = Path(__file__).parents[2]
@@ -76,7 +76,7 @@ def logs(file: Path, root: Path, folder: Path) -> tuple[Said, Said]:
     """All messages of the scenario's log, with its stack in the engine and behind the protocol."""
     prepared = prepare(load_scenario(file, root))
     here = simulate(prepared, log=folder / "here.mcap")
-    there = simulate(served(prepared), log=folder / "there.mcap", printed=folder / "stack.log")
+    there = simulate(with_external_reference(prepared), log=folder / "there.mcap", printed=folder / "stack.log")
     assert there.result == here.result
     assert there.trace.events == here.trace.events
     return messages(folder / "here.mcap"), messages(folder / "there.mcap")
@@ -141,7 +141,7 @@ def test_two_robots_each_with_a_process_of_its_own_give_the_same_bits(tmp_path: 
 def test_another_stack_gives_other_bits(tmp_path: Path) -> None:
     """The comparison can fail."""
     prepared = prepare(load_scenario(ROOT / "scenarios/navigation/goal.scenario.yaml", ROOT))
-    other = served(prepared)
+    other = with_external_reference(prepared)
     argv = other.loaded.runs and (*other.loaded.runs.argv[:-1], '{"controller": {"desired_linear_vel": 0.3}}')
     other = replace(other, loaded=replace(other.loaded, runs=replace(other.loaded.runs, argv=argv)))
     assert simulate(other).result.metrics != simulate(prepared).result.metrics

@@ -8,8 +8,8 @@ import numpy as np
 from simscen.core.geometry import Pose2
 from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
-from simscen.run.agent import Agent
-from simscen.run.prepare import prepare
+from simscen.run.lockstep import RobotUnderTest
+from simscen.run.preparation.scenario import prepare
 from simscen.run.simulate import simulate
 from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.reference import ReferenceStack
@@ -34,7 +34,7 @@ pass: [{collisions: {max: 0, caused_by_robot: true}}]
 class Compared:
     """At each scan: errors of what is told of people, and what is told to move and does not."""
 
-    def __init__(self, agent: Agent) -> None:
+    def __init__(self, agent: RobotUnderTest) -> None:
         assert isinstance(agent.stack, InstalledStack) and isinstance(agent.stack.inner, ReferenceStack)
         (self.prediction,) = (part for name, part, _ in agent.stack.inner.components if name == "prediction")
         self.places: list[float] = []
@@ -74,7 +74,7 @@ def test_people_are_known_to_centimetres_and_furniture_does_not_walk(tmp_path: P
     heard: list[Compared] = []
 
     def attach(rig, logs):
-        heard.append(Compared(rig.agents[0]))
+        heard.append(Compared(rig.robots[0]))
         return heard
 
     simulate(prepare(load_scenario(file, tmp_path, (WORLDS,))), 1, attach=attach)

@@ -5,14 +5,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from simscen.bench.speed.run_speed import PATROL, SEED
+from simscen.bench.speed.stopwatch import Stopwatch
 from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import Log
-from simscen.run.external.serving import served
-from simscen.run.lockstep import Rig
-from simscen.run.prepare import Prepared, prepare
+from simscen.run.external.build import with_external_reference
+from simscen.run.lockstep import RunSetup
+from simscen.run.preparation.scenario import PreparedScenario, prepare
 from simscen.run.simulate import simulate
-from simscen.run.stopwatch import Stopwatch
 
 
 @dataclass(frozen=True)
@@ -36,15 +36,15 @@ def measure_external(rounds: int) -> External:
     """The medians of several drives of the patrol, without a log."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     here = [_each_beat(prepared) for _ in range(rounds)]
-    there = [_each_beat(served(prepared)) for _ in range(rounds)]
+    there = [_each_beat(with_external_reference(prepared)) for _ in range(rounds)]
     return External(here[0][0], statistics.median(us for _, us in here), statistics.median(us for _, us in there))
 
 
-def _each_beat(prepared: Prepared) -> tuple[int, float]:
+def _each_beat(prepared: PreparedScenario) -> tuple[int, float]:
     watch, beats = Stopwatch(), _Beats()
 
-    def attach(rig: Rig, _: Sequence[Log]) -> Sequence[Log]:
-        watch.watch("stack", rig.agents[0].stack, "decide")
+    def attach(setup: RunSetup, _: Sequence[Log]) -> Sequence[Log]:
+        watch.watch("stack", setup.robots[0].stack, "decide")
         return (beats,)
 
     simulate(prepared, SEED, attach=attach)

@@ -18,7 +18,7 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGri
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Solid
 from simscen.loading.scenario import load_scenario
-from simscen.run.prepare import prepare
+from simscen.run.preparation.scenario import prepare
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rosmap import save_map
 

@@ -10,17 +10,17 @@ from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 from tempfile import TemporaryDirectory
 
+from simscen.bench.speed.measurement import Measurement, Measurements
 from simscen.bench.speed.run_speed import PATROL, SEED, Tell, nobody
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import Log
-from simscen.run.figure import Figure, Figures
-from simscen.run.lockstep import Rig
-from simscen.run.outfolder import run_folder
-from simscen.run.prepare import prepare
+from simscen.run.lockstep import RunSetup
+from simscen.run.preparation.scenario import prepare
 from simscen.run.process.jobs import Job, ProcessEnd
 from simscen.run.process.supervisor import Ended, supervise
+from simscen.run.sessions.output_folder import run_folder
 from simscen.run.simulate import simulate
 
 SHORT = 0.1
@@ -49,24 +49,24 @@ class Overhead:
     validate: tuple[float, ...]
 
     @property
-    def figures(self) -> Figures:
+    def figures(self) -> Measurements:
         """Their medians."""
         return {
-            f"a run of {SHORT} s": Figure.of(self.run, MILLISECONDS),
-            "of that beyond its simulation": Figure.of(self.beyond, MILLISECONDS),
-            "the same as a process": Figure.of(self.process, MILLISECONDS),
-            "the same as a process, wall time": Figure.of(self.wall, MILLISECONDS),
-            "preparing a scenario": Figure.of(self.preparing, MILLISECONDS),
-            "start of a session": Figure.of(self.start, MILLISECONDS),
-            "simscen validate": Figure.of(self.validate, MILLISECONDS),
-            "memory of a worker": Figure.of(self.memory, MEGABYTES),
+            f"a run of {SHORT} s": Measurement.of(self.run, MILLISECONDS),
+            "of that beyond its simulation": Measurement.of(self.beyond, MILLISECONDS),
+            "the same as a process": Measurement.of(self.process, MILLISECONDS),
+            "the same as a process, wall time": Measurement.of(self.wall, MILLISECONDS),
+            "preparing a scenario": Measurement.of(self.preparing, MILLISECONDS),
+            "start of a session": Measurement.of(self.start, MILLISECONDS),
+            "simscen validate": Measurement.of(self.validate, MILLISECONDS),
+            "memory of a worker": Measurement.of(self.memory, MEGABYTES),
         }
 
 
 class _Beats:
     """CPU ms that a run takes from its first beat to its last: its simulation, with the first plan."""
 
-    def attach(self, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
+    def attach(self, rig: RunSetup, own: Sequence[Log]) -> Sequence[Log]:
         """The run begins."""
         self.begun = self.ended = time.process_time()
         return (self,)

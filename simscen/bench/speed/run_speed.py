@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from simscen.bench.speed.stopwatch import Stopwatch
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import Log
-from simscen.run.lockstep import Rig
-from simscen.run.perform import MANY
-from simscen.run.prepare import Prepared, lidar_height, prepare
+from simscen.run.lockstep import RunSetup
+from simscen.run.preparation.scenario import PreparedScenario, lidar_height, prepare
+from simscen.run.sessions.execute_run import GC_THRESHOLD
 from simscen.run.simulate import simulate
-from simscen.run.stopwatch import Stopwatch
 from simscen.sim.bare import BareWorld
 from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.reference import ReferenceStack
@@ -100,7 +100,7 @@ def measure_patrol(rounds: int, tell: Tell = nobody) -> Patrol:
     return Patrol(simulated, cpu, parts, statistics.median(bares), tuple(cpus), tuple(bares), parted)
 
 
-def _taken_apart(prepared: Prepared, cpu: float) -> dict[str, float]:
+def _taken_apart(prepared: PreparedScenario, cpu: float) -> dict[str, float]:
     """Seconds of a run's parts. The stopwatch sees wall time and costs some itself: scaled to a run without it."""
     watch = Stopwatch()
     _, _, whole = timed_run(prepared, watch)
@@ -109,12 +109,12 @@ def _taken_apart(prepared: Prepared, cpu: float) -> dict[str, float]:
     return parts
 
 
-def timed_run(prepared: Prepared, watch: Stopwatch | None = None) -> tuple[float, float, float]:
+def timed_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> tuple[float, float, float]:
     """Simulated, CPU and wall seconds of one run, from setting up to the verdicts; `watch` takes it apart."""
     gc.collect()
     gc.freeze()  # as what hands out runs does: what was here before them is not looked through for garbage
     before = gc.get_threshold()
-    gc.set_threshold(MANY)  # as a run's own process does
+    gc.set_threshold(GC_THRESHOLD)  # as a run's own process does
     with TemporaryDirectory() as folder:
         begun, begun_wall = time.process_time(), time.perf_counter()
         run = simulate(prepared, SEED, log=Path(folder, "run.mcap"), attach=partial(_watched, watch) if watch else None)
@@ -124,14 +124,14 @@ def timed_run(prepared: Prepared, watch: Stopwatch | None = None) -> tuple[float
     return run.result.simulated, cpu, wall
 
 
-def _watched(watch: Stopwatch, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
-    """Watch the parts of the rig, and the log and the trace that are its `own` listeners."""
-    (agent,) = rig.agents
-    watch.watch("physics", rig.simulation, "step")
+def _watched(watch: Stopwatch, setup: RunSetup, own: Sequence[Log]) -> Sequence[Log]:
+    """Watch the parts of the setup, and the log and the trace that are its `own` listeners."""
+    (agent,) = setup.robots
+    watch.watch("physics", setup.simulation, "step")
     watch.watch("physics", agent.robot, "drive")
     watch.watch("truth and contacts", agent.robot, "truth", "sample", "collisions")
     watch.watch("truth and contacts", agent.robot.samples, "settle")
-    watch.watch("sensors", agent.senses, "read")
+    watch.watch("sensors", agent.sensors, "read")
     if isinstance(agent.stack, InstalledStack) and isinstance(agent.stack.inner, ReferenceStack):
         for name, component, methods in agent.stack.inner.components:
             watch.watch(name, component, *methods)
@@ -141,7 +141,7 @@ def _watched(watch: Stopwatch, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
     return ()
 
 
-def bare_patrol(prepared: Prepared, simulated: float) -> float:
+def bare_patrol(prepared: PreparedScenario, simulated: float) -> float:
     """CPU seconds that PyBullet takes to step and scan as often in the same world, and nothing else."""
     lidar = next(sensor.lidar for sensor in prepared.robot.sensors.values() if sensor.lidar)
     bare = BareWorld(prepared.built.mesh, prepared.body, prepared.start, triangulate)

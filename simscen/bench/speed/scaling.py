@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from simscen.bench.speed.measurement import Measurement, Measurements
 from simscen.bench.speed.run_speed import PATROL, Tell, nobody, timed_run
 from simscen.loading.scenario import load_scenario
-from simscen.run.figure import Figure, Figures
-from simscen.run.goals import goals_of
-from simscen.run.prepare import prepare
+from simscen.run.preparation.goals import scenario_goals
+from simscen.run.preparation.scenario import prepare
 
 SECONDS = 15
 """Of the patrol."""
@@ -29,9 +29,9 @@ ROW = 25
 UNIT = "ms a simulated second"
 
 
-def measure_growth(rounds: int, tell: Tell = nobody) -> Figures:
+def measure_growth(rounds: int, tell: Tell = nobody) -> Measurements:
     """The medians of several runs each."""
-    figures: Figures = {}
+    figures: Measurements = {}
     with TemporaryDirectory() as folder:
         for axis, counts in AXES.items():
             for count in counts:
@@ -39,7 +39,7 @@ def measure_growth(rounds: int, tell: Tell = nobody) -> Figures:
                 prepared = prepare(load_scenario(write_more(Path(folder), axis, count), Path(folder)))
                 timed_run(prepared)  # the first run pays for caches
                 runs = [timed_run(prepared) for _ in range(rounds)]
-                figures[f"{count} {axis}"] = Figure.of([1e3 * cpu / simulated for simulated, cpu, _ in runs], UNIT)
+                figures[f"{count} {axis}"] = Measurement.of([1e3 * cpu / simulated for simulated, cpu, _ in runs], UNIT)
     return figures
 
 
@@ -83,7 +83,7 @@ def _places(count: int) -> Iterator[tuple[int, float, float]]:
 
 def _robots(count: int) -> str:
     """So many robots that begin one behind the other; each patrols the same goals, from another one on."""
-    goals = goals_of(load_scenario(PATROL, PATROL.parent).spec)
+    goals = scenario_goals(load_scenario(PATROL, PATROL.parent).spec)
     poses = [{"x": goal.pose.x, "y": goal.pose.y, "yaw": goal.pose.yaw} for goal in goals]
     robots = {
         f"robot_{number}": {

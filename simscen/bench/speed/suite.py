@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from simscen.bench.speed.measurement import Measurement, Measurements
 from simscen.bench.speed.run_speed import PATROL, Tell, bare_patrol, nobody
 from simscen.core.records.session_events import RunFinished
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.loading.scenario import load_scenario
-from simscen.run.figure import Figure, Figures
-from simscen.run.prepare import prepare
-from simscen.run.process.answer import answer_to
+from simscen.run.preparation.scenario import prepare
 from simscen.run.process.jobs import ProcessEnd
+from simscen.run.process.plugin_path import plugin_path_arguments
 from simscen.run.process.supervisor import Ended, supervise
-from simscen.run.process.whereabouts import whereabouts
-from simscen.run.session import Options, plan
+from simscen.run.sessions.results import finished_run
+from simscen.run.sessions.run_session import SessionOptions, plan_jobs
 
 BARE_SECONDS = 60.0
 
@@ -41,16 +41,16 @@ class Suite:
     bare: float
 
     @property
-    def figures(self) -> Figures:
+    def figures(self) -> Measurements:
         """What is compared."""
         alone = self.bare * self.simulated
         return {
-            "suite: runs a minute": Figure(60 * self.runs / self.wall, "", more_is_better=True),
-            "suite: wall time": Figure(self.wall, "s"),
-            "suite: wall time, times PyBullet alone on one core": Figure(self.wall / alone, ""),
-            "suite: CPU time, times PyBullet alone": Figure(self.cpu / alone, ""),
-            "suite: memory of a worker": Figure(statistics.median(self.memory), "MB"),
-            "suite: memory of the largest worker": Figure(max(self.memory), "MB"),
+            "suite: runs a minute": Measurement(60 * self.runs / self.wall, "", more_is_better=True),
+            "suite: wall time": Measurement(self.wall, "s"),
+            "suite: wall time, times PyBullet alone on one core": Measurement(self.wall / alone, ""),
+            "suite: CPU time, times PyBullet alone": Measurement(self.cpu / alone, ""),
+            "suite: memory of a worker": Measurement(statistics.median(self.memory), "MB"),
+            "suite: memory of the largest worker": Measurement(max(self.memory), "MB"),
         }
 
 
@@ -68,12 +68,12 @@ def measure_suite(
     patrol = prepare(load_scenario(PATROL, PATROL.parent))
     bares = [bare_patrol(patrol, BARE_SECONDS)]
     begun = time.perf_counter()
-    jobs = plan(scenarios, Options(workers=workers), out)
-    told = whereabouts(plugins_of_all(scenarios))
+    jobs = plan_jobs(scenarios, SessionOptions(workers=workers), out)
+    told = plugin_path_arguments(plugins_of_all(scenarios))
     answers, ends = list[RunFinished](), list[ProcessEnd]()
     for happening in supervise(jobs, workers, (*entry, *told), lambda: True):
         if isinstance(happening, Ended):
-            answers.append(answer_to(happening.job, happening.end))
+            answers.append(finished_run(happening.job, happening.end))
             if isinstance(happening.end, ProcessEnd):
                 ends.append(happening.end)
             tell(f"{len(answers)} of {len(jobs)} runs")

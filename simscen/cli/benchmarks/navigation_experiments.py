@@ -172,8 +172,10 @@ def _buildings(folder: Path, numbers: Sequence[int]) -> Mapping[str, BuiltWorld]
 def _built(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, BuiltWorld]:
     """Worlds by the name that scenarios in `folder` give them, made ready."""
     from simscen.loading.files.worldfile import load_world_file
-    from simscen.run.worldsource import world_of
+    from simscen.run.preparation.loaders import world_from_file
     from simscen.worlds.build import build
 
     folder.mkdir(parents=True, exist_ok=True)
-    return {file: build(world_of(load_world_file(worlds / file, worlds), worlds), LIDAR_HEIGHT) for file in files}
+    return {
+        file: build(world_from_file(load_world_file(worlds / file, worlds), worlds), LIDAR_HEIGHT) for file in files
+    }

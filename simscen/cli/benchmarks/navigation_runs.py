@@ -25,9 +25,9 @@ from simscen.report.journal import Journal
 from simscen.report.line import text_of
 from simscen.report.lines import Naming, finished
 from simscen.report.sessions import UNDECIDED
-from simscen.run.outfolder import run_folder
 from simscen.run.process.jobs import Job
-from simscen.run.session import Options, run_session
+from simscen.run.sessions.output_folder import run_folder
+from simscen.run.sessions.run_session import SessionOptions, run_session
 
 PATIENCE = 1800.0
 """Seconds of wall time that a run may take: a busy machine is no failure of the stack."""
@@ -71,7 +71,9 @@ def drive(experiments: Sequence[Experiment], journal: Journal, workers: int) -> 
         progress(event)
 
     with signals_interrupt():
-        answers, stopped = run_session(work.jobs, Options(workers=workers, wall_limit=PATIENCE), WARM_PROCESS, listen)
+        answers, stopped = run_session(
+            work.jobs, SessionOptions(workers=workers, wall_limit=PATIENCE), WARM_PROCESS, listen
+        )
     print_progress("")
     of = {answer.key: answer for answer in (*work.kept, *answers)}
     trials: list[list[Trial]] = [[] for _ in experiments]

@@ -10,10 +10,10 @@ from typing import Annotated, Any
 
 import typer
 
+from simscen.bench.speed.measurement import Measurement, Measurements
 from simscen.cli.diagnostics import print_text
 from simscen.cli.installation import processor
 from simscen.core.errors import UsageError
-from simscen.run.figure import Figure, Figures
 
 FORMAT = 1
 """Of the JSON; another number means that names or meanings have changed."""
@@ -23,12 +23,12 @@ FORMAT = 1
 class Result:
     """What one call has measured, where and with which version of simscen."""
 
-    figures: Figures
+    figures: Measurements
     machine: str
     simscen: str
 
     @classmethod
-    def here(cls, figures: Figures) -> "Result":
+    def here(cls, figures: Measurements) -> "Result":
         """Measured just now."""
         return cls(figures, processor(), version("simscen"))
 
@@ -65,9 +65,9 @@ def read_result(file: Path) -> Result:
         raise UsageError(f"{file} is a damaged result of simscen bench: {type(error).__name__} at {error}") from None
 
 
-def _figure(entry: dict[str, Any]) -> Figure:
+def _figure(entry: dict[str, Any]) -> Measurement:
     rounds = tuple(float(value) for value in entry["rounds"])
-    return Figure(float(entry["value"]), str(entry["unit"]), rounds, bool(entry["more_is_better"]))
+    return Measurement(float(entry["value"]), str(entry["unit"]), rounds, bool(entry["more_is_better"]))
 
 
 # MERGED: Two results of `simscen bench` against each other.
@@ -106,7 +106,7 @@ def comparison_text(before: Result, after: Result) -> str:
     return "\n".join(lines)
 
 
-def judgement(before: Figure, after: Figure) -> str:
+def judgement(before: Measurement, after: Measurement) -> str:
     """`noise` where the rounds overlap, `better` or `worse` where they do not; "" where there are too few of them."""
     if min(len(before.rounds), len(after.rounds)) < FEWEST:
         return ""
@@ -115,7 +115,7 @@ def judgement(before: Figure, after: Figure) -> str:
     return "better" if (after.value > before.value) == after.more_is_better else "worse"
 
 
-def _row(name: str, before: Figure, after: Figure) -> tuple[str, ...]:
+def _row(name: str, before: Measurement, after: Measurement) -> tuple[str, ...]:
     ratio = f"{after.value / before.value:.2f}" if before.value else "-"
     values = (_value(before.value, before.unit), _value(after.value, after.unit))
     return name, *values, ratio, _spread(before), _spread(after), judgement(before, after)
@@ -125,7 +125,7 @@ def _value(value: float, unit: str) -> str:
     return f"{value:.4g} {unit}".rstrip()
 
 
-def _spread(figure: Figure) -> str:
+def _spread(figure: Measurement) -> str:
     return f"{min(figure.rounds):.4g} … {max(figure.rounds):.4g}" if len(figure.rounds) > 1 else "-"
 
 

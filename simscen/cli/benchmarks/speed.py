@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from simscen.bench.speed.measurement import Measurements
 from simscen.cli.benchmarks.results import COMPARE_HELP, Format, Result, load_baseline, print_progress, print_result
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit
-from simscen.run.figure import Figures
 
 if TYPE_CHECKING:
     from simscen.bench.speed.suite import Suite
@@ -42,7 +42,7 @@ def growth_command(
     print_result(Result.here(figures), growth_text(figures), {}, format_, before)
 
 
-def growth_text(figures: Figures) -> str:
+def growth_text(figures: Measurements) -> str:
     """A line for each; beside it how many times as much as the least of its kind."""
     width = max(map(len, figures))
     lines = ["the patrol with                 CPU a simulated second"]

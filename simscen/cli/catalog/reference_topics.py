@@ -9,7 +9,7 @@ from simscen.criteria.plugin_metric import AnyMeasure
 from simscen.criteria.trace_signals.catalog import SIGNALS, Signal
 from simscen.judge.metrics.catalog import METRICS, Metric
 from simscen.loading.codes import CODES
-from simscen.run.external.errors import CRASHED, FAILED, PROTOCOL, TIMEOUT
+from simscen.run.external.protocol import CRASHED, FAILED, PROTOCOL, TIMEOUT
 
 NAV2 = {
     ErrorCode.NONE: "Nothing went wrong.",

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from simscen.bench.speed.measurement import Measurement, Measurements
 from simscen.cli.benchmarks import localization, navigation, results, speed
 from simscen.cli.benchmarks.results import COMPARE_HELP, Format, Result, load_baseline, print_progress, print_result
-from simscen.run.figure import Figure, Figures
 
 if TYPE_CHECKING:
     from simscen.bench.speed.external_stack import External
@@ -74,22 +74,22 @@ def _sections(patrol: "Patrol", overhead: "Overhead", fields: "list[Field]", ext
     }
 
 
-def _patrol_figures(patrol: "Patrol") -> Figures:
+def _patrol_figures(patrol: "Patrol") -> Measurements:
     each, unit = 1e3 / patrol.simulated, "ms a simulated second"
     return {
-        "patrol, times PyBullet alone": Figure.of(patrol.ratios, ""),
-        "patrol": Figure.of([each * cpu for cpu in patrol.cpus], unit),
-        "PyBullet alone": Figure.of([each * bare for bare in patrol.bares], unit),
-        **{name: Figure.of([each * one for one in rounds], unit) for name, rounds in patrol.parted.items()},
+        "patrol, times PyBullet alone": Measurement.of(patrol.ratios, ""),
+        "patrol": Measurement.of([each * cpu for cpu in patrol.cpus], unit),
+        "PyBullet alone": Measurement.of([each * bare for bare in patrol.bares], unit),
+        **{name: Measurement.of([each * one for one in rounds], unit) for name, rounds in patrol.parted.items()},
     }
 
 
-def _other_figures(fields: "list[Field]", external: "External") -> Figures:
-    figures = dict[str, Figure]()
+def _other_figures(fields: "list[Field]", external: "External") -> Measurements:
+    figures = dict[str, Measurement]()
     for field in fields:
-        figures[f"scan among {field.obstacles} obstacles"] = Figure(field.scan_ms, "ms")
-        figures[f"step among {field.obstacles} obstacles"] = Figure(field.step_us, "µs")
-    return {**figures, "beat with the stack as a process": Figure(external.there_us, "µs")}
+        figures[f"scan among {field.obstacles} obstacles"] = Measurement(field.scan_ms, "ms")
+        figures[f"step among {field.obstacles} obstacles"] = Measurement(field.step_us, "µs")
+    return {**figures, "beat with the stack as a process": Measurement(external.there_us, "µs")}
 
 
 def _patrol_lines(patrol: "Patrol", rounds: int) -> list[str]:

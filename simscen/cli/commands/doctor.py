@@ -78,18 +78,24 @@ def _line(sign: str, name: str, result: str) -> str:
 
 def cache() -> str:
     """Check the cache of maps and shortest paths, and return its folder and size."""
-    from simscen.run.keptfiles import MOST_BYTES, VARIABLE, cache_folder, is_own, used
+    from simscen.run.caching.disk_cache import (
+        CACHE_DIR_VARIABLE,
+        MAX_CACHE_BYTES,
+        cache_folder,
+        disk_usage,
+        is_private_folder,
+    )
 
     folder = cache_folder(os.environ)
     if folder is None:
-        return f"disabled by {VARIABLE}"
+        return f"disabled by {CACHE_DIR_VARIABLE}"
     if not folder.exists():
         return f"{folder}: empty"
-    if not is_own(folder):
+    if not is_private_folder(folder):
         reason = f"{folder} is not used: it does not belong to you, or other users may write to it"
-        raise CheckFailed(f"{reason}; delete it, or set {VARIABLE} to another folder")
-    count, size = used(folder)
-    return f"{folder}: {count} files, {size / 1e6:.1f} MB of at most {MOST_BYTES / 1e6:.0f}; safe to delete"
+        raise CheckFailed(f"{reason}; delete it, or set {CACHE_DIR_VARIABLE} to another folder")
+    count, size = disk_usage(folder)
+    return f"{folder}: {count} files, {size / 1e6:.1f} MB of at most {MAX_CACHE_BYTES / 1e6:.0f}; safe to delete"
 
 
 def stacks() -> str:
@@ -128,14 +134,14 @@ def run_twice() -> str:
     from simscen.cli.session.run_session import WARM_PROCESS
     from simscen.core.records.run_result import Outcome
     from simscen.loading.scenario import load_scenario
-    from simscen.run.session import Options, plan, run_session
+    from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
 
     with tempfile.TemporaryDirectory(prefix="simscen-doctor-") as name:
         folder = Path(name).resolve()
         (folder / "doctor.scenario.yaml").write_text(SCENARIO, encoding="utf-8")
-        options = Options(workers=2, twice=True, wall_limit=60.0)
+        options = SessionOptions(workers=2, twice=True, wall_limit=60.0)
         try:
-            jobs = plan([load_scenario(folder / "doctor.scenario.yaml", folder)], options, folder / "out")
+            jobs = plan_jobs([load_scenario(folder / "doctor.scenario.yaml", folder)], options, folder / "out")
             answers, _ = run_session(jobs, options, WARM_PROCESS, lambda _: None)
         except SimscenError as error:
             raise CheckFailed(str(error)) from error

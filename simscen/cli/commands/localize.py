@@ -85,8 +85,8 @@ def command(
 def _given(
     scenario: Path | None, map_: Path, robot: str, root: Path | None
 ) -> tuple[StackSpec, OccupancyGrid, RobotModel]:
-    from simscen.run.robotmodel import robot_model
-    from simscen.run.worldsource import load_map, robot_of
+    from simscen.run.preparation.loaders import load_map, robot_from_file
+    from simscen.run.robot_interface import robot_model
 
     spec = StackSpec()
     if scenario is not None:
@@ -110,7 +110,7 @@ def _given(
     home = root if root is not None else (default_root([Path(robot)]) if Path(robot).exists() else Path.cwd())
     try:
         file = load_robot_file(robot, home)
-        body = robot_of(file.robot, file.roots)[1]
+        body = robot_from_file(file.robot, file.roots)[1]
     except InvalidInput as error:
         raise InvalidInput(from_here(error.problems, home)) from error
     return spec, load_map(world.map), robot_model(body)

@@ -17,8 +17,8 @@ from simscen.loading.files.discovery import default_root
 from simscen.loading.files.robotfile import RobotFile, load_robot_file
 
 if TYPE_CHECKING:
-    from simscen.run.robotcheck import Check, Checked
-    from simscen.run.trialdrive import Motion, Trial
+    from simscen.run.robot_check.drive_checks import DriveCheck, RobotCheckResult
+    from simscen.run.robot_check.trial_drive import Motion, Trial
     from simscen.sim.robot_body import RobotBody
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
@@ -59,13 +59,13 @@ def check(
 
 def _checked(file: RobotFile, named: str, picture: Path | None, as_json: bool) -> int:
     from simscen.cli.process import engine_output_on_stderr
-    from simscen.run.robotcheck import check_robot
-    from simscen.run.robotgeometry import geometry_notes
-    from simscen.run.worldsource import robot_of
+    from simscen.run.preparation.loaders import robot_from_file
+    from simscen.run.robot_check.drive_checks import check_robot
+    from simscen.run.robot_check.geometry import geometry_warnings
 
-    spec, body = robot_of(file.robot, file.roots)
+    spec, body = robot_from_file(file.robot, file.roots)
     library = file.library
-    notes = library.with_source_where_missing(geometry_notes(file.robot, spec, body, file.roots))
+    notes = library.with_source_where_missing(geometry_warnings(file.robot, spec, body, file.roots))
     notes = from_here(notes, library.fence.root)
     with engine_output_on_stderr():
         checked = check_robot(body)
@@ -84,7 +84,7 @@ def _checked(file: RobotFile, named: str, picture: Path | None, as_json: bool) -
     return checked.failed
 
 
-def as_table(body: "RobotBody", checked: "Checked") -> Iterator[str]:
+def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
     """Yield lines of at most 80 columns: the test drives, then every check with its value and limit."""
     drive = body.drive.type.replace("_", " ")
     yield f"  {drive}, {body.mass:.4g} kg, {len(body.wheels)} wheels"
@@ -113,13 +113,13 @@ def _row(trial: "Trial") -> str:
     return f"  {trial.name:9} {driven}  {turned}   {gap:7.3f} m  {math.degrees(trial.tilt):4.1f}"
 
 
-def _line(check: "Check") -> str:
+def _line(check: "DriveCheck") -> str:
     verdict = "ok" if check.held else "FAILED"
     line = f"  {verdict:7} {check.name:36} {check.value:9.3f}, at most {check.limit:.3g} {check.unit}"
     return line if check.held or not check.advice else f"{line}\n          {check.advice}"
 
 
-def as_data(body: "RobotBody", checked: "Checked") -> dict[str, Any]:
+def as_data(body: "RobotBody", checked: "RobotCheckResult") -> dict[str, Any]:
     """Return all values as JSON data; angles in rad and lengths in m unless a unit is given."""
     return {
         "robot": body.name,

@@ -14,8 +14,8 @@ from simscen.cli.session.stacks import STACK_HELP
 from simscen.cli.session.terminal import Format
 from simscen.cli.session.watch import watched
 from simscen.report.journaldata import NAME
-from simscen.run.process.jobs import Replays
-from simscen.run.session import Options
+from simscen.run.process.jobs import ReplayMode
+from simscen.run.sessions.run_session import SessionOptions
 
 
 def command(
@@ -98,8 +98,8 @@ def command(
         list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
     ] = None,
     replay: Annotated[
-        Replays, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")
-    ] = Replays.FAILED,
+        ReplayMode, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")
+    ] = ReplayMode.FAILED,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")
     ] = False,
@@ -119,7 +119,7 @@ def command(
     asked = Asked(
         paths,
         Selection(keyword, tag or [], shard_of(shard), variation or []),
-        Options(
+        SessionOptions(
             workers or cores(), seed, repeat, check_determinism, fail_fast, wall_limit, check_against, replay=replay
         ),
         root,

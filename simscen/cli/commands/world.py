@@ -18,9 +18,9 @@ from simscen.loading.files.discovery import default_root
 from simscen.loading.files.worldfile import load_world_file, world_text
 from simscen.loading.loaded import LoadedWorld
 from simscen.model.world import WorldSpec
-from simscen.run.outfolder import write_atomically
+from simscen.run.preparation.loaders import world_from_file
+from simscen.run.sessions.output_folder import write_atomically
 from simscen.run.worldchecks.runner import world_reader_notes
-from simscen.run.worldsource import world_of
 
 if TYPE_CHECKING:
     from simscen.worlds.inspect import Inspection, Item
@@ -149,7 +149,7 @@ def _converted(
 
 def _built(source: LoadedWorld, home: Path, world_path: list[Path], lenient: bool) -> World:
     try:
-        return world_of(source, home, world_path, lenient)
+        return world_from_file(source, home, world_path, lenient)
     except InvalidInput as error:
         raise InvalidInput(from_here(error.problems, home)) from error
 

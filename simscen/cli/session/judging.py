@@ -28,7 +28,7 @@ from simscen.record.header import LogHeader
 from simscen.record.replay import Log, read_run
 from simscen.report.journaldata import NAME
 from simscen.report.rebuild import read_journal
-from simscen.run.outfolder import run_folder
+from simscen.run.sessions.output_folder import run_folder
 
 
 class Judging:
@@ -137,10 +137,10 @@ class Judging:
         """The filter masks that criteria name; those of a file that is the same for all robots are read once."""
         if criteria is self._criteria and self._named is not None:
             return self._named
-        from simscen.run.foreigncase import masks_of
+        from simscen.run.preparation.foreign_logs import masks_from_criteria
 
         with _told_from_here(criteria):
-            named = masks_of(criteria) if criteria.masks else {}
+            named = masks_from_criteria(criteria) if criteria.masks else {}
         self._named = named if criteria is self._criteria else self._named
         return named
 
@@ -148,10 +148,10 @@ class Judging:
         """What the file of criteria says about the robot's surroundings; read once."""
         assert self._criteria is not None
         if self._case is None:
-            from simscen.run.foreigncase import case_of
+            from simscen.run.preparation.foreign_logs import case_from_criteria
 
             with _told_from_here(self._criteria):
-                self._case = case_of(self._criteria, self._world_path)
+                self._case = case_from_criteria(self._criteria, self._world_path)
         return self._case
 
     def _finished(

@@ -22,11 +22,11 @@ from simscen.report.junit import Family, to_xml
 from simscen.report.results import to_json
 from simscen.report.suite import Live, Session, to_html
 from simscen.report.suite.history import Past, past_sessions
-from simscen.run.outfolder import RUNS, probe_writable, write_atomically
-from simscen.run.versions import arithmetic, cpu_flags, versions
+from simscen.run.reproducibility.environment import arithmetic_fingerprints, cpu_flags, software_versions
+from simscen.run.sessions.output_folder import RUNS_FOLDER, probe_writable, write_atomically
 
 PAGE = "report.html"
-OWN = ("results.json", PAGE, "run.json", NAME, RUNS)
+OWN = ("results.json", PAGE, "run.json", NAME, RUNS_FOLDER)
 """What a session writes into its folder beside junit.xml."""
 
 
@@ -172,8 +172,8 @@ def session_info_json(used: Mapping[str, object], wall: float | None = None) -> 
             "machine": platform.machine(),
             "cores": os.cpu_count(),
             "cpu_flags": cpu_flags(),
-            "arithmetic": arithmetic(),
-            "packages": versions(),
+            "arithmetic": arithmetic_fingerprints(),
+            "packages": software_versions(),
             **used,
         },
         indent=2,

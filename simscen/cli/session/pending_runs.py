@@ -13,11 +13,11 @@ from simscen.report.journal import Journal
 from simscen.report.journaldata import Planned
 from simscen.report.rebuild import read_journal
 from simscen.report.sessions import last_failed
-from simscen.run.digest import digest
-from simscen.run.outfolder import DEFAULT
 from simscen.run.process.jobs import Job
-from simscen.run.repeat_command import repeat_command, shown
-from simscen.run.session import Options, seeds_of
+from simscen.run.reproducibility.digest import scenario_digest
+from simscen.run.sessions.output_folder import DEFAULT_FOLDER
+from simscen.run.sessions.results import repeat_command, shown
+from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> PendingRuns:
     none.
     """
     scenarios = {_asked(job): job.scenario for job in jobs}
-    digests = {asked: digest(scenario) for asked, scenario in scenarios.items()}
+    digests = {asked: scenario_digest(scenario) for asked, scenario in scenarios.items()}
     planned = [_planned(job, digests[_asked(job)]) for job in jobs]
     known = _verdicts(journal)
     answers = [known.get(run) for run in planned]
@@ -65,10 +65,10 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> PendingRuns:
     return PendingRuns(journal, left, kept, workers, tuple(dict.fromkeys(run.stack for run in planned if run.stack)))
 
 
-def _planned(job: Job, digest: str) -> Planned:
+def _planned(job: Job, scenario_digest: str) -> Planned:
     scenario = job.scenario
     again = repeat_command(scenario, job.key.seed)
-    return Planned(job.key, scenario.path, digest, again, shown(scenario.file), scenario.stack)
+    return Planned(job.key, scenario.path, scenario_digest, again, shown(scenario.file), scenario.stack)
 
 
 def _verdicts(journal: Journal) -> dict[Planned, RunFinished]:
@@ -99,14 +99,14 @@ EVERYTHING = "everything that is chosen runs"
 
 
 def failed_runs(
-    scenarios: Sequence[LoadedScenario], options: Options, out: Path | None
+    scenarios: Sequence[LoadedScenario], options: SessionOptions, out: Path | None
 ) -> tuple[frozenset[RunKey] | None, str]:
     """The runs of these scenarios that failed when they were run last, and what to tell.
 
     None where there is nothing to choose by: then, as with pytest, everything runs. Sessions are looked for beside the
     output folder `out`. A failed run keeps its seed, unless the options name seeds.
     """
-    home = DEFAULT if out is None else out.absolute().parent
+    home = DEFAULT_FOLDER if out is None else out.absolute().parent
     last = last_failed(home)
     if last is None:
         return None, f"there is no earlier session in {home}: {EVERYTHING}"
@@ -121,10 +121,10 @@ def failed_runs(
     return found, f"{_runs(last.runs)} failed last" + (f": {len(found)} {_is(len(found))} run, {where}" if left else "")
 
 
-def _run_key(key: RunKey, scenario: LoadedScenario | None, options: Options) -> bool:
+def _run_key(key: RunKey, scenario: LoadedScenario | None, options: SessionOptions) -> bool:
     if scenario is None:
         return False
-    return (options.seed is None and options.repeat == 1) or key.seed in seeds_of(scenario, options)
+    return (options.seed is None and options.repeat == 1) or key.seed in scenario_seeds(scenario, options)
 
 
 def _runs(runs: Collection[RunKey]) -> str:

@@ -24,9 +24,9 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.report.journal import Journal, require_free
 from simscen.report.rebuild import read_journal
-from simscen.run.outfolder import RUNS, make_folder
-from simscen.run.plugincode import packages_of
-from simscen.run.session import Options, plan, run_session, seeds_of
+from simscen.run.reproducibility.environment import plugin_packages
+from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
+from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session, scenario_seeds
 
 WARM_PROCESS = ("-m", "simscen.cli.session.warm_process")
 
@@ -49,7 +49,7 @@ class Asked:
 
     paths: Sequence[Path]
     wanted: Selection = field(default_factory=Selection)
-    options: Options = field(default_factory=Options)
+    options: SessionOptions = field(default_factory=SessionOptions)
     root: Path | None = None
     world_path: Sequence[Path] = ()
     lenient: bool = False
@@ -72,19 +72,19 @@ def session(asked: Asked, observer: Observer | None = None) -> Exit:
         observer.loaded(scenarios)
     if warnings:
         print_text(as_text(warnings), sys.stderr)
-    if options.against is not None and not (options.against / RUNS).is_dir():
+    if options.against is not None and not (options.against / RUNS_FOLDER).is_dir():
         raise UsageError(f"--check-against {options.against}: there are no runs in it")
     for scenario in scenarios:
-        seeds_of(scenario, options)
+        scenario_seeds(scenario, options)
     if asked.last_failed:
         options = replace(options, only=_last_failed(scenarios, asked))
     inputs = {file for each in scenarios for file in (*each.files.values(), *each.read)}
     require_writable(asked.junit, asked.out or asked.resume, inputs)
     folder, journal = output_folder(asked.out, asked.resume)
-    used = {"plugins": packages_of(plugins_of_all(scenarios)), "stacks": commands_of(scenarios)}
+    used = {"plugins": plugin_packages(plugins_of_all(scenarios)), "stacks": commands_of(scenarios)}
     reports = Reports(folder, asked.junit, asked.junit_family.value, used=used)
     reports.begin()
-    work = begin(journal, plan(scenarios, options, folder), options.workers)
+    work = begin(journal, plan_jobs(scenarios, options, folder), options.workers)
     with screen(asked.format_, asked.durations) as shown:
         listeners: list[Listener] = [*([observer] if observer else []), *([LivePage(reports)] if asked.open_ else [])]
         code = _run(work, options, reports, shown, listeners)
@@ -99,7 +99,9 @@ def _last_failed(scenarios: Sequence[LoadedScenario], asked: Asked) -> frozenset
     return only
 
 
-def _run(work: PendingRuns, options: Options, reports: Reports, shown: Screen, listeners: Sequence[Listener]) -> Exit:
+def _run(
+    work: PendingRuns, options: SessionOptions, reports: Reports, shown: Screen, listeners: Sequence[Listener]
+) -> Exit:
     """Do what is left to do, tell the journal, the screen, all who listen and the reports, and say how it went."""
     begun = time.monotonic()
 
@@ -146,7 +148,7 @@ def output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]
         read_journal(resume)
     elif out is not None:
         require_free(out)
-    folder = resume or make_folder(out)
+    folder = resume or create_output_folder(out)
     try:
         return folder, Journal(folder, goes_on=resume is not None)
     except OSError as error:

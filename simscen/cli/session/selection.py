@@ -18,11 +18,11 @@ from simscen.loading.scenario import try_variations
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.variations.problems import VariationProblems, merge_problems
-from simscen.run.robotproblems import problems_once_built
-from simscen.run.worldcache import WorldCache
+from simscen.run.caching.world_cache import WorldCache
+from simscen.run.preparation.loaders import world_from_file
+from simscen.run.robot_check.geometry import robot_problems
 from simscen.run.worldchecks.runner import check_in_world, world_reader_notes
 from simscen.run.worldchecks.world_file import check_built_world
-from simscen.run.worldsource import world_of
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class Checks:
             notes = list(source.map.notes) if source.map else []
             if self.fast:
                 return notes
-            world = world_of(source, self.root, self.world_path, self.lenient)
+            world = world_from_file(source, self.root, self.world_path, self.lenient)
             return [*notes, *check_built_world(world, source), *world_reader_notes(world, source, self.root)]
         except InvalidInput as error:
             return error.problems
@@ -157,7 +157,7 @@ class Checks:
         if self.fast:
             return []
         try:
-            return problems_once_built(load_robot_file(str(file), self.root, self.world_path))
+            return robot_problems(load_robot_file(str(file), self.root, self.world_path))
         except InvalidInput as error:
             return error.problems
 

@@ -16,7 +16,7 @@ from simscen.report.console import text_reporter
 from simscen.report.github import github_reporter
 from simscen.report.machine import json_reporter
 from simscen.report.plain import Reporter
-from simscen.run.outfolder import probe_writable
+from simscen.run.sessions.output_folder import probe_writable
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 PICTURES_URL = "SIMSCEN_PICTURES_URL"

@@ -16,22 +16,21 @@ from simscen.core.records.run import Run
 from simscen.record.replay import read_run
 from simscen.report.picture.compose import write_picture
 from simscen.report.picture.scene import Scene, with_robots
-from simscen.run.keptfiles import KeptFiles, cache_folder
-from simscen.run.keptworlds import KeptWorlds
-from simscen.run.logheader import log_header
-from simscen.run.perform import perform
-from simscen.run.preload import import_components, work_out_ahead
-from simscen.run.prepare import Prepared
-from simscen.run.prepared_cache import PreparedCache
-from simscen.run.process.confine import MEMORY_BYTES
-from simscen.run.process.jobs import Job, Replays
-from simscen.run.process.whereabouts import settle_in
-from simscen.run.process.worker import Progress
-from simscen.run.process.zygote import Zygote
-from simscen.run.scenery import scenery_of
+from simscen.run.caching.disk_cache import DiskCache, cache_folder
+from simscen.run.caching.scenario_cache import CachedWorldBuilder, ScenarioCache
+from simscen.run.log_header import log_header
+from simscen.run.preparation.scenario import PreparedScenario
+from simscen.run.preparation.scenery import world_scenery
+from simscen.run.preparation.warm_up import import_components, precompute
+from simscen.run.process.fork_server import ForkServer
+from simscen.run.process.isolation import MAX_MEMORY_BYTES
+from simscen.run.process.jobs import Job, ReplayMode
+from simscen.run.process.plugin_path import apply_plugin_path
+from simscen.run.process.worker import ProgressReporter
+from simscen.run.sessions.execute_run import execute_run
 from simscen.sim.clients import CLIENTS
 
-_PREPARED = PreparedCache(KeptWorlds(KeptFiles(cache_folder(os.environ))))
+_PREPARED = ScenarioCache(CachedWorldBuilder(DiskCache(cache_folder(os.environ))))
 Image.preinit()  # imports what it would import when the first picture is written
 
 
@@ -39,8 +38,8 @@ def main() -> None:
     """Serve the supervisor until it closes its end."""
     *told, replies = sys.argv[1:]
     for whereabouts in told:
-        settle_in(whereabouts)
-    Zygote(0, int(replies), _warm_up, _perform).serve()
+        apply_plugin_path(whereabouts)
+    ForkServer(0, int(replies), _warm_up, _perform).serve()
 
 
 def _warm_up(job: Job) -> None:
@@ -48,11 +47,11 @@ def _warm_up(job: Job) -> None:
 
     Before what is kept takes more than half of the memory there is, it is let go.
     """
-    if _memory() > MEMORY_BYTES / 2:
+    if _memory() > MAX_MEMORY_BYTES / 2:
         _PREPARED.clear()
     prepared = _PREPARED.prepared(job.scenario)
     import_components(prepared)
-    work_out_ahead(prepared)
+    precompute(prepared)
     log_header(prepared, job.key.seed)
     CLIENTS.make_ahead()
 
@@ -64,12 +63,12 @@ def _memory() -> int:
 
 def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
     prepared = _PREPARED.prepared(job.scenario)
-    progress = Progress(prepared.spec.physics.tick_rate, tell)
-    return perform(prepared, job.key.seed, job.folder, (progress,), partial(_finish, replay=job.replay))
+    progress = ProgressReporter(prepared.spec.physics.tick_rate, tell)
+    return execute_run(prepared, job.key.seed, job.folder, (progress,), partial(_finish, replay=job.replay))
 
 
-def _finish(prepared: Prepared, run: Run, folder: Path, replay: Replays) -> None:
-    scene = Scene(run.trace, run.case, prepared.built.map, run.result, scenery_of(prepared))
+def _finish(prepared: PreparedScenario, run: Run, folder: Path, replay: ReplayMode) -> None:
+    scene = Scene(run.trace, run.case, prepared.built.map, run.result, world_scenery(prepared))
     robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
     write_picture(with_robots(scene, robots), folder / "map.png")
     if replay.wants(run.result.outcome) and run.log is not None:

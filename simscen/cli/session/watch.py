@@ -20,7 +20,7 @@ from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, Usage
 from simscen.core.records.session_events import RunFinished, SessionEvent
 from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.filesof import files_of
+from simscen.run.reproducibility.digest import scenario_files
 
 Stamps = dict[Path, tuple[int, int, int] | None]
 
@@ -50,7 +50,7 @@ class Report:
         made_of: dict[str, set[Path]] = {}
         for scenario in scenarios:
             self._files[scenario.id] = str(scenario.file)
-            made_of.setdefault(str(scenario.file), set()).update(files_of(scenario))
+            made_of.setdefault(str(scenario.file), set()).update(scenario_files(scenario))
         for file, others in made_of.items():
             self._write({"scenario": file, "files": sorted(map(str, others))})
 

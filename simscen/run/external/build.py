@@ -1,21 +1,27 @@
 """From a prepared scenario to its external stack, ready to `start`."""
 
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput
+from simscen.core.external_command import ExternalCommand
 from simscen.loading.stacks.userconfig import undefined_stack
 from simscen.model.anystack import ExternalStackSpec
-from simscen.run.external.hello import Ordered
+from simscen.model.stack import StackSpec
+from simscen.model.stackbase import GoalTolerances, StackBase
+from simscen.run.external.handshake import RunParameters
 from simscen.run.external.stack import ExternalStack
-from simscen.run.prepare import Prepared
-from simscen.run.sensornames import sensor_frames, sensor_kinds
+from simscen.run.preparation.scenario import PreparedScenario
+from simscen.run.process.isolation import clean_environment
+from simscen.run.robot_interface import sensor_frames, sensor_kinds
 from simscen.sim.urdf.describe import describe
 from simscen.stack.protocols import Surroundings
 
 
-def build_external(
-    prepared: Prepared, spec: ExternalStackSpec, surroundings: Surroundings, seed: int, printed: Path | None
+def build_external_stack(
+    prepared: PreparedScenario, spec: ExternalStackSpec, surroundings: Surroundings, seed: int, printed: Path | None
 ) -> ExternalStack:
     """The stack that a scenario names; what it prints goes to the file `printed`, as `for_robot` calls it.
 
@@ -24,7 +30,7 @@ def build_external(
     command = prepared.loaded.runs
     if command is None:
         raise InvalidInput([problem] if (problem := undefined_stack(prepared.loaded)) else [])
-    ordered = Ordered(
+    ordered = RunParameters(
         seed=seed,
         control_period=Clock(surroundings.tick_rate).period(spec.controller_frequency),
         sensors=sensor_kinds(prepared),
@@ -35,10 +41,30 @@ def build_external(
         mode=prepared.spec.navigation.mode,
         robot_name=prepared.loaded.robot_name,
     )
-    shown = printed and for_robot(printed, ordered.robot_name)
+    shown = printed and robot_file(printed, ordered.robot_name)
     return ExternalStack(spec.external, command, surroundings, ordered, shown)
 
 
-def for_robot(file: Path, robot: str) -> Path:
+def robot_file(file: Path, robot: str) -> Path:
     """What the file of a stack is called for that one of several robots: `stack.a.log`."""
     return file.with_stem(f"{file.stem}.{robot}") if robot else file
+
+
+# MERGED: The same scenario with simscen's own stack as a process of its own.
+def with_external_reference(prepared: PreparedScenario) -> PreparedScenario:
+    """A prepared scenario whose stack, simscen's own, runs behind the stack protocol; of several robots, each one's."""
+    if prepared.robots:
+        parts = {name: with_external_reference(part) for name, part in prepared.robots.items()}
+        loaded = replace(prepared.loaded, robots={name: part.loaded for name, part in parts.items()})
+        return replace(next(iter(parts.values())), loaded=loaded, robots=parts)
+    stack = prepared.stack
+    assert isinstance(stack, StackSpec)
+    written = stack.model_dump_json(by_alias=True, exclude_none=True)
+    argv = (sys.executable, "-I", "-m", "simscen.run.external.reference_stack", written)
+    tolerances = {name: getattr(stack.goal_checker, name) for name in GoalTolerances.model_fields}
+    shared = {name: getattr(stack, name) for name in StackBase.model_fields if name != "goal_checker"}
+    external = ExternalStackSpec(
+        external="reference", ground_truth=stack.told_truth, goal_checker=GoalTolerances(**tolerances), **shared
+    )
+    runs = ExternalCommand(argv, clean_environment(), str(Path.cwd()))
+    return replace(prepared, stack=external, loaded=replace(prepared.loaded, runs=runs))

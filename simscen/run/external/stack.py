@@ -16,18 +16,16 @@ from simscen.core.records.trace import Decision
 from simscen.peer import wire
 from simscen.record import topics
 from simscen.record.simtime import SimTime
-from simscen.run.external import errors
-from simscen.run.external.errors import NotAllowed
-from simscen.run.external.feed import Feed
-from simscen.run.external.goals import ToldGoals
-from simscen.run.external.hello import Ordered, goal_data, hello, task
-from simscen.run.external.process import StackProcess
-from simscen.run.external.topics import KEEPOUT_MASK, SPEED_MASK, Offer
-from simscen.run.external.understand import Answer, by_topic, understood
-from simscen.run.external.welcome import Welcome
+from simscen.run.external import protocol
+from simscen.run.external.answer_decoder import Answer, decode_answer, group_by_topic
+from simscen.run.external.goal_tracker import GoalTracker
+from simscen.run.external.handshake import RunParameters, Welcome, goal_content, goal_data, hello_content
+from simscen.run.external.protocol import KEEPOUT_MASK, SPEED_MASK, ProtocolViolation, TopicTable
+from simscen.run.external.publisher import StepPublisher
+from simscen.run.external.stack_process import StackProcess
 from simscen.stack.protocols import Surroundings
 
-GRACE = 2.0
+END_GRACE_S = 2.0
 """Seconds of wall time that a stack may take to end by itself after the last step."""
 T = TypeVar("T")
 _GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
@@ -39,7 +37,7 @@ class ExternalStack:
     With several robots each has a stack of its own: all begin before the first is waited for, all are told the end
     before any is waited for, and all are released before the first is closed.
 
-    Raises RunError of a kind in simscen.run.external.errors from whatever needs the process.
+    Raises RunError of a kind in simscen.run.external.protocol from whatever needs the process.
     """
 
     def __init__(
@@ -47,16 +45,16 @@ class ExternalStack:
         name: str,
         command: ExternalCommand,
         surroundings: Surroundings,
-        ordered: Ordered,
+        ordered: RunParameters,
         printed: FilePath | None = None,
     ) -> None:
         self._name, self._command, self._printed = name, command, printed
         self._surroundings, self._ordered = surroundings, ordered
         self._time = SimTime(surroundings.tick_rate)
-        self._goals = ToldGoals(ordered.stop_on_failure, surroundings.tick_rate, ordered.mode)
-        self._feed = Feed(surroundings.tick_rate, ordered.sensors, ordered.mounts)
+        self._goals = GoalTracker(ordered.stop_on_failure, surroundings.tick_rate, ordered.mode)
+        self._feed = StepPublisher(surroundings.tick_rate, ordered.sensors, ordered.mounts)
         self._process: StackProcess | None = None
-        self._offer = Offer.of(())
+        self._offer = TopicTable.of(())
         self._welcome = Welcome()
         self._plan: Path | None = None
         self._held = Decision(STOP)
@@ -75,7 +73,7 @@ class ExternalStack:
         feed.latch_robot(self._ordered.robot_description, estimate)
         self._offer = offer = feed.offer()
         self._process = StackProcess(self._name, self._command, self._printed, self._ordered.robot_name)
-        told = hello(surroundings, self._ordered, offer, feed.named, self._command.answer_limit)
+        told = hello_content(surroundings, self._ordered, offer, feed.named, self._command.answer_limit)
         self._process.send(wire.json_frame(wire.HELLO, told))
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
@@ -90,7 +88,7 @@ class ExternalStack:
                 "the answer to HELLO", lambda: Welcome.of(kind, body, offer, self._ordered.mode)
             )
             self._feed.want(offer, self._welcome.topics)
-            self._process.send(wire.json_frame(wire.GOAL, task(estimate, goals, self._ordered)))
+            self._process.send(wire.json_frame(wire.GOAL, goal_content(estimate, goals, self._ordered)))
         except RunError:
             self.close()
             raise
@@ -147,7 +145,7 @@ class ExternalStack:
     def finish(self) -> None:
         """Let it end by itself, which it was told to."""
         if self._process is not None:
-            farewell = self._process.farewell(GRACE)
+            farewell = self._process.farewell(END_GRACE_S)
             self._welcome = self._welcome.with_farewell(farewell)
 
     def release(self) -> None:
@@ -176,15 +174,17 @@ class ExternalStack:
 
     def _understood(self, kind: int, body: bytes, tick: int, due: bool) -> Answer:
         if kind != wire.ANSWER:
-            raise NotAllowed(f"a frame {_name(kind)} instead of an ANSWER")
+            raise ProtocolViolation(f"a frame {_name(kind)} instead of an ANSWER")
         answered, said = wire.from_answer(body)
         if answered != tick:
-            raise NotAllowed(f"it answers tick {answered} instead of {tick}")
+            raise ProtocolViolation(f"it answers tick {answered} instead of {tick}")
         dead_reckoned = None if self._odometry is None else self._odometry.pose
-        answer = understood(by_topic(said, self._offer.answers), tick, self._time, self._correction, dead_reckoned)
+        answer = decode_answer(
+            group_by_topic(said, self._offer.answers), tick, self._time, self._correction, dead_reckoned
+        )
         self._correction = answer.correction
         if due and answer.command is None:
-            raise NotAllowed(f"no message on {topics.COMMAND.name}, though a command is due")
+            raise ProtocolViolation(f"no message on {topics.COMMAND.name}, though a command is due")
         for event in answer.events:
             self._goals.hear(tick, event)
         return answer
@@ -216,8 +216,8 @@ class ExternalStack:
         assert self._process is not None
         try:
             return take()
-        except (NotAllowed, wire.Malformed) as error:
-            raise self._process.error(errors.PROTOCOL, f"{what}: {error}") from error
+        except (ProtocolViolation, wire.Malformed) as error:
+            raise self._process.error(protocol.PROTOCOL, f"{what}: {error}") from error
 
 
 def _name(kind: int) -> str:

@@ -15,7 +15,7 @@ from simscen.loading.loaded import LoadedScenario
 _LENGTH = struct.Struct("<I")
 
 
-class Replays(str, Enum):
+class ReplayMode(str, Enum):
     """Which runs get a page that plays them."""
 
     NONE = "none"
@@ -24,7 +24,7 @@ class Replays(str, Enum):
 
     def wants(self, outcome: Outcome) -> bool:
         """Whether a run that came out so gets one."""
-        return self is Replays.ALL or (self is Replays.FAILED and not outcome.good)
+        return self is ReplayMode.ALL or (self is ReplayMode.FAILED and not outcome.good)
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Job:
     key: RunKey
     folder: Path
     wall_limit: float
-    replay: Replays = Replays.NONE
+    replay: ReplayMode = ReplayMode.NONE
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class ProcessEnd:
 
 
 @dataclass(frozen=True)
-class PreparerDeath:
+class ForkServerDeath:
     """The warm process died under a job, or was killed because it no longer answered.
 
     `how` says so in words; `at_fault` = it was preparing this very job; `printed` is the end of what it printed.
@@ -71,7 +71,7 @@ class PreparerDeath:
     printed: str
 
 
-def packed(job: Job) -> bytes:
+def pack_job(job: Job) -> bytes:
     """One job as bytes; the other side is our own process, so pickle is safe."""
     data = pickle.dumps(job)
     return _LENGTH.pack(len(data)) + data
@@ -98,6 +98,6 @@ def _exactly(pipe: int, size: int) -> bytes:
     return bytes(data)
 
 
-def line(message: dict[str, Any]) -> bytes:
+def json_line(message: dict[str, Any]) -> bytes:
     """A message as one line of JSON."""
     return json.dumps(message, separators=(",", ":")).encode() + b"\n"

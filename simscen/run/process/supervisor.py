@@ -11,10 +11,10 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from simscen.run.process.jobs import Job, PreparerDeath, ProcessEnd, packed
-from simscen.run.process.warmprocess import Death, Silent, WarmProcess
+from simscen.run.process.fork_server_process import ForkServerProcess, ProcessDeath, Unresponsive
+from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd, pack_job
 
-SILENCE = 30.0
+MAX_SILENCE_S = 30.0
 """Seconds without a sign of life after which the warm process is taken for dead; it gives one each second."""
 
 
@@ -26,7 +26,7 @@ class Started:
 
 
 @dataclass(frozen=True)
-class Advanced:
+class Progressed:
     """A job has got so far, in simulated seconds."""
 
     job: Job
@@ -38,7 +38,7 @@ class Ended:
     """A job's process has ended, or the warm process under it."""
 
     job: Job
-    end: ProcessEnd | PreparerDeath
+    end: ProcessEnd | ForkServerDeath
 
 
 class Interrupted(BaseException):
@@ -49,12 +49,12 @@ class Interrupted(BaseException):
         super().__init__(signal.Signals(number).name)
 
 
-Happening = Started | Advanced | Ended
+JobUpdate = Started | Progressed | Ended
 
 
 def supervise(
     jobs: Iterable[Job], workers: int, entry: Sequence[str], go_on: Callable[[], bool]
-) -> Iterator[Happening]:
+) -> Iterator[JobUpdate]:
     """Run all jobs, `workers` at a time, yielding what happens as it happens.
 
     `entry` is how Python is called to be the warm process, e.g. `-m module`. `go_on` is asked before each new job.
@@ -84,26 +84,26 @@ class Supervisor:
         """One more job, behind the others; of `happenings` that have come to an end nothing more is heard."""
         self._waiting.append(job)
 
-    def happenings(self) -> Generator[Happening, None, None]:
+    def happenings(self) -> Generator[JobUpdate, None, None]:
         """What happens, until there is nothing left to do; where its consumer closes it, everything is killed."""
         while (self._waiting or self._suspects) and self._go_on():
             self._alive = False
-            warm = WarmProcess(self._entry)
+            warm = ForkServerProcess(self._entry)
             try:
                 yield from self._converse(warm)
             except EOFError:
                 yield from self._after_death(warm.autopsy(), silent=False)
-            except Silent:
+            except Unresponsive:
                 warm.abort()
                 yield from self._after_death(warm.autopsy(), silent=True)
             finally:
                 warm.leave()
 
-    def _converse(self, warm: WarmProcess) -> Iterator[Happening]:
+    def _converse(self, warm: ForkServerProcess) -> Iterator[JobUpdate]:
         while True:
             while self._go_on() and (job := self._next()):
                 self._running[job.number] = job
-                warm.send(packed(job))
+                warm.send(pack_job(job))
             if not self._running:
                 return
             happening = self._understood(warm.hear(self._patience()))
@@ -121,9 +121,9 @@ class Supervisor:
 
     def _patience(self) -> float:
         """Preparing has the wall limit of the job, and nothing else is heard meanwhile."""
-        return SILENCE + (self._preparing.wall_limit if self._preparing else 0.0)
+        return MAX_SILENCE_S + (self._preparing.wall_limit if self._preparing else 0.0)
 
-    def _understood(self, text: bytes) -> Happening | None:
+    def _understood(self, text: bytes) -> JobUpdate | None:
         message: dict[str, Any] = json.loads(text)
         match message:
             case {"started": number}:
@@ -134,7 +134,7 @@ class Supervisor:
             case {"prepared": _}:
                 self._preparing = None
             case {"job": number, "seconds": seconds}:
-                return Advanced(self._running[number], seconds)
+                return Progressed(self._running[number], seconds)
             case {"exit": number}:
                 del message["exit"]
                 return Ended(self._running.pop(number), ProcessEnd(number=number, **message))
@@ -142,7 +142,7 @@ class Supervisor:
                 self._alive = True
         return None
 
-    def _after_death(self, death: Death, silent: bool) -> Iterator[Happening]:
+    def _after_death(self, death: ProcessDeath, silent: bool) -> Iterator[JobUpdate]:
         """Answer the jobs that are to blame; the others run again."""
         under_way, prepared = list(self._running.values()), self._preparing
         self._running.clear()
@@ -156,9 +156,44 @@ class Supervisor:
             self._waiting.clear()
         for job in under_way:
             if job is culprit or job.number in self._tried or not self._alive:
-                yield Ended(job, PreparerDeath(how, job is prepared, silent and job is culprit, death.printed))
+                yield Ended(job, ForkServerDeath(how, job is prepared, silent and job is culprit, death.printed))
             elif culprit is not None:
                 self._waiting.appendleft(job)
             else:
                 self._tried.add(job.number)
                 self._suspects.append(job)
+
+
+# MERGED: A warm process that waits for jobs which come one by one, for a caller who has other things to do in between.
+class OnDemandRunner:
+    """Runs jobs as a session does, each in a process of its own; what was imported and built stays for the next.
+
+    `entry` is how Python is called to be the warm process. A context, which ends that process.
+    """
+
+    def __init__(self, entry: Sequence[str]) -> None:
+        self._supervisor = Supervisor((), 1, entry, lambda: True)
+        self._happenings: Generator[JobUpdate, None, None] | None = None
+
+    def __enter__(self) -> "OnDemandRunner":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def run(self, job: Job) -> ProcessEnd | ForkServerDeath:
+        """Run it; how its process ended. Whatever is raised meanwhile (Ctrl-C) ends the warm process, too."""
+        self._supervisor.add(job)
+        if self._happenings is None:
+            self._happenings = self._supervisor.happenings()
+        try:
+            return next(one.end for one in self._happenings if isinstance(one, Ended) and one.job is job)
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """End the warm process, if there is one."""
+        if self._happenings is not None:
+            self._happenings.close()
+            self._happenings = None

@@ -13,28 +13,33 @@ from typing import Any, NamedTuple, NoReturn
 
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.records.trace import Moment
-from simscen.run.process.confine import die_with_parent, limit_resources, offer_to_the_oom_killer
-from simscen.run.process.jobs import Job, line
-from simscen.run.process.orphans import adopt_orphans, has_descendants
+from simscen.run.process.isolation import (
+    adopt_orphans,
+    die_with_parent,
+    has_descendants,
+    limit_resources,
+    prefer_for_oom_kill,
+)
+from simscen.run.process.jobs import Job, json_line
 
-PROGRESS_EVERY = 5.0
+PROGRESS_INTERVAL_S = 5.0
 """Simulated seconds between two signs of life."""
 
-Perform = Callable[[Job, Callable[[float], None]], dict[str, Any]]
+ExecuteJob = Callable[[Job, Callable[[float], None]], dict[str, Any]]
 """Runs a job; is handed what to tell simulated seconds to; returns the end record."""
 
 
 _OUT_OF_MEMORY = {"error": "out-of-memory", "message": "the run used more memory than it may"}
 
 
-class Pipes(NamedTuple):
+class WorkerPipes(NamedTuple):
     """Where a worker tells how it goes, and where it prints; descriptors."""
 
     report: int
     printed: int
 
 
-def be_worker(job: Job, parent: int, pipes: Pipes, perform: Perform) -> NoReturn:
+def run_worker(job: Job, parent: int, pipes: WorkerPipes, perform: ExecuteJob) -> NoReturn:
     """Run the job, tell how it ended, and leave without looking back, whatever happens.
 
     `os._exit` because nanobind and Bullet have nothing to say at the end that a user should read, and because nothing
@@ -44,7 +49,7 @@ def be_worker(job: Job, parent: int, pipes: Pipes, perform: Perform) -> NoReturn
     try:
         _settle(parent, pipes.printed)
         end = _end_record(job, pipes.report, perform)
-        os.write(pipes.report, line({"end": end, "left_processes": has_descendants()}))
+        os.write(pipes.report, json_line({"end": end, "left_processes": has_descendants()}))
         code = 0
         sys.stdout.flush()
         sys.stderr.flush()
@@ -64,11 +69,11 @@ def _settle(parent: int, printed: int) -> None:
     _redirect_output(printed)
     faulthandler.enable()
     faulthandler.register(signal.SIGUSR1)
-    offer_to_the_oom_killer()
+    prefer_for_oom_kill()
     limit_resources()
 
 
-def _end_record(job: Job, report: int, perform: Perform) -> dict[str, Any]:
+def _end_record(job: Job, report: int, perform: ExecuteJob) -> dict[str, Any]:
     try:
         job.folder.mkdir(parents=True, exist_ok=True)
         return perform(job, lambda seconds: _tell(report, seconds))
@@ -110,7 +115,7 @@ def _redirect_output(printed: int) -> None:
     os.close(printed)
 
 
-class Progress:
+class ProgressReporter:
     """A log that only tells how far the run is."""
 
     def __init__(self, tick_rate: int, tell: Callable[[float], None]) -> None:
@@ -121,5 +126,5 @@ class Progress:
         """Tell now and then."""
         seconds = moment.tick / self._rate
         if seconds >= self._next:
-            self._next = seconds + PROGRESS_EVERY
+            self._next = seconds + PROGRESS_INTERVAL_S
             self._tell(seconds)

@@ -14,7 +14,7 @@ from simscen.criteria.keepout import Keepout
 from simscen.criteria.speed import Speed
 from simscen.loading.checks.registry import Finding, Keys
 from simscen.loading.schema.messages import quoted
-from simscen.run.masks import KEEPOUT, SPEED, load_judged_masks, load_masks
+from simscen.run.preparation.filter_masks import KEEPOUT_KEYS, SPEED_KEYS, load_criterion_masks, load_masks
 from simscen.run.worldchecks.expected_failures import expects_start_failure
 from simscen.run.worldchecks.scene import WORLD, Scene
 
@@ -35,7 +35,7 @@ def stack_masks(scene: Scene) -> FilterMasks:
 
 def judged_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
     """Return the masks of criteria, by file. Raises InvalidInput for a mask that cannot be read."""
-    return load_judged_masks(scene.loaded.judged_masks, scene.loaded.tree, scene.loaded.sourced)
+    return load_criterion_masks(scene.loaded.judged_masks, scene.loaded.tree, scene.loaded.sourced)
 
 
 @WORLD.check("SC302")
@@ -48,7 +48,7 @@ def check_stack_zones(scene: Scene) -> Iterator[Finding]:
     ]
     keepout = scene.once(stack_masks).keepout
     if keepout is not None:
-        zones.append((KEEPOUT, "in a cell that the keepout mask forbids", forbidden_test(keepout)))
+        zones.append((KEEPOUT_KEYS, "in a cell that the keepout mask forbids", forbidden_test(keepout)))
     for keys, where, forbids in zones:
         hint = "move one of them, or expect the failure with `result: {status: FAILED, error_code: %s}`"
         for name in [goal.name for _, goal in scene.targets if forbids(goal.pose, CELL_M)]:
@@ -79,9 +79,9 @@ def masks_without_effect(scene: Scene) -> Iterator[Finding]:
     """Find masks of the stack that forbid or limit nothing."""
     masks = scene.once(stack_masks)
     if masks.keepout is not None and not (masks.keepout.cells == OCCUPIED).any():
-        yield Finding(KEEPOUT, "the keepout mask forbids nothing: none of its cells is occupied")
+        yield Finding(KEEPOUT_KEYS, "the keepout mask forbids nothing: none of its cells is occupied")
     if masks.speed is not None and not masks.speed.limiting:
-        yield Finding(SPEED, f"the speed mask has no effect: {NO_LIMIT}")
+        yield Finding(SPEED_KEYS, f"the speed mask has no effect: {NO_LIMIT}")
 
 
 @WORLD.check("SC311", severity="warning")
@@ -92,7 +92,7 @@ def shades_in_keepout_mask(scene: Scene) -> Iterator[Finding]:
         count = np.count_nonzero((keepout.cells > FREE) & (keepout.cells < OCCUPIED))
         if count:
             message = f"{count} cells of the keepout mask are neither free nor occupied: they forbid nothing"
-            yield Finding(KEEPOUT, message)
+            yield Finding(KEEPOUT_KEYS, message)
 
 
 @WORLD.check("SC055", severity="warning")

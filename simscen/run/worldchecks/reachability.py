@@ -60,7 +60,7 @@ def check_reachability(scene: Scene) -> Iterator[Finding]:
 
 def _ramp_hint(scene: Scene) -> str:
     """Return when a goal may be reachable after all: a solid that is not upright may be a ramp."""
-    from simscen.run.worldsource import load_robot
+    from simscen.run.preparation.loaders import load_robot
     from simscen.sim.climb import climb_of
 
     slope = math.degrees(climb_of(load_robot(scene.loaded)[1]).slope)

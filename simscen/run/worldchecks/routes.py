@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Solid
-from simscen.run.worldcache import around
+from simscen.run.caching.world_cache import bounds_with
 from simscen.run.worldchecks.scene import Scene
 from simscen.worlds.plainways import PlainWays, plain_ways
 
@@ -61,7 +61,7 @@ class RobotRoutes:
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
         """Bounds of the world and of all stops, with room to drive around them."""
-        return around(self.scene.world.bounds, list(self.stops))
+        return bounds_with(self.scene.world.bounds, list(self.stops))
 
     @cached_property
     def _fixed(self) -> PlainWays | None:

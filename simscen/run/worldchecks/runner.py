@@ -12,13 +12,12 @@ from simscen.core.errors import Problem, UsageError
 from simscen.core.files import require_regular_file
 from simscen.loading.checks.runner import check_scenario
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
-from simscen.run.robotsize import robot_size_of
-from simscen.run.robotways import as_met
-from simscen.run.worldcache import WorldCache
+from simscen.run.caching.world_cache import WorldCache
+from simscen.run.preparation.loaders import load_robot
+from simscen.run.preparation.robot_size import blocking_world, robot_size
 from simscen.run.worldchecks import masks, placement, reachability, regions, timing
 from simscen.run.worldchecks.scene import TIMING, WORLD, Scene
 from simscen.run.worldchecks.world_file import check_built_world
-from simscen.run.worldsource import load_robot
 from simscen.worlds.mapsize import too_large
 from simscen.worlds.overlap import placed
 
@@ -41,7 +40,7 @@ def check_in_world(
     problems = list(dict.fromkeys(found))  # the robots share most problems
     if not _has_errors(problems):
         world, views = cache.world(loaded), [_with_robot_spec(view) for view in loaded.robots.values()]
-        problems += placement.check_robots_apart([Scene(view, world, robot_size_of(view), cache) for view in views])
+        problems += placement.check_robots_apart([Scene(view, world, robot_size(view), cache) for view in views])
     return problems
 
 
@@ -49,12 +48,12 @@ def _check_robot(loaded: LoadedScenario, cache: WorldCache, pictures: Path | Non
     """Return the problems of a scenario of one robot, or as one of several robots sees it."""
     world = cache.world(loaded)
     loaded = _with_robot_spec(loaded)
-    blocking = as_met(loaded, world)
+    blocking = blocking_world(loaded, world)
     problems = [*_check_names_again(loaded, world), *_too_large(loaded, world)]
     problems += [loaded.sourced(problem) for problem in check_built_world(blocking, loaded.world)]
     problems += _robot_file_mismatches(loaded)
     if not _has_errors(problems):
-        problems += _check_scene(Scene(loaded, blocking, robot_size_of(loaded), cache), pictures)
+        problems += _check_scene(Scene(loaded, blocking, robot_size(loaded), cache), pictures)
     return [*problems, *world_reader_notes(world, loaded.world, loaded.root)]
 
 
@@ -116,9 +115,9 @@ def _robot_file_mismatches(loaded: LoadedScenario) -> Iterator[Problem]:
     """Find contradictions between a robot file and its URDF."""
     if loaded.robot.urdf is None:
         return
-    from simscen.run.robotgeometry import otherwise
+    from simscen.run.robot_check.geometry import dimension_warnings
 
-    yield from map(loaded.sourced, otherwise(loaded.robot, load_robot(loaded)[1]))
+    yield from map(loaded.sourced, dimension_warnings(loaded.robot, load_robot(loaded)[1]))
 
 
 def _with_robot_spec(loaded: LoadedScenario) -> LoadedScenario:

@@ -17,11 +17,11 @@ from simscen.core.messages.navigation import Goal
 from simscen.loading.checks.registry import Keys, Stage
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import MappingNode
-from simscen.run.goals import goals_of, sent_goals
-from simscen.run.robotsize import RobotSize
-from simscen.run.worldcache import WorldCache
+from simscen.run.caching.world_cache import WorldCache
+from simscen.run.preparation.goals import event_goals, scenario_goals
+from simscen.run.preparation.loaders import load_map
+from simscen.run.preparation.robot_size import RobotSize
 from simscen.run.worldchecks.expected_failures import expects_failure
-from simscen.run.worldsource import load_map
 from simscen.worlds.contain import first_blocking
 from simscen.worlds.overlap import first_overlapping
 from simscen.worlds.upright import upright
@@ -149,9 +149,9 @@ class Scene:
     def targets(self) -> list[tuple[Keys, Goal]]:
         """The goals that the robot is expected to reach, also those sent by events, with the keys of their poses."""
         spec = self.loaded.spec
-        first = goals_of(spec)[: len(spec.goals)]  # further loops lead to the same poses
+        first = scenario_goals(spec)[: len(spec.goals)]  # further loops lead to the same poses
         own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first)}
-        every = {**own, **sent_goals(spec, self.loaded.concerns)}
+        every = {**own, **event_goals(spec, self.loaded.concerns)}
         return [((*keys, "pose"), goal) for keys, goal in every.items() if not expects_failure(spec, goal.name)]
 
     @cached_property

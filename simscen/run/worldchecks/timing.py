@@ -10,7 +10,7 @@ from simscen.core.messages.navigation import Goal
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.checks.registry import Finding
 from simscen.model.robot import RobotSpec
-from simscen.run.goals import goals_of
+from simscen.run.preparation.goals import scenario_goals
 from simscen.run.worldchecks.expected_failures import expects_failure
 from simscen.run.worldchecks.regions import robot_routes
 from simscen.run.worldchecks.scene import TIMING, Scene
@@ -58,7 +58,7 @@ class Drive:
 @TIMING.check("SC303")
 def impossible_time_bounds(scene: Scene) -> Iterator[Finding]:
     """Find timeouts, time limits and bounds of criteria that no drive can meet."""
-    goals, robot = goals_of(scene.loaded.spec), scene.loaded.robot.spec
+    goals, robot = scenario_goals(scene.loaded.spec), scene.loaded.robot.spec
     failing = any(expects_failure(scene.loaded.spec, goal.name) for goal in goals)
     if not goals or robot is None or failing or scene.does(*SHORTCUT_ACTIONS):
         return

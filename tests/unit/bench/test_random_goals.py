@@ -16,7 +16,7 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Body, Box, Solid
 from simscen.loading.files.worldfile import load_world_file
 from simscen.loading.scenario import load_scenario
-from simscen.run.worldsource import world_of
+from simscen.run.preparation.loaders import world_from_file
 from simscen.worlds.build import build
 
 
@@ -56,7 +56,7 @@ def test_a_building_is_a_map_with_one_large_free_part_that_loads(tmp_path: Path)
         assert largest * resolution**2 > 100.0
         assert largest > 0.6 * np.count_nonzero(mapped == FREE)
     file = write_building(1, tmp_path)
-    world = world_of(load_world_file(file, tmp_path), tmp_path)
+    world = world_from_file(load_world_file(file, tmp_path), tmp_path)
     assert world.grid is not None
     assert world.grid.resolution == building(1)[1]
     assert np.array_equal(world.grid.cells == 0, np.flipud(building(1)[0] == FREE)[::-1])
@@ -64,7 +64,7 @@ def test_a_building_is_a_map_with_one_large_free_part_that_loads(tmp_path: Path)
 
 def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
     file = write_building(3, tmp_path)
-    built = {file.name: build(world_of(load_world_file(file, tmp_path), tmp_path), 0.2)}
+    built = {file.name: build(world_from_file(load_world_file(file, tmp_path), tmp_path), 0.2)}
     plain = random_goals("random goals", tmp_path, built, (1, 2))
     weak, medium, strong = degraded(tmp_path / "degraded", built, 1, (tmp_path,))
     assert len(plain.drives) == 2

@@ -6,26 +6,26 @@ from pathlib import Path
 
 import pytest
 
+from simscen.bench.speed.measurement import Measurement
 from simscen.cli.benchmarks.results import FORMAT, Result, as_json, comparison_text, judgement, read_result
 from simscen.core.errors import UsageError
-from simscen.run.figure import Figure
 
 BEFORE = Result(
     {
-        "patrol": Figure.of((36.0, 40.0, 35.0), "ms a simulated second"),
-        "log": Figure.of((3.0, 3.2), "ms a simulated second"),
-        "suite: runs a minute": Figure(50.0, "", (), more_is_better=True),
-        "scan": Figure(0.0, "ms"),
+        "patrol": Measurement.of((36.0, 40.0, 35.0), "ms a simulated second"),
+        "log": Measurement.of((3.0, 3.2), "ms a simulated second"),
+        "suite: runs a minute": Measurement(50.0, "", (), more_is_better=True),
+        "scan": Measurement(0.0, "ms"),
     },
     "x86_64, 2 cores, avx",
     "0.1.0",
 )
 AFTER = Result(
     {
-        "patrol": Figure.of((18.0, 17.0, 20.0), "ms a simulated second"),
-        "log": Figure.of((3.1, 3.3), "ms a simulated second"),
-        "suite: runs a minute": Figure(100.0, "", (), more_is_better=True),
-        "step": Figure(14.0, "µs"),
+        "patrol": Measurement.of((18.0, 17.0, 20.0), "ms a simulated second"),
+        "log": Measurement.of((3.1, 3.3), "ms a simulated second"),
+        "suite: runs a minute": Measurement(100.0, "", (), more_is_better=True),
+        "step": Measurement(14.0, "µs"),
     },
     "x86_64, 2 cores, avx",
     "0.1.0",
@@ -52,9 +52,12 @@ def test_another_machine_and_another_version_are_told() -> None:
 
 
 def test_more_of_what_is_better_is_better_and_fewer_than_two_rounds_say_nothing() -> None:
-    few, many = Figure.of((10.0, 11.0), "", more_is_better=True), Figure.of((20.0, 21.0), "", more_is_better=True)
+    few, many = (
+        Measurement.of((10.0, 11.0), "", more_is_better=True),
+        Measurement.of((20.0, 21.0), "", more_is_better=True),
+    )
     assert (judgement(few, many), judgement(many, few)) == ("better", "worse")
-    assert judgement(few, Figure.of((20.0,), "")) == ""
+    assert judgement(few, Measurement.of((20.0,), "")) == ""
 
 
 def test_a_figure_that_was_nothing_has_no_ratio() -> None:
@@ -103,4 +106,4 @@ def test_a_file_that_cannot_be_read_is_told_in_words(tmp_path: Path, there: bool
 
 def test_results_of_different_commands_have_nothing_to_compare() -> None:
     with pytest.raises(UsageError, match="no figure in common: compare results of the same command"):
-        comparison_text(BEFORE, replace(AFTER, figures={"2 robots": Figure(80.0, "ms a simulated second")}))
+        comparison_text(BEFORE, replace(AFTER, figures={"2 robots": Measurement(80.0, "ms a simulated second")}))

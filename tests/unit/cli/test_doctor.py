@@ -12,7 +12,7 @@ import pytest
 from simscen.bench.speed import run_speed
 from simscen.cli import installation
 from simscen.cli.commands import doctor
-from simscen.run.keptfiles import KeptFiles, cache_folder
+from simscen.run.caching.disk_cache import DiskCache, cache_folder
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def test_the_cache_of_worlds_is_told_and_one_of_others_is_ill(tmp_path: Path, mo
     monkeypatch.setenv("SIMSCEN_CACHE_DIR", str(tmp_path))
     folder = cache_folder(os.environ)
     assert doctor.cache() == f"{folder}: empty"
-    KeptFiles(folder).put("a" * 64, bytes(99_968))
+    DiskCache(folder).put("a" * 64, bytes(99_968))
     assert doctor.cache() == f"{folder}: 1 files, 0.1 MB of at most 256; to be deleted at any time"
     folder.chmod(0o777)
     with pytest.raises(installation.CheckFailed, match="others may write to it"):

@@ -8,7 +8,7 @@ import pytest
 from simscen.cli.process import caller_environment, config_file
 from simscen.cli.session.selection import Selection, load_all
 from simscen.core.errors import UsageError
-from simscen.run.digest import digest
+from simscen.run.reproducibility.digest import scenario_digest
 
 SHORT = """\
 simscen: 1
@@ -194,7 +194,7 @@ def test_a_program_of_the_configuration_that_is_not_there_is_told_in_it(simscen,
 
 def test_the_digest_holds_words_the_variables_asked_for_and_the_content_of_files(project: Path, monkeypatch) -> None:
     def of(*given: str) -> str:
-        return digest(loaded("mine", *given)[0])
+        return scenario_digest(loaded("mine", *given)[0])
 
     before = of("mine=./nav --map map.yaml")
     assert of("mine=./nav --map map.yaml") == before

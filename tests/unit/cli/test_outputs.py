@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.records.run_result import RunKey
-from simscen.run.outfolder import make_folder, run_folder, write_atomically
+from simscen.run.sessions.output_folder import create_output_folder, run_folder, write_atomically
 
 NOT_PLAIN = ("device", "fifo", "link", "dangling", "folder")
 
@@ -132,7 +132,7 @@ def test_latest_that_is_someones_own_stays(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("simscen-out").mkdir()
     Path("simscen-out/latest").write_text("keep me")
-    folder = make_folder(None)
+    folder = create_output_folder(None)
     assert Path("simscen-out/latest").read_text() == "keep me"
     assert set(Path("simscen-out").iterdir()) == {folder, Path("simscen-out/latest")}
 

@@ -6,7 +6,7 @@ import pytest
 
 from simscen.cli.session.selection import Selection, load_all
 from simscen.loading.resolved import resolved_text, spec_of_text
-from simscen.run.digest import digest
+from simscen.run.reproducibility.digest import scenario_digest
 
 HEAD = """\
 simscen: 1
@@ -129,11 +129,11 @@ def test_a_variation_of_what_another_stack_replaces_changes_nothing_and_is_told(
 
 
 def test_the_digest_has_what_each_robots_stack_runs(project: Path) -> None:
-    before = digest(loaded("mixed", "mine=./nav")[0])
-    assert digest(loaded("mixed", "mine=./nav")[0]) == before
-    assert digest(loaded("mixed", "mine=./nav 2")[0]) != before
+    before = scenario_digest(loaded("mixed", "mine=./nav")[0])
+    assert scenario_digest(loaded("mixed", "mine=./nav")[0]) == before
+    assert scenario_digest(loaded("mixed", "mine=./nav 2")[0]) != before
     (project / "home/simscen/config.yaml").write_text("stacks: {other: {command: ./nav --else}}\n")
-    assert digest(loaded("mixed", "mine=./nav")[0]) != before
+    assert scenario_digest(loaded("mixed", "mine=./nav")[0]) != before
 
 
 def test_a_list_names_the_stacks_that_robots_have(simscen, project: Path) -> None:

@@ -7,7 +7,7 @@ from simscen.bench.speed.scaling import AXES, write_more
 from simscen.bench.speed.suite import Suite, spread_over
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
-from simscen.run.worldsource import load_robot, load_world
+from simscen.run.preparation.loaders import load_robot, load_world
 
 
 def count(axis: str, loaded: LoadedScenario) -> int:

@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from simscen.cli.session.selection import Selection, load_all
-from simscen.run import digest as module
-from simscen.run.digest import digest
+from simscen.run import scenario_digest as module
+from simscen.run.reproducibility.digest import scenario_digest
 
 SCENARIO = """\
 extends: base.yaml
@@ -116,7 +116,7 @@ def of(project: Path) -> Digest:
         folders = [project / folder for folder in world_path or ("models",)]
         file = project / f"p/{name}.scenario.yaml"
         (loaded,), _ = load_all([file], project / "p", folders, lenient, Selection())
-        return digest(loaded)
+        return scenario_digest(loaded)
 
     return made
 

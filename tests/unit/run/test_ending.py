@@ -10,7 +10,7 @@ from simscen.core.records.trace import Decision
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.run.ending import Ending
+from simscen.run.termination import EndCondition
 from simscen.testing.sketch import sketch_case
 
 RATES = [
@@ -54,10 +54,10 @@ def test_an_end_between_two_samples_breaks_nothing_that_is_derived_from_them(pla
 
 
 def test_a_new_goal_takes_the_ending_back():
-    ending = Ending(Clock(240), 60.0, 0.5)
-    ending.heard(Decision(STOP, events=(Event(100, EventKind.NAVIGATION_ENDED),)))
+    ending = EndCondition(Clock(240), 60.0, 0.5)
+    ending.update(Decision(STOP, events=(Event(100, EventKind.NAVIGATION_ENDED),)))
     assert not ending.reached(219)
     assert ending.reached(220)
-    ending.heard(Decision(STOP, events=(Event(120, EventKind.GOAL_ACCEPTED),)))
+    ending.update(Decision(STOP, events=(Event(120, EventKind.GOAL_ACCEPTED),)))
     assert not ending.reached(220)
     assert ending.reached(60 * 240)

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.faultymap import with_faulty_map
-from simscen.run.prepare import Prepared, prepare
+from simscen.run.faults.map_faults import apply_map_faults
+from simscen.run.preparation.scenario import PreparedScenario, prepare
 
 SCENARIO = """\
 simscen: 1
@@ -25,7 +25,7 @@ pass: [{goals_reached: {}}]
 def two(tmp_path: Path):
     """Two robots, the second with some faults."""
 
-    def prepared(faults: str = "") -> Prepared:
+    def prepared(faults: str = "") -> PreparedScenario:
         (tmp_path / "a.scenario.yaml").write_text(SCENARIO.replace("FAULTS", faults))
         return prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path))
 
@@ -34,12 +34,12 @@ def two(tmp_path: Path):
 
 def test_robots_whose_maps_are_true_run_with_what_was_prepared(two) -> None:
     prepared = two()
-    assert with_faulty_map(prepared, seed=1) is prepared
+    assert apply_map_faults(prepared, seed=1) is prepared
 
 
 def test_only_the_robot_whose_map_has_a_fault_gets_another(two) -> None:
     prepared = two(", faults: [{sensor: map, shift: {x: 10 cm}}]")
-    run = with_faulty_map(prepared, seed=1)
+    run = apply_map_faults(prepared, seed=1)
     assert run.robots["a"] is prepared.robots["a"]
     assert run.robots["b"].mapped == (0,)
     assert run.robots["b"].map is not prepared.robots["b"].map

@@ -7,7 +7,7 @@ from simscen.core.environment.costmap_filters import FilterMasks, ZoneSwitch
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.model.stack import StackSpec
-from simscen.run.filters import Filters
+from simscen.run.live_world.costmap_filters import CostmapFilters
 
 WET, DRY, SLOW = (((k, 0.0), (k + 1, 0.0), (k + 1, 1.0)) for k in (0.0, 2.0, 4.0))
 REGIONS = {"wet": WET, "dry": DRY, "slow": SLOW}
@@ -16,7 +16,7 @@ MASK = OccupancyGrid(np.zeros((2, 2), np.int8), 0.1, Pose2(0.0, 0.0))
 
 
 def filters(masks=None, **stack):
-    return Filters(StackSpec.model_validate(stack), REGIONS, masks or FilterMasks())
+    return CostmapFilters(StackSpec.model_validate(stack), REGIONS, masks or FilterMasks())
 
 
 def order(filters, what, enabled, region=None, limit=None):

@@ -7,7 +7,7 @@ import pytest
 from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.run.firing import Firing, Watch
+from simscen.run.live_world.trigger_state import ConditionState, TriggerState
 from simscen.testing.puppetstage import PuppetStage
 from simscen.triggers.trigger import Trigger
 
@@ -20,7 +20,7 @@ class Now:
 
 
 def firings(trigger: dict, travelled, seed=1):
-    firing = Firing(Trigger.model_validate(trigger), np.random.default_rng(seed))
+    firing = TriggerState(Trigger.model_validate(trigger), np.random.default_rng(seed))
     return [firing.fires(Now(24 * beat, value)) for beat, value in enumerate(travelled)]
 
 
@@ -108,7 +108,7 @@ def test_a_condition_may_last_anywhere_inside_of_others(where):
     fast, hall = (np.repeat(chance.random(60) < 0.6, chance.integers(1, 9, 60)) for _ in range(2))
     length = min(len(fast), len(hall))
     fast, hall = fast[:length], hall[:length]
-    watch = Watch(Trigger.model_validate(words))
+    watch = ConditionState(Trigger.model_validate(words))
     square = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
     said = [
         watch.holds(

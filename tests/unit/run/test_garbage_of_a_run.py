@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from simscen.loading.scenario import load_scenario
-from simscen.run import perform
-from simscen.run.prepare import prepare
+from simscen.run.preparation.scenario import prepare
+from simscen.run.sessions import execute_run
 from simscen.spec.registry import Entry
 
 SCENARIO = """\
@@ -39,12 +39,12 @@ def test_garbage_is_looked_for_as_ever_where_code_of_others_runs(
     def simulate(*_: object, **__: object) -> None:
         raise Begun(gc.get_threshold()[0])
 
-    monkeypatch.setattr(perform, "simulate", simulate)
+    monkeypatch.setattr(execute_run, "simulate", simulate)
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     package = Entry("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")
     prepared = replace(
         prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path)), plugins=(package,) if others else ()
     )
     with pytest.raises(Begun) as begun:
-        perform.perform(prepared, 1, tmp_path, (), lambda *_: None)
-    assert begun.value.args == ((thresholds[0] if others else perform.MANY),)
+        execute_run.execute_run(prepared, 1, tmp_path, (), lambda *_: None)
+    assert begun.value.args == ((thresholds[0] if others else execute_run.GC_THRESHOLD),)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.goals import goals_of, sent_goals
+from simscen.run.preparation.goals import event_goals, scenario_goals
 
 SCENARIO = """
 simscen: 1
@@ -21,6 +21,6 @@ def test_goals_that_name_no_tolerances_have_those_of_the_stack(tmp_path: Path) -
     file = tmp_path / "a.scenario.yaml"
     file.write_text(SCENARIO)
     spec = load_scenario(file, tmp_path).spec
-    goals = [*goals_of(spec), *sent_goals(spec, lambda _robot: True).values()]
+    goals = [*scenario_goals(spec), *event_goals(spec, lambda _robot: True).values()]
     found = [(goal.xy_tolerance, goal.yaw_tolerance) for goal in goals]
     assert found == [(0.31, 0.17), (0.1, 0.2), (0.31, 0.17)]

@@ -6,34 +6,36 @@ from pathlib import Path
 
 import pytest
 
-from simscen.run.keptfiles import FORMAT, KeptFiles, cache_folder, is_own, used
+from simscen.run.caching.disk_cache import CACHE_FORMAT, DiskCache, cache_folder, disk_usage, is_private_folder
 
 KEY, OTHER = "a" * 64, "b" * 64
 
 
 def test_the_folder_is_where_caches_of_the_platform_are_and_can_be_moved_or_left_out() -> None:
-    assert cache_folder({"HOME": "/home/me"}) == Path("/home/me/.cache/simscen", FORMAT)
-    assert cache_folder({"HOME": "/home/me", "XDG_CACHE_HOME": "/fast"}) == Path("/fast/simscen", FORMAT)
-    assert cache_folder({"HOME": "/home/me", "XDG_CACHE_HOME": "relative"}) == Path("/home/me/.cache/simscen", FORMAT)
-    assert cache_folder({"HOME": "/home/me", "SIMSCEN_CACHE_DIR": "/mine"}) == Path("/mine", FORMAT)
+    assert cache_folder({"HOME": "/home/me"}) == Path("/home/me/.cache/simscen", CACHE_FORMAT)
+    assert cache_folder({"HOME": "/home/me", "XDG_CACHE_HOME": "/fast"}) == Path("/fast/simscen", CACHE_FORMAT)
+    assert cache_folder({"HOME": "/home/me", "XDG_CACHE_HOME": "relative"}) == Path(
+        "/home/me/.cache/simscen", CACHE_FORMAT
+    )
+    assert cache_folder({"HOME": "/home/me", "SIMSCEN_CACHE_DIR": "/mine"}) == Path("/mine", CACHE_FORMAT)
     for off in ("off", "", "relative"):
         assert cache_folder({"HOME": "/home/me", "SIMSCEN_CACHE_DIR": off}) is None
     assert cache_folder({}) is None
 
 
 def test_what_was_kept_is_found_by_the_next_session_in_a_folder_of_ones_own(tmp_path: Path) -> None:
-    folder = tmp_path / "cache" / FORMAT
-    assert KeptFiles(folder).get(KEY) is None
-    KeptFiles(folder).put(KEY, b"content")
-    assert KeptFiles(folder).get(KEY) == b"content"
-    assert KeptFiles(folder).get(OTHER) is None
+    folder = tmp_path / "cache" / CACHE_FORMAT
+    assert DiskCache(folder).get(KEY) is None
+    DiskCache(folder).put(KEY, b"content")
+    assert DiskCache(folder).get(KEY) == b"content"
+    assert DiskCache(folder).get(OTHER) is None
     assert folder.stat().st_mode & 0o777 == 0o700
     assert [path.name for path in folder.iterdir()] == [KEY]
 
 
 @pytest.mark.parametrize("damage", ["empty", "cut", "changed", "swapped", "link", "folder", "fifo"])
 def test_what_is_damaged_counts_as_not_there_and_is_written_anew(tmp_path: Path, damage: str) -> None:
-    kept = KeptFiles(tmp_path / "c")
+    kept = DiskCache(tmp_path / "c")
     kept.put(KEY, b"content")
     kept.put(OTHER, b"of another")
     file = tmp_path / "c" / KEY
@@ -61,43 +63,43 @@ def test_what_is_damaged_counts_as_not_there_and_is_written_anew(tmp_path: Path,
 
 
 def test_a_folder_into_which_others_may_write_is_left_alone(tmp_path: Path) -> None:
-    kept = KeptFiles(tmp_path / "c")
+    kept = DiskCache(tmp_path / "c")
     kept.put(KEY, b"content")
     (tmp_path / "c").chmod(0o777)
     assert kept.get(KEY) is None
     kept.put(OTHER, b"more")
     assert not (tmp_path / "c" / OTHER).exists()
-    assert not is_own(tmp_path / "nowhere")
+    assert not is_private_folder(tmp_path / "nowhere")
 
 
 def test_what_was_not_used_for_longest_goes_first(tmp_path: Path) -> None:
     keys = [f"{number:064x}" for number in range(6)]
-    kept = KeptFiles(tmp_path, most_bytes=500)
+    kept = DiskCache(tmp_path, most_bytes=500)
     for number, key in enumerate(keys[:4]):
         kept.put(key, bytes(68))
         os.utime(tmp_path / key, (number, number))
-    assert KeptFiles(tmp_path, 500).get(keys[0]) == bytes(68), "used again just now"
+    assert DiskCache(tmp_path, 500).get(keys[0]) == bytes(68), "used again just now"
     for key in keys[4:]:
-        KeptFiles(tmp_path, 500).put(key, bytes(68))
+        DiskCache(tmp_path, 500).put(key, bytes(68))
     assert sorted(path.name for path in tmp_path.iterdir()) == [keys[0], *keys[2:]]
-    assert used(tmp_path) == (5, 500)
+    assert disk_usage(tmp_path) == (5, 500)
     kept.put(OTHER, bytes(1000))
     assert kept.get(OTHER) is None, "it has no room at all"
 
 
 def test_sessions_that_write_the_same_at_once_leave_one_sound_file(tmp_path: Path) -> None:
     content = bytes(range(256)) * 400
-    threads = [threading.Thread(target=KeptFiles(tmp_path).put, args=(KEY, content)) for _ in range(8)]
+    threads = [threading.Thread(target=DiskCache(tmp_path).put, args=(KEY, content)) for _ in range(8)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert KeptFiles(tmp_path).get(KEY) == content
+    assert DiskCache(tmp_path).get(KEY) == content
     assert [path.name for path in tmp_path.iterdir()] == [KEY]
 
 
 def test_a_folder_that_cannot_be_written_costs_nothing_but_the_time(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
-    kept = KeptFiles(tmp_path / "file" / "c")
+    kept = DiskCache(tmp_path / "file" / "c")
     kept.put(KEY, b"content")
     assert kept.get(KEY) is None

@@ -9,10 +9,9 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Solid
 from simscen.core.messages.navigation import Goal
 from simscen.loading.scenario import load_scenario
-from simscen.run import keptworlds
-from simscen.run.keptfiles import KeptFiles
-from simscen.run.keptworlds import KeptWorlds
-from simscen.run.prepared_cache import PreparedCache
+from simscen.run.caching import scenario_cache
+from simscen.run.caching.disk_cache import DiskCache
+from simscen.run.caching.scenario_cache import CachedWorldBuilder, ScenarioCache
 from simscen.run.simulate import simulate
 
 SCENARIO = """\
@@ -33,25 +32,25 @@ def test_logs_are_the_same_with_a_cold_a_warm_and_a_damaged_cache(tmp_path: Path
     loaded = load_scenario(tmp_path / "a.scenario.yaml", tmp_path)
     cache = tmp_path / "cache"
 
-    def log(kept: KeptFiles) -> bytes:
-        prepared = PreparedCache(KeptWorlds(kept)).prepared(loaded)
+    def log(kept: DiskCache) -> bytes:
+        prepared = ScenarioCache(CachedWorldBuilder(kept)).prepared(loaded)
         simulate(prepared, 1, log=tmp_path / "run.mcap")
         return (tmp_path / "run.mcap").read_bytes()
 
-    without, cold = log(KeptFiles(None)), log(KeptFiles(cache))
+    without, cold = log(DiskCache(None)), log(DiskCache(cache))
     assert len(list(cache.iterdir())) == 2
     with monkeypatch.context() as broken:
-        broken.setattr(keptworlds, "map_of", None)
-        broken.setattr(keptworlds, "legs_between", None)
-        warm = log(KeptFiles(cache))
+        broken.setattr(scenario_cache, "map_of", None)
+        broken.setattr(scenario_cache, "legs_between", None)
+        warm = log(DiskCache(cache))
     for file in cache.iterdir():
         file.write_bytes(file.read_bytes()[:-3] + b"xyz")
-    assert without == cold == warm == log(KeptFiles(cache))
+    assert without == cold == warm == log(DiskCache(cache))
 
 
 def test_what_is_sound_and_means_nothing_counts_as_not_there(tmp_path: Path) -> None:
-    files = KeptFiles(tmp_path)
-    kept = KeptWorlds(files)
+    files = DiskCache(tmp_path)
+    kept = CachedWorldBuilder(files)
     world = World("w", (Solid(Box((4.0, 0.2, 1.0)), Pose3(0.0, 2.0, 0.5), "wall"),), bounds=(-3.0, -3.0, 3.0, 3.0))
     built = kept.build(world, 0.2)
     ends = [(Pose2(0.0, 0.0), Goal("far", Pose2(0.0, 2.9)))]
@@ -67,7 +66,7 @@ def test_what_is_sound_and_means_nothing_counts_as_not_there(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("other", [(1.0, 0.0, 0.2), (0.0, 0.5, 0.2), (0.0, 0.0, 0.3)])
 def test_another_world_another_goal_and_another_robot_have_ways_of_their_own(tmp_path: Path, other) -> None:
-    kept = KeptWorlds(KeptFiles(tmp_path))
+    kept = CachedWorldBuilder(DiskCache(tmp_path))
 
     def legs(wall: float, goal: float, radius: float) -> object:
         solid = Solid(Box((4.0, 0.2, 1.0)), Pose3(wall, 2.0, 0.5), "wall")
@@ -78,8 +77,8 @@ def test_another_world_another_goal_and_another_robot_have_ways_of_their_own(tmp
 
 
 def test_results_of_other_code_are_not_used(monkeypatch) -> None:
-    before = keptworlds.key_of("map", 1.0)
-    keptworlds._circumstances.cache_clear()
-    monkeypatch.setattr(keptworlds, "code", lambda *rooms: "of another version")
-    assert keptworlds.key_of("map", 1.0) != before
-    keptworlds._circumstances.cache_clear()
+    before = scenario_cache.cache_key("map", 1.0)
+    scenario_cache._circumstances.cache_clear()
+    monkeypatch.setattr(scenario_cache, "code", lambda *rooms: "of another version")
+    assert scenario_cache.cache_key("map", 1.0) != before
+    scenario_cache._circumstances.cache_clear()

@@ -7,9 +7,9 @@ import pytest
 from simscen.core.errors import InvalidInput
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.loading.scenario import load_scenario
-from simscen.run.assemble import assemble
-from simscen.run.prepare import prepare
-from simscen.run.senses import Senses
+from simscen.run.assembly import assemble
+from simscen.run.preparation.scenario import prepare
+from simscen.run.sensing import SensorSuite
 
 SCENARIO = """\
 simscen: 1
@@ -43,16 +43,16 @@ def moments(tmp_path: Path, beats: int, stack: str = "", lidar: str = "", latenc
     file.write_text(SCENARIO.format(stack=stack))
     prepared = prepare(load_scenario(file, tmp_path))
     rig = assemble(prepared, 1)
-    (agent,) = rig.agents
+    (agent,) = rig.robots
     agent.stack.start(prepared.estimate, prepared.case.goals)
     taken = []
     for _ in range(beats):
         tick = rig.simulation.tick
-        agent.look(tick)
+        agent.observe(tick)
         agent.decide(tick)
         taken.append(agent.moment)
         agent.drive()
-        rig.simulation.step(agent.timetable.until_next(tick))
+        rig.simulation.step(agent.schedule.until_next(tick))
     return taken
 
 
@@ -100,6 +100,6 @@ def test_a_late_sensor_keeps_the_order_of_its_readings() -> None:
         def read(self, tick: int) -> Odometry:
             return Odometry("s", tick, None, None)
 
-    senses = Senses([Sensor()], {"s": 10})
+    senses = SensorSuite([Sensor()], {"s": 10})
     assert senses.arrivals == ((4, 10),)
     assert [one.tick for tick in range(30) for one in senses.read(tick)] == [0, 4, 8, 12, 16]

@@ -3,10 +3,9 @@
 from pathlib import Path
 
 from simscen.loading.scenario import try_variations
-from simscen.run import prepared_cache
-from simscen.run.keptfiles import KeptFiles
-from simscen.run.keptworlds import KeptWorlds
-from simscen.run.prepared_cache import PreparedCache
+from simscen.run.caching import scenario_cache
+from simscen.run.caching.disk_cache import DiskCache
+from simscen.run.caching.scenario_cache import CachedWorldBuilder, ScenarioCache
 
 TEXT = """\
 simscen: 1
@@ -19,11 +18,11 @@ variations: {grid: {robot.pose.x: [1, 2, 3]}}
 
 
 def test_variations_of_one_world_build_it_once_and_keep_only_the_last(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(prepared_cache, "MOST", 2)
+    monkeypatch.setattr(scenario_cache, "MOST", 2)
     (tmp_path / "a.scenario.yaml").write_text(TEXT)
     variations = try_variations(tmp_path / "a.scenario.yaml", tmp_path)
     assert isinstance(variations, tuple)
-    cache = PreparedCache(KeptWorlds(KeptFiles(None)))
+    cache = ScenarioCache(CachedWorldBuilder(DiskCache(None)))
     prepared = [cache.prepared(one) for one in variations]
     assert len({id(one.built) for one in prepared}) == 1
     assert [one.start.x for one in prepared] == [1, 2, 3]

@@ -6,7 +6,7 @@ from pydantic import ValidationError
 from simscen.core.errors import InvalidInput
 from simscen.loading.files.robotfile import load_robot_file
 from simscen.model.robot import RobotSpec
-from simscen.run.worldsource import robot_of
+from simscen.run.preparation.loaders import robot_from_file
 
 ROBOT = """\
 simscen: 1
@@ -78,7 +78,7 @@ def published(tmp_path):
             (tmp_path / "root" / name).write_text(text)
         root = tmp_path / "root"
         file = load_robot_file(str(root / "cart.robot.yaml"), root, [root / folder for folder in world_path])
-        return robot_of(file.robot, file.roots)[1]
+        return robot_from_file(file.robot, file.roots)[1]
 
     return body
 

@@ -4,7 +4,7 @@ import shlex
 from dataclasses import replace
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.repeat_command import repeat_command, shown
+from simscen.run.sessions.results import repeat_command, shown
 
 TEXT = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 0, y: 0}}\npass: [{collisions: {}}]\n"
 

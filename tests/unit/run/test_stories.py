@@ -4,7 +4,7 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.records.events import EventKind
-from simscen.run.since import Since
+from simscen.run.live_world.trigger_state import RelativeSituation
 from simscen.testing.puppetstage import PuppetStage
 from simscen.triggers.trigger import Trigger
 
@@ -68,7 +68,7 @@ def test_a_story_that_waits_changes_nothing_until_it_goes_on(play):
 
 def test_in_a_step_everything_that_counts_counts_from_its_beginning():
     now = PuppetStage(tick=1000, travelled=5.0, scans={"lidar": 990, "rear": 700})
-    step = Since(now)
+    step = RelativeSituation(now)
 
     def holds(words):
         return Trigger.model_validate(words).holds(step)

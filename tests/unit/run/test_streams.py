@@ -11,9 +11,9 @@ from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.faults.base import FaultSetting
 from simscen.model.disturbances import EventEntry, FaultEntry
-from simscen.run.commandlink import CommandLink
-from simscen.run.faultrig import FaultRig
-from simscen.run.streamnames import stream_names
+from simscen.run.faults.channels import CommandLink
+from simscen.run.faults.injector import FaultInjector
+from simscen.run.live_world.random_streams import stream_names
 
 FAULTS = [
     "{sensor: lidar, noise: {std: 5 cm}%s}",
@@ -78,7 +78,9 @@ def test_adding_an_event_changes_nothing_before_it_takes_effect(play, plain, eve
 def rig(*faults):
     entries = [FaultEntry.model_validate(fault, by_alias=True, by_name=False) for fault in faults]
     kinds = {"lidar": FaultSetting(0.3, kind="Scan"), "odom": FaultSetting(0.3, kind="Odometry")}
-    return FaultRig(entries, Streams(7), lambda entry: kinds[entry.sensor], CommandLink(12, 120), lambda event: None)
+    return FaultInjector(
+        entries, Streams(7), lambda entry: kinds[entry.sensor], CommandLink(12, 120), lambda event: None
+    )
 
 
 def scan(tick=0):

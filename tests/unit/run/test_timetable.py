@@ -1,12 +1,12 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.run.timetable import Timetable
+from simscen.run.sensing import TickSchedule
 
 
 @given(st.lists(st.sampled_from([1, 2, 3, 4, 6, 8, 12, 24, 48, 7]), min_size=1, max_size=4))
 def test_every_tick_at_which_something_is_due_is_visited_and_no_other(periods):
-    table, tick, visited = Timetable(periods), 0, []
+    table, tick, visited = TickSchedule(periods), 0, []
     while tick < 500:
         tick += table.until_next(tick)
         visited.append(tick)
@@ -16,7 +16,7 @@ def test_every_tick_at_which_something_is_due_is_visited_and_no_other(periods):
 
 @given(st.lists(st.tuples(st.sampled_from([3, 4, 6, 12, 24]), st.integers(0, 60)), min_size=1, max_size=4))
 def test_what_comes_later_than_a_multiple_of_its_period_is_visited_when_it_comes(later):
-    table, tick, visited = Timetable([24], later), 0, []
+    table, tick, visited = TickSchedule([24], later), 0, []
     while tick < 300:
         tick += table.until_next(tick)
         visited.append(tick)

@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.ray_fans import RayFan
 from simscen.core.geometry.shapes import Body
-from simscen.run.liverays import LiveRays
+from simscen.run.live_world.ray_caster import LiveRayCaster
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 
@@ -22,7 +22,7 @@ FAN = RayFan(-math.pi, math.pi / 45, 90)
 def drive(simulate, every, looking):
     """What a level fan meets, every fifth of a second; every so many ticks somebody else is `looking`."""
     simulation = simulate(solids=[WALL], bodies=CRATES, drive=(0.4, 0.0, 0.0))
-    rays, scans = LiveRays(RayScene(fuse([WALL])), simulation.robot), []
+    rays, scans = LiveRayCaster(RayScene(fuse([WALL])), simulation.robot), []
     for tick in range(0, 3612, 12):
         if tick in (660, 840):
             simulation.drive(Twist(-0.3, 0.0, 0.0) if tick == 660 else Twist())
@@ -44,7 +44,7 @@ def test_who_else_looks_changes_not_one_bit_of_a_scan(simulate):
 
     def look(simulation):
         homes = simulation.robot.homes
-        other or other.append(LiveRays(RayScene(fuse([WALL])), simulation.robot, frozenset({"crate 1"})))
+        other or other.append(LiveRayCaster(RayScene(fuse([WALL])), simulation.robot, frozenset({"crate 1"})))
         other[0].sweep(FAN, Pose3.from_rpy(0.0, 0.5, 0.3, 0.1, 0.2, 0.0), 9.0)
         at_home.append({name for name, pose in simulation.objects().items() if homes.get(name) == pose})
 

@@ -9,8 +9,8 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.ray_fans import RayFan
 from simscen.core.geometry.scripted_poses import PosesAtTick
 from simscen.core.geometry.shapes import Body, MotionPath
-from simscen.run import liverays
-from simscen.run.liverays import LiveRays
+from simscen.run.live_world import ray_caster
+from simscen.run.live_world.ray_caster import LiveRayCaster
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 
@@ -36,10 +36,10 @@ def carts() -> list[Body]:
 
 def test_a_scan_is_that_of_a_scene_that_was_told_of_everything(simulate, monkeypatch) -> None:
     """Whoever else looks, from wherever and however far; also once something is given a script."""
-    monkeypatch.setattr(liverays, "STRAY", 0.5)
+    monkeypatch.setattr(ray_caster, "STRAY", 0.5)
     simulation, chance = simulate(solids=[WALL], bodies=carts(), drive=(0.02, 0.0, 0.1)), np.random.default_rng(2)
     robot, told = simulation.robot, RayScene(fuse([WALL]))
-    rays, watched = (LiveRays(RayScene(fuse([WALL])), robot) for _ in range(2))
+    rays, watched = (LiveRayCaster(RayScene(fuse([WALL])), robot) for _ in range(2))
     ahead, met = 0, set[str]()
     for beat in range(130):
         robot.sample(24)

@@ -8,7 +8,7 @@ from playground import box, shipped
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.run.liverays import LiveRays
+from simscen.run.live_world.ray_caster import LiveRayCaster
 from simscen.sim.embody import robot_body
 from simscen.sim.simulation import Placed, Simulation
 from simscen.worlds.meshing import fuse, triangulate
@@ -79,7 +79,7 @@ def test_each_is_among_the_things_that_the_other_sees(meet):
     a = simulation.robots["a"]
     assert list(a.truth().objects) == ["b"]
     assert a.truth().objects["b"] == simulation.robots["b"].base_pose()
-    rays = LiveRays(RayScene(fuse([])), a)
+    rays = LiveRayCaster(RayScene(fuse([])), a)
     (ahead, back) = rays.cast(np.array([[0.3, 0.0, 0.1]] * 2), np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), 5.0)
     radius = robot_body(shipped("turtlebot")).radius
     assert ahead == pytest.approx(1.7 - radius, abs=0.02)

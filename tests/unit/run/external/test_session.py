@@ -15,7 +15,7 @@ from simscen.cli.session.run_session import WARM_PROCESS
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunStarted
 from simscen.report.junit import to_xml
-from simscen.run.session import Options, plan, run_session
+from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
 
 HELLO = 'peer = Peer("mine", topics=["/odom", "/scan"])\n'
 GOOD = HELLO + DRIVE
@@ -41,8 +41,8 @@ def session(load, tmp_path: Path):
     def run(out: str, programs: dict[str, str], listen=lambda event: None):
         limits = {name: 1.0 if KINDS.get(name) == "stack-timeout" else 30.0 for name in programs}
         scenarios = [load(text, name, answer_limit=limits[name]) for name, text in programs.items()]
-        options = Options(workers=2, wall_limit=60.0)
-        answers, _ = run_session(plan(scenarios, options, tmp_path / out), options, WARM_PROCESS, listen)
+        options = SessionOptions(workers=2, wall_limit=60.0)
+        answers, _ = run_session(plan_jobs(scenarios, options, tmp_path / out), options, WARM_PROCESS, listen)
         return {answer.key.scenario: answer for answer in answers}
 
     return run
@@ -117,8 +117,8 @@ def test_a_supervisor_that_is_killed_takes_every_stack_along(load, processes, tm
     loaded = load(LINGERS + HELLO + "for step in peer: time.sleep(60)", answer_limit=60.0)
     pid = os.fork()
     if pid == 0:
-        options = Options()
-        run_session(plan([loaded], options, tmp_path / "out"), options, WARM_PROCESS, lambda event: None)
+        options = SessionOptions()
+        run_session(plan_jobs([loaded], options, tmp_path / "out"), options, WARM_PROCESS, lambda event: None)
         os._exit(0)
     _until(lambda: len(processes()) >= 2)
     os.kill(pid, signal.SIGKILL)
@@ -143,8 +143,8 @@ def test_an_interrupted_session_leaves_no_stack_behind(load, processes, tmp_path
             _until(lambda: len(processes()) >= 2)
             raise Interrupted(signal.SIGINT)
 
-    options = Options()
-    answers, stopped = run_session(plan([loaded], options, tmp_path / "out"), options, WARM_PROCESS, interrupt)
+    options = SessionOptions()
+    answers, stopped = run_session(plan_jobs([loaded], options, tmp_path / "out"), options, WARM_PROCESS, interrupt)
     assert stopped is not None
     assert [answer.result.error.kind for answer in answers] == ["interrupted"]
     assert not processes()

@@ -12,9 +12,9 @@ from simscen.cli.session.run_session import WARM_PROCESS
 from simscen.core.errors import RunError
 from simscen.core.records.run_result import Outcome
 from simscen.loading.scenario import load_scenario
-from simscen.run.perform import perform
-from simscen.run.prepare import prepare
-from simscen.run.session import Options, plan, run_session
+from simscen.run.preparation.scenario import prepare
+from simscen.run.sessions.execute_run import execute_run
+from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
 from simscen.run.simulate import simulate
 
 FLEET = """\
@@ -54,7 +54,7 @@ def fleet(load_fleet):
 def test_each_is_told_whose_it_is_and_leaves_what_it_printed_and_said(fleet, tmp_path: Path) -> None:
     seen = []
     prepared = fleet(HELLO + DRIVE.replace("for step in peer:\n", GOALS))
-    perform(prepared, 1, tmp_path, (), lambda *given: seen.append(given[1]))
+    execute_run(prepared, 1, tmp_path, (), lambda *given: seen.append(given[1]))
     (run,) = seen
     assert run.result.outcome is Outcome.PASSED
     assert run.result.events["goal.reached"] == 2
@@ -116,8 +116,8 @@ def test_a_worker_that_is_killed_takes_the_stacks_of_all_robots_along(load_fleet
     """The keeper is the parent of a stack, the worker the parent of the keeper."""
     kill = "os.kill(int(open(f'/proc/{os.getppid()}/stat').read().rsplit(')', 1)[1].split()[1]), signal.SIGKILL)\n"
     told = f"{HELLO}for step in peer:\n    if peer.robot_name == 'right': {kill}    step.drive(0, 0)\n"
-    options = Options(wall_limit=60.0)
-    jobs = plan([load_fleet(told, answer_limit=30.0)], options, tmp_path / "out")
+    options = SessionOptions(wall_limit=60.0)
+    jobs = plan_jobs([load_fleet(told, answer_limit=30.0)], options, tmp_path / "out")
     ((answer,), _) = run_session(jobs, options, WARM_PROCESS, lambda event: None)
     assert answer.result.error is not None
     assert answer.result.error.kind == "crashed"

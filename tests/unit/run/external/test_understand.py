@@ -11,11 +11,10 @@ from simscen.core.geometry import Pose2
 from simscen.peer import messages, wire
 from simscen.peer.cdr import HEADER
 from simscen.record.simtime import SimTime
-from simscen.run.external.errors import NotAllowed
-from simscen.run.external.goals import ToldGoals
-from simscen.run.external.topics import HEARD, Offer
-from simscen.run.external.understand import Answer, understood
-from simscen.run.external.welcome import Welcome
+from simscen.run.external.answer_decoder import Answer, decode_answer
+from simscen.run.external.goal_tracker import GoalTracker
+from simscen.run.external.handshake import Welcome
+from simscen.run.external.protocol import STACK_TOPICS, ProtocolViolation, TopicTable
 
 TIME = SimTime(240)
 EXAMPLES = {
@@ -38,11 +37,11 @@ EXAMPLES = {
 
 
 def understand(**said: bytes) -> Answer:
-    return understood({name: [data] for name, data in said.items()}, 240, TIME, None, Pose2(0, 0, 0))
+    return decode_answer({name: [data] for name, data in said.items()}, 240, TIME, None, Pose2(0, 0, 0))
 
 
 def test_there_is_an_example_of_each_topic() -> None:
-    assert EXAMPLES.keys() == {topic.name for topic in HEARD}
+    assert EXAMPLES.keys() == {topic.name for topic in STACK_TOPICS}
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -54,7 +53,7 @@ def test_bytes_gone_wrong_are_refused_or_understood(name: str, data) -> None:
     cut = data.draw(st.integers(0, len(sound)))
     with_belief = {} if name == "/amcl_pose" else {"/amcl_pose": EXAMPLES["/amcl_pose"]}
     for garbage in (bytes(sound), bytes(sound[:cut]), HEADER + data.draw(st.binary(max_size=60))):
-        with suppress(NotAllowed):
+        with suppress(ProtocolViolation):
             understand(**{name: garbage}, **with_belief)
 
 
@@ -76,7 +75,7 @@ def test_a_costmap_is_recorded_as_it_was_said() -> None:
 )
 def test_a_costmap_that_is_none_is_refused(frame: str, resolution: float, width: int, origin) -> None:
     said = messages.occupancy_grid((1, 0), frame, resolution, width, origin, [0, 100, -1, 50])
-    with pytest.raises(NotAllowed, match="local costmap"):
+    with pytest.raises(ProtocolViolation, match="local costmap"):
         understand(**{"/local_costmap/costmap": said})
 
 
@@ -97,8 +96,8 @@ def test_an_event_of_any_kind_is_heard_or_refused_and_can_be_logged(said) -> Non
     from simscen.record.event_text import sentence, to_json
     from simscen.record.pack_rare import log, string
 
-    goals = ToldGoals(True, 240)
-    with suppress(NotAllowed):
+    goals = GoalTracker(True, 240)
+    with suppress(ProtocolViolation):
         for event in understand(**{"/simscen/events": messages.string(json.dumps(said))}).events:
             goals.hear(240, event)
     for event in goals.take():
@@ -110,8 +109,8 @@ def test_an_event_of_any_kind_is_heard_or_refused_and_can_be_logged(said) -> Non
 @given(st.dictionaries(st.sampled_from(["protocol", "name", "version", "topics", "step", "about"]), json_values))
 def test_any_welcome_is_taken_or_refused_and_can_be_logged(told) -> None:
     told.setdefault("protocol", 1)
-    with suppress(NotAllowed, wire.Malformed):
-        welcome = Welcome.of(wire.WELCOME, json.dumps(told).encode(), Offer.of([]))
+    with suppress(ProtocolViolation, wire.Malformed):
+        welcome = Welcome.of(wire.WELCOME, json.dumps(told).encode(), TopicTable.of([]))
         assert all(text.encode() is not None for text in welcome.facts.values())
 
 
@@ -137,12 +136,12 @@ def test_any_answer_is_read_or_malformed(body: bytes) -> None:
     ],
 )
 def test_an_event_that_no_log_takes_is_refused(said: str) -> None:
-    with pytest.raises(NotAllowed):
+    with pytest.raises(ProtocolViolation):
         for event in understand(**{"/simscen/events": messages.string(said)}).events:
-            ToldGoals(True, 240).hear(240, event)
+            GoalTracker(True, 240).hear(240, event)
 
 
 @pytest.mark.parametrize("told", ['{"protocol": 1, "name": "\\ud800"}', '{"protocol": 1, "about": {"x": NaN}}'])
 def test_a_welcome_that_no_log_takes_is_refused(told: str) -> None:
-    with pytest.raises((NotAllowed, wire.Malformed)):
-        Welcome.of(wire.WELCOME, told.encode(), Offer.of([]))
+    with pytest.raises((ProtocolViolation, wire.Malformed)):
+        Welcome.of(wire.WELCOME, told.encode(), TopicTable.of([]))

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 
-from simscen.run.process.zygote import Zygote
+from simscen.run.process.fork_server import ForkServer
 
 
 def prepare(job):
@@ -109,4 +109,4 @@ RESULT = """{"format": 2, "scenario": "x", "seed": 1, "variation": "", "path": "
 
 
 if __name__ == "__main__":
-    Zygote(0, int(sys.argv[1]), prepare, perform).serve()
+    ForkServer(0, int(sys.argv[1]), prepare, perform).serve()

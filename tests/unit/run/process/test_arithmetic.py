@@ -4,10 +4,10 @@ import os
 import subprocess
 import sys
 
-SHOWN = "from simscen.run.versions import arithmetic; print(arithmetic())"
+SHOWN = "from simscen.run.reproducibility.environment import arithmetic; print(arithmetic())"
 BOTH = f"""
 import subprocess, sys
-from simscen.run.process.confine import environment
+from simscen.run.process.isolation import environment
 {SHOWN}
 print(subprocess.run([sys.executable, "-c", {SHOWN!r}], env=environment(), capture_output=True, text=True).stdout)
 """

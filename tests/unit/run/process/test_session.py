@@ -16,7 +16,7 @@ from simscen.core.records.session_events import RunFinished, RunProgress, RunSta
 from simscen.loading.scenario import load_scenario
 from simscen.run.process import supervisor
 from simscen.run.process.supervisor import Interrupted
-from simscen.run.session import Options, plan, run_session
+from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
 
 ENTRY = (str(Path(__file__).with_name("faulty_zygote.py")),)
 SCENARIO = """
@@ -36,9 +36,9 @@ def session(tmp_path):
             file = tmp_path / f"{number}-{fault}.scenario.yaml"
             file.write_text(SCENARIO.format(fault=fault))
             scenarios.append(load_scenario(file, tmp_path))
-        chosen = Options(**{"wall_limit": 20.0, **options})
+        chosen = SessionOptions(**{"wall_limit": 20.0, **options})
         heard = [] if events is None else events
-        answers, stopped = run_session(plan(scenarios, chosen, tmp_path / "out"), chosen, entry, heard.append)
+        answers, stopped = run_session(plan_jobs(scenarios, chosen, tmp_path / "out"), chosen, entry, heard.append)
         return {answer.key.scenario.partition("-")[2]: answer for answer in answers}, stopped
 
     return run

@@ -18,7 +18,7 @@ from simscen.core.random_streams import Streams
 from simscen.loading.files.worldfile import load_world_file
 from simscen.model.localizers import Amcl
 from simscen.model.world import WorldSpec
-from simscen.run.worldsource import world_of
+from simscen.run.preparation.loaders import world_from_file
 from simscen.stack.installed.localizer import InstalledLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
 from simscen.stack.setting import Setting
@@ -48,7 +48,7 @@ def building(name: str) -> BuiltWorld:
     """A shipped world, or a generated one; `… coarse` has a map of 20 cm cells."""
     base, _, coarse = name.partition(" ")
     if (WORLDS / f"{base}.world.yaml").exists():
-        world = world_of(load_world_file(WORLDS / f"{base}.world.yaml", WORLDS), WORLDS)
+        world = world_from_file(load_world_file(WORLDS / f"{base}.world.yaml", WORLDS), WORLDS)
     else:
         world = build_own(WorldSpec.model_validate({"simscen": 1, **GENERATED[base]()}), base)
     return build(world, HEIGHT, 0.2 if coarse else 0.05)

@@ -1,0 +1,193 @@
+"""The composition root: the only place that builds engines, sensors and stacks."""
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from simscen.core.clock import Clock
+from simscen.core.environment.world_model import Patch
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.sensor_data import Odometry
+from simscen.core.random_streams import Streams
+from simscen.core.records.events import Event, EventKind
+from simscen.model.anystack import ExternalStackSpec
+from simscen.run.external.build import build_external_stack
+from simscen.run.faults.channels import CommandLink, LocalizerWithFaults
+from simscen.run.faults.context import FaultContexts
+from simscen.run.faults.injector import FaultInjector
+from simscen.run.live_world.costmap_filters import CostmapFilters
+from simscen.run.live_world.director import Director
+from simscen.run.live_world.pedestrians import PedestrianSimulation
+from simscen.run.live_world.ray_caster import LiveRayCaster
+from simscen.run.live_world.stage import LiveStage, body_data
+from simscen.run.lockstep import RobotUnderTest, RunSetup
+from simscen.run.preparation.scenario import PreparedScenario
+from simscen.run.robot_interface import command_latencies, robot_model, sensor_latencies, with_robot_latency
+from simscen.run.sensing import SensorSuite, TickSchedule
+from simscen.run.termination import EndCondition
+from simscen.sensors.build import build_sensors
+from simscen.sensors.sensor import Sensor
+from simscen.sim.robot import Robot
+from simscen.sim.simulation import Placed, Simulation
+from simscen.stack.build import build_stack
+from simscen.stack.protocols import Stack, Surroundings
+from simscen.worlds.meshing import triangulate
+from simscen.worlds.rays import RayScene
+
+
+def assemble(prepared: PreparedScenario, seed: int, printed: Path | None = None) -> RunSetup:
+    """Build the rig of one run of a prepared scenario with this seed; its stacks have not been started.
+
+    `printed` is the file for what an external stack prints.
+    """
+    spec, world = prepared.spec, prepared.built.world
+    clock, streams = Clock(spec.physics.tick_rate), Streams(seed)
+    simulation = Simulation(
+        prepared.built.mesh,
+        world.bodies,
+        {name: Placed(part.body, part.start, part.obstacles) for name, part in prepared.each.items()},
+        triangulate,
+        tick_rate=clock.rate,
+        solver_iterations=spec.physics.solver_iterations,
+        clearance_range=prepared.case.clearance_range,
+        pictures=any(
+            sensor.takes_pictures for part in prepared.each.values() for sensor in part.robot.sensors.values()
+        ),
+    )
+    for region, friction in world.friction.items():
+        simulation.lay(region, Patch(world.regions[region], friction))
+    scene, stages = RayScene(prepared.built.mesh), dict[str, LiveStage]()
+    walking = PedestrianSimulation(prepared.built, simulation, clock)
+    agents = {
+        name: _agent(name, part, simulation, scene, seed, walking, stages, printed)
+        for name, part in prepared.each.items()
+    }
+    for name, stage in stages.items():
+        for body in (*world.bodies, *(robot.shape for robot in simulation.robots[name].others)):
+            stage.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, body_data(body)))
+    directors = tuple(director for director in _directors(prepared, streams, agents) if director.needed)
+    for stage in stages.values():
+        stage.is_observed = bool(directors)
+    return RunSetup(
+        simulation,
+        tuple(agents.values()),
+        directors,
+        clock.period(spec.physics.truth_rate),
+    )
+
+
+def _directors(
+    prepared: PreparedScenario, streams: Streams, agents: Mapping[str, RobotUnderTest]
+) -> Iterator[Director]:
+    """Who lets things happen: to the world, then to each robot; for a single robot that is one.
+
+    What is about no robot is the same for all, so that any of them may stand for it.
+    """
+    spec = prepared.spec
+    first, *_ = agents.values()
+    if not prepared.robots:
+        yield Director(spec.steps, spec.faults, streams, first.stage, first.faults)
+        return
+    yield Director(spec.steps, [], streams, first.stage, first.faults)
+    for name, agent in agents.items():
+        own = Streams(streams.seed, name)
+        yield Director([], prepared.robots[name].spec.faults, own, agent.stage, agent.faults)
+
+
+def _agent(
+    name: str,
+    prepared: PreparedScenario,
+    simulation: Simulation,
+    scene: RayScene,
+    seed: int,
+    walking: PedestrianSimulation,
+    stages: dict[str, LiveStage],
+    printed: Path | None,
+) -> RobotUnderTest:
+    """One robot with its senses and its stack; its stage is added to those of the others."""
+    spec, robot = prepared.spec, simulation.robots[name]
+    clock, streams = Clock(spec.physics.tick_rate), Streams(seed, name)
+    rays = LiveRayCaster(RayScene(scene), robot)
+    sensors: tuple[Sensor, ...] = build_sensors(prepared.robot, clock, streams, robot, rays)
+    truth_period = clock.period(spec.physics.truth_rate)
+    control_period = clock.period(prepared.stack.controller_frequency)
+    if prepared.stack.told_truth:
+        # Last, because the log takes the first odometry for the robot's own.
+        sensors = (*sensors, TruthSensor(robot, control_period))
+    senses = SensorSuite(sensors, sensor_latencies(prepared, clock))
+
+    def told(belief: Belief) -> Belief:
+        return faults.belief(simulation.tick, belief)
+
+    stack = _stack(prepared, clock, streams, seed, printed, told)
+    world, sent = prepared.built.world, prepared.case.sent
+    filters = CostmapFilters(prepared.stack, world.regions, prepared.masks)
+    stage = LiveStage(world, simulation, robot, stack, filters, clock, sent, walking, Streams(seed), stages)
+    settings = FaultContexts(
+        prepared.robot,
+        clock,
+        lambda: simulation.tick,
+        robot,
+        prepared.built.mesh,
+        lambda mesh, names: LiveRayCaster(RayScene(mesh), robot, names),
+    )
+    link = CommandLink(control_period, clock.ticks(prepared.robot.limits.command_timeout))
+    faults = FaultInjector(spec.faults, streams, settings, link, stage.note, prepared.mapped)
+    return RobotUnderTest(
+        robot=robot,
+        sensors=senses,
+        stack=stack,
+        faults=faults,
+        stage=stage,
+        end_condition=EndCondition(clock, spec.time_limit, spec.linger, idle=bool(name) and not prepared.case.goals),
+        schedule=TickSchedule(
+            (truth_period, control_period, *senses.periods),
+            (*senses.arrivals, *((control_period, late) for late in command_latencies(prepared, clock))),
+        ),
+        truth_period=truth_period,
+    )
+
+
+def _stack(
+    prepared: PreparedScenario,
+    clock: Clock,
+    streams: Streams,
+    seed: int,
+    printed: Path | None,
+    told: Callable[[Belief], Belief],
+) -> Stack:
+    """The stack of a robot; it is `told` what becomes of what its localizer says."""
+    world = prepared.built.world
+    surroundings = Surroundings(
+        robot=robot_model(prepared.body),
+        map=prepared.map,
+        tick_rate=clock.rate,
+        keepout=tuple(world.regions[name] for name in prepared.stack.keepout),
+        speed_zones=tuple((world.regions[zone.region], zone.speed_limit) for zone in prepared.stack.speed_zones),
+        masks=prepared.masks,
+        lidars=tuple(name for name, sensor in prepared.robot.sensors.items() if sensor.localizes),
+    )
+    if isinstance(prepared.stack, ExternalStackSpec):
+        return build_external_stack(prepared, prepared.stack, surroundings, seed, printed)
+    return build_stack(
+        with_robot_latency(prepared.stack, prepared.robot),
+        surroundings,
+        streams,
+        clock,
+        stop_on_failure=prepared.spec.on_goal_failure != "continue",
+        mode=prepared.spec.navigation.mode,
+        heard=lambda localizer: LocalizerWithFaults(localizer, told) if prepared.spec.faults else localizer,
+    )
+
+
+class TruthSensor:
+    """Tells the `ground_truth` localizer the true pose, as an odometry that never errs and lives in the map frame."""
+
+    name = "ground_truth"
+
+    def __init__(self, robot: Robot, period: int) -> None:
+        self._robot, self.period = robot, period
+
+    def read(self, tick: int) -> Odometry:
+        """The true pose now."""
+        truth = self._robot.truth()
+        return Odometry(self.name, tick, truth.pose.plane, truth.twist)

@@ -1,0 +1,1 @@
+"""Caches of worlds and prepared scenarios, in memory and on disk."""

@@ -1,0 +1,73 @@
+"""The worlds of one command, each built once however many scenarios are in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from simscen.core.environment.world_model import World
+from simscen.core.files import collect_read_files, record_read_file
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.shapes import Solid
+from simscen.loading.loaded import LoadedScenario, LoadedWorld
+from simscen.run.preparation.loaders import load_world
+from simscen.worlds.plainways import PlainWays, plain_ways
+
+if TYPE_CHECKING:
+    from simscen.worlds.shortest import ShortestWays
+
+Bounds = tuple[float, float, float, float]
+
+
+@dataclass
+class WorldCache:
+    """Remembers worlds by what their files say, and where a robot of some size gets in them."""
+
+    _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
+    _plain: list[tuple[tuple[Solid, ...], float, tuple[float, float], PlainWays | None]] = field(default_factory=list)
+    _ways: list[tuple[tuple[Solid, ...], Bounds, float, tuple[float, float], ShortestWays]] = field(
+        default_factory=list
+    )
+
+    def world(self, loaded: LoadedScenario) -> World:
+        """The world of a scenario; files that it was made of are noted as read. Raises InvalidInput."""
+        known = next((entry for entry in self._worlds if entry[0] == loaded.world), None)
+        if known is None:
+            with collect_read_files() as read:
+                world = load_world(loaded)
+            known = loaded.world, world, read
+            self._worlds.append(known)
+        for file in sorted(known[2]):
+            record_read_file(file)
+        return known[1]
+
+    def plain_ways(self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]) -> PlainWays | None:
+        """The ways of a disc between solids in plain numbers; None where the solids are not plain."""
+        for known in self._plain:
+            if known[0] is solids and known[1:3] == (radius, z_range):
+                return known[3]
+        ways = plain_ways(solids, radius, z_range)
+        self._plain = [*self._plain[-7:], (solids, radius, z_range, ways)]
+        return ways
+
+    def ways(
+        self, solids: tuple[Solid, ...], bounds: Bounds, radius: float, z_range: tuple[float, float]
+    ) -> ShortestWays:
+        """The ways of a disc between solids."""
+        for known in self._ways:
+            if known[0] is solids and known[1:4] == (bounds, radius, z_range):
+                return known[4]
+        from simscen.worlds.meshing import fuse
+        from simscen.worlds.shortest import ShortestWays
+
+        ways = ShortestWays(fuse(solids), bounds, radius, z_range)
+        self._ways = [*self._ways[-3:], (solids, bounds, radius, z_range, ways)]  # large: only the last few
+        return ways
+
+
+def bounds_with(bounds: Bounds, places: list[Pose2]) -> Bounds:
+    """Bounds that hold the places, too."""
+    left, low, right, high = bounds
+    xs, ys = [place.x for place in places], [place.y for place in places]
+    return min([left, *xs]), min([low, *ys]), max([right, *xs]), max([high, *ys])

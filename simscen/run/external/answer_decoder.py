@@ -1,0 +1,235 @@
+"""What an external stack says in an answer, message by message; what does not fit its type is refused."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Path
+from simscen.core.records.trace import CostGrid, LogLine
+from simscen.peer import wire
+from simscen.peer.cdr import Reader
+from simscen.peer.messages import read
+from simscen.record import frames, topics, unpack
+from simscen.record.foreign import messages
+from simscen.record.foreign.messages import Posed
+from simscen.record.rows import on_the_ground
+from simscen.record.simtime import SimTime
+from simscen.run.external.protocol import EXACT_SUFFIX, FLOAT64_ARRAY, POSE2D, STACK_TOPICS, ProtocolViolation
+
+if TYPE_CHECKING:
+    from simscen.peer.wire import Messages
+
+MAX_PARTICLES = 1_000_000
+_PLANAR_INDICES = (0, 1, 5, 6, 7, 11, 30, 31, 35)
+"""Where the nine numbers of a covariance over x, y, yaw stand among the 36 of a message."""
+_TYPES = {topic.name: topic.type for topic in STACK_TOPICS}
+
+MessagesByTopic = dict[str, list[bytes]]
+"""The messages of an answer by topic, in order."""
+T = TypeVar("T")
+
+MAX_QUATERNION_COMPONENT = 1.01
+"""No number of a unit quaternion is larger, however it was rounded."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """An answer, understood. None: nothing was said. A path without poses says that no plan is followed."""
+
+    command: Twist | None = None
+    plan: Path | None = None
+    local_plan: Path | None = None
+    belief: Belief | None = None
+    correction: Pose2 | None = None
+    events: tuple[dict[str, Any], ...] = ()
+    lines: tuple[LogLine, ...] = field(default=())
+    costmaps: tuple[CostGrid, ...] = ()
+
+
+def group_by_topic(said: Messages, answers: dict[int, str]) -> MessagesByTopic:
+    """The messages of an answer. Raises NotAllowed for a topic that no stack may speak on."""
+    found: MessagesByTopic = {}
+    for number, data in said:
+        if number not in answers:
+            raise ProtocolViolation(f"a message on topic {number}, which there is not")
+        found.setdefault(answers[number], []).append(data)
+    return found
+
+
+def decode_answer(
+    said: MessagesByTopic, tick: int, time: SimTime, correction: Pose2 | None, dead_reckoned: Pose2 | None
+) -> Answer:
+    """The answer at `tick`.
+
+    Where no transform was ever told (`correction`, the last one), a belief is one of the odometry's pose
+    `dead_reckoned`. Raises NotAllowed.
+    """
+    if len(said.get(topics.COMMAND.name, ())) > 1:
+        raise ProtocolViolation("two commands in one answer")
+    correction = _correction(said) or correction
+    return Answer(
+        command=_last(said, topics.COMMAND.name, _twist),
+        plan=_path(said, topics.PLAN.name, tick, time),
+        local_plan=_path(said, topics.LOCAL_PLAN.name, tick, time),
+        belief=_belief(said, correction, dead_reckoned),
+        correction=correction,
+        events=tuple(_told(said, topics.EVENTS.name, _event)),
+        lines=tuple(_told(said, topics.ROSOUT.name, _line)),
+        costmaps=tuple(_costmaps(said)),
+    )
+
+
+def _belief(said: MessagesByTopic, correction: Pose2 | None, dead_reckoned: Pose2 | None) -> Belief | None:
+    name = topics.BELIEF.name
+    told = _last(said, name, _posed)
+    if told is None:
+        return None
+    exact = _last(said, name + EXACT_SUFFIX, _pose2d)
+    pose = exact if exact is not None else _ground(told)
+    if correction is None:
+        correction = pose if dead_reckoned is None else pose.compose(dead_reckoned.inverse())
+    covariance = _taken(name, _covariance, said[name][-1])
+    particles = _last(said, topics.PARTICLES.name, _particles)
+    exactly = _last(said, topics.PARTICLES.name + EXACT_SUFFIX, lambda data: _table(data, 4))
+    cloud = exactly if exactly is not None else particles
+    return Belief(pose, covariance, correction, cloud if cloud is not None else np.empty((0, 4)))
+
+
+def _correction(said: MessagesByTopic) -> Pose2 | None:
+    """Where the odometry's frame is in the map."""
+    exact = _last(said, topics.TF.name + EXACT_SUFFIX, _pose2d)
+    if exact is not None:
+        return exact
+    links = [link for part in _told(said, topics.TF.name, messages.transforms) for link in part]
+    found = [link for link in links if (link.frame, link.child) == (frames.MAP, frames.ODOM)]
+    return _ground(found[-1]) if found else None
+
+
+def _path(said: MessagesByTopic, name: str, tick: int, time: SimTime) -> Path | None:
+    told = _last(said, name, messages.path)
+    exact = _last(said, name + EXACT_SUFFIX, lambda data: _table(data, 3))
+    if told is None and exact is None:
+        return None
+    made = tick if told is None else time.tick(told.stamp)
+    points = exact if exact is not None else on_the_ground(told.poses) if told is not None else np.empty((0, 3))
+    if not np.isfinite(points).all():
+        raise ProtocolViolation(f"a path on {name} that is not finite")
+    return Path(points, made)
+
+
+def _costmaps(said: MessagesByTopic) -> Iterator[CostGrid]:
+    """The newest of each."""
+    for name, topic in (("global", topics.GLOBAL_COSTMAP.name), ("local", topics.LOCAL_COSTMAP.name)):
+        if said.get(topic):
+            yield _taken(topic, partial(_costmap, name), said[topic][-1])
+
+
+def _costmap(name: str, data: bytes) -> CostGrid:
+    told = read(topics.MAP.type, data)
+    if told.frame not in (frames.MAP, frames.ODOM):
+        raise ProtocolViolation(
+            f"a {name} costmap in the frame `{told.frame}` instead of `{frames.MAP}` or `{frames.ODOM}`"
+        )
+    if not (0.0 < told.resolution < math.inf and all(map(math.isfinite, told.origin))):
+        raise ProtocolViolation(f"a {name} costmap of cells of {told.resolution:g} m at {tuple(told.origin)}")
+    if told.width * told.height != len(told.data):
+        raise ProtocolViolation(f"a {name} costmap of {told.width} x {told.height} cells with {len(told.data)} of them")
+    cells = np.array(told.data, dtype=np.int8).reshape(told.height, told.width)
+    return CostGrid(name, told.frame, OccupancyGrid(cells, told.resolution, Pose2(*told.origin)))
+
+
+def _twist(data: bytes) -> Twist:
+    command = Twist(*messages.twist(data).values)
+    if not all(map(math.isfinite, command)):
+        raise ProtocolViolation(f"a command that is not finite: {', '.join(f'{value:g}' for value in command)}")
+    return command
+
+
+def _posed(data: bytes) -> Posed:
+    told = messages.pose_with_covariance_stamped(data)
+    if told.frame not in (frames.MAP, ""):
+        raise ProtocolViolation(f"a pose on {topics.BELIEF.name} in the frame `{told.frame}` instead of `{frames.MAP}`")
+    if not all(map(math.isfinite, (*told.pose, *told.covariance))):
+        raise ProtocolViolation(f"a pose on {topics.BELIEF.name} that is not finite")
+    return told
+
+
+def _covariance(data: bytes) -> Array:
+    reader = Reader(data)
+    reader.take("iI")
+    reader.string()
+    reader.take("7d")
+    numbers = reader.take("36d")
+    return np.array([numbers[i] for i in _PLANAR_INDICES], dtype=np.float64).reshape(3, 3)
+
+
+def _ground(told: Posed) -> Pose2:
+    x, y, yaw = on_the_ground(np.array([told.pose]))[0].tolist()
+    return Pose2(x, y, yaw)
+
+
+def _particles(data: bytes) -> Array:
+    reader = Reader(data)
+    reader.take("iI")
+    reader.string()
+    (count,) = reader.take("I")
+    if count > MAX_PARTICLES:
+        raise ProtocolViolation(f"{count} particles")
+    poses = np.array([reader.take("8d") for _ in range(count)], dtype=np.float64).reshape(-1, 8)
+    if not (np.abs(poses[:, 3:7]) <= MAX_QUATERNION_COMPONENT).all():
+        raise ProtocolViolation(f"a particle on {topics.PARTICLES.name} whose orientation is no unit quaternion")
+    return np.column_stack((on_the_ground(poses[:, :7]), poses[:, 7]))
+
+
+def _pose2d(data: bytes) -> Pose2:
+    pose = Pose2(*read(POSE2D, data))
+    if not all(map(math.isfinite, pose)):
+        raise ProtocolViolation("a pose that is not finite")
+    return pose
+
+
+def _table(data: bytes, width: int) -> Array:
+    numbers = np.array(read(FLOAT64_ARRAY, data), dtype=np.float64)
+    if len(numbers) % width:
+        raise ProtocolViolation(f"{len(numbers)} numbers, which are no rows of {width}")
+    return numbers.reshape(-1, width)
+
+
+def _event(data: bytes) -> dict[str, Any]:
+    return wire.from_json(unpack.string(data).encode())
+
+
+def _line(data: bytes) -> LogLine:
+    reader = Reader(data)
+    reader.take("iI")
+    (level,) = reader.take("B")
+    return LogLine(level, reader.string(), reader.string())
+
+
+def _last(said: MessagesByTopic, name: str, take: Callable[[bytes], T]) -> T | None:
+    found = said.get(name)
+    return _taken(name, take, found[-1]) if found else None
+
+
+def _told(said: MessagesByTopic, name: str, take: Callable[[bytes], T]) -> list[T]:
+    return [_taken(name, take, data) for data in said.get(name, ())]
+
+
+def _taken(name: str, take: Callable[[bytes], T], data: bytes) -> T:
+    try:
+        return take(data)
+    except ProtocolViolation:
+        raise
+    except (ValueError, struct.error, RecursionError) as error:
+        raise ProtocolViolation(f"a message on {name} that is no {_TYPES[name]}: {error}") from error

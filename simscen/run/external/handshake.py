@@ -1,0 +1,205 @@
+"""What an external stack is told before the first step: the objects of HELLO and GOAL."""
+
+import json
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.geometry import Pose3
+from simscen.core.messages.goal_names import Mode
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Goal
+from simscen.core.version import __version__
+from simscen.peer import wire
+from simscen.record.topics import Topic
+from simscen.run.external.protocol import EXACT_SUFFIX, ProtocolViolation, TopicTable
+from simscen.stack.protocols import RobotModel, Surroundings
+
+
+@dataclass(frozen=True)
+class RunParameters:
+    """What of a run a stack is told besides its surroundings; `robot_name` is "" where there is one robot."""
+
+    seed: int
+    control_period: int
+    sensors: dict[str, str]
+    mounts: dict[str, Pose3]
+    rates: dict[str, float]
+    robot_description: str
+    stop_on_failure: bool
+    mode: Mode = "navigate_to_pose"
+    robot_name: str = ""
+
+
+def hello_content(
+    surroundings: Surroundings,
+    ordered: RunParameters,
+    offer: TopicTable,
+    named: list[tuple[str, Topic]],
+    answer_limit: float,
+) -> dict[str, Any]:
+    """The object of HELLO; `named` are the topics of each sensor."""
+    masks = surroundings.masks
+    sensor_of = {topic.name: sensor for sensor, topic in named}
+    return {
+        "protocols": [wire.PROTOCOL],
+        "simscen": __version__,
+        "seed": ordered.seed,
+        "tick_rate": surroundings.tick_rate,
+        "control_period": ordered.control_period,
+        "answer_limit": answer_limit,
+        "mode": ordered.mode,
+        "robot_name": ordered.robot_name,
+        "robot": _robot(surroundings.robot),
+        "map": _grid(surroundings.map),
+        "keepout": [_polygon(area) for area in surroundings.keepout],
+        "speed_zones": [{"polygon": _polygon(area), "speed_limit": v} for area, v in surroundings.speed_zones],
+        "keepout_mask": _grid(masks.keepout),
+        "speed_mask": masks.speed
+        and {
+            **(_grid(masks.speed.grid) or {}),
+            "percent": masks.speed.percent,
+            "base": masks.speed.base,
+            "multiplier": masks.speed.multiplier,
+        },
+        "lidars": list(surroundings.lidars),
+        "sensors": {name: _sensor(name, ordered) for name in ordered.sensors},
+        "says": [_topic(topic, offer.numbers[name], sensor_of) for name, topic in offer.says.items()],
+        "hears": [
+            {"topic": name, "type": offer.hears[name].type, "number": number} for number, name in offer.answers.items()
+        ],
+    }
+
+
+def goal_content(estimate: Estimate, goals: tuple[Goal, ...], ordered: RunParameters) -> dict[str, Any]:
+    """The object of GOAL."""
+    pose = estimate.pose
+    return {
+        "initial_estimate": {"pose": None if pose is None else list(pose), "std": list(estimate.std)},
+        "goals": [goal_data(goal) for goal in goals],
+        "on_goal_failure": "stop" if ordered.stop_on_failure else "continue",
+        "mode": ordered.mode,
+    }
+
+
+def goal_data(goal: Goal) -> dict[str, Any]:
+    """A goal as GOAL and PREEMPT say it."""
+    x, y, yaw = map(float, goal.pose)
+    tolerances = {"xy_tolerance": goal.xy_tolerance, "yaw_tolerance": goal.yaw_tolerance}
+    drive = {"timeout": goal.timeout, "via": goal.via, "wait": goal.wait}
+    return {"name": goal.name, "x": x, "y": y, "yaw": yaw, **tolerances, **drive}
+
+
+def _robot(robot: RobotModel) -> dict[str, Any]:
+    return {
+        "footprint": _polygon(robot.footprint),
+        "radius": robot.radius,
+        "max_linear": robot.max_linear,
+        "max_reverse": robot.max_reverse,
+        "max_lateral": robot.max_lateral,
+        "max_angular": robot.max_angular,
+        "linear_acceleration": robot.linear_acceleration,
+        "linear_deceleration": robot.linear_deceleration,
+        "angular_acceleration": robot.angular_acceleration,
+        "turning_radius": robot.turning_radius,
+        "holonomic": robot.holonomic,
+    }
+
+
+def _sensor(name: str, ordered: RunParameters) -> dict[str, Any]:
+    mount = ordered.mounts.get(name)
+    return {"says": ordered.sensors[name], "rate": ordered.rates.get(name), "mount": mount and list(mount)}
+
+
+def _topic(topic: Topic, number: int, sensor_of: dict[str, str]) -> dict[str, Any]:
+    sensor = sensor_of.get(topic.name.removesuffix(EXACT_SUFFIX))
+    return {
+        "topic": topic.name,
+        "type": topic.type,
+        "number": number,
+        "latched": topic.latched,
+        **({"sensor": sensor} if sensor is not None else {}),
+    }
+
+
+def _grid(grid: OccupancyGrid | None) -> dict[str, Any] | None:
+    """What a nav_msgs/msg/OccupancyGrid rounds or turns into a quaternion."""
+    if grid is None:
+        return None
+    height, width = grid.shape
+    return {"resolution": grid.resolution, "width": width, "height": height, "origin": [float(v) for v in grid.origin]}
+
+
+def _polygon(corners: Any) -> list[list[float]]:
+    return [[float(x), float(y)] for x, y in corners]
+
+
+# MERGED: How an external stack introduces itself.
+MAX_NAME_LENGTH = 200
+MAX_ABOUT_LENGTH = 65_536
+
+
+@dataclass(frozen=True)
+class Welcome:
+    """Its name and version, the topics it wants, when it wants to be asked, and what else it says of itself."""
+
+    name: str = ""
+    version: str = ""
+    topics: tuple[str, ...] = ()
+    every_beat: bool = False
+    about: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, kind: int, body: bytes, offer: TopicTable, mode: Mode = "navigate_to_pose") -> "Welcome":
+        """From its first frame. Raises Malformed, or NotAllowed, as of a stack that does not know the `mode`."""
+        if kind != wire.WELCOME:
+            raise ProtocolViolation("its first frame is no WELCOME")
+        told = wire.from_json(body)
+        if told.get("protocol") != wire.PROTOCOL:
+            raise ProtocolViolation(
+                f"it speaks version {told.get('protocol')} of the protocol, simscen {wire.PROTOCOL}"
+            )
+        step = told.get("step", "control")
+        if step not in ("control", "beat"):
+            raise ProtocolViolation(f"`step` is {step!r}, neither `control` nor `beat`")
+        modes = told.get("modes", ["navigate_to_pose"])
+        if not isinstance(modes, list) or mode not in modes:
+            known = ", ".join(map(str, modes))[:200] if isinstance(modes, list) else "none"
+            raise ProtocolViolation(
+                f"the scenario sends goals by {mode}, which this stack does not know; it knows {known}"
+            )
+        topics = told.get("topics", [])
+        if not isinstance(topics, list) or not all(isinstance(topic, str) for topic in topics):
+            raise ProtocolViolation("`topics` is no list of names")
+        if unknown := [topic for topic in topics if topic not in offer.says]:
+            raise ProtocolViolation(
+                f"it wants `{unknown[0][:80]}`, which there is not; there are {', '.join(offer.says)}"
+            )
+        return cls(_text(told, "name"), _text(told, "version"), tuple(topics), step == "beat", _about(told))
+
+    def with_farewell(self, body: bytes) -> "Welcome":
+        """The same, with what it said at the end; what cannot be read changes nothing, as the run is over."""
+        try:
+            return replace(self, about=self.about | _about(wire.from_json(body)))
+        except (ProtocolViolation, wire.Malformed):
+            return self
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """For the log."""
+        about = {"about": json.dumps(self.about, sort_keys=True)} if self.about else {}
+        return {"name": self.name, "version": self.version, "protocol": str(wire.PROTOCOL), **about}
+
+
+def _text(told: dict[str, Any], key: str) -> str:
+    text = told.get(key, "")
+    if not isinstance(text, str) or len(text) > MAX_NAME_LENGTH:
+        raise ProtocolViolation(f"`{key}` is no text of at most {MAX_NAME_LENGTH} characters")
+    return text
+
+
+def _about(told: dict[str, Any]) -> dict[str, Any]:
+    about = told.get("about", {})
+    if not isinstance(about, dict) or len(str(about)) > MAX_ABOUT_LENGTH:
+        raise ProtocolViolation(f"`about` is no object of at most {MAX_ABOUT_LENGTH} characters")
+    return about

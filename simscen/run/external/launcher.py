@@ -1,0 +1,120 @@
+"""The program that keeps an external stack: `python -I -m simscen.run.external.launcher CONTROL REPORT SOCKET`.
+
+It starts the stack, tells how it ended, and when the run is over, or when the run's process is no more, whatever became
+of it, it ends the stack with all that the stack has started. Not for people.
+"""
+
+import ctypes
+import errno
+import json
+import os
+import resource
+import select
+import signal
+import struct
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from simscen.run.process.isolation import adopt_orphans, kill_children_except
+
+TERM_GRACE_S = 0.5
+"""Seconds between SIGTERM and SIGKILL."""
+MAX_OPEN_FILES = 1024
+_PR_SET_PDEATHSIG = 1
+
+
+def main() -> None:
+    """Keep one stack from its start to its end."""
+    control, report, stream = map(int, sys.argv[1:])
+    (size,) = struct.unpack("<I", _exactly(control, 4))
+    told: dict[str, Any] = json.loads(_exactly(control, size))
+    adopt_orphans()
+    _own_limits()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # the run's process ignores it, which a program would inherit
+    try:
+        process = subprocess.Popen(
+            told["argv"],
+            env={**told["env"], told["variable"]: str(stream)},
+            cwd=told["cwd"],
+            stdin=subprocess.DEVNULL,
+            pass_fds=[stream],
+            start_new_session=True,
+            preexec_fn=_die_with_keeper,  # noqa: PLW1509 - this program has one thread
+        )
+    except (OSError, ValueError) as error:
+        _tell(report, {"failed": _why(error)})
+        return
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.close(stream)
+    _watch(process, control, report)
+    _end(process)
+
+
+def _why(error: Exception) -> str:
+    """Why the program could not be started, in more words than the kernel has."""
+    if not isinstance(error, OSError) or error.strerror is None:
+        return str(error)
+    if error.errno == errno.ENOEXEC:
+        return f"{error.strerror}: neither a program for this machine nor a script that begins with #!"
+    if error.errno == errno.ENOENT and error.filename and Path(error.filename).exists():
+        return f"{error.strerror}: it is there, but not what it needs to be run, such as its dynamic linker"
+    return f"{error.strerror}: {error.filename}" if error.filename else error.strerror
+
+
+def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> None:
+    """Wait for the end of the run; tell of the end of the stack should that come first."""
+    pidfd = os.pidfd_open(process.pid)
+    waiting = [control, pidfd]
+    while True:
+        ready, _, _ = select.select(waiting, [], [])
+        if pidfd in ready:
+            _tell(report, {"exit": process.wait()})
+            waiting.remove(pidfd)
+        if control in ready:
+            return
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    """End the stack and its group by asking, then all that it has started by force."""
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGTERM)
+    end = time.monotonic() + TERM_GRACE_S
+    while process.poll() is None and time.monotonic() < end:
+        select.select([], [], [], 0.005)
+    kill_children_except(())
+
+
+def _own_limits() -> None:
+    """The limits of the run's process are for engines; a stack has those of whoever called simscen."""
+    for what in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
+        hard = resource.getrlimit(what)[1]
+        resource.setrlimit(what, (hard, hard))
+    hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    soft = MAX_OPEN_FILES if hard == resource.RLIM_INFINITY else min(MAX_OPEN_FILES, hard)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def _die_with_keeper() -> None:
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+
+
+def _tell(report: int, message: dict[str, Any]) -> None:
+    with suppress(BrokenPipeError):
+        os.write(report, json.dumps(message).encode() + b"\n")
+
+
+def _exactly(pipe: int, size: int) -> bytes:
+    data = b""
+    while len(data) < size:
+        if not (piece := os.read(pipe, size - len(data))):
+            sys.exit()  # whoever started this is no more
+        data += piece
+    return data
+
+
+if __name__ == "__main__":
+    main()

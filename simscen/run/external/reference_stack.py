@@ -1,0 +1,194 @@
+"""simscen's own stack as a process of its own: `python -m simscen.run.external.reference_stack STACK`.
+
+STACK is a `stack:` section as JSON (default: an empty one). It exists to prove the protocol: a run with this stack
+gives the same log as one with the stack in the engine, to the last bit. `simscen bench` measures with it what a beat
+costs.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from array import array
+from collections.abc import Iterator
+from typing import Any, get_args
+
+import numpy as np
+
+from simscen.core.clock import Clock
+from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.goal_names import Mode
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Goal as CoreGoal
+from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Scan
+from simscen.core.random_streams import Streams
+from simscen.core.records.events import EventKind, Value
+from simscen.core.records.trace import Decision
+from simscen.model.stack import StackSpec
+from simscen.peer import Goal, Peer, Step, messages, wire
+from simscen.peer.client import EVENTS, Message
+from simscen.record import pack_many, topics
+from simscen.record.simtime import SECOND, SimTime
+from simscen.run.external.protocol import EXACT_SUFFIX, KEEPOUT_MASK, SPEED_MASK
+from simscen.stack.build import build_stack
+from simscen.stack.protocols import RobotModel, Stack, Surroundings
+
+_NO_PIXELS = Image("", 0, np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.float32))
+
+
+class ReferenceStackPeer(Peer):
+    """Hands what it hears to a ReferenceStack, and says what that decides."""
+
+    def __init__(self, spec: StackSpec) -> None:
+        self._spec = spec
+        self._stack: Stack | None = None
+        self._first: dict[str, Any] = {}
+        self._orders: list[tuple[int, dict[str, Any]]] = []
+        self._followed = False
+        self._under_way: Value = 0
+        super().__init__("simscen's reference stack", every_beat=True, topics=None, modes=get_args(Mode))
+        self._time = SimTime(self.hello["tick_rate"])
+        self._sensors = {topic["topic"]: topic.get("sensor", "") for topic in self.hello["says"]}
+
+    def serve(self) -> None:
+        """Answer until the run is over."""
+        for step in self:
+            stack = self._stack or self._started(step)
+            for kind, told in self._orders:
+                if kind == wire.PREEMPT:
+                    stack.preempt(told["tick"], _goal(Goal.of(told["goal"])))
+                else:
+                    stack.cancel(told["tick"])
+            self._orders.clear()
+            self._say(step, stack.decide(step.tick, tuple(self._readings(step.messages))), stack)
+
+    def _take(self, kind: int, content: dict[str, Any]) -> None:
+        if kind == wire.GOAL:
+            self._first = content
+        else:
+            self._orders.append((kind, content))
+
+    def _started(self, step: Step) -> Stack:
+        hello, grids = self.hello, {m.topic: m.content for m in step.messages if m.type == topics.MAP.type}
+        speed = _grid(hello["speed_mask"], grids.get(SPEED_MASK.name))
+        limits = hello["speed_mask"]
+        surroundings = Surroundings(
+            robot=RobotModel(**{**self.robot, "footprint": _polygon(self.robot["footprint"])}),
+            map=_grid(hello["map"], grids.get(topics.MAP.name)),
+            tick_rate=hello["tick_rate"],
+            keepout=tuple(map(_polygon, hello["keepout"])),
+            speed_zones=tuple((_polygon(zone["polygon"]), zone["speed_limit"]) for zone in hello["speed_zones"]),
+            masks=FilterMasks(
+                _grid(hello["keepout_mask"], grids.get(KEEPOUT_MASK.name)),
+                speed if speed is None else SpeedLimits(speed, limits["percent"], limits["base"], limits["multiplier"]),
+            ),
+            lidars=tuple(hello["lidars"]),
+        )
+        told, estimate = self._first, self._first["initial_estimate"]
+        self._stack = build_stack(
+            self._spec,
+            surroundings,
+            Streams(hello["seed"], hello["robot_name"]),
+            Clock(hello["tick_rate"]),
+            stop_on_failure=told["on_goal_failure"] == "stop",
+            mode=told["mode"],
+        )
+        pose, std = estimate["pose"], estimate["std"]
+        self._stack.start(
+            Estimate(None if pose is None else Pose2(*pose), (std[0], std[1], std[2])),
+            tuple(_goal(Goal.of(goal)) for goal in told["goals"]),
+        )
+        return self._stack
+
+    def _readings(self, heard: list[Message]) -> Iterator[Reading]:
+        """The readings as the engine had them."""
+        exact = {m.topic: iter([e.content for e in heard if e.topic == m.topic + EXACT_SUFFIX]) for m in heard}
+        for message in heard:
+            sensor = self._sensors[message.topic]
+            if not sensor or message.topic.endswith(EXACT_SUFFIX):
+                continue
+            told: Any = next(exact[message.topic], None)
+            match message.type:
+                case topics.SCAN_TYPE:
+                    scan = message.content
+                    angle, step, least, most, x, y, yaw = told[:7]
+                    ranges = np.array(told[7:], dtype=np.float64)
+                    yield Scan(sensor, self._tick(scan.stamp), ranges, angle, step, least, most, Pose2(x, y, yaw))
+                case topics.ODOMETRY_TYPE:
+                    odom = message.content
+                    yield Odometry(sensor, self._tick(odom.stamp), Pose2(*told), Twist(odom.vx, odom.vy, odom.wz))
+                case topics.IMU_TYPE:
+                    imu = message.content
+                    yield Imu(sensor, self._tick(imu.stamp), imu.angular_velocity, imu.linear_acceleration)
+                case topics.BUMPER_TYPE:
+                    yield Bump(sensor, 0, message.content)
+                case topics.IMAGE_TYPE:
+                    yield _NO_PIXELS
+
+    def _tick(self, stamp: messages.Stamp) -> int:
+        return self._time.tick(stamp[0] * SECOND + stamp[1])
+
+    def _say(self, step: Step, decision: Decision, stack: Stack) -> None:
+        vx, vy, wz = decision.command
+        step.drive(vx, wz, vy)
+        if decision.belief is not None:
+            belief = decision.belief
+            covariance = belief.covariance.ravel().tolist()
+            step.publish(topics.BELIEF.name, messages.pose_with_covariance(step.stamp, belief.pose, covariance))
+            step.publish(topics.BELIEF.name + EXACT_SUFFIX, messages.pose2d(*belief.pose))
+            step.publish(topics.TF.name + EXACT_SUFFIX, messages.pose2d(*belief.map_from_odom))
+            if len(belief.particles):
+                step.publish(topics.PARTICLES.name + EXACT_SUFFIX, _numbers(belief.particles))
+        if decision.plan is not None:
+            made = self._time.stamp(decision.plan.tick)
+            step.publish(topics.PLAN.name, messages.path(made, []))
+            step.publish(topics.PLAN.name + EXACT_SUFFIX, _numbers(decision.plan.points))
+        elif self._followed and stack.plan is None:
+            step.publish(topics.PLAN.name, messages.path(step.stamp, []))
+        self._followed = stack.plan is not None
+        if decision.local_plan is not None:
+            step.publish(topics.LOCAL_PLAN.name + EXACT_SUFFIX, _numbers(decision.local_plan.points))
+        for costmap in decision.costmaps:
+            topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
+            step.publish(topic.name, pack_many.occupancy_grid(costmap.frame, step.stamp, costmap.grid))
+        for event in decision.events:
+            if event.kind is EventKind.GOAL_ACCEPTED:
+                self._under_way = event.data["index"]
+            if event.data.get("index", self._under_way) != self._under_way:
+                continue  # what ends with the goal that it follows in the same drive, nobody needs to be told
+            if event.kind is not EventKind.NAVIGATION_ENDED:
+                said = {"kind": event.kind.value, "name": event.name, "data": dict(event.data)}
+                step.publish(EVENTS, messages.string(json.dumps(said)))
+
+
+def _goal(goal: Goal) -> CoreGoal:
+    pose = Pose2(goal.x, goal.y, goal.yaw)
+    return CoreGoal(goal.name, pose, goal.xy_tolerance, goal.yaw_tolerance, goal.timeout, goal.via, goal.wait)
+
+
+def _grid(facts: dict[str, Any] | None, grid: messages.OccupancyGrid | None) -> OccupancyGrid | None:
+    if facts is None or grid is None:
+        return None
+    cells = np.array(grid.data, dtype=np.int8).reshape(grid.height, grid.width)
+    return OccupancyGrid(cells, facts["resolution"], Pose2(*facts["origin"]))
+
+
+def _polygon(corners: list[list[float]]) -> tuple[tuple[float, float], ...]:
+    return tuple((x, y) for x, y in corners)
+
+
+def _numbers(table: Array) -> bytes:
+    return messages.float64_array(array("d", np.ascontiguousarray(table, dtype=np.float64).tobytes()))
+
+
+def main() -> None:
+    """Serve the stack that the command line says."""
+    written = json.loads(sys.argv[1]) if len(sys.argv) > 1 else {}
+    ReferenceStackPeer(StackSpec.model_validate(written, by_alias=True, by_name=False)).serve()
+
+
+if __name__ == "__main__":
+    main()

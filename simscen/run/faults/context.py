@@ -1,0 +1,100 @@
+"""What each fault of a scenario is told of the instance that it affects."""
+
+from collections.abc import Callable, Collection
+from functools import cache
+
+import numpy as np
+
+from simscen.core.clock import Clock
+from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry.ray_fans import RayCaster
+from simscen.core.geometry.shapes import TriangleMesh
+from simscen.core.messages.sensor_data import Image, Scan
+from simscen.core.records.disturbances import KIND_BY_INSTANCE
+from simscen.faults.base import FaultSetting, Sight
+from simscen.model.disturbances import FaultEntry
+from simscen.model.robot import Camera, Mount, RobotSpec
+from simscen.sensors.sensor import SensorView
+
+RayCasterFactory = Callable[[TriangleMesh, frozenset[str]], RayCaster]
+"""Makes rays against a mesh that never moves, and against all that does but what is called so."""
+
+
+class FaultContexts:
+    """Makes the setting of each fault of one robot."""
+
+    def __init__(
+        self,
+        robot: RobotSpec,
+        clock: Clock,
+        now: Callable[[], int],
+        view: SensorView,
+        mesh: TriangleMesh,
+        rays: RayCasterFactory,
+    ) -> None:
+        self._robot, self._clock, self._now, self._view = robot, clock, now, view
+        self._rays = cache(lambda names: rays(_without(mesh, names), names))
+
+    def __call__(self, entry: FaultEntry) -> FaultSetting:
+        """What the fault of an entry may know."""
+        sensor = self._robot.sensors.get(entry.sensor)
+        return FaultSetting(
+            separation=getattr(self._robot.drive, "wheel_separation", 0.0),
+            clock=self._clock,
+            now=self._now,
+            kind=sensor.says if sensor is not None else KIND_BY_INSTANCE[entry.sensor],
+            sight=None if sensor is None else self._sight(entry.sensor, sensor.chosen),
+        )
+
+    def _sight(self, name: str, spec: object) -> Sight:
+        return HypotheticalSensor(spec, self._view, self._rays, self._now, name)
+
+
+def _without(mesh: TriangleMesh, names: frozenset[str]) -> TriangleMesh:
+    """The mesh without what is called so."""
+    gone = [number for number, name in enumerate(mesh.names) if name in names]
+    kept = ~np.isin(mesh.owners, gone)
+    return TriangleMesh(mesh.vertices, mesh.faces[kept], mesh.owners[kept], mesh.names)
+
+
+# MERGED: What a lidar or a camera would see now if it sat elsewhere, or if something were not there: for faults.
+RayCasterWithout = Callable[[frozenset[str]], RayCaster]
+"""Gives rays that go through what is called so."""
+
+
+class HypotheticalSensor:
+    """Implements faults.base.Sight for one sensor of a robot."""
+
+    def __init__(
+        self, spec: object, view: SensorView, rays: RayCasterWithout, now: Callable[[], int], name: str
+    ) -> None:
+        self._spec, self._view, self._rays, self._now, self._name = spec, view, rays, now, name
+        mount = getattr(spec, "mount", None)
+        self._mount = mount if isinstance(mount, Mount) else Mount()
+
+    def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
+        """See faults.base.Sight."""
+        pose = self._view.base_pose().compose(self._placed(error))
+        angles = scan.angles()
+        flat = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))))
+        directions = flat @ pose.rotation().T
+        origins = np.repeat([pose.position], len(directions), axis=0)
+        hits = self._rays(frozenset(without)).cast(origins, directions, 2 * scan.range_max)
+        return hits if error is None else np.minimum(hits, _floor(pose.z, directions[:, 2]))
+
+    def image(self, error: Pose3) -> Image:
+        """See faults.base.Sight."""
+        spec = self._spec
+        assert isinstance(spec, Camera)
+        seen = self._view.image(self._placed(error), spec.width, spec.height, spec.field_of_view, spec.max_range)
+        return Image(self._name, self._now(), *seen)
+
+    def _placed(self, error: Pose3 | None) -> Pose3:
+        thought = self._mount.pose
+        return thought if error is None else thought.compose(error)
+
+
+def _floor(height: float, slopes: Array) -> Array:
+    """Where beams from a height end at the floor (z = 0); inf for those that do not point down."""
+    down = slopes < -1e-9
+    return np.where(down, height / np.where(down, -slopes, 1.0), np.inf)

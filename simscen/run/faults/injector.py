@@ -1,0 +1,232 @@
+"""The faults of a robot, between its sensors and the stack, in the stack, and between the stack and the wheels.
+
+What several faults do to one instance adds up in the order of the scenario: each gets what the one before it made. What
+a fault kept back (a delay) arrives where that fault stands: those after it see it when it arrives.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, fields
+from typing import NoReturn
+
+import numpy as np
+
+from simscen.core.errors import BROKEN_COMPONENT, RunError
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief
+from simscen.core.messages.sensor_data import Odometry, Reading, Readings
+from simscen.core.random_streams import Streams
+from simscen.core.records.disturbances import BELIEF, COMMAND, WHEELS
+from simscen.core.records.events import Event, EventKind
+from simscen.faults.base import Disturbance, FaultSetting
+from simscen.model.disturbances import FaultEntry
+from simscen.run.faults.channels import CommandLink
+from simscen.run.live_world.random_streams import stream_names
+from simscen.stack.localizers.ground_truth import TRUTH
+
+ROUNDING = 1e-9
+"""What a fault that changes nothing may still change in a number, by adding increments up."""
+
+
+@dataclass
+class _Active:
+    """A fault at work; `touched` counts the messages and commands that it changed or kept back."""
+
+    index: int
+    sensor: str
+    kind: str
+    disturbance: Disturbance
+    touched: int = 0
+    over: bool = False
+
+    def hears(self, reading: Reading) -> bool:
+        """Whether it affects such a reading: that of its sensor; of wheels, all that count how they turn."""
+        if self.kind == WHEELS:
+            return isinstance(reading, Odometry) and reading.sensor != TRUTH
+        return reading.sensor == self.sensor
+
+
+class FaultInjector:
+    """Disturbs readings, commands, beliefs and the map with the faults that are under way, in the scenario's order."""
+
+    def __init__(
+        self,
+        faults: list[FaultEntry],
+        streams: Streams,
+        setting: Callable[[FaultEntry], FaultSetting],
+        link: CommandLink,
+        note: Callable[[Event], None],
+        mapped: Collection[int] = (),
+    ) -> None:
+        """`note` takes a fault.took_effect when a fault changes its first message or command.
+
+        `mapped` are the numbers of those faults that have changed the map before the run.
+        """
+        self._mapped = set(mapped)
+        self._faults, self._streams, self._setting, self._link, self._note = faults, streams, setting, link, note
+        self._names = stream_names(faults)
+        self.possible = bool(faults)
+        """Whether it has any fault that may begin."""
+        self._begun: Counter[int] = Counter()
+        # By number of the fault and count of its activations: what one activation leaves behind, the next builds on.
+        self.active: dict[tuple[int, int], _Active] = {}
+        self._linked = False
+        self._believed: tuple[int, Belief, Belief] | None = None
+
+    def begin(self, index: int) -> str:
+        """Start the scenario's fault number `index`; each time its chance is a stream of its own.
+
+        Returns the kind of what it affects.
+        """
+        entry = self._faults[index]
+        self._begun[index] += 1
+        chance = self._streams.generator(f"fault{self._names[index]}#{self._begun[index]}")
+        setting = self._setting(entry)
+        disturbance: object = entry.fault.begin(chance, setting)
+        if not isinstance(disturbance, Disturbance):
+            self._broke(index, f"begins as {disturbance!r}, which is no Disturbance")
+        self.active[index, self._begun[index]] = _Active(index, entry.sensor, setting.kind, disturbance)
+        self._linked = self._linked or setting.kind == COMMAND
+        return setting.kind
+
+    def end(self, index: int) -> int:
+        """End it; what it leaves behind stays at work. Returns how many messages and commands it has touched."""
+        key = index, self._begun[index]
+        active = self.active.pop(key)
+        if rest := active.disturbance.end():
+            self.active[key] = _Active(index, active.sensor, active.kind, rest, over=True)
+        return active.touched
+
+    def disturb(self, readings: Readings) -> Readings:
+        """The readings as the stack gets them."""
+        if not self.active:
+            return readings
+        for active in self._at_work():
+            if active.index in self._mapped:
+                self._mapped.remove(active.index)
+                self._count(active)
+            late = self._late(active)
+            heard = (self._reading(active, one) if active.hears(one) else one for one in readings)
+            readings = (*late, *(one for one in heard if one is not None))
+        return readings
+
+    def command(self, tick: int, command: Twist) -> Twist:
+        """The command as the wheels get it: what cmd_vel lets through, then what else befalls the wheels."""
+        sends = self._link.sends(tick, command)
+        if not self._linked and not self.active:
+            if sends:
+                self._link.hear(tick, command)
+            return command
+        if self._linked:
+            self._transmit(tick, command if sends else None)
+            command = self._link.driven(tick)
+        elif sends:
+            self._link.hear(tick, command)
+        for active in self._at_work():
+            if active.kind == WHEELS or active.disturbance.drives:
+                command = self._commanded(active, command) or command
+        return command
+
+    def belief(self, tick: int, belief: Belief) -> Belief:
+        """What the navigator is told instead of a belief of the localizer."""
+        if not self.active or not any(active.kind == BELIEF for active in self.active.values()):
+            return belief
+        if self._believed is None or self._believed[:2] != (tick, belief):
+            told = belief
+            for active in self._at_work():
+                if active.kind == BELIEF:
+                    told = self._told(active, told)
+            self._believed = tick, belief, told
+        return self._believed[2]
+
+    def _at_work(self) -> list[_Active]:
+        if not self.active:
+            return []
+        return [active for _, active in sorted(self.active.items(), key=lambda item: item[0])]
+
+    def _late(self, active: _Active) -> Sequence[Reading]:
+        late: object = active.disturbance.arriving()
+        if not isinstance(late, list | tuple):
+            self._broke(active.index, f"lets {late!r} arrive")
+        if strange := [one for one in late if getattr(one, "sensor", None) != active.sensor]:
+            self._broke(active.index, f"lets {strange[0]!r} arrive, which is no reading of `{active.sensor}`")
+        return late
+
+    def _reading(self, active: _Active, reading: Reading) -> Reading | None:
+        disturbed = active.disturbance.reading(_kept(reading))
+        if disturbed is not None and _signed(disturbed) != _signed(reading):
+            what = f"makes {type(disturbed).__name__} of the {type(reading).__name__} of a sensor"
+            self._broke(active.index, what)
+        if disturbed is None or not _equal(disturbed, reading):
+            self._count(active)
+        return disturbed
+
+    def _transmit(self, tick: int, command: Twist | None) -> None:
+        """Hand what is sent, and what was kept back, from fault to fault, and the rest to the base."""
+        for active in self._at_work():
+            if active.kind == COMMAND:
+                late = active.disturbance.arriving_command()
+                if late is not None:
+                    self._check(active, late)
+                fresh = None if command is None else self._commanded(active, command)
+                command = late if fresh is None else fresh
+        if command is not None:
+            self._link.hear(tick, command)
+
+    def _commanded(self, active: _Active, command: Twist) -> Twist | None:
+        disturbed = active.disturbance.command(command)
+        if disturbed is None and active.kind == COMMAND:
+            self._count(active)
+            return None
+        disturbed = self._check(active, disturbed)
+        if not np.allclose(disturbed, command, rtol=0.0, atol=ROUNDING):
+            self._count(active)
+        return disturbed
+
+    def _check(self, active: _Active, command: object) -> Twist:
+        if not isinstance(command, Twist) or not all(map(math.isfinite, command)):
+            self._broke(active.index, f"makes {command!r} of a command")
+        return command
+
+    def _told(self, active: _Active, belief: Belief) -> Belief:
+        told: object = active.disturbance.belief(belief)
+        if not isinstance(told, Belief) or not all(map(math.isfinite, (*told.pose, *told.map_from_odom))):
+            self._broke(active.index, f"makes {told!r} of a belief")
+        if not np.allclose((*told.pose, *told.map_from_odom), (*belief.pose, *belief.map_from_odom), 0.0, ROUNDING):
+            self._count(active)
+        return told
+
+    def _broke(self, index: int, what: str) -> NoReturn:
+        entry = self._faults[index]
+        raise RunError(BROKEN_COMPONENT, f"fault `{entry.label}` {what}{entry.added_by}")
+
+    def _count(self, active: _Active) -> None:
+        if active.over:
+            return
+        if not active.touched:
+            entry = self._faults[active.index]
+            self._note(Event(0, EventKind.FAULT_TOOK_EFFECT, entry.label, {"entry": active.index}))
+        active.touched += 1
+
+
+def _kept(reading: Reading) -> Reading:
+    """The reading, its arrays kept from being written to: what a fault changes in place would not count as changed."""
+    for array in (getattr(reading, field.name) for field in fields(reading)):
+        if isinstance(array, np.ndarray):
+            array.flags.writeable = False
+    return reading
+
+
+def _signed(reading: object) -> tuple[type, object]:
+    return type(reading), getattr(reading, "sensor", None)
+
+
+def _equal(one: Reading, other: Reading) -> bool:
+    """Whether two readings of one sensor say the same but for rounding; beams without an answer (nan) do."""
+    if one is other:
+        return True
+    said = [(getattr(one, field.name), getattr(other, field.name)) for field in fields(one) if field.name != "sensor"]
+    return all(
+        np.shape(a) == np.shape(b) and np.allclose(a, b, rtol=0.0, atol=ROUNDING, equal_nan=True) for a, b in said
+    )

@@ -1,0 +1,58 @@
+"""Faults of the map, which the stack gets once: they change it before anything starts."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from simscen.core.clock import Clock
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.errors import BROKEN_COMPONENT, RunError
+from simscen.core.random_streams import Streams
+from simscen.core.records.disturbances import KIND_BY_INSTANCE, MAP
+from simscen.faults.base import FaultSetting
+from simscen.model.disturbances import FaultEntry
+from simscen.run.live_world.random_streams import stream_names
+from simscen.run.preparation.scenario import PreparedScenario
+
+
+def apply_map_faults(prepared: PreparedScenario, seed: int) -> PreparedScenario:
+    """The same with the map that each stack gets in a run with this seed, and which faults have changed it."""
+    if not prepared.robots:
+        return _of_one(prepared, Streams(seed))
+    parts = {name: _of_one(part, Streams(seed, name)) for name, part in prepared.robots.items()}
+    if all(parts[name] is part for name, part in prepared.robots.items()):
+        return prepared  # and what has been worked out of it
+    first = next(iter(parts.values()))
+    return replace(prepared, map=first.map, mapped=first.mapped, robots=parts)
+
+
+def _of_one(prepared: PreparedScenario, streams: Streams) -> PreparedScenario:
+    faults, grid = prepared.spec.faults, prepared.map
+    mapped: list[int] = []
+    for index, (entry, name) in enumerate(zip(faults, stream_names(faults), strict=True)):
+        if (
+            grid is not None
+            and KIND_BY_INSTANCE.get(entry.sensor) == MAP
+            and entry.sensor not in prepared.robot.sensors
+        ):
+            disturbed = _disturbed(grid, entry, streams.generator(f"fault{name}#1"), prepared)
+            mapped += [] if _same(grid, disturbed) else [index]
+            grid = disturbed
+    return replace(prepared, map=grid, mapped=tuple(mapped)) if mapped else prepared
+
+
+def _disturbed(
+    grid: OccupancyGrid, entry: FaultEntry, chance: np.random.Generator, prepared: PreparedScenario
+) -> OccupancyGrid:
+    clock = Clock(prepared.spec.physics.tick_rate)
+    disturbed: object = entry.fault.begin(chance, FaultSetting(clock=clock, kind=MAP)).map(grid)
+    if not isinstance(disturbed, OccupancyGrid):
+        raise RunError(
+            BROKEN_COMPONENT, f"fault `{entry.label}` makes {type(disturbed).__name__} of a map{entry.added_by}"
+        )
+    return disturbed
+
+
+def _same(one: OccupancyGrid, other: OccupancyGrid) -> bool:
+    frames = (one.resolution, one.origin) == (other.resolution, other.origin)
+    return frames and np.array_equal(one.cells, other.cells)

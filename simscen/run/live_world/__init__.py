@@ -1,0 +1,1 @@
+"""The running world: what triggers observe and what events and actions change."""

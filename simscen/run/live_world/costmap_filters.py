@@ -1,0 +1,73 @@
+"""The costmap filters of a stack while a scenario runs: which of their zones are on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from simscen.core.environment.costmap_filters import Filter, FilterMasks, Zones, ZoneSwitch
+from simscen.core.environment.world_model import Polygon
+from simscen.model.stackbase import StackBase
+
+
+@dataclass
+class _Filter:
+    """Zones by region, in the order in which they came, each with its speed limit (0 for none) and whether it is on."""
+
+    zones: dict[str, tuple[float, bool]]
+    masked: bool
+    on: bool = True
+
+    def holds(self, region: str) -> bool:
+        """Whether the zone is in force."""
+        return self.on and self.zones.get(region, (0.0, False))[1]
+
+
+class CostmapFilters:
+    """Keeps what is on; `zones` is what a stack has to be told."""
+
+    def __init__(self, stack: StackBase, regions: Mapping[str, Polygon], masks: FilterMasks) -> None:
+        self._regions, self._masks = regions, masks
+        keepout = dict.fromkeys(stack.keepout, (0.0, True))
+        speed = {zone.region: (zone.speed_limit, True) for zone in stack.speed_zones}
+        self._filters: dict[Filter, _Filter] = {
+            "keepout": _Filter(keepout, masks.keepout is not None),
+            "speed": _Filter(speed, masks.speed is not None),
+        }
+
+    def refused(self, order: ZoneSwitch) -> str:
+        """Why an order changes nothing; "" where it does."""
+        chosen, state = self._filters[order.filter], "on" if order.enabled else "off"
+        if order.region is None:
+            if not chosen.zones and not chosen.masked:
+                return f"the stack's {order.filter} filter has no zone and no mask"
+            return f"the stack's {order.filter} filter was {state} already" if chosen.on == order.enabled else ""
+        if not chosen.on:
+            return f"the stack's {order.filter} filter is off as a whole"
+        limit, on = chosen.zones.get(order.region, (0.0, False))
+        if order.enabled and order.filter == "speed" and not (order.speed_limit or limit):
+            return f"`{order.region}` is no speed zone of the stack, and has no speed limit"
+        same = order.speed_limit in (None, limit) or not order.enabled
+        return f"`{order.region}` was {state} already" if on == order.enabled and same else ""
+
+    def switch(self, order: ZoneSwitch) -> tuple[str, ...]:
+        """Carry out an order that is not refused; the regions for which it changed something, "" for the mask."""
+        chosen = self._filters[order.filter]
+        if order.region is None:
+            chosen.on = order.enabled
+            return (*(region for region, (_, on) in chosen.zones.items() if on), *([""] if chosen.masked else []))
+        limit = chosen.zones.get(order.region, (0.0, False))[0]
+        chosen.zones[order.region] = (order.speed_limit or limit, order.enabled)
+        return (order.region,)
+
+    def limit(self, region: str) -> float:
+        """The speed limit of a zone in m/s; 0 for none."""
+        return self._filters["speed"].zones.get(region, (0.0, False))[0]
+
+    @property
+    def zones(self) -> Zones:
+        """What is in force now."""
+        keepout, speed = self._filters["keepout"], self._filters["speed"]
+        return Zones(
+            tuple(self._regions[name] for name in keepout.zones if keepout.holds(name)),
+            tuple((self._regions[name], limit) for name, (limit, _) in speed.zones.items() if speed.holds(name)),
+            FilterMasks(self._masks.keepout if keepout.on else None, self._masks.speed if speed.on else None),
+        )

@@ -1,0 +1,149 @@
+"""The people of a run: what they see of it, how their bodies move in it, and what they did."""
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from simscen.core.clock import Clock
+from simscen.core.environment.pedestrians import PedestrianAction, WalkingPedestrian
+from simscen.core.environment.world_model import BuiltWorld
+from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.core.geometry.polygons import distance_to_polygon
+from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
+from simscen.core.records.events import Event, EventKind, Value
+from simscen.people.people import People, Point
+from simscen.people.seen import SeenRobot, SeenThing, Surroundings
+from simscen.people.walls import Walls
+from simscen.sim.outline import footprint, parts
+from simscen.sim.robot import Robot
+from simscen.sim.simulation import Simulation
+from simscen.worlds.section import section
+from simscen.worlds.shortest import ShortestWays, ways_in
+
+MAX_STEP_S = 0.05
+"""Seconds in which somebody walks straight on."""
+OBSTACLE_HEIGHTS_M = (0.15, 0.5, 0.95)
+"""m above the ground at which what stands is in somebody's way; what reaches the last hides what is behind it."""
+BODY_HEIGHT_RANGE_M = (0.05, 1.7)
+"""m above the ground between which a thing is in somebody's way."""
+PATH_CELL_M = 0.1
+"""m; the cells in which ways of people are searched."""
+PREFERRED_CLEARANCE_M = 0.2
+"""m of air that people like to have beside them where they plan a way."""
+EVENT_KINDS = {
+    "reached": EventKind.PEDESTRIAN_REACHED,
+    "reacted": EventKind.PEDESTRIAN_REACTED,
+    "calmed": EventKind.PEDESTRIAN_CALMED,
+}
+
+
+class PedestrianSimulation:
+    """Everybody who walks in a run; costs nothing until somebody comes. `tell` is told what they do."""
+
+    def __init__(self, built: BuiltWorld, simulation: Simulation, clock: Clock) -> None:
+        self._built, self._simulation = built, simulation
+        self._period = max(1, int(MAX_STEP_S * clock.rate + 1e-9))
+        self._seconds = self._period / clock.rate
+        self._behaviors: dict[str, str] = {}
+        self._hulls: dict[str, Array] = {}
+        self._outlines: dict[str, tuple[tuple[Solid, ...], tuple[Array, ...]]] = {}
+        self._ways: dict[float, ShortestWays] = {}
+        self.tell: list[Callable[[Event], None]] = []
+
+    @cached_property
+    def _walls(self) -> Walls:
+        cuts = [section(self._built.mesh, height) for height in OBSTACLE_HEIGHTS_M]
+        opaque = np.concatenate([np.full(len(cut.owners), cut is cuts[-1]) for cut in cuts])
+        owners = np.concatenate([cut.owners for cut in cuts]).astype(np.int64)
+        return Walls(np.concatenate([cut.segments for cut in cuts]), owners, opaque)
+
+    @cached_property
+    def _people(self) -> People:
+        return People(self._walls, self._way)
+
+    def come(self, walker: WalkingPedestrian) -> Body:
+        """Let somebody come; the body they have."""
+        people = self._people
+        people.add(walker)
+        self._behaviors[walker.name] = walker.behavior
+        shape = Cylinder(walker.radius, walker.height)
+        solids = (Solid(shape, Pose3(z=walker.height / 2), walker.name),)
+        body = Body(walker.name, solids, Pose3.planar(walker.pose))
+        self._simulation.come(body, people.top_speed(walker.name))
+        self._simulation.attend(self._period, self._step)
+        return body
+
+    def walks(self, name: str) -> bool:
+        """Whether somebody walks by themselves."""
+        return name in self._behaviors
+
+    def go(self, name: str) -> None:
+        """Somebody walks no more by themselves; who does not anyway is nobody."""
+        if self._behaviors.pop(name, None) is not None:
+            self._people.remove(name)
+
+    def room(self, place: Point, radius: float, walls_only: bool) -> bool:
+        """Whether a person of a radius could stand somewhere."""
+        if walls_only or self._walls.gap(place) < radius:
+            return self._walls.gap(place) >= radius
+        around = self._surroundings()
+        outlines = [outline for thing in around.things for outline in thing.outlines]
+        outlines += [robot.pose.apply(robot.outline) for robot in around.robots]
+        here = Pose2(*place, 0.0)
+        if any(distance_to_polygon(here, outline.tolist()) < radius for outline in outlines):
+            return False
+        others = [(pose, self._people.radius(name)) for name, pose in self._people.poses().items()]
+        return all(here.distance(pose) >= radius + other for pose, other in others)
+
+    def _step(self) -> None:
+        people, seconds = self._people, self._seconds
+        before = people.poses()
+        deeds = people.step(self._surroundings(), seconds)
+        for name, pose in people.poses().items():
+            path = MotionPath((0.0, seconds), (before[name], pose))
+            self._simulation.follow(name, path, people.top_speed(name))
+        for deed in deeds:
+            event = self._event(deed)
+            for tell in self.tell:
+                tell(event)
+
+    def _event(self, deed: PedestrianAction) -> Event:
+        data: dict[str, Value] = {"behavior": self._behaviors[deed.name], "robot": deed.about}
+        if deed.what == "reached":
+            data = {"goal": int(deed.about)}
+        return Event(self._simulation.tick, EVENT_KINDS[deed.what], deed.name, data)
+
+    # what they see
+
+    def _surroundings(self) -> Surroundings:
+        robots = tuple(self._seen(robot) for robot in self._simulation.robots.values())
+        things = self._simulation.things()
+        known = [(name, body, pose) for name, (body, pose) in things.items() if name not in self._behaviors]
+        return Surroundings(robots, tuple(SeenThing(name, self._placed(body, pose)) for name, body, pose in known))
+
+    def _placed(self, body: Body, pose: Pose3) -> tuple[Array, ...]:
+        """The outlines of a thing where it is."""
+        known = self._outlines.get(body.name)
+        if known is None or known[0] is not body.solids:
+            known = body.solids, tuple(np.array(outline) for outline in parts(body.solids, BODY_HEIGHT_RANGE_M))
+            self._outlines[body.name] = known
+        return tuple(pose.plane.apply(outline) for outline in known[1])
+
+    def _seen(self, robot: Robot) -> SeenRobot:
+        if robot.name not in self._hulls:
+            self._hulls[robot.name] = np.array(footprint(robot.shape.solids))
+        outline = self._hulls[robot.name]
+        (vx, vy, _), _ = robot.base_velocity()
+        radius = float(np.hypot(outline[:, 0], outline[:, 1]).max())
+        return SeenRobot(robot.name, robot.base_pose().plane, (vx, vy), radius, outline)
+
+    def _way(self, start: Point, goal: Point, radius: float) -> list[Point]:
+        """Around walls with room to spare, or without, or straight on where there is no way."""
+        for room in (radius + PREFERRED_CLEARANCE_M, radius):
+            if room not in self._ways:
+                self._ways[room] = ways_in(self._built, (), room, BODY_HEIGHT_RANGE_M, PATH_CELL_M)
+            corners = self._ways[room].way(Pose2(*start, 0.0), Pose2(*goal, 0.0))
+            if corners is not None:
+                return [(x, y) for x, y in corners[1:].tolist()]
+        return [goal]

@@ -1,0 +1,1 @@
+"""Everything that the runs of a scenario share: world, map, robot, goals, and shortest paths."""

@@ -1,0 +1,119 @@
+"""Where a scenario's world, map and robot come from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import World
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.geometry.shapes import Mesh
+from simscen.loading.loaded import LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.yaml.tree import key_position
+from simscen.model.robot import RobotSpec
+from simscen.model.world import WorldSpec
+from simscen.worlds.own import build_own
+
+if TYPE_CHECKING:
+    from simscen.sim.robot_body import RobotBody
+
+
+def load_world(loaded: LoadedScenario) -> World:
+    """The world of a scenario. Raises InvalidInput for a map image or an SDF file that cannot be used."""
+    return world_from_file(loaded.world, loaded.root, loaded.world_path, loaded.lenient)
+
+
+def world_from_file(source: LoadedWorld, root: Path, world_path: Sequence[Path] = (), lenient: bool = False) -> World:
+    """The world of a file; what SDF names stays inside `root` and `world_path`.
+
+    Raises InvalidInput for a map image or an SDF file that cannot be used; with `lenient`, the elements of SDF that
+    cannot be used become notes.
+    """
+    base: World | None = None
+    if source.sdf is not None:
+        from simscen.worlds.sdf import load_sdf
+
+        base = load_sdf(source.sdf, search=world_path, root=root, lenient=lenient)
+    spec = source.spec or WorldSpec(simscen=1)
+    grid, notes = _map_and_notes(source.map) if source.map else (None, ())
+    return build_own(spec, source.name, grid, base, notes)
+
+
+def load_map(source: LoadedMap) -> OccupancyGrid:
+    """The grid of a ROS map."""
+    return _map_and_notes(source)[0]
+
+
+def _map_and_notes(source: LoadedMap) -> tuple[OccupancyGrid, tuple[str, ...]]:
+    from simscen.worlds.rosmap import load_grid
+
+    return load_grid(source.spec, source.image)
+
+
+def read_mesh(path: Path) -> Mesh:
+    """For a URDF, which tells what is wrong with a mesh at the line that names it."""
+    from simscen.worlds.sdf.meshes import read_mesh as read
+
+    try:
+        return read(path)
+    except InvalidInput as error:
+        raise ValueError("; ".join(problem.message for problem in error.problems)) from error
+
+
+def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
+    """The robot as specified (a bare URDF as far as it makes plain), and made ready for physics, with what it carries.
+
+    Raises InvalidInput also for a load under which it would fall over where it stands.
+    """
+    try:
+        spec, body = robot_from_file(loaded.robot, (loaded.root, *loaded.world_path))
+        return spec, _as_entered(loaded, body)
+    except InvalidInput as error:
+        raise InvalidInput([p if p.source else loaded.sourced(p) for p in error.problems]) from error
+
+
+def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
+    entry = loaded.spec.own
+    if entry.payload is None and entry.motor_torque == 1.0:
+        return body
+    from simscen.sim.laden import centre, laden, stands, top, weakened
+
+    body = weakened(body, entry.motor_torque)
+    if entry.payload is not None:
+        x, y, z = entry.payload.at or (0.0, 0.0, top(body))
+        body = laden(body, entry.payload.mass, (x, y, z))
+        if not stands(body):
+            x, y, _ = centre(body)
+            what = f"the robot falls over: with its payload its centre of mass is at ({x:.2f}, {y:.2f}), off its wheels"
+            raise InvalidInput([loaded.problem(("robot", "payload"), "SC406", what, "put it nearer to the middle")])
+    return body
+
+
+def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, RobotBody]:
+    """The same of a robot whose files lie in `roots`."""
+    from simscen.sim.embody import robot_body
+    from simscen.sim.urdf.files import Found
+    from simscen.sim.urdf.xacro.expand import UnknownArgument
+
+    spec = robot.spec or _inferred(robot.path, roots)
+    found = Found(robot.urdf, robot.packages) if robot.urdf else None
+    try:
+        return spec, robot_body(spec, robot.path, roots, read_mesh, found)
+    except UnknownArgument as error:
+        raise InvalidInput([_unknown(robot, error.name, error.declared)]) from error
+
+
+def _unknown(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Problem:
+    assert robot.tree is not None and robot.urdf is not None  # who else would give arguments
+    message = f"{quoted(robot.urdf.name)} declares no argument {quoted(argument)}"
+    hint = suggestion(argument, declared) or "it has no <xacro:arg>"
+    return Problem(*key_position(robot.tree, ("arguments", argument)), "SC403", message, hint)
+
+
+def _inferred(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:
+    from simscen.sim.urdf.infer import spec_of_urdf
+
+    return spec_of_urdf(urdf, roots, read_mesh)

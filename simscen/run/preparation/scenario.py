@@ -1,0 +1,196 @@
+"""From a loaded scenario to all that its runs share: the built world, the robot's map, goals, the shortest ways.
+
+Plain data and numpy arrays only, so that it can be made once in the warm process and survive the fork.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from simscen.core.environment.costmap_filters import FilterMasks
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import BuiltWorld
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.shapes import TriangleMesh
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Goal
+from simscen.core.records.case import CLEARANCE_RANGE, Case
+from simscen.criteria.base import Criterion
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.plugins import plugins_of
+from simscen.loading.resolved import disturbances_of
+from simscen.model.anystack import AnyStack
+from simscen.model.localizers import Amcl, OdometryOnly
+from simscen.model.robot import RobotSpec
+from simscen.model.scenario import ScenarioSpec, estimate_of
+from simscen.model.stack import StackSpec
+from simscen.run.preparation.filter_masks import load_criterion_masks, load_masks
+from simscen.run.preparation.goals import event_goals, expected_failures, scenario_goals
+from simscen.run.preparation.loaders import load_map, load_robot, load_world
+from simscen.run.preparation.robot_size import blocking_solids, inscribed_radius
+from simscen.sim.alone import NAMELESS
+from simscen.sim.robot_body import RobotBody
+from simscen.spec.registry import Entry
+from simscen.triggers.clearance_below import ClearanceBelow
+from simscen.worlds.build import build
+from simscen.worlds.meshing import fuse
+from simscen.worlds.shortest import Leg, legs_between
+
+DEFAULT_LIDAR_HEIGHT = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedScenario:
+    """Everything of a scenario but chance.
+
+    Where there are several robots, `robots` has it as each of them needs it, by name; what stands here of a robot is
+    then that of the first.
+    """
+
+    loaded: LoadedScenario
+    built: BuiltWorld
+    map: OccupancyGrid | None
+    masks: FilterMasks
+    robot: RobotSpec
+    body: RobotBody
+    stack: AnyStack
+    start: Pose2
+    estimate: Estimate
+    case: Case
+    obstacles: TriangleMesh
+    """What of the built world's mesh is in the robot's way; the same where it is all of it."""
+    mapped: tuple[int, ...] = ()
+    """The numbers of the faults that have changed the map."""
+    plugins: tuple[Entry, ...] = ()
+    """What it takes from installed packages."""
+    robots: Mapping[str, "PreparedScenario"] = field(default_factory=dict)
+
+    @property
+    def each(self) -> Mapping[str, "PreparedScenario"]:
+        """It as each of its robots needs it, by name in order; the only one has none."""
+        return self.robots or {NAMELESS: self}
+
+    @property
+    def spec(self) -> ScenarioSpec:
+        """The scenario as written."""
+        return self.loaded.spec
+
+
+BuildWorld = Callable[[LoadedScenario, float], BuiltWorld]
+"""Gives the built world of a scenario, as a lidar at a height in metres maps it."""
+
+
+FindLegs = Callable[[BuiltWorld, Sequence[tuple[Pose2, Goal]], float], list[Leg]]
+"""Gives the shortest way of a disc of a radius from each pose to its goal."""
+
+
+def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
+    """Build it anew."""
+    return build(load_world(loaded), height)
+
+
+def prepare(
+    loaded: LoadedScenario, world_of: BuildWorld = build_world, legs: FindLegs = legs_between
+) -> PreparedScenario:
+    """Build what the runs of this scenario share. Raises InvalidInput for files that cannot be used."""
+    if not loaded.robots:
+        return _prepared(loaded, world_of, legs)
+    parts: dict[str, PreparedScenario] = {}
+    heights: dict[float, BuiltWorld] = {}
+
+    def known(view: LoadedScenario, height: float) -> BuiltWorld:
+        if height not in heights:
+            heights[height] = world_of(view, height)
+        return heights[height]
+
+    for name, view in loaded.robots.items():
+        parts[name] = _prepared(view, known, legs)
+    reach = max(part.case.clearance_range for part in parts.values())
+    parts = {name: replace(part, case=replace(part.case, clearance_range=reach)) for name, part in parts.items()}
+    return replace(next(iter(parts.values())), loaded=loaded, robots=parts, plugins=plugins_of(loaded))
+
+
+def _prepared(loaded: LoadedScenario, world_of: BuildWorld, legs: FindLegs) -> PreparedScenario:
+    """For its only robot, or one of several."""
+    spec = loaded.spec
+    robot, body = load_robot(loaded)
+    built = world_of(loaded, lidar_height(robot))
+    world = built.world
+    standing = blocking_solids(world.solids, body)
+    obstacles = built.mesh if standing is world.solids else fuse(standing)
+    start = spec.own.pose.pose
+    goals = scenario_goals(spec)
+    case = Case(
+        start=start,
+        goals=goals,
+        expected=expected_failures(spec, goals),
+        sent=tuple(event_goals(spec, loaded.concerns).values()),
+        regions=world.regions,
+        footprint=body.footprint,
+        inscribed_radius=inscribed_radius(body.radius, body.footprint),
+        time_limit=spec.time_limit,
+        clearance_range=_clearance_range(spec),
+        disturbances=disturbances_of(loaded),
+        masks=load_criterion_masks(loaded.judged_masks, loaded.tree, loaded.sourced),
+    )
+    return PreparedScenario(
+        loaded=loaded,
+        built=built,
+        map=_robot_map(loaded, built),
+        masks=load_masks(loaded),
+        robot=robot,
+        body=body,
+        stack=effective_stack(spec),
+        start=start,
+        estimate=estimate_of(spec.own, start),
+        case=with_shortest_paths(case, built, obstacles, legs),
+        obstacles=obstacles,
+        plugins=plugins_of(loaded),
+    )
+
+
+def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, find_legs: FindLegs) -> Case:
+    """The case with the shortest ways past the obstacles to its goals, and what they pass between.
+
+    Where the robot is to fail at a goal, the way to the next one begins where the way to that one did.
+    """
+    ends, at = [], case.start
+    for goal in case.goals:
+        ends.append((at, goal))
+        at = at if goal.name in case.expected else goal.pose
+    legs = find_legs(replace(built, mesh=obstacles), ends, case.inscribed_radius)
+    return replace(
+        case,
+        shortest={goal.name: leg.length for goal, leg in zip(case.goals, legs, strict=True)},
+        passages=tuple(passage for leg in legs for passage in leg.passages),
+    )
+
+
+def _clearance_range(spec: ScenarioSpec) -> float:
+    """As far as any criterion or trigger needs it."""
+    asked = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
+    near = (test.clearance_below for trigger in spec.triggers for test in trigger.parts())
+    asked += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]
+    return max([CLEARANCE_RANGE, *asked])
+
+
+def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | None:
+    if loaded.map == "none":
+        return None
+    return load_map(loaded.map) if loaded.map is not None else built.map
+
+
+def lidar_height(robot: RobotSpec) -> float:
+    """The height that the robot's map shows: that of its first lidar."""
+    heights = [sensor.lidar.mount.z for sensor in robot.sensors.values() if sensor.lidar]
+    return heights[0] if heights else DEFAULT_LIDAR_HEIGHT
+
+
+def effective_stack(spec: ScenarioSpec) -> AnyStack:
+    """The stack as written; without a map, AMCL cannot work, so dead reckoning is the default there."""
+    stack = spec.stack
+    if not isinstance(stack, StackSpec):
+        return stack
+    unwritten = "localizer" not in stack.model_fields_set
+    if spec.map == "none" and unwritten and isinstance(stack.localizer, Amcl):
+        return stack.model_copy(update={"localizer": OdometryOnly(type="odometry")})
+    return stack

@@ -1,0 +1,135 @@
+"""Which software and which processor a result comes from: with others, it may differ in its last bits."""
+
+import hashlib
+import importlib
+import importlib.util
+import math
+import platform
+from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from simscen.core.version import PACKAGE
+from simscen.spec.registry import Entry
+
+PACKAGES = (
+    *("simscen", "pybullet", "ompl", "filterpy", "numpy", "scipy", "embreex", "trimesh", "mapbox-earcut", "pycollada"),
+    *("pillow", "mcap", "zstandard", "pydantic", "pyyaml"),
+)
+"""Every package that simscen needs and that shapes a result or the bytes of a log."""
+_LAST_BITS = frozenset({"fma", "avx", "avx2", "avx512f", "sse4_2"})
+"""The instruction sets that change last bits."""
+
+
+def software_versions() -> dict[str, str]:
+    """Python and the packages that shape results, by name; "" for one that is not installed."""
+    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
+
+
+def cpu_flags() -> list[str]:
+    """Which of the instruction sets that change last bits this machine has; nothing where Linux does not say."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []
+    flags = next((line.split(":", 1)[1].split() for line in lines if line.startswith("flags")), [])
+    return sorted(_LAST_BITS.intersection(flags))
+
+
+@cache
+def arithmetic_fingerprints() -> dict[str, str]:
+    """Fingerprints of what the C library and numpy compute here: equal ones compute alike, down to the last bit.
+
+    They depend on the instructions that both choose at run time (`numpy` lists its own), which flags alone do not say.
+    """
+    import numpy as np
+
+    numbers = [(0.37 + 1.618 * k) * 1.7 ** (k % 23) for k in range(400)]
+    functions = (math.sin, math.cos, math.tan, math.atan, math.sqrt, lambda x: math.exp(-x / 1e5), math.log)
+    libm = [function(number) for function in functions for number in numbers]
+    array = np.array(numbers)
+    told = [np.sin(array), np.exp(-array / 1e5), np.arctan2(array, array[::-1]), np.outer(array, array) @ array]
+    return {
+        "libm": hashlib.sha256(repr(libm).encode()).hexdigest()[:16],
+        "numpy": hashlib.sha256(b"".join(part.tobytes() for part in told)).hexdigest()[:16],
+        "numpy_dispatch": " ".join(sorted(name for name, used in _numpy_features().items() if used)),
+    }
+
+
+def _numpy_features() -> dict[str, bool]:
+    import numpy as np
+
+    core = "numpy._core" if np.lib.NumpyVersion(np.__version__) >= "2.0.0" else "numpy.core"
+    return dict(importlib.import_module(f"{core}._multiarray_umath").__cpu_features__)
+
+
+@cache
+def source_digest(*rooms: str) -> str:
+    """SHA-256 of simscen's own files: an installation from a working copy changes without a new version.
+
+    Of those in some `rooms` only, where any are named.
+    """
+    sha, folder = hashlib.sha256(), PACKAGE
+    files = [path for room in rooms or (".",) for path in (folder / room).rglob("*")]
+    for file in sorted(path for path in files if path.suffix in (".py", ".yaml", ".json")):
+        sha.update(f"{file.relative_to(folder).as_posix()}\0".encode() + file.read_bytes())
+    return sha.hexdigest()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+# MERGED: What installed packages are, down to their files: a package in development changes without a new version.
+def plugin_packages(plugins: Iterable[Entry]) -> dict[str, dict[str, object]]:
+    """The packages by name, each with its version and what of it is used, for run.json."""
+    found: dict[str, dict[str, object]] = {}
+    for entry in plugins:
+        package = found.setdefault(entry.distribution, {"version": entry.version, "used": []})
+        used = package["used"]
+        assert isinstance(used, list)
+        used.append(f"{entry.group} {entry.name}")
+    return found
+
+
+def plugin_fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
+    """What of an installed package could change a run: its version, its class, and all of its files."""
+    return {
+        f"{entry.group} {entry.name}": [entry.distribution, entry.version, entry.value, _files_digest(entry.value)]
+        for entry in plugins
+    }
+
+
+@cache
+def _files_digest(value: str) -> str:
+    """SHA-256 over the files of the outermost package that the class is in; of its module alone where there is none."""
+    sha = hashlib.sha256()
+    for name, file in _files(value):
+        data = file.read_bytes()
+        sha.update(f"{name}\0{len(data)}\0".encode() + data)
+    return sha.hexdigest()
+
+
+def plugin_files(plugins: Iterable[Entry]) -> list[Path]:
+    """The files of the outermost packages that their classes are in."""
+    return [file for entry in plugins for _, file in _files(entry.value)]
+
+
+def _files(value: str) -> Iterator[tuple[str, Path]]:
+    found = importlib.util.find_spec(value.partition(":")[0])
+    if found is None or found.origin is None:
+        return
+    file = Path(found.origin)
+    folder = file.parent
+    if not (folder / "__init__.py").is_file():
+        yield file.name, file
+        return
+    while (folder.parent / "__init__.py").is_file():
+        folder = folder.parent
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            yield path.relative_to(folder).as_posix(), path

@@ -1,0 +1,78 @@
+"""Where what a robot's files say of its geometry does not agree: all of it is warnings."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.errors import InvalidInput, Problem
+from simscen.loading.files.robotfile import RobotFile
+from simscen.loading.loaded import LoadedRobot
+from simscen.loading.yaml.tree import value_position
+from simscen.model.robot import RobotSpec
+from simscen.run.preparation.loaders import read_mesh, robot_from_file
+from simscen.sim.ground import refuse_dragging
+from simscen.sim.robot_body import RobotBody
+from simscen.sim.undercarriage import Wheel
+
+DIMENSION_TOLERANCE = 0.01
+"""Share by which a dimension of the drive may differ from the URDF's."""
+
+
+def geometry_warnings(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, roots: tuple[Path, ...]) -> list[Problem]:
+    """Warnings about a robot with a URDF: other dimensions in its drive, wheels and casters off the ground."""
+    if robot.urdf is None:
+        return []
+    from simscen.sim.urdf.body import tree_of_spec
+    from simscen.sim.urdf.files import Found
+    from simscen.sim.urdf.stance import stance_of
+
+    tree = tree_of_spec(spec, robot.path, roots, read_mesh, Found(robot.urdf, robot.packages))
+    return [*dimension_warnings(robot, body), *stance_of(tree, spec.drive)]
+
+
+def dimension_warnings(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]:
+    """Warnings about dimensions of the drive that are not those of the URDF."""
+    if robot.tree is None or robot.urdf is None:
+        return
+    drawn = _drawn(body.wheels)
+    for name in ("wheel_radius", "wheel_separation", "wheel_base"):
+        said = getattr(body.drive, name, None)
+        if said is None or name not in body.drive.model_fields_set or name not in drawn:
+            continue
+        if abs(said - drawn[name]) > DIMENSION_TOLERANCE * drawn[name]:
+            message = f"{name} is {said:g} m here, but {drawn[name]:.4g} m in {robot.urdf.name}"
+            hint = "the wheels stand where the URDF has them; commands and odometry reckon with what is written here"
+            yield Problem(*value_position(robot.tree, ("drive", name)), "SC404", message, hint, "warning")
+
+
+def _drawn(wheels: tuple[Wheel, ...]) -> dict[str, float]:
+    """Dimensions as the wheels have them."""
+    driven = [wheel for wheel in wheels if wheel.driven]
+    if not driven:
+        return {}
+    left, right = ([wheel.y for wheel in driven if wheel.left is side] for side in (True, False))
+    axles, steered = [wheel.x for wheel in driven], [wheel.x for wheel in wheels if wheel.steered]
+    base = np.mean(steered) - np.mean(axles) if steered else max(axles) - min(axles)
+    return {
+        "wheel_radius": float(np.mean([wheel.radius for wheel in driven])),
+        "wheel_separation": float(np.mean(left) - np.mean(right)),
+        **({"wheel_base": float(base)} if base > 0 else {}),
+    }
+
+
+# MERGED: What only building a robot can tell of its file.
+def robot_problems(file: RobotFile) -> list[Problem]:
+    """Why a robot cannot be used, or warnings about it; one of simple shapes need not be built."""
+    robot = file.robot
+    try:
+        if robot.urdf is not None:
+            spec, body = robot_from_file(robot, file.roots)
+            found = geometry_warnings(robot, spec, body, file.roots)
+        else:
+            assert robot.spec is not None  # a robot has one or the other
+            refuse_dragging(robot.spec, robot.path)
+            found = []
+    except InvalidInput as error:
+        found = error.problems
+    return file.library.with_source_where_missing(found)

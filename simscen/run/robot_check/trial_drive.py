@@ -1,0 +1,177 @@
+"""A robot driven once in an empty world: what it was told, what its encoders say and what is true."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from simscen.core.geometry import Pose2, Pose3, wrap
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.model.robot import Ackermann
+from simscen.run.robot_interface import robot_model
+from simscen.sensors.kinematics import kinematics_of
+from simscen.sensors.odometry import along_arc
+from simscen.sim.alone import Alone
+from simscen.sim.robot_body import RobotBody
+from simscen.sim.simulation import FIRMWARE_RATE
+from simscen.worlds.meshing import fuse, triangulate
+
+TICK_RATE = 240
+PERIOD = TICK_RATE // FIRMWARE_RATE
+"""Ticks between two commands: each is reached before the next, so that no ramp of the firmware lags behind."""
+RESTING, SETTLING = 240, 60
+"""Ticks at rest before the first trial, and after each leg."""
+LINE, SIDE = 2.0, 1.0
+"""m of the straight line and of a side of the square."""
+SPEED, TURN = 0.5, 1.0
+"""m/s and rad/s at most; and no more than SHARE of the robot's limits."""
+SHARE, EFFORT = 0.8, 0.5
+"""Of the limits of speed, and of those of acceleration."""
+WIDER = 1.05
+"""A car's circle over its smallest: at the very end of the steering nothing could be corrected."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A way from the origin: `driven` metres, `turned` rad anticlockwise, and the `path` of poses."""
+
+    driven: float
+    turned: float
+    path: tuple[Pose2, ...]
+
+    @property
+    def end(self) -> Pose2:
+        """Where it leads."""
+        return self.path[-1]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial: the same way as it was commanded, as the encoders say without any noise, and in truth.
+
+    `tilt` is by how many rad the base leaned away from how it rests, at most.
+    """
+
+    name: str
+    command: Motion
+    odometry: Motion
+    truth: Motion
+    tilt: float
+
+
+@dataclass(frozen=True)
+class RestingState:
+    """A second at rest: `tilt` of the base in rad, `height` of its frame above the ground and how far it `crept`, m."""
+
+    tilt: float
+    height: float
+    crept: float
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """From rest to rest: m forward, m to the left and rad, all at once."""
+
+    forward: float = 0.0
+    left: float = 0.0
+    turn: float = 0.0
+
+
+def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
+    """At rest, a line of 2 m, a full turn (a car: its smallest circle), a square; a holonomic base also sideways.
+
+    Raises RunError when the physics loses the robot.
+    """
+    simulation = Alone(fuse([]), [], body, Pose2(0.0, 0.0, 0.0), triangulate)
+    try:
+        rest = _rest(simulation)
+        return rest, tuple(_trial(simulation, body, name, legs) for name, legs in _trials(body).items())
+    finally:
+        simulation.close()
+
+
+def _trials(body: RobotBody) -> dict[str, list[_Leg]]:
+    radius = 0.0
+    if isinstance(body.drive, Ackermann):
+        radius = WIDER * body.drive.wheel_base / math.tan(body.drive.max_steering)
+    circle, corner = (_Leg(turn * radius, 0.0, turn) for turn in (2 * math.pi, math.pi / 2))
+    trials = {"line": [_Leg(LINE)], "circle" if radius else "turn": [circle], "square": [_Leg(SIDE), corner] * 4}
+    return trials | ({"sideways": [_Leg(0.0, LINE)]} if robot_model(body).holonomic else {})
+
+
+def _rest(simulation: Alone) -> RestingState:
+    begin = simulation.base_pose()
+    simulation.step(RESTING)
+    end = simulation.base_pose()
+    return RestingState(_tilt(end, Pose3()), end.z, math.hypot(end.x - begin.x, end.y - begin.y))
+
+
+def _trial(simulation: Alone, body: RobotBody, name: str, legs: list[_Leg]) -> Trial:
+    simulation.place_robot(Pose2(0.0, 0.0, 0.0))
+    simulation.step(SETTLING)
+    motion, level = kinematics_of(body.drive), simulation.base_pose()
+    rolled, start, most = simulation.encoders(), level.plane, 0.0
+    told, reckoned, true = _Way(), _Way(), _Way()
+    for twist in (twist for leg in legs for twist in _commands(leg, body)):
+        simulation.drive(twist)
+        simulation.step(PERIOD)
+        told.to(told.last.compose(along_arc(Twist(*(part / FIRMWARE_RATE for part in twist)))))
+        now = simulation.encoders()
+        step = motion(tuple(b - a for a, b in zip(rolled, now, strict=True)))
+        rolled = now
+        reckoned.to(reckoned.last.compose(along_arc(step)))
+        pose = simulation.base_pose()
+        true.to(start.between(pose.plane))
+        most = max(most, _tilt(pose, level))
+    simulation.truth()  # tells when the physics has lost it
+    return Trial(name, told.motion, reckoned.motion, true.motion, most)
+
+
+def _commands(leg: _Leg, body: RobotBody) -> Iterator[Twist]:
+    """A trapezoid of speed, in steps of the firmware's period, that sums up to the leg; then standing still."""
+    model = robot_model(body)
+    spans = [
+        (leg.forward, min(SPEED, SHARE * model.max_linear), min(model.linear_acceleration, model.linear_deceleration)),
+        (leg.left, min(SPEED, SHARE * model.max_lateral), min(model.linear_acceleration, model.linear_deceleration)),
+        (leg.turn, min(TURN, SHARE * model.max_angular), model.angular_acceleration),
+    ]
+    rate = min(speed / abs(span) for span, speed, _ in spans if span)
+    gain = min(EFFORT * most / abs(span) for span, _, most in spans if span) / FIRMWARE_RATE
+    ramp = [gain * k for k in range(1, math.ceil(rate / gain))]
+    rest = 1.0 - 2 * sum(ramp) / FIRMWARE_RATE
+    while rest < 0:
+        rest += 2 * ramp.pop() / FIRMWARE_RATE
+    cruising = math.ceil(rest * FIRMWARE_RATE / rate)
+    rates = [*ramp, *[rest * FIRMWARE_RATE / max(1, cruising)] * cruising, *reversed(ramp)]
+    yield from (Twist(leg.forward * r, leg.left * r, leg.turn * r) for r in rates)
+    yield from [STOP] * (SETTLING // PERIOD)
+
+
+class _Way:
+    """Poses one after the other."""
+
+    def __init__(self) -> None:
+        self._path, self._driven, self._turned = [Pose2(0.0, 0.0, 0.0)], 0.0, 0.0
+
+    @property
+    def last(self) -> Pose2:
+        return self._path[-1]
+
+    def to(self, pose: Pose2) -> None:
+        self._driven += self.last.distance(pose)
+        self._turned += wrap(pose.yaw - self.last.yaw)
+        self._path.append(pose)
+
+    @property
+    def motion(self) -> Motion:
+        return Motion(self._driven, self._turned, tuple(self._path))
+
+
+def _tilt(pose: Pose3, level: Pose3) -> float:
+    """The angle in rad between the upward axes of two poses whose headings do not matter."""
+    return math.dist(_lean(pose), _lean(level))
+
+
+def _lean(pose: Pose3) -> tuple[float, float]:
+    """How far the upward axis leans forward and to the left of the base: small angles in rad."""
+    x, y, z, w = pose.quaternion
+    return 2 * (w * y - z * x), -2 * (w * x + y * z)

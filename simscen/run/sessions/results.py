@@ -1,0 +1,153 @@
+"""What the end of a process says about its run."""
+
+import os
+import shlex
+import signal
+from dataclasses import replace
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput, RunError
+from simscen.core.records.run_result import RunFailure, RunResult, error_result, skipped_result
+from simscen.core.records.session_events import Artifacts, RunFinished
+from simscen.judge.result_json import from_json
+from simscen.loading.files.discovery import default_root
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.stacks.choice import StackChoice
+from simscen.record.logfile import PARTIAL_SUFFIX
+from simscen.run.process.captured_output import innermost_frame, output_tail
+from simscen.run.process.isolation import MAX_MEMORY_BYTES
+from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd
+
+MAX_RECOVER_BYTES = 64 << 20
+"""Bytes of a log that is made whole while other runs wait to be heard: a second or two."""
+
+
+def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
+    """The answer to a run. It passed or failed only if its process ended by itself, with status 0 and a last word."""
+    failure = _with_log(_failure(end), job.folder)
+    printed = output_tail(end.printed)
+    result = (
+        _result(job, printed)
+        if failure is None
+        else error_result(job.key, job.scenario.path, failure, job.scenario.stack)
+    )
+    return RunFinished(
+        result,
+        wall=end.wall if isinstance(end, ProcessEnd) else 0.0,
+        artifacts=_artifacts(job.folder),
+        again=repeat_command(job.scenario, job.key.seed),
+        file=shown(job.scenario.file),
+        tags=tuple(job.scenario.spec.tags),
+    )
+
+
+def unfinished_run(job: Job, failure: RunFailure) -> RunFinished:
+    """The answer to a run that was never finished, or never begun."""
+    result = error_result(job.key, job.scenario.path, failure, job.scenario.stack)
+    return _told(job, result)
+
+
+def skipped_run(job: Job, reason: str) -> RunFinished:
+    """The answer to a run that its scenario says to skip."""
+    result = skipped_result(job.key, job.scenario.path, reason, job.scenario.stack)
+    return _told(job, result)
+
+
+def _told(job: Job, result: RunResult) -> RunFinished:
+    """The answer to a run that never began, or was never finished."""
+    again, file = repeat_command(job.scenario, job.key.seed), shown(job.scenario.file)
+    return RunFinished(result, again=again, file=file, tags=tuple(job.scenario.spec.tags))
+
+
+def _result(job: Job, said: str) -> RunResult:
+    """What the run says of itself. Its second performance says the same as the first, so the key is ours to give."""
+    try:
+        return replace(from_json((job.folder / "result.json").read_text(encoding="utf-8")), key=job.key)
+    except (OSError, ValueError) as error:
+        failure = RunFailure("crashed", f"its result cannot be read: {error}", said)
+        return error_result(job.key, job.scenario.path, failure, job.scenario.stack)
+
+
+def _artifacts(folder: Path) -> Artifacts:
+    def path(name: str) -> str:
+        return str(folder / name) if (folder / name).exists() else ""
+
+    return Artifacts(str(folder), path("run.mcap"), path("map.png"), path("result.json"), path("replay.html"))
+
+
+def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
+    if isinstance(end, ForkServerDeath):
+        when = "while it prepared this one" if end.at_fault else "while this run was under way"
+        kind = "timeout" if end.timed_out else "crashed"
+        return RunFailure(
+            kind, f"the process that prepares runs {end.how} {when}{_place(end)}", output_tail(end.printed)
+        )
+    peak = f"peak memory {end.peak_bytes / 2**20:.0f} MiB of {MAX_MEMORY_BYTES / 2**20:.0f} MiB"
+    if end.killed_for == "timeout":
+        return _fault(end, f"stopped after {end.wall:.0f} s of wall time{_place(end)}", "timeout")
+    if end.signal == signal.SIGKILL:
+        return _fault(end, f"killed (SIGKILL; possibly out of memory; {peak})")
+    if end.signal is not None:
+        return _fault(end, f"crashed: {signal.Signals(end.signal).name}{_place(end)} ({peak})")
+    if end.code != 0:
+        return _fault(end, f"exited {end.code} ({peak})")
+    if end.last_word is None:
+        return _fault(end, "exited 0 without a result")
+    if "error" in end.last_word:
+        printed = end.last_word.get("tail") or output_tail(end.printed)
+        return RunFailure(end.last_word["error"], end.last_word["message"], printed)
+    if end.left_processes:
+        return _fault(end, "left a process behind, which was killed")
+    return None
+
+
+def _with_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
+    """The same, with where the log of what happened until then is. What the worker could not finish is finished now."""
+    log = folder / f"run{PARTIAL_SUFFIX}"
+    if failure is None or not log.exists():
+        return failure
+    from simscen.record.recover import recover
+
+    how = ""
+    if log.stat().st_size > MAX_RECOVER_BYTES:
+        how = ", which `simscen log recover` makes whole"
+    else:
+        try:
+            recover(log)
+        except (InvalidInput, RunError) as error:
+            how = f" ({error})"
+    return replace(failure, message=f"{failure.message}; its log until then is {log.name}{how}")
+
+
+def _fault(end: ProcessEnd, message: str, kind: str = "crashed") -> RunFailure:
+    return RunFailure(kind, message, output_tail(end.printed))
+
+
+def _place(end: ProcessEnd | ForkServerDeath) -> str:
+    """Where it was, if it had time to say so."""
+    place = innermost_frame(end.printed)
+    return f", in {place}" if place else ""
+
+
+# MERGED: How to repeat a run: the command that does, from where we are.
+def repeat_command(scenario: LoadedScenario, seed: int) -> str:
+    """The command that repeats a run, called from the working folder. Options are named only where they matter."""
+    words = ["simscen", "run", shown(scenario.file), "--seed", str(seed)]
+    if scenario.variation:
+        words += ["--variation", scenario.variation]
+    if scenario.root != default_root([scenario.file]):
+        words += ["--root", shown(scenario.root)]
+    for folder in scenario.world_path:
+        words += ["--world-path", shown(folder)]
+    if scenario.choice is not None:
+        words += ["--stack", _seen_from_here(scenario.choice)]
+    return shlex.join([*words, *(["--lenient"] if scenario.lenient else [])])
+
+
+def _seen_from_here(choice: StackChoice) -> str:
+    return choice.written if choice.file is None else f"{choice.name}={shown(choice.file)}"
+
+
+def shown(path: Path) -> str:
+    """A file or folder as seen from the working folder, or absolute where that is shorter."""
+    return min(os.path.relpath(path), str(path), key=len)
