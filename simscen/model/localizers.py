@@ -1,14 +1,14 @@
-"""The parameters of localizers, with Nav2's names; what differs from Nav2's defaults says so."""
+"""Parameters of the localizers, with Nav2's names and default values."""
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 
 from simscen.spec.base import Ranged, type_discriminator
 from simscen.spec.bytype import ByType
 from simscen.spec.component import Typed
+from simscen.spec.lazy import LazySpec
 from simscen.spec.quantities import (
     Length,
     NonNegativeAngle,
@@ -23,33 +23,22 @@ Noise = Annotated[float, Field(ge=0, le=100)]
 
 
 class LocalizerSpec(Typed):
-    """What knows where the robot is."""
+    """Base class of localizer specifications."""
 
     fuses_odometry: ClassVar[bool] = False
-    """Whether it never jumps, and so is the odom frame itself, as robot_localization is that publishes odom→base."""
+    """The pose never jumps, so that it also defines the odom frame, as that of robot_localization's odom→base does."""
+    needs_map: ClassVar[bool] = False
+    """Without a map the localizer is no more than dead reckoning."""
+    precomputation: ClassVar[str] = ""
+    """`package.module:function`, called as `function(spec, grid)` once per map before the runs start; optional."""
 
 
-AMCL_PARAMETERS: Mapping[str, Mapping[str, object]] = {
-    "default": {},
-    "nav2": {
-        "laser_model_type": "likelihood_field", "sigma_hit": 0.2, "likelihood_exponent": 1.0,
-        "beams_beyond_the_map": "miss", "map_trust_none": 0.0, "map_trust_full": 0.0,
-        "match_scans": False, "settling_distance": 0.0, "relocalization": "random", "sure_update_interval": 1,
-    },
-    "consistent": {"covariance": "scatter", "sure_update_interval": 1},
-}  # fmt: skip
-"""What AMCL's parameters are by default under each name."""
+class AmclParameters(Ranged, LocalizerSpec):
+    """Parameters of nav2_amcl, with its names and default values."""
 
-
-class Amcl(Ranged, LocalizerSpec):
-    """Particle-filter localisation: nav2_amcl's parameters (Thrun et al., Probabilistic Robotics, ch. 8)."""
-
-    component: ClassVar[str] = "simscen.stack.localizers.build:amcl"
-    type: Literal["amcl"] = "amcl"
-    parameters: Literal["default", "nav2", "consistent"] = "default"
-    """What all else is where it is not said: as here; exactly as in nav2_amcl; or so that the covariance is true."""
+    needs_map: ClassVar[bool] = True
     robot_model: Literal["differential", "omni"] | None = None
-    """Motion model; default: as the robot's drive."""
+    """Motion model; default: the one of the robot's drive."""
     alpha1: Noise = 0.2
     """Rotation noise from rotation."""
     alpha2: Noise = 0.2
@@ -61,101 +50,75 @@ class Amcl(Ranged, LocalizerSpec):
     alpha5: Noise = 0.2
     """Strafing noise of the omni model."""
     min_particles: Annotated[int, Field(ge=10, le=50_000)] = 500
-    """The fewest that KLD sampling may leave."""
+    """Minimum number of particles; KLD sampling chooses between this and the maximum."""
     max_particles: Annotated[int, Field(ge=10, le=50_000)] = 2000
-    """The most, and as many as it begins with."""
+    """Maximum number of particles, and the number at the start."""
     pf_err: Annotated[float, Field(gt=0, lt=1), Quantity("ratio")] = 0.05
-    """KLD: greatest distance between the true and the sampled distribution."""
+    """KLD sampling: maximum distance between the true and the sampled distribution."""
     pf_z: Annotated[float, Field(gt=0, lt=1)] = 0.99
-    """KLD: upper quantile of the standard normal distribution, used as it is, as Nav2 does."""
+    """KLD sampling: upper quantile of the standard normal distribution, used as it is, as in Nav2."""
     update_min_d: NonNegativeLength = 0.25
-    """How far the robot must have moved until it looks at another scan."""
+    """Distance that the robot must move before the next filter update."""
     update_min_a: Annotated[NonNegativeAngle, Field(le=6.3)] = 0.2
-    """How far it must have turned until it looks at another scan."""
-    sure_update_interval: Annotated[int, Field(ge=1, le=10)] = 2
-    """Scans looked at for each that is compared with the map, while the robot is sure of its place: the map shows what
-    the last one saw, the particles are one narrow group, and scans and wheels say the same of how it moved. The others
-    show that alone. 1 = each, as in Nav2, and always so with `covariance: scatter`."""
+    """Angle that the robot must turn before the next filter update."""
     resample_interval: Annotated[int, Field(ge=1, le=100)] = 1
-    """Scans looked at for each resampling."""
+    """Number of filter updates per resampling."""
     max_beams: Annotated[int, Field(ge=2, le=4096)] = 60
-    """How many beams of a scan are compared with the map."""
-    laser_model_type: Literal["likelihood_field", "likelihood_field_prob", "beam"] = "likelihood_field_prob"
-    """Nav2's default is `likelihood_field`, which forgives more and knows less."""
+    """Maximum number of beams of a scan that are compared with the map."""
+    laser_model_type: Literal["likelihood_field", "likelihood_field_prob", "beam"] = "likelihood_field"
+    """Sensor model. `likelihood_field_prob` is more accurate; `likelihood_field` tolerates more obstacles that are not
+    on the map."""
     z_hit: Probability = 0.5
     """Weight of beams that end at an obstacle of the map."""
     z_short: Probability = 0.05
-    """Weight of beams that end before it; the `beam` model only."""
+    """Weight of beams that end before it; `beam` model only."""
     z_max: Probability = 0.05
-    """Weight of beams without an answer; the `beam` model only."""
+    """Weight of beams that measure the maximum range; `beam` model only."""
     z_rand: Probability = 0.5
-    """Weight of beams that end anywhere."""
-    sigma_hit: Annotated[Length, Field(ge=0.001)] = 0.1
-    """Standard deviation of the ends of beams that hit an obstacle of the map."""
+    """Weight of random measurements."""
+    sigma_hit: Annotated[Length, Field(ge=0.001)] = 0.2
+    """Standard deviation of the endpoints of beams that hit an obstacle of the map."""
     lambda_short: Annotated[float, Field(gt=0, le=100)] = 0.1
-    """How fast short beams get rarer with their length, for each metre; the `beam` model only."""
+    """Exponential decay of short measurements, per meter; `beam` model only."""
     laser_likelihood_max_dist: PositiveLength = 2.0
-    """Ends further from any obstacle than this count as that far."""
+    """Distances from obstacles are capped at this value in the likelihood field."""
     laser_min_range: Length = -1.0
-    """-1 = the lidar's own."""
+    """Minimum range that is used; -1 = the lidar's own."""
     laser_max_range: Length = 100.0
-    """Ranges are cut here, and at the lidar's own greatest one; -1 = at the lidar's own."""
+    """Maximum range that is used, at most the lidar's own; -1 = the lidar's own."""
     recovery_alpha_slow: Probability = 0.0
-    """Decay of the slow average of weights, by which random particles are added; 0 = never."""
+    """Decay rate of the slow average of weights, which decides when to add random particles; 0 = never."""
     recovery_alpha_fast: Probability = 0.0
-    """Decay of the fast average of weights, by which random particles are added; 0 = never."""
-    relocalization: Literal["scan_matching", "random"] = "scan_matching"
-    """How a robot is found that does not know where it is, or is wrong about it: the last metres' scans are matched
-    with the whole map; or only as Nav2 does, by particles anywhere at the start and by `recovery_alpha_*`."""
-    likelihood_exponent: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """Of the product over the beams, which err together and so say less than as many would; `likelihood_field_prob`
-    only."""
-    beams_beyond_the_map: Literal["say_nothing", "miss"] = "say_nothing"
-    """What beams tell that end where the map ends, in unknown space next to free space or off it; in Nav2 they miss.
-    `likelihood_field_prob` only."""
-    map_trust_none: Probability = 0.45
-    """Up to this share of its beams that end near what the map shows a scan counts for nothing, as long as the
-    particles are one narrow group: rooms are rebuilt, and nobody draws the map anew."""
-    map_trust_full: Probability = 0.8
-    """From this share on it counts in full, in between in proportion; 0 = it always does, as in Nav2."""
-    settling_distance: NonNegativeLength = 4.0
-    """Over so many metres from a place that was told, turns of 2 rad counting as one, scans count more and more, from a
-    fifth on: what one room shows fits many places. 0 = in full at once, as in Nav2."""
-    match_scans: bool = True
-    """Correct each step of odometry by how the scan fits those of the last metres, where these can tell."""
-    covariance: Literal["particles", "scatter"] = "particles"
-    """What the covariance is told from: the particles, as in Nav2, or also how the poses of the last metres scatter
-    about the way that the robot saw itself go, and how far off the beams are, for particles all err together; that
-    with `match_scans` only."""
+    """Decay rate of the fast average of weights, which decides when to add random particles; 0 = never."""
     selective_resampling: bool = False
     """Resample only when the effective number of particles is below half of them."""
     do_beamskip: bool = False
-    """Leave out beams that fit hardly any particle; `likelihood_field_prob` only."""
+    """Skip beams that fit hardly any particle once the filter has converged; `likelihood_field_prob` only."""
     beam_skip_distance: PositiveLength = 0.5
-    """A beam fits a particle when it ends this near to an obstacle of the map."""
+    """A beam fits a particle if it ends this near to an obstacle of the map."""
     beam_skip_threshold: Probability = 0.3
-    """Beams that fit a smaller share of the particles are left out."""
+    """Beams that fit a smaller share of the particles are skipped."""
     beam_skip_error_threshold: Probability = 0.9
-    """Where so great a share of the beams would be left out, none is: then it is the pose that is wrong."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _filled_in(cls, values: Any) -> Any:
-        """With what `parameters` names; what is said wins."""
-        named = values.get("parameters") if isinstance(values, Mapping) else None
-        chosen = AMCL_PARAMETERS.get(named) if isinstance(named, str) else None
-        return {**chosen, **values} if chosen else values
+    """If this share of the beams would be skipped, none is, because the pose must be wrong."""
 
     @property
     def farthest(self) -> float:
-        """Where ranges are cut, if the lidar's own greatest one is not less; nothing above zero is the lidar's own."""
+        """Maximum range in m that is used, if the lidar's own is not less; infinite for the lidar's own."""
         return self.laser_max_range if self.laser_max_range > 0.0 else math.inf
+
+
+class Amcl(AmclParameters):
+    """Particle-filter localization as in nav2_amcl (Thrun et al., Probabilistic Robotics, ch. 8)."""
+
+    component: ClassVar[str] = "simscen.stack.localizers.build:amcl"
+    precomputation: ClassVar[str] = "simscen.stack.localizers.build:precompute"
+    type: Literal["amcl"] = "amcl"
 
 
 class Ekf(LocalizerSpec):
     """Odometry and gyroscope in an extended Kalman filter; no map, so it drifts."""
 
-    component: ClassVar[str] = "simscen.stack.localizers.build:ekf"
+    component: ClassVar[str] = "simscen.advanced.localizers.build:slip_ekf"
     fuses_odometry: ClassVar[bool] = True
     type: Literal["ekf"]
     translation_noise: Annotated[NonNegativeLength, Field(le=100)] = 0.02
@@ -189,12 +152,15 @@ class OdometryOnly(LocalizerSpec):
     type: Literal["odometry"]
 
 
+DEFAULT_TYPE = "scan_matching_amcl"
+"""The type of a localizer that is written without one."""
 _Localizers = Annotated[
     Annotated[Amcl, Tag("amcl")]
     | Annotated[Ekf, Tag("ekf")]
     | Annotated[GroundTruth, Tag("ground_truth")]
-    | Annotated[OdometryOnly, Tag("odometry")],
-    Discriminator(type_discriminator("amcl")),
+    | Annotated[OdometryOnly, Tag("odometry")]
+    | Annotated[LocalizerSpec, LazySpec("simscen.advanced.localizers.spec", "ScanMatchingAmcl"), Tag(DEFAULT_TYPE)],
+    Discriminator(type_discriminator(DEFAULT_TYPE)),
 ]
 
 
@@ -207,4 +173,5 @@ LOCALIZERS = {
     "ekf": _HERE + "Ekf",
     "ground_truth": _HERE + "GroundTruth",
     "odometry": _HERE + "OdometryOnly",
+    "scan_matching_amcl": "simscen.advanced.localizers.spec:ScanMatchingAmcl",
 }

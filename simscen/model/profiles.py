@@ -23,7 +23,7 @@ _CIRCLE: Values = {"consider_footprint": False}
 NAV2: Values = {
     "controller_frequency": 20.0,
     "failure_tolerance": 0.3,
-    "localizer": {"amcl": {"parameters": "nav2"}},
+    "localizer": {"amcl": {}},
     "costmap": {**_SEEN, "update_frequency": 1.0, "track_unknown_space": True},
     "local_costmap": {**_SEEN, "update_frequency": 5.0, "width": 3.0, "height": 3.0, "track_unknown_space": False},
     "planner": {"navfn": _PLANNING, "smac_2d": {**_PLANNING, "tolerance": 0.125}},

@@ -19,7 +19,7 @@ events: [{when: {time: 1 s}, do: {spawn: {name: box, box: [0.2, 0.2, 0.4], pose:
 faults:
   - {sensor: lidar, noise: {std: 5 cm}}
   - {sensor: odom, slip: {left: 0.1, right: 0.05}, when: {time: 1 s}, for: 1 s}
-stack: {localizer: {type: amcl, max_particles: 500}}
+stack: {localizer: {type: scan_matching_amcl, max_particles: 500}}
 """
 
 

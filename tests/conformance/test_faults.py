@@ -100,7 +100,7 @@ def session(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, str]) -> 
     for case in CASES:
         tagged = text.replace("seed: 7", f"seed: 7\ntags: [{case.fault}]")
         if case.number == 64:
-            tagged += "stack: {localizer: {type: amcl, max_particles: 500}}\n"
+            tagged += "stack: {localizer: {type: scan_matching_amcl, max_particles: 500}}\n"
         (home / f"{case.number}-{case.fault}.scenario.yaml").write_text(tagged)
     shut_in = text.replace("goals: [{pose: {x: 1.5, y: 1}}]", "goals: [{pose: {x: 3, y: 1}, timeout: 6 s}]")
     (home / "63-no-way.scenario.yaml").write_text(shut_in + SHUT_IN)

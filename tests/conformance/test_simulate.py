@@ -9,7 +9,7 @@ from simscen.core.errors import InvalidInput
 from simscen.record.replay import read_log
 
 PLANNED = """\
-stack: {localizer: {type: amcl, max_particles: 500}, planner: {type: rrt_connect}}
+stack: {localizer: {type: scan_matching_amcl, max_particles: 500}, planner: {type: rrt_connect}}
 faults: [{sensor: lidar, noise: {std: 5 cm}}]
 """
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.localization import Estimate
@@ -14,6 +15,8 @@ from simscen.testing.room import Drive, localizer, run
 
 SPECS: dict[str, LocalizerSpec] = {
     "amcl": Amcl(),
+    "scan_matching_amcl": ScanMatchingAmcl(),
+    "scan_matching_amcl consistent": ScanMatchingAmcl(parameters="consistent"),
     "amcl omni": Amcl(robot_model="omni", update_min_d=0.0, update_min_a=0.0),
     "amcl prob": Amcl(laser_model_type="likelihood_field_prob", do_beamskip=True, selective_resampling=True),
     "amcl beam": Amcl(laser_model_type="beam", min_particles=100, max_particles=300, resample_interval=2),

@@ -7,18 +7,19 @@ from multiprocessing import get_context
 
 import numpy as np
 
+from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.bench.localization.consistency import anees, bounds, bounds_over, within_bounds
 from simscen.bench.localization.generated_logs import CIRCUMSTANCES, log
 from simscen.bench.localization.trial import MOMENTS, Trial, trial
 from simscen.core.random_streams import Streams
 from simscen.core.statistics import bootstrap_mean_interval
-from simscen.model.localizers import Amcl
+from simscen.model.localizers import Amcl, AmclParameters
 
-PARAMETERS: Mapping[str, Amcl] = {
-    "Nav2's": Amcl(parameters="nav2"),
-    "Nav2's, likelihood_field_prob": Amcl(parameters="nav2", laser_model_type="likelihood_field_prob"),
-    "default": Amcl(),
-    "consistent": Amcl(parameters="consistent"),
+PARAMETERS: Mapping[str, AmclParameters] = {
+    "Nav2's": Amcl(),
+    "Nav2's, likelihood_field_prob": Amcl(laser_model_type="likelihood_field_prob"),
+    "default": ScanMatchingAmcl(),
+    "consistent": ScanMatchingAmcl(parameters="consistent"),
 }
 LOGS: Mapping[str, int] = {name: 5 if name == "tracked" else 1 for name in CIRCUMSTANCES}
 """Logs of each building under each circumstance."""

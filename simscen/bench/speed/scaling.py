@@ -59,7 +59,9 @@ def write_more(folder: Path, axis: str, count: int) -> Path:
             (folder / "robot.robot.yaml").write_text(robot, encoding="utf-8")
             text = text.replace("robot: {pose", "robot: {model: robot.robot.yaml, pose")
         case "particles":
-            text += f"stack: {{localizer: {{type: amcl, min_particles: {count}, max_particles: {count}}}}}\n"
+            text += (
+                f"stack: {{localizer: {{type: scan_matching_amcl, min_particles: {count}, max_particles: {count}}}}}\n"
+            )
         case _:
             text = re.sub(r"^robot:.*?^(?=time_limit)", _robots(count), text, flags=re.DOTALL | re.MULTILINE)
     file = folder / f"{axis.replace(' ', '_')}_{count}.scenario.yaml"

@@ -41,7 +41,7 @@ from simscen.spec import bytype, registry
 from simscen.spec.base import field_docs
 from simscen.spec.bytype import ByType
 from simscen.spec.choice import Choice, added
-from simscen.spec.lazy import annotation_of
+from simscen.spec.lazy import LazySpec, annotation_of
 from simscen.spec.named_places import OrPlace, PlaceAlone
 from simscen.spec.places import PoseSpec
 from simscen.spec.quantities import UNITS, Quantity
@@ -233,7 +233,8 @@ def by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
     mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ByType)), None)
     members = get_args(get_args(union if mark is None else mark.own)[0])
     for member in members:
-        model = get_args(member)[0] if get_origin(member) is Annotated else member
+        lazy = next((mark for mark in get_args(member)[1:] if isinstance(mark, LazySpec)), None)
+        model = lazy.load() if lazy else get_args(member)[0] if get_origin(member) is Annotated else member
         yield get_args(model.model_fields["type"].annotation)[0], model
 
 

@@ -34,6 +34,15 @@ def types_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
     return [str(value) for kind in models_at(model, loc) for value in _types(kind)]
 
 
+def types_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -> list[str]:
+    """Return the other types that the mapping at `loc` could have instead of its own, and that have this key."""
+    own = types_at(model, loc)
+    if not loc or loc[-1] not in own:
+        return []
+    having = [kind for kind in models_at(model, loc[:-1]) if key in keys_of([kind])]
+    return [name for kind in having for name in map(str, _types(kind)) if name not in own]
+
+
 def keys_of(models: Iterable[type[BaseModel]]) -> list[str]:
     """The keys that these models know, as they are written in YAML."""
     keys = [field.alias or name for model in models for name, field in model.model_fields.items()]

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ValidationError
 
 from simscen.core.errors import Problem
 from simscen.loading.schema import common_mistakes, messages
-from simscen.loading.schema.lookup import keys_of, models_at, needs_nothing, types_at
+from simscen.loading.schema.lookup import keys_of, models_at, needs_nothing, types_at, types_with_key
 from simscen.loading.yaml import textfile
 from simscen.loading.yaml.tree import (
     Key,
@@ -116,6 +116,8 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
         hint = mended
     elif key in Trigger.modifiers and models == [Test]:
         hint = f"`{key}` is of the whole trigger: it stands beside the `all`, `any` or `not` of `when`"
+    elif others := types_with_key(model, loc[:-1], key):
+        hint = f"`{key}` is a parameter of type {' and '.join(f'`{name}`' for name in others)}"
     elif elsewhere := common_mistakes.hint_for_reserved_key(loc[:-1], key):
         hint = elsewhere
     elif not hint.startswith("did") and (belongs := common_mistakes.hint_for_misplaced_key(model, tree, loc[:-1], key)):

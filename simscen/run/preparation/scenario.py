@@ -19,7 +19,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
 from simscen.loading.resolved import disturbances_of
 from simscen.model.anystack import AnyStack
-from simscen.model.localizers import Amcl, OdometryOnly
+from simscen.model.localizers import OdometryOnly
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, estimate_of
 from simscen.model.stack import StackSpec
@@ -191,6 +191,6 @@ def effective_stack(spec: ScenarioSpec) -> AnyStack:
     if not isinstance(stack, StackSpec):
         return stack
     unwritten = "localizer" not in stack.model_fields_set
-    if spec.map == "none" and unwritten and isinstance(stack.localizer, Amcl):
+    if spec.map == "none" and unwritten and stack.localizer.needs_map:
         return stack.model_copy(update={"localizer": OdometryOnly(type="odometry")})
     return stack

@@ -5,7 +5,8 @@ from importlib import import_module
 
 from pydantic import BaseModel
 
-from simscen.model.localizers import Amcl
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.model.localizers import LocalizerSpec
 from simscen.model.recovery import Recovery
 from simscen.model.stack import StackSpec
 from simscen.run.preparation.scenario import PreparedScenario
@@ -25,7 +26,6 @@ def precompute(prepared: PreparedScenario) -> None:
     """What each of its runs would need of the world and of the map: 0.6 s for a map of 100 x 100 m."""
     from simscen.run.robot_interface import robot_model
     from simscen.stack.costmap import costmap
-    from simscen.stack.localizers.build import matching
 
     rays.ready(prepared.built.mesh)
     walls.ready(prepared.built.mesh)
@@ -34,8 +34,14 @@ def precompute(prepared: PreparedScenario) -> None:
         if part.map is not None and isinstance(part.stack, StackSpec):
             grid = part.map.refined(part.stack.costmap.resolution)
             costmap.ready(part.stack.costmap, robot_model(part.body), grid)
-            if isinstance(part.stack.localizer, Amcl):
-                matching(grid, part.stack.localizer).ready()
+            precompute_localizer(part.stack.localizer, grid)
+
+
+def precompute_localizer(spec: LocalizerSpec, grid: OccupancyGrid) -> None:
+    """Compute what a shipped localizer derives from its map, so that all runs share it."""
+    module, _, name = spec.precomputation.partition(":")
+    if module.startswith("simscen."):
+        getattr(import_module(module), name)(spec, grid)
 
 
 def shipped_modules(components: Iterable[Component]) -> Iterator[str]:

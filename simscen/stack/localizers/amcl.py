@@ -1,4 +1,4 @@
-"""When a particle filter is corrected and what it tells the world meanwhile: nav2_amcl's rhythm (amcl_node.cpp)."""
+"""AMCL as a localizer: when scans update the particle filter, and the pose in between (nav2_amcl's amcl_node.cpp)."""
 
 import math
 from dataclasses import dataclass, replace
@@ -9,31 +9,21 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.localization import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
-from simscen.model.localizers import Amcl
+from simscen.model.localizers import AmclParameters
 from simscen.stack.localizers.clusters import spread, summarise
-from simscen.stack.localizers.finder import UNSEEN, Finder
-from simscen.stack.localizers.global_search import GlobalSearch
-from simscen.stack.localizers.map_trust import TOGETHER, MapTrust
-from simscen.stack.localizers.misfit import MapMisfit
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
-from simscen.stack.localizers.scan_matcher import ScanMatcher, Step
-from simscen.stack.localizers.scatter import Scatter
-from simscen.stack.localizers.sure import Moved
 from simscen.stack.odometry_history import OdometryHistory
-
-SURE_AFTER = 8
-"""Corrections in a row in which nothing was amiss, after which a robot is sure of its place."""
-SHOWN = 0.7
-"""Share of what a scan shows that those before it must have shown, for particles to be weighed by it that are no narrow
-group: who steps before the lidar hides most of the room, and fits wherever something is as near."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Correction:
-    """What the filter last said: `pose` and `covariance` in the map, when odometry was at `odometry`.
+class Correction:
+    """The filter's newest estimate.
 
-    `tick` is that of the newest scan that said something.
+    pose:        map_from_base at the time of the scan
+    covariance:  of the pose, (3, 3) over x, y, yaw
+    odometry:    odom_from_base at the same time
+    tick:        of the newest scan that the estimate is based on
     """
 
     pose: Pose2
@@ -42,183 +32,123 @@ class _Correction:
     tick: int
 
     @cached_property
-    def before(self) -> Pose2:
-        """The odom frame seen from where the robot was then."""
+    def base_from_odom(self) -> Pose2:
+        """The odom frame as seen from the base at the time of the scan."""
         return self.odometry.inverse()
 
     @cached_property
     def map_from_odom(self) -> Pose2:
-        return self.pose.compose(self.before)
+        """The transform that nav2_amcl publishes."""
+        return self.pose.compose(self.base_from_odom)
 
 
 class AmclLocalizer:
-    """A particle filter on a map.
+    """Adaptive Monte Carlo localization on an occupancy grid.
 
-    A scan corrects when the robot has moved by update_min_d or update_min_a since the last correction; the first
-    scan always does. A scan waits for the odometry of its own tick, as tf2's message filter makes it wait. Between
-    corrections map→odom stands still, odometry carries the pose on and the motion model its covariance.
+    The first scan of each lidar updates the filter. After that, a scan updates it when the robot has moved by
+    `update_min_d` or turned by `update_min_a` since the last update. A scan that arrives before the odometry of its own
+    tick waits for it, as tf2's message filter makes it wait. Between updates map→odom is constant: odometry moves the
+    pose, and the motion model increases the covariance.
+
+    Subclasses may override `reset`, `_correct` and `_propagated_covariance`.
     """
 
     def __init__(
-        self, spec: Amcl, particle_filter: ParticleFilter, motion: MotionModel, estimate: Estimate, tick_rate: int,
-        search: tuple[GlobalSearch, MapTrust] | None = None, misfit: MapMisfit | None = None,
+        self, spec: AmclParameters, particle_filter: ParticleFilter, motion: MotionModel, estimate: Estimate,
+        tick_rate: int,
     ) -> None:  # fmt: skip
-        """`search` is what finds a robot that is lost; without, that is left to random particles.
-
-        `misfit` says what beams tell of the covariance; without, only the particles do.
-        """
         self._spec, self._filter, self._motion, self._tick_rate = spec, particle_filter, motion, tick_rate
-        self._search, self._misfit = search, misfit
-        self._every = spec.sure_update_interval if misfit is None else 1
         self.reset(estimate)
 
     def reset(self, estimate: Estimate) -> None:
-        """Start over: particles around the estimate's pose, or over all free space when it has none."""
-        self._odometry, self._begun = OdometryHistory(self._tick_rate), False
+        """Restart with particles around the estimate's pose, or over all free space if it has none."""
+        self._odometry, self._has_odometry = OdometryHistory(self._tick_rate), False
         self._filter.begin(estimate)
-        settling = self._spec.settling_distance
-        self._finder = None if self._search is None else Finder(*self._search, estimate, settling)
-        self._told = estimate
+        self._initial_estimate = estimate
         self.__dict__.pop("_correction", None)
-        self._moved_to: Pose2 | None = None
-        self._matcher = ScanMatcher() if self._spec.match_scans else None
-        self._scatter = Scatter() if self._misfit is not None and self._matcher is not None else None
-        self._matched: tuple[str, Pose2] | None = None
-        self._came, self._calm, self._passed = UNSEEN, 0, 0
-        self._due: dict[str, bool] = {}
-        self._waiting: dict[str, Scan] = {}
+        self._last_update: Pose2 | None = None  # odometry at the last filter update
+        self._update_due: dict[str, bool] = {}  # by lidar
+        self._waiting: dict[str, Scan] = {}  # by lidar: scans without odometry at their tick
         self._belief: Belief | None = None
 
     @cached_property
-    def _correction(self) -> _Correction:
-        """The newest; before there is any, what was told. Particles anywhere take 4 ms to sum up, if anyone asks."""
-        if self._told.pose is None:
+    def _correction(self) -> Correction:
+        """The newest correction; at first, the initial estimate. Computed lazily because global clusters take 4 ms."""
+        initial = self._initial_estimate
+        if initial.pose is None:
             pose, covariance = summarise(self._filter.particles)
         else:
-            pose, covariance = self._told.pose, np.diag(np.square(self._told.std))
-        return _Correction(pose, covariance, Pose2(0, 0, 0), 0)
+            pose, covariance = initial.pose, np.diag(np.square(initial.std))
+        return Correction(pose, covariance, Pose2(0, 0, 0), 0)
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Carry the pose on, and use scans that waited for this odometry."""
+        """Store the odometry, and use the scans that waited for it."""
         if not self._odometry.add(odometry.tick, odometry.pose):
             return
-        if not self._begun:
-            start, self._begun = self._correction, True
-            self._correction = _Correction(start.pose, start.covariance, odometry.pose, start.tick)
+        if not self._has_odometry:
+            start, self._has_odometry = self._correction, True
+            self._correction = replace(start, odometry=odometry.pose)
         self._belief = None
         if self._waiting:
             ready = [name for name, scan in self._waiting.items() if self._odometry.reaches(scan.tick)]
             for name in ready:
-                self._use(self._waiting.pop(name))
+                self._process(self._waiting.pop(name))
 
     def on_scan(self, scan: Scan) -> None:
-        """Correct with a scan, at once or when the odometry of its tick is there."""
+        """Process a scan, or keep it until the odometry of its tick has arrived."""
         if self._odometry.reaches(scan.tick):
-            self._use(scan)
+            self._process(scan)
         else:
             self._waiting[scan.sensor] = replace(scan, ranges=scan.ranges.copy())
 
     def on_imu(self, imu: Imu) -> None:
-        """Nothing: AMCL trusts its odometry."""
+        """Ignore the IMU: AMCL predicts with odometry only, which an EKF may have fused."""
 
     @property
     def belief(self) -> Belief:
-        """The last correction, carried on by odometry."""
+        """The last correction, propagated with the odometry since then."""
         if self._belief is None:
             last = self._correction
-            delta = last.before.compose(self._odometry.now)
-            covariance = (self._scatter or self._motion).carry(last.covariance, last.pose.yaw, delta)
+            delta = last.base_from_odom.compose(self._odometry.now)
+            covariance = self._propagated_covariance(last, delta)
             self._belief = Belief(self.pose, covariance, last.map_from_odom, self._filter.particles.table, last.tick)
         return self._belief
 
     @property
     def pose(self) -> Pose2:
-        """That of the belief."""
+        """The pose of the belief, without the cost of its covariance."""
         return self._correction.map_from_odom.compose(self._odometry.now)
 
-    def _use(self, scan: Scan) -> None:
-        """Correct with a scan if its lidar is due; after enough motion all lidars are due once."""
+    def _process(self, scan: Scan) -> None:
+        """Update the filter if the lidar of this scan is due. Enough motion makes every lidar due once."""
         odometry = self._odometry.at(scan.tick)
         if odometry is None or not scan.range_max > 0:
             return
-        delta = None if self._moved_to is None else self._moved_to.between(odometry)
+        delta = None if self._last_update is None else self._last_update.between(odometry)
         if delta is not None and self._moved_enough(delta):
-            self._due = dict.fromkeys(self._due, True)
-        if self._due.get(scan.sensor, True):
+            self._update_due = dict.fromkeys(self._update_due, True)
+        if self._update_due.get(scan.sensor, True):
             self._correct(scan, odometry, delta)
-            if self._finder is not None:
-                self._look_elsewhere(self._finder, scan, odometry)
-
-    def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
-        """Move the particles by what was driven since the last correction, and weigh them by a scan.
-
-        Who is sure of its place need not compare each with the map: in between scans show how it goes.
-        """
-        matched = None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
-        self._came = Moved(step=matched, parted=None if self._matcher is None else self._matcher.parted)
-        agreed = False
-        if delta is not None and matched is not None:
-            self._filter.follow(matched, delta)
-            if not (agreed := matched.agrees(delta)):
-                self._came = replace(self._came, torn=delta.between(matched.delta))
-            if self._scatter is not None:
-                self._scatter.compare(matched.delta, delta)
-        elif delta is not None:
-            self._filter.move(delta)
-        if self._scatter is not None:
-            self._scatter.drive(self._base(odometry), None if matched is None else matched.covariance)
-        self._due[scan.sensor], self._moved_to, self._belief = False, odometry, None
-        sure = agreed and not self._came.parted and self._calm >= SURE_AFTER
-        self._passed = self._passed + 1 if sure and self._passed + 1 < self._every else 0
-        answer = None if self._passed or self._hidden else self._filter.correct(scan)
-        if answer is not None:
-            pose, covariance = answer
-            if self._scatter is not None and self._misfit is not None:
-                covariance = self._scatter.widened(pose, covariance, self._misfit.of(self._filter.beams(scan), pose))
-            self._correction = _Correction(pose, covariance, odometry, scan.tick)
-        else:
-            last = self._correction
-            carried = last.map_from_odom.compose(odometry) if matched is None else last.pose.compose(matched.delta)
-            covariance = spread(self._filter.particles, carried)
-            self._correction = _Correction(carried, covariance, odometry, scan.tick if self._passed else last.tick)
-        if not self._passed:
-            self._calm = self._calm + 1 if agreed and answer is not None and self._filter.sure else 0
-
-    @property
-    def _hidden(self) -> bool:
-        """Whether somebody hides the room from particles that may be anywhere about, so that no map can tell."""
-        again = None if self._matcher is None else self._matcher.again
-        return again is not None and again < SHOWN and not self._filter.particles.within(TOGETHER)
-
-    def _matched_step(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
-        """The motion since the last correction as the first lidar saw it; None where it did not see it."""
-        sensor, before = self._matched or (scan.sensor, odometry)
-        if scan.sensor != sensor:
-            return None
-        step = matcher.step(scan, before.between(odometry))
-        self._matched = sensor, odometry
-        return step if before == self._moved_to else None
-
-    def _look_elsewhere(self, finder: Finder, scan: Scan, odometry: Pose2) -> None:
-        """Put the particles where the robot may be if it is not where it was thought to be."""
-        limits = self._spec.laser_min_range, self._spec.farthest
-        base = self._base(odometry)
-        if self._passed:
-            finder.passed(scan, base, limits, self._came)
-            return
-        believed = self._correction.map_from_odom.compose(odometry)
-        fit = self._filter.fitting if self._calm else None
-        if (places := finder.places(scan, base, believed, limits, self._came, fit)) is not None:
-            self._correction = _Correction(*self._filter.put(*places), odometry, scan.tick)
-            self._moved_to, self._belief, self._calm = odometry, None, 0
-            if self._scatter is not None:
-                self._scatter.forget()
-
-    def _base(self, odometry: Pose2) -> Pose2:
-        """Where the robot is at `odometry` in a frame that drifts: by what its scans show of its motion, if they do."""
-        if self._matcher is None or self._matched is None:
-            return odometry
-        return self._matcher.pose.compose(self._matched[1].between(odometry))
 
     def _moved_enough(self, delta: Pose2) -> bool:
         return math.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a
+
+    def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
+        """Move the particles by `delta`, the odometry since the last update (None at first), and weigh them."""
+        if delta is not None:
+            self._filter.move(delta)
+        self._mark_updated(scan, odometry)
+        estimate = self._filter.correct(scan)
+        if estimate is not None:
+            self._correction = Correction(*estimate, odometry, scan.tick)
+        else:
+            last = self._correction
+            pose = last.map_from_odom.compose(odometry)
+            self._correction = Correction(pose, spread(self._filter.particles, pose), odometry, last.tick)
+
+    def _mark_updated(self, scan: Scan, odometry: Pose2) -> None:
+        self._update_due[scan.sensor], self._last_update, self._belief = False, odometry, None
+
+    def _propagated_covariance(self, last: Correction, delta: Pose2) -> Array:
+        """Return the covariance (3, 3) after moving by `delta` (in the base frame) since the last correction."""
+        return self._motion.carry(last.covariance, last.pose.yaw, delta)

@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.environment.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array
 from simscen.stack.localizers.beams import Cells, Plane
 from simscen.stack.nearest import BEYOND, FARTHEST, squared_cells, squared_within
@@ -21,8 +21,6 @@ Kind = TypeVar("Kind", np.float32, np.uint8)
 BLOCK = 512
 AT_ONCE = 2**16
 """Cells."""
-BEHIND = 1.0
-"""m: what is unknown behind a wall is at most so thick."""
 
 
 def by_blocks(judge: Callable[[Array], Array], poses: Array) -> Array:
@@ -30,26 +28,6 @@ def by_blocks(judge: Callable[[Array], Array], poses: Array) -> Array:
     if len(poses) <= BLOCK:
         return judge(poses)
     return np.concatenate([judge(poses[begin : begin + BLOCK]) for begin in range(0, len(poses), BLOCK)])
-
-
-def beyond_the_map(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
-    """Unknown cells, bordered by one more all around, where the map ends: no beam would have been stopped before.
-
-    These are the ones that no known cell is nearer to than a free one; where a wall is nearer no beam gets, but further
-    off than BEHIND there may be rooms that nobody mapped.
-    """
-    unknown = np.pad(grid.cells == UNKNOWN, 1, constant_values=True)
-    if unknown.all():
-        return unknown
-    if np.count_nonzero(unknown) == unknown.size - grid.cells.size and math.sqrt(2) * grid.resolution <= BEHIND:
-        beside: npt.NDArray[np.bool_] = np.pad(grid.cells == FREE, 1, mode="edge")
-        return unknown & beside  # all is known: the nearest known cell is the next one
-    reach = min(FARTHEST, math.ceil(BEHIND / grid.resolution))
-    known = squared_within(~unknown, reach)
-    beyond: npt.NDArray[np.bool_] = squared_within(np.pad(grid.cells == FREE, 1), reach) == known
-    beyond |= known > (BEHIND / grid.resolution) ** 2
-    beyond &= unknown
-    return beyond
 
 
 class DistanceField:

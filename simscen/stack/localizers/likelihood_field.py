@@ -22,11 +22,6 @@ STRAYS_OF_SUMS = 0.05
 """Of the same models: a particle anywhere weighs half as much as a good one, and outlives many scans."""
 
 
-SAYS_NOTHING = 0.4
-"""Of a hit's likelihood: what a beam has that ends where the map says nothing, about that of a beam of a robot that
-knows where it is, on geometric average."""
-
-
 class SensorModel(Protocol):
     """Judges particles by a scan."""
 
@@ -79,7 +74,7 @@ class LikelihoodField:
 
     def __init__(self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float) -> None:
         self._field, self._z_rand = field, np.float32(z_rand)
-        self._hit = _hit(field, z_hit, sigma_hit)
+        self._hit = _hit_likelihoods(field, z_hit, sigma_hit)
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of 1 + Σ p³."""
@@ -113,64 +108,67 @@ class BeamSkipping:
 
 
 class LikelihoodFieldProb:
-    """A particle weighs the product of its beams' probabilities (table 6.3), with optional beam skipping."""
+    """A particle's weight is the product of its beams' likelihoods (table 6.3), with optional beam skipping.
+
+    Subclasses may set `exponent` and override `_hit_likelihoods`.
+    """
 
     peak, strays = 1.0, 1.0
+    exponent = 1.0
+    """Power to which the product is raised."""
 
     def __init__(
-        self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float, skipping: BeamSkipping | None = None,
-        exponent: float = 1.0, beyond: npt.NDArray[np.bool_] | None = None,
+        self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float, skipping: BeamSkipping | None = None
     ) -> None:  # fmt: skip
-        """`exponent` is that of the product; beams that end `beyond` the map (flat, as the field's table) say nothing.
-
-        They count as SAYS_NOTHING of a hit, for to leave them out would favour places from which more of them do.
-        """
-        self._field, self._z_rand, self._skipping, self._exponent = field, np.float32(z_rand), skipping, exponent
-        self._z_hit, self._sigma_hit, self._beyond = z_hit, sigma_hit, beyond
+        self._field, self._z_rand, self._skipping = field, np.float32(z_rand), skipping
+        self._z_hit, self._sigma_hit = z_hit, sigma_hit
         self._range_max, self._logarithm = math.nan, field.table
         self._exponents: Float32 = np.empty(0, dtype=np.float32)
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
-        """Logarithms (n,) of Π p."""
+        """Return the logarithms (n,) of the product."""
         kept = self._kept(poses, beams, self._skipping) if self._skipping is not None and converged else slice(None)
-        logarithms, counting = self._logarithms(beams.range_max), self._counts(len(beams.ends))[kept]
+        logarithms, exponents = self._logarithms(beams.range_max), self._beam_exponents(len(beams.ends))[kept]
 
-        def judge(block: Array) -> Array:
-            # All cells are in the table; `wrap` spares looking whether they are.
+        def weigh(block: Array) -> Array:
             cells = beams.cells(self._field, block)[:, kept]
-            return (logarithms.take(cells, mode="wrap") @ counting).astype(np.float64)
+            # All indices are valid; mode="wrap" skips the check.
+            return (logarithms.take(cells, mode="wrap") @ exponents).astype(np.float64)
 
-        return by_blocks(judge, poses)
+        return by_blocks(weigh, poses)
 
-    def _counts(self, beams: int) -> Float32:
-        """How much each beam counts: (b,)."""
+    def tempering(self, beams: Beams) -> float:
+        """Return the exponent of the geometric mean over the beams that hit something."""
+        return 1 / max(1, int(np.count_nonzero(beams.ranges < beams.range_max))) / self.exponent
+
+    def _beam_exponents(self, beams: int) -> Float32:
+        """Return `exponent` once for each beam; a matrix product sums faster than numpy's sum."""
         if beams != len(self._exponents):
-            self._exponents = np.full(beams, self._exponent, dtype=np.float32)
+            self._exponents = np.full(beams, self.exponent, dtype=np.float32)
         return self._exponents
 
     def _logarithms(self, range_max: float) -> Float32:
-        """Those of the probability of a beam that ends in each cell of the field."""
+        """Return the log likelihood of a beam that ends in each cell, for a lidar with this maximum range."""
         if range_max != self._range_max:
-            chance = _hit(self._field, self._z_hit, self._sigma_hit)
-            if self._beyond is not None:
-                chance[self._beyond] = np.maximum(chance[self._beyond], np.float32(SAYS_NOTHING * self._z_hit))
-            chance += self._z_rand / np.float32(range_max)
+            likelihoods = self._hit_likelihoods()
+            likelihoods += self._z_rand / np.float32(range_max)
             with np.errstate(divide="ignore"):
-                self._logarithm = np.log(chance, out=chance)
+                self._logarithm = np.log(likelihoods, out=likelihoods)
             self._range_max = range_max
         return self._logarithm
 
-    def tempering(self, beams: Beams) -> float:
-        """The geometric mean over the beams that hit something."""
-        return 1 / max(1, int(np.count_nonzero(beams.ranges < beams.range_max))) / self._exponent
+    def _hit_likelihoods(self) -> Float32:
+        """Return the likelihood of a hit in each cell, without the random part."""
+        return _hit_likelihoods(self._field, self._z_hit, self._sigma_hit)
 
     def _kept(self, poses: Array, beams: Beams, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
+        """Return which beams enough particles can explain; all of them if too few beams are left."""
         near = self._field.table.take(beams.cells(self._field, poses)) < skipping.distance
         explained: npt.NDArray[np.bool_] = near.mean(axis=0) > skipping.threshold
-        misfit = np.count_nonzero(~explained) >= len(explained) * skipping.error_threshold
-        return slice(None) if misfit else explained
+        is_pose_wrong = np.count_nonzero(~explained) >= len(explained) * skipping.error_threshold
+        return slice(None) if is_pose_wrong else explained
 
 
-def _hit(field: DistanceField, z_hit: float, sigma_hit: float) -> Float32:
-    """The part of a beam's probability that its end decides, for each cell of the field."""
+def _hit_likelihoods(field: DistanceField, z_hit: float, sigma_hit: float) -> Float32:
+    """Return z_hit · exp(-d² / 2σ²) of each cell's distance d to the nearest obstacle."""
     return field.told(lambda d: np.float32(z_hit) * np.exp(np.square(d) / np.float32(-2 * sigma_hit**2)), np.float32)

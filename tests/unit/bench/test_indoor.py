@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.bench.localization.buildings import building, distance_to, wall
 from simscen.bench.localization.campaign import PARAMETERS, Share, summed_up
 from simscen.bench.localization.generated_logs import Log, log
@@ -13,7 +14,6 @@ from simscen.bench.localization.recorded_drive import errors_of, localize
 from simscen.bench.localization.trial import MOMENTS, ROBOT, Trial
 from simscen.core.environment.occupancy_grid import FREE, UNKNOWN
 from simscen.core.messages.sensor_data import Odometry, Scan
-from simscen.model.localizers import Amcl
 from simscen.model.stack import StackSpec
 from simscen.record.foreign.sensedrows import TICK_RATE
 from simscen.stack.protocols import Surroundings
@@ -66,21 +66,12 @@ def test_a_robot_is_tracked_on_raw_odometry_and_found_on_a_floor_of_forty_metres
     circumstance: str, parameters: str
 ) -> None:
     made = short(circumstance)
-    spec = StackSpec(localizer=Amcl.model_validate({"parameters": parameters}))
+    spec = StackSpec(localizer=ScanMatchingAmcl.model_validate({"parameters": parameters}))
     localized = localize(made.sensed, spec, Surroundings(ROBOT, made.map, TICK_RATE), made.estimate, 1)
     errors = errors_of(localized, made.sensed, 1.0)
     assert errors is not None
     assert errors.distance[-40:].max() < 0.3
     assert circumstance == "unknown" or not errors.lost
-
-
-def test_parameters_that_are_called_nav2_are_exactly_nav2s_and_what_is_said_wins() -> None:
-    nav2 = Amcl.model_validate({"parameters": "nav2", "max_beams": 30})
-    assert nav2.laser_model_type == "likelihood_field"
-    assert nav2.relocalization == "random"
-    assert (nav2.match_scans, nav2.likelihood_exponent, nav2.map_trust_full) == (False, 1.0, 0.0)
-    assert nav2.max_beams == 30
-    assert Amcl.model_validate({"parameters": "nav2", "sigma_hit": 0.1}).sigma_hit == 0.1
 
 
 def test_a_row_counts_what_was_tracked_and_what_was_found_in_time() -> None:

@@ -122,7 +122,7 @@ def test_the_log_of_a_run_on_slipping_wheels_among_people_gives_the_figures_of_i
     assert found["lost"] == []
 
 
-NAV2S = "stack: {localizer: {parameters: nav2}}\n"
+NAV2S = "stack: {localizer: {type: amcl}}\n"
 
 
 @pytest.mark.slow

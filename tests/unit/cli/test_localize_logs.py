@@ -86,7 +86,7 @@ def scan(time: int, ranges: Iterable[float], frame: str, first: float = -math.pi
 
 
 AT_ONCE = """
-stack: {localizer: {type: amcl, settling_distance: 0}}
+stack: {localizer: {type: scan_matching_amcl, settling_distance: 0}}
 pass: [{localization_error: {rmse: 10 cm}}]
 """
 """Scans count in full from the first one: what is asked is where the lidar is, not how careful AMCL begins."""

@@ -17,6 +17,7 @@ import scenes
 from pydantic import BaseModel, ValidationError
 from scenes import Scene
 
+from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.model import checkers, costmaps, guards, localizers, planners
 from simscen.model import recovery as behaviors
 from simscen.model.controllerspec import ControllerSpec
@@ -44,6 +45,10 @@ class Part(NamedTuple):
 
 
 def amcl(**said: Any) -> Said:
+    return {"localizer": {"type": "scan_matching_amcl", "max_particles": 120, "min_particles": 40, **said}}
+
+
+def plain_amcl(**said: Any) -> Said:
     return {"localizer": {"type": "amcl", "max_particles": 120, "min_particles": 40, **said}}
 
 
@@ -68,18 +73,39 @@ def of_planner(kind: str) -> dict[str, tuple[tuple[Said, Scene], ...]]:
     }
 
 
-LOST: Said = {"parameters": "nav2", "laser_model_type": "likelihood_field_prob", "update_min_d": 0.05}
+LOST: Said = {"laser_model_type": "likelihood_field_prob", "update_min_d": 0.05}
+RANDOM: Said = {
+    "sigma_hit": 0.2, "likelihood_exponent": 1.0, "beams_beyond_the_map": "miss", "map_trust_none": 0.0,
+    "map_trust_full": 0.0, "match_scans": False, "settling_distance": 0.0, "relocalization": "random",
+    "sure_update_interval": 1,
+}  # fmt: skip
+"""Parameters with which scan-matching AMCL is plain AMCL."""
 SMALL: Said = {**TRUTH, "costmap": {"rolling_size": 8.0}}
 SEEN = ((TRUTH, scenes.through), (SMALL, scenes.no_map), (TRUTH, scenes.seen_by_a_camera))
 SEEN_BY_A_CAMERA = ("min_obstacle_height", "max_obstacle_height", "max_ground_slope")
 DENOISE = {"enabled": True, "minimal_group_size": 6}
 PARTS = [
-    Part(("localizer",), localizers.Amcl, ((amcl(), scenes.moved), (amcl(match_scans=False), scenes.moved)), {
+    Part(("localizer",), localizers.Amcl, ((plain_amcl(), scenes.moved),), {
+        "alpha5": ((plain_amcl(robot_model="omni"), scenes.moved),),
+        "min_particles": ((plain_amcl(min_particles=20), scenes.moved),),
+        "selective_resampling": ((plain_amcl(max_beams=5), scenes.moved),),
+        **dict.fromkeys(("pf_err", "pf_z"), ((plain_amcl(), scenes.unknown),)),
+        "recovery_alpha_slow": ((plain_amcl(**LOST, recovery_alpha_fast=0.9), scenes.kidnapped),),
+        "recovery_alpha_fast": ((plain_amcl(**LOST, recovery_alpha_slow=0.01), scenes.kidnapped),),
+        **dict.fromkeys(("z_short", "z_max", "lambda_short"), ((plain_amcl(laser_model_type="beam"), scenes.moved),)),
+        **dict.fromkeys(
+            ("beam_skip_distance", "beam_skip_threshold", "beam_skip_error_threshold"),
+            ((plain_amcl(**LOST, do_beamskip=True, beam_skip_threshold=0.9), scenes.moved),),
+        ),
+        "do_beamskip": ((plain_amcl(**LOST, beam_skip_threshold=0.9), scenes.moved),),
+    }, {"laser_min_range": [0.5, 1.5], "laser_max_range": [0.5, 1.5], "min_particles": [100],
+        "laser_likelihood_max_dist": [0.2]}),
+    Part(("localizer",), ScanMatchingAmcl, ((amcl(), scenes.moved), (amcl(match_scans=False), scenes.moved)), {
         "alpha5": ((amcl(robot_model="omni", match_scans=False), scenes.moved),),
         "min_particles": ((amcl(min_particles=20), scenes.moved),),
         "selective_resampling": ((amcl(max_beams=5, likelihood_exponent=0.1), scenes.moved),),
-        "recovery_alpha_slow": ((amcl(**LOST, recovery_alpha_fast=0.9), scenes.kidnapped),),
-        "recovery_alpha_fast": ((amcl(**LOST, recovery_alpha_slow=0.01), scenes.kidnapped),),
+        "recovery_alpha_slow": ((amcl(**LOST, **RANDOM, recovery_alpha_fast=0.9), scenes.kidnapped),),
+        "recovery_alpha_fast": ((amcl(**LOST, **RANDOM, recovery_alpha_slow=0.01), scenes.kidnapped),),
         "relocalization": ((amcl(), scenes.unknown),),
         "match_scans": ((amcl(), scenes.slipped),),
         **dict.fromkeys(("z_short", "z_max", "lambda_short"), ((amcl(laser_model_type="beam"), scenes.moved),)),
@@ -160,7 +186,7 @@ ELSEWHERE = {
     "ClearCostmap.clear_entirely": "tests/unit/stack/behaviors/test_motions.py",
     "Recovery.retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",
     "VelocitySmoother.counter_turn_slip": "tests/unit/stack/test_slipping_wheels.py",
-    "Amcl.sure_update_interval": "tests/unit/stack/localizers/test_amcl.py",
+    "ScanMatchingAmcl.sure_update_interval": "tests/unit/advanced/localizers/test_scan_matching_amcl.py",
     # Whoever makes goals reads these.
     "SimpleGoalChecker.xy_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",
     "SimpleGoalChecker.yaw_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",

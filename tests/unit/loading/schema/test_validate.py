@@ -50,6 +50,12 @@ def test_a_type_may_be_left_out_where_there_is_a_default() -> None:
     assert told == [(5, 22, "unknown key `sim_time` in `stack.controller`")]
 
 
+def test_a_key_of_another_type_names_that_type() -> None:
+    problem = _problems(ScenarioSpec, SCENARIO + "stack: {localizer: {type: amcl, match_scans: true}}\n")[0]
+    assert problem.message == "unknown key `match_scans` in `stack.localizer`"
+    assert "`scan_matching_amcl`" in problem.hint
+
+
 def test_a_missing_type_lists_the_types() -> None:
     problem = _problems(
         RobotSpec,

@@ -219,7 +219,7 @@ class Case:
 def case(name: str, circumstance: str, model: str, seed: int) -> Case:
     """One drive of a building under one of CIRCUMSTANCES, with a sensor model."""
     built, truth = building(name), drive(name, seed)
-    changes: dict[str, object] = {"parameters": "nav2", "laser_model_type": model}
+    changes: dict[str, object] = {"laser_model_type": model}
     scene, estimate = RayScene(built.mesh), Estimate(Pose2(*truth[0]))
     match circumstance:
         case "kidnapped":

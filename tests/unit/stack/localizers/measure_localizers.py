@@ -19,12 +19,11 @@ from simscen.model.localizers import Amcl, Ekf
 from simscen.model.localizers import Localizer as Spec
 from simscen.testing.room import USUAL, Drive, Noise, drive, errors, localizer, nees, run, scan
 
-SUM = Amcl(parameters="nav2", laser_model_type="likelihood_field")
-PROB = Amcl(parameters="nav2", laser_model_type="likelihood_field_prob")
-BEAM = Amcl(parameters="nav2", laser_model_type="beam")
-MANY = Amcl(parameters="nav2", laser_model_type="likelihood_field", max_particles=5000)
+SUM = Amcl(laser_model_type="likelihood_field")
+PROB = Amcl(laser_model_type="likelihood_field_prob")
+BEAM = Amcl(laser_model_type="beam")
+MANY = Amcl(laser_model_type="likelihood_field", max_particles=5000)
 RECOVERING = Amcl(
-    parameters="nav2",
     laser_model_type="likelihood_field",
     max_particles=5000,
     recovery_alpha_slow=0.001,

@@ -1,25 +1,21 @@
-"""AMCL keeps Nav2's rhythm and stays sane whatever its sensors say."""
+"""Tests of when AMCL updates its filter, and of unusable sensor data."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from simscen.core.environment.occupancy_grid import UNKNOWN
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.localization import Belief, Estimate
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.model.localizers import Amcl
-from simscen.stack.localizers.amcl import SURE_AFTER
 from simscen.stack.localizers.build import amcl
-from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting
-from simscen.testing.room import BEAMS, cast, drive, grid, localizer, run, scan, surroundings
+from simscen.testing.room import BEAMS, cast, drive, grid, localizer, scan, surroundings
 
 START = Pose2(-2.5, -1.8, 0.6)
 DEFAULT = Amcl()
@@ -62,104 +58,6 @@ def test_the_first_scan_corrects_although_nothing_has_moved() -> None:
 def test_a_scan_corrects_only_after_enough_motion(step: Pose2, corrects: bool) -> None:
     belief = moved(started(), 24, step)
     assert belief.updated == (24 if corrects else 0)
-
-
-SURELY = Amcl(sure_update_interval=2, settling_distance=0.0)
-TOLD = Estimate(START, (0.05, 0.05, 0.02))
-
-
-@pytest.fixture
-def compared(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Ticks of the scans that are compared with the map."""
-    ticks: list[int] = []
-    correct = ParticleFilter.correct
-
-    def watched(self: ParticleFilter, scan: Scan) -> tuple[Pose2, Array] | None:
-        ticks.append(scan.tick)
-        return correct(self, scan)
-
-    monkeypatch.setattr(ParticleFilter, "correct", watched)
-    return ticks
-
-
-@pytest.mark.parametrize("interval", [1, 2, 3])
-def test_who_is_sure_compares_one_of_so_many_scans_with_the_map(interval: int, compared: list[int]) -> None:
-    driven = drive(20.0)
-    spec = SURELY.model_copy(update={"sure_update_interval": interval})
-    beliefs = run(localizer(spec, Estimate(Pose2(*driven.truth[0]), TOLD.std), 1), driven, 1)
-    looked_at = list(dict.fromkeys(belief.updated for belief in beliefs))
-    assert compared == looked_at[: SURE_AFTER + 1] + looked_at[SURE_AFTER + interval :: interval]
-
-
-@pytest.mark.parametrize(("std", "expected"), [(1.0, [0, 48]), (0.1, [0, 24, 48])])
-def test_who_hides_the_room_tells_nothing_to_a_robot_that_may_be_anywhere_about(
-    std: float, expected: list[int], compared: list[int]
-) -> None:
-    """Somebody 0.3 m from the lidar hides half of the room; a robot whose particles are together asks the map."""
-    subject = localizer(Amcl(settling_distance=400.0), Estimate(START, (std, std, 0.2)), 1)
-    for tick, metres in ((0, 0.0), (24, 0.26), (48, 0.52)):
-        there = Pose2(metres, 0.0, 0.0)
-        view = seen(START.compose(there), tick)
-        if tick == 24:
-            view.ranges[: BEAMS // 2] = 0.3
-        subject.on_odometry(odometry(tick, there))
-        subject.on_scan(view)
-    assert compared == expected
-
-
-def test_a_covariance_of_scatter_is_learned_from_each_scan(compared: list[int]) -> None:
-    driven = drive(10.0)
-    spec = SURELY.model_copy(update={"covariance": "scatter"})
-    beliefs = run(localizer(spec, Estimate(Pose2(*driven.truth[0]), TOLD.std), 1), driven, 1)
-    assert compared == list(dict.fromkeys(belief.updated for belief in beliefs))
-    assert len(compared) > SURE_AFTER + 4
-
-
-def turning(subject: Localizer, until: int) -> None:
-    for k in range(until):
-        moved(subject, 24 * k, Pose2(0.0, 0.0, 0.26 * k))
-
-
-def test_a_scan_that_is_not_compared_shows_how_far_the_robot_came(compared: list[int]) -> None:
-    """Wheels that are 2 cm off are no surprise, and not believed either."""
-    subject = localizer(SURELY, TOLD, 1)
-    turning(subject, SURE_AFTER + 1)
-    before, tick = subject.belief, 24 * (SURE_AFTER + 1)
-    said = Pose2(0.0, 0.0, 0.26 * (SURE_AFTER + 1))
-    truth = START.compose(said).compose(Pose2(0.02, 0.0, 0.0))
-    subject.on_odometry(odometry(tick, said))
-    subject.on_scan(seen(truth, tick))
-    after = subject.belief
-    assert after.updated == tick
-    assert tick not in compared
-    drifted = truth.between(after.pose), START.compose(Pose2(0.0, 0.0, 0.26 * SURE_AFTER)).between(before.pose)
-    assert math.dist(drifted[0][:2], drifted[1][:2]) < 0.008
-    assert np.linalg.eigvalsh(after.covariance).min() > 0
-    assert np.trace(after.covariance) > np.trace(before.covariance)
-
-
-def test_who_is_sure_compares_a_scan_at_once_when_the_wheels_slip(compared: list[int]) -> None:
-    subject = localizer(SURELY, TOLD, 1)
-    turning(subject, SURE_AFTER + 1)
-    tick, said = 24 * (SURE_AFTER + 1), Pose2(0.0, 0.0, 0.26 * (SURE_AFTER + 1))
-    slipped = said.compose(Pose2(0.3, 0.0, 0.0))
-    subject.on_odometry(odometry(tick, said))
-    subject.on_scan(seen(START.compose(slipped), tick))
-    assert compared[-1] == tick
-    assert math.dist(START.compose(slipped)[:2], subject.belief.pose[:2]) < 0.1
-
-
-@pytest.mark.parametrize("strange_at", [SURE_AFTER + 3, SURE_AFTER + 4])
-def test_after_a_scan_that_does_not_show_the_map_each_is_compared(strange_at: int, compared: list[int]) -> None:
-    subject = localizer(SURELY, TOLD, 1)
-    for k in range(SURE_AFTER + 10):
-        step = Pose2(0.0, 0.0, 0.26 * k)
-        here = seen(START.compose(step), 24 * k)
-        subject.on_odometry(odometry(24 * k, step))
-        subject.on_scan(replace(here, ranges=np.full_like(here.ranges, 1.2)) if k == strange_at else here)
-    numbers = [tick // 24 for tick in compared]
-    sure = [k for k in range(SURE_AFTER + 1, strange_at) if (k - SURE_AFTER) % 2]
-    assert numbers == [k for k in range(SURE_AFTER + 10) if k not in sure]
 
 
 def test_between_corrections_odometry_carries_the_pose_and_uncertainty_grows() -> None:
@@ -207,24 +105,6 @@ def test_a_scan_that_arrives_late_corrects_the_pose_at_which_it_was_taken() -> N
             punctual.on_scan(seen(START.compose(step), tick))
     delayed.on_scan(seen(START.compose(steps[0][1]), 24))
     assert delayed.belief.pose == pytest.approx(punctual.belief.pose)
-
-
-def test_where_there_is_no_map_the_pose_follows_what_the_scans_show_and_not_wheels_that_slip() -> None:
-    unknown = replace(grid(), cells=np.full_like(grid().cells, UNKNOWN))
-    subject = amcl(Amcl(), Setting(replace(surroundings(), map=unknown), "localizer", Streams(1)))
-    subject.reset(Estimate(START, (0.01, 0.01, 0.01)))
-    for k in range(8):
-        subject.on_odometry(odometry(24 * k, Pose2(0.3 * k, 0.03 * k, 0.04 * k)))
-        subject.on_scan(seen(START.compose(Pose2(0.26 * k, 0.0, 0.0)), 24 * k))
-    off = START.compose(Pose2(0.26 * 7, 0.0, 0.0)).between(subject.belief.pose)
-    assert np.hypot(off.x, off.y) < 0.06
-    assert abs(off.yaw) < 0.03
-
-
-def test_the_first_scan_counts_little_beside_what_was_told() -> None:
-    settling, at_once = (started(Amcl(settling_distance=metres)).belief for metres in (4.0, 0.0))
-    assert np.trace(settling.covariance) > 1.5 * np.trace(at_once.covariance)
-    assert np.hypot(*(np.array(START) - settling.pose)[:2]) < 0.2
 
 
 def test_scans_older_than_any_odometry_are_left_alone() -> None:

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.ndimage import distance_transform_edt
 
-from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.environment.occupancy_grid import OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.stack.localizers.distance_field import BEHIND, DistanceField, beyond_the_map
+from simscen.stack.localizers.distance_field import DistanceField
 
 
 def some_grid(seed: int, origin: Pose2 = Pose2(-1.3, 0.4, 0.0)) -> OccupancyGrid:
@@ -25,19 +24,6 @@ def test_distances_are_those_between_cell_centres(seed: int) -> None:
     exact = np.hypot(rows[:, None] - obstacles[:, 0], columns[:, None] - obstacles[:, 1]).min(axis=1) * 0.1
     inner = field.table.reshape(19, 25)[1:-1, 1:-1]
     assert np.allclose(inner.ravel(), np.minimum(exact, 0.5))
-
-
-@pytest.mark.parametrize(("resolution", "unknown"), [(0.1, 0.5), (0.1, 0.97), (0.3, 0.9), (1.5, 0.5), (0.1, 0.0)])
-def test_the_map_ends_where_nothing_known_is_nearer_than_what_is_free(resolution: float, unknown: float) -> None:
-    """Or, behind a wall, farther than a metre from all that is known."""
-    chance = np.random.default_rng(3)
-    cells = np.where(chance.random((40, 30)) < 0.5, FREE, OCCUPIED)
-    cells[chance.random((40, 30)) < unknown] = UNKNOWN
-    bordered = np.pad(cells, 1, constant_values=UNKNOWN)
-    to_known = distance_transform_edt(bordered == UNKNOWN)
-    ends = (distance_transform_edt(bordered != FREE) == to_known) | (to_known * resolution > BEHIND)
-    told = beyond_the_map(OccupancyGrid(cells.astype(np.int8), resolution))
-    assert np.array_equal(told, (bordered == UNKNOWN) & ends)
 
 
 def test_a_map_without_obstacles_is_far_from_everything() -> None:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from simscen.advanced.localizers.scan_matcher import ScanMatcher, Step, moved
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
-from simscen.stack.localizers.scan_matcher import ScanMatcher, Step, moved
 from simscen.testing.room import BEAMS, cast, scan
 
 ANGLES = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)

@@ -5,9 +5,9 @@ Wheels that slip count metres that nobody drove, and no gyroscope shows it. What
 
 import math
 
+from simscen.advanced.localizers.scan_matcher import ScanMatcher
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
-from simscen.stack.localizers.scan_matcher import ScanMatcher
 from simscen.stack.odometry_history import OdometryHistory
 
 

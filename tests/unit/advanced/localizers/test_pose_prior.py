@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
+from simscen.advanced.localizers.pose_prior import AROUND, DRIFT, TOLD, ObservedMotion, PosePrior
+from simscen.advanced.localizers.scan_matcher import Step, moved
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.clusters import errors_about
-from simscen.stack.localizers.scan_matcher import Step, moved
-from simscen.stack.localizers.sure import AROUND, DRIFT, TOLD, Moved, Sure
 
 THEN = Pose2(1.0, 2.0, np.pi / 2)
-SURE = Sure.at(np.array([5.0, 5.0, 0.0]), THEN)
+SURE = PosePrior.at(np.array([5.0, 5.0, 0.0]), THEN)
 NOW = THEN.compose(Pose2(2.0, 1.0, 0.3))
 STEP = Step(Pose2(0.25, 0.0, 0.1), np.array([[4e-5, 1e-5, 0.0], [1e-5, 3e-5, 1e-5], [0.0, 1e-5, 2e-5]]))
 
 
-def far(sure: Sure, base: Pose2, off: Array) -> float:
+def far(sure: PosePrior, base: Pose2, off: Array) -> float:
     return float(sure.unlikely((sure.expected(base) + off)[None], base)[0])
 
 
@@ -25,11 +25,15 @@ def test_it_is_expected_where_its_scans_say_that_it_went() -> None:
 
 @pytest.mark.parametrize("off", [(0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.1), (0.2, -0.1, 0.05)])
 def test_errors_of_steps_add_up_as_they_do_for_many_robots_that_go_the_same_way(off: tuple[float, ...]) -> None:
-    chance, base, sure = np.random.default_rng(1), THEN, Sure.at(np.array([5.0, 5.0, 0.7]), THEN, (1e-6, 1e-6, 1e-6))
+    chance, base, sure = (
+        np.random.default_rng(1),
+        THEN,
+        PosePrior.at(np.array([5.0, 5.0, 0.7]), THEN, (1e-6, 1e-6, 1e-6)),
+    )
     robots = np.tile(np.array(sure.pose), (20_000, 1))
     for _ in range(20):
         robots, before, base = moved(robots, STEP, chance), base, base.compose(STEP.delta)
-        sure = sure.after(before, base, 0.3, Moved(step=STEP))
+        sure = sure.after(before, base, 0.3, ObservedMotion(step=STEP))
     off_by = errors_about(sure.expected(base), robots)
     aside, spread = np.array(off), off_by.T @ off_by / len(robots)
     assert far(sure, base, aside) == pytest.approx(0.5 * aside @ np.linalg.inv(spread) @ aside, rel=0.05)
@@ -39,14 +43,14 @@ def test_errors_of_steps_add_up_as_they_do_for_many_robots_that_go_the_same_way(
 @pytest.mark.parametrize(
     ("way", "drift"),
     [
-        (Moved(), (10 * DRIFT[0], 10 * DRIFT[0], 10 * DRIFT[1])),
-        (Moved(torn=Pose2(0.3, -0.4, 0.2), step=Step(STEP.delta, np.zeros((3, 3)))), (0.5, 0.5, 0.2)),
-        (Moved(step=Step(STEP.delta, np.diag([(4 * TOLD) ** 2, 0.0, 0.0]))), (3 * TOLD, 3 * TOLD, 0.0)),
+        (ObservedMotion(), (10 * DRIFT[0], 10 * DRIFT[0], 10 * DRIFT[1])),
+        (ObservedMotion(torn=Pose2(0.3, -0.4, 0.2), step=Step(STEP.delta, np.zeros((3, 3)))), (0.5, 0.5, 0.2)),
+        (ObservedMotion(step=Step(STEP.delta, np.diag([(4 * TOLD) ** 2, 0.0, 0.0]))), (3 * TOLD, 3 * TOLD, 0.0)),
     ],
     ids=["unseen", "torn", "a corridor without an end"],
 )
 def test_where_scans_do_not_tell_the_next_step_errs_as_the_last_one(
-    axis: int, way: Moved, drift: tuple[float, float, float]
+    axis: int, way: ObservedMotion, drift: tuple[float, float, float]
 ) -> None:
     """Twice as far leads twice as far astray; errors by chance lead √2 as far, and those of a step count besides."""
     sure = SURE.after(THEN, THEN, 10.0, way).after(THEN, THEN, 10.0, way)
@@ -61,8 +65,8 @@ def test_where_scans_do_not_tell_the_next_step_errs_as_the_last_one(
     ids=["agreed", "wheels slip", "people walk along", "people come towards it", "hardly moved"],
 )
 def test_scans_that_differ_by_more_than_wheels_slip_show_what_goes_along(seen: float, torn: float, led: bool) -> None:
-    assert Moved(torn=Pose2(torn, 0.0, 0.0), step=Step(Pose2(seen, 0.0, 0.0), np.zeros((3, 3)))).led is led
+    assert ObservedMotion(torn=Pose2(torn, 0.0, 0.0), step=Step(Pose2(seen, 0.0, 0.0), np.zeros((3, 3)))).led is led
 
 
 def test_wheels_alone_are_not_contradicted() -> None:
-    assert not Moved(torn=Pose2(1.0, 0.0, 0.0)).led
+    assert not ObservedMotion(torn=Pose2(1.0, 0.0, 0.0)).led

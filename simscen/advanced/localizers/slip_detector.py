@@ -10,7 +10,7 @@ _WINDOW, _WINDOW_GATE = 0.5, 24.0
 _RELEASE, _RELEASE_GATE = 0.15, 4.0
 
 
-class WheelWatch:
+class SlipDetector:
     """A gate for the wheels' turn rate as a gyroscope's innovations pass it."""
 
     def __init__(self) -> None:

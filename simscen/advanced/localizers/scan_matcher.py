@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simscen.advanced.localizers.surfaces import Surface, surfaces_of
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.particles import columns, wrapped
-from simscen.stack.localizers.surfaces import Surface, surfaces_of
 
 FRAMES = 4
 """Scans that a new one is matched with."""

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
+from simscen.advanced.localizers.global_search import GlobalSearch
+from simscen.advanced.localizers.map_trust import MapTrust
+from simscen.advanced.localizers.pose_prior import ObservedMotion
+from simscen.advanced.localizers.relocalization import Relocalizer
+from simscen.advanced.localizers.scan_matcher import Step
+from simscen.advanced.localizers.tempered_likelihood import beyond_the_map
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.localization import Estimate
-from simscen.stack.localizers.distance_field import beyond_the_map
-from simscen.stack.localizers.finder import Finder
-from simscen.stack.localizers.global_search import GlobalSearch
 from simscen.stack.localizers.likelihood_field import obstacle_field
-from simscen.stack.localizers.map_trust import MapTrust
-from simscen.stack.localizers.scan_matcher import Step
-from simscen.stack.localizers.sure import Moved
 from simscen.testing.room import BEAMS, cast, grid, scan
 
 START = Pose2(-2.5, -1.8, 0.6)
@@ -37,7 +37,7 @@ def found(
     """
     known = map_ or grid()
     trust = MapTrust(obstacle_field(known, 2.0), beyond_the_map(known).ravel(), 0.45, 0.8)
-    finder, places = Finder(GlobalSearch(known), trust, Estimate(START.compose(told), std), settling), []
+    finder, places = Relocalizer(GlobalSearch(known), trust, Estimate(START.compose(told), std), settling), []
     for driven in np.arange(0.0, way, apart).tolist():
         base = Pose2(driven, 0.0, 0.0)
         pose = START.compose(base)
@@ -97,13 +97,13 @@ def test_a_robot_is_moved_far_only_when_searches_agree_over_two_metres() -> None
 def test_a_robot_that_saw_itself_carried_off_forgets_where_it_was(parted: bool, found_again: bool) -> None:
     """What it saw there would lie beside what it sees here: with that, here fits no better than elsewhere."""
     trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
-    finder, there, puts = Finder(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(3.9, -0.2, 2.17), []
+    finder, there, puts = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(3.9, -0.2, 2.17), []
     step = Step(Pose2(0.25, 0.0, 0.0), np.diag([1e-5, 1e-5, 1e-6]))
     for k, driven in enumerate(np.concatenate((np.arange(0.0, 2.0, 0.25), 2.0 + np.arange(0.0, 3.0, 0.25))).tolist()):
         base, carried = Pose2(driven, 0.0, 0.0), k >= 8
         pose = there.compose(Pose2(driven - 2.0, 0.0, 0.0)) if carried else START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
-        way = Moved(step=None if k == 8 else step, parted=parted and k == 8)
+        way = ObservedMotion(step=None if k == 8 else step, parted=parted and k == 8)
         put = finder.places(scan(ranges), base, START.compose(base), (0.0, 100.0), way)
         if put is not None:
             puts.append(pose.between(Pose2(*put[0][0].tolist())))
@@ -114,12 +114,12 @@ def test_a_robot_that_saw_itself_carried_off_forgets_where_it_was(parted: bool, 
 def test_who_was_carried_off_is_found_by_what_is_too_little_for_who_left_the_map(carried_off: bool) -> None:
     """Rooms that nobody mapped look like mapped ones, and who went there is there; who was carried off is anywhere."""
     trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
-    finder, away, puts = Finder(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(40.0, 3.0, 0.7), []
+    finder, away, puts = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(40.0, 3.0, 0.7), []
     for k, driven in enumerate([0.04 * k for k in range(25)] + [1.0 + 0.25 * k for k in range(10)]):
         pose = START.compose(Pose2(driven, 0.0, 0.0))
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
         ranges[::6] *= 0.5  # people
-        way = Moved(parted=carried_off and k == 1)
+        way = ObservedMotion(parted=carried_off and k == 1)
         put = finder.places(scan(ranges), Pose2(driven, 0.0, 0.0), pose.compose(away), (0.0, 100.0), way)
         if put is not None:
             puts.append(pose.between(Pose2(*put[0][0].tolist())))

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
-from test_ekf_slip import RATE, replayed
+from test_slip_ekf_slip import RATE, replayed
 
+from simscen.advanced.localizers.slip_detector import SlipDetector
 from simscen.core.geometry import Array
 from simscen.model.localizers import Ekf
-from simscen.stack.localizers.wheel_watch import WheelWatch
 from simscen.testing.room import nees
 
 SPEC = Ekf(type="ekf")
@@ -95,5 +95,5 @@ def test_it_is_no_surer_than_it_is_right_whatever_makes_its_wheels_slip(what: ob
 
 
 def test_odometry_that_comes_once_a_second_is_checked_step_by_step() -> None:
-    watch = WheelWatch()
+    watch = SlipDetector()
     assert [watch.slipped(rate, 1e-4, 1e-6, 1.0) > 0.0 for rate in (0.0, 0.2, 0.0)] == [False, True, False]

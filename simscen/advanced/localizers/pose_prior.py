@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from simscen.advanced.localizers.scan_matcher import Step
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.clusters import errors_about
 from simscen.stack.localizers.planar_motion import Noise, swing, turn, turned
-from simscen.stack.localizers.scan_matcher import Step
 
 AROUND = (0.1, 0.1, 0.05)
 """m, m, rad: standard deviations of a robot about a place where it is sure to be."""
@@ -26,7 +26,7 @@ CERTAIN: Noise = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Moved:
+class ObservedMotion:
     """A way from one correction to the next: a `step` as scans show it, if they do.
 
     What scans and wheels say of it is `torn` apart, where they do not agree: then one of them errs by as much. Wheels
@@ -57,7 +57,7 @@ class Moved:
 
 
 @dataclass(frozen=True, eq=False)
-class Sure:
+class PosePrior:
     """A robot was at `pose` when its base was at `base` in a frame that drifts.
 
     `std` (3,) are the standard deviations of the pose in m, m and rad; `covariance` (3, 3) is that of how the robot saw
@@ -71,11 +71,11 @@ class Sure:
     together: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def at(cls, pose: Array, base: Pose2, std: Array | tuple[float, float, float] = AROUND) -> "Sure":
+    def at(cls, pose: Array, base: Pose2, std: Array | tuple[float, float, float] = AROUND) -> "PosePrior":
         """Sure by what was seen, or by what was told if that says how much."""
         return cls(Pose2(*pose.tolist()), base, np.array(std), np.zeros((3, 3)))
 
-    def after(self, before: Pose2, base: Pose2, metres: float, way: Moved) -> "Sure":
+    def after(self, before: Pose2, base: Pose2, metres: float, way: ObservedMotion) -> "PosePrior":
         """The same, when the base went on from `before`."""
         metre, rad = way.together(metres)
         noise = CERTAIN if way.step is None else turned(way.step.covariance, before.yaw)

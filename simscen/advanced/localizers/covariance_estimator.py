@@ -5,11 +5,11 @@ from collections import deque
 
 import numpy as np
 
+from simscen.advanced.localizers.map_residuals import ScanResiduals
+from simscen.advanced.localizers.scan_matcher import FLOOR
+from simscen.advanced.localizers.scan_memory import METRES_A_RAD
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.stack.localizers.misfit import Misfit
 from simscen.stack.localizers.planar_motion import swing, turn
-from simscen.stack.localizers.scan_matcher import FLOOR
-from simscen.stack.localizers.scan_memory import METRES_A_RAD
 
 COUNTED = 36
 """Corrections whose poses are opinions of where the robot is now: some 9 m of driving."""
@@ -35,7 +35,7 @@ LEAST = np.diag(np.square((1e-3, 1e-3, 1e-3)))
 """m, m, rad: nothing is known better, so that no covariance is singular."""
 
 
-class Scatter:
+class CovarianceEstimator:
     """Widens or narrows the covariance of particles, which take each scan for news and each beam for independent.
 
     What stands elsewhere than the map shows it, and cells that are half a cell off, pull scan after scan the same way
@@ -62,7 +62,7 @@ class Scatter:
         self._bases: Array = np.empty((0, 3))
         self._drifts: Array = np.empty((0, 3, 3))  # since each opinion, in the frame of the bases
         self._ways, self._weights = np.empty(0), np.empty(0)
-        self._misfits: deque[Misfit] = deque(maxlen=COUNTED)
+        self._misfits: deque[ScanResiduals] = deque(maxlen=COUNTED)
         self._base: Pose2 | None = None
 
     def compare(self, seen: Pose2, odometry: Pose2) -> None:
@@ -98,7 +98,7 @@ class Scatter:
         self._drifts = swung @ self._drifts @ swung.T + frame @ (doubt + np.diag(DRIFT * way)) @ frame.T
         self._ways = self._ways + way
 
-    def widened(self, pose: Pose2, covariance: Array, misfit: Misfit | None) -> Array:
+    def widened(self, pose: Pose2, covariance: Array, misfit: ScanResiduals | None) -> Array:
         """The covariance (3, 3) of `pose` after a correction at the base that was driven to.
 
         The particles say `covariance`; `misfit` is that of the scan.

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from simscen.advanced.localizers.covariance_estimator import COUNTED, CovarianceEstimator
+from simscen.advanced.localizers.map_residuals import ScanResiduals
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.misfit import Misfit
-from simscen.stack.localizers.scatter import COUNTED, Scatter
 
 STEP = Pose2(0.25, 0.0, 0.05)
 MATCHED = np.diag(np.square((0.005, 0.004, 0.0017)))
@@ -15,10 +15,10 @@ MATCHED = np.diag(np.square((0.005, 0.004, 0.0017)))
 ERROR = np.array([0.05, 0.02, 0.01])
 """m, m, rad: standard deviations of errors that last for some corrections."""
 TOO_SURE = np.diag(np.square((0.01, 0.01, 0.005)))
-AS_MAPPED = Misfit(0.98, 0.1)
+AS_MAPPED = ScanResiduals(0.98, 0.1)
 
 
-def drive(seed: int, lasting: float, error: Array, particles: Array, misfit: Misfit = AS_MAPPED) -> list[float]:
+def drive(seed: int, lasting: float, error: Array, particles: Array, misfit: ScanResiduals = AS_MAPPED) -> list[float]:
     """NEES of particles alone and of what is told, at the end and 9 m before; `lasting`: the correlation of one error
     (ahead, aside, in heading) with the next."""
     nees = []
@@ -28,10 +28,10 @@ def drive(seed: int, lasting: float, error: Array, particles: Array, misfit: Mis
 
 
 def corrections(
-    seed: int, lasting: float, error: Array, particles: Array, misfit: Misfit = AS_MAPPED
+    seed: int, lasting: float, error: Array, particles: Array, misfit: ScanResiduals = AS_MAPPED
 ) -> Iterator[tuple[Array, Array]]:
     """Errors (3,) and covariances (3, 3) of a drive."""
-    chance, scatter = np.random.default_rng(seed), Scatter()
+    chance, scatter = np.random.default_rng(seed), CovarianceEstimator()
     truth, off = Pose2(3.0, -2.0, 1.0), error * chance.standard_normal(3)
     start = truth
     for _ in range(2 * COUNTED):
@@ -57,8 +57,13 @@ def test_the_squared_error_is_about_what_it_is_said_to_be_although_the_particles
 def test_errors_that_all_poses_share_are_told_by_beams_that_are_off() -> None:
     """What beams that are off mean was learned where poses scatter, and holds where they all err alike."""
 
-    def doubt(misfit: Misfit) -> float:
-        chance, scatter, base, covariance = np.random.default_rng(1), Scatter(), Pose2(0.0, 0.0, 0.0), TOO_SURE
+    def doubt(misfit: ScanResiduals) -> float:
+        chance, scatter, base, covariance = (
+            np.random.default_rng(1),
+            CovarianceEstimator(),
+            Pose2(0.0, 0.0, 0.0),
+            TOO_SURE,
+        )
         for k in range(2 * COUNTED):
             base, learning = base.compose(Pose2(0.25, 0.0, 0.0)), k < COUNTED
             x = base.x + (0.05 * float(chance.standard_normal()) if learning else 0.1)
@@ -66,12 +71,12 @@ def test_errors_that_all_poses_share_are_told_by_beams_that_are_off() -> None:
             covariance = scatter.widened(Pose2(x, 0.0, 0.0), TOO_SURE, AS_MAPPED if learning else misfit)
         return float(np.sqrt(covariance[0, 0]))
 
-    assert doubt(Misfit(0.98, 1.0)) > 2.0 * doubt(AS_MAPPED)
+    assert doubt(ScanResiduals(0.98, 1.0)) > 2.0 * doubt(AS_MAPPED)
 
 
 def test_fewer_beams_that_the_map_explains_are_worth_less() -> None:
     (_, most), (_, half) = (
-        list(corrections(1, 0.9, ERROR, TOO_SURE, Misfit(fits, 0.3 * fits)))[-1] for fits in (1.0, 0.5)
+        list(corrections(1, 0.9, ERROR, TOO_SURE, ScanResiduals(fits, 0.3 * fits)))[-1] for fits in (1.0, 0.5)
     )
     assert np.sqrt(np.diag(half)) == pytest.approx(2 * np.sqrt(np.diag(most)))
 
@@ -85,7 +90,12 @@ def test_what_matched_scans_drift_by_is_not_what_the_poses_are_off_by() -> None:
     """Along a corridor without features nothing but wheels tells how far the robot went, and the map puts it right."""
     blind, stds = np.diag(np.square((0.05, 0.004, 0.0017))), []
     for doubt in (MATCHED, blind):
-        chance, scatter, base, covariance = np.random.default_rng(2), Scatter(), Pose2(0.0, 0.0, 0.0), TOO_SURE
+        chance, scatter, base, covariance = (
+            np.random.default_rng(2),
+            CovarianceEstimator(),
+            Pose2(0.0, 0.0, 0.0),
+            TOO_SURE,
+        )
         for k in range(2 * COUNTED):
             base = base.compose(Pose2(0.25 + 0.05 * float(chance.standard_normal()), 0.0, 0.0))
             scatter.drive(base, doubt)
@@ -95,7 +105,7 @@ def test_what_matched_scans_drift_by_is_not_what_the_poses_are_off_by() -> None:
 
 
 def test_the_first_correction_has_a_covariance_too() -> None:
-    scatter = Scatter()
+    scatter = CovarianceEstimator()
     scatter.drive(Pose2(0.0, 0.0, 0.0), None)
     covariance = scatter.widened(Pose2(1.0, 2.0, 3.0), TOO_SURE, None)
     assert (np.linalg.eigvalsh(covariance) > 0).all()
@@ -107,7 +117,7 @@ def test_it_is_the_same_wherever_the_frame_of_the_scans_lies(turn: float) -> Non
     frame, found = Pose2(5.0, -3.0, turn), []
     doubt = np.array(((4e-4, 1e-5, 0.0), (1e-5, 5e-5, 2e-6), (0.0, 2e-6, 9e-6)))
     for from_frame in (Pose2(0.0, 0.0, 0.0), frame):
-        scatter, covariance = Scatter(), TOO_SURE
+        scatter, covariance = CovarianceEstimator(), TOO_SURE
         for k, pose in enumerate(poses):
             scatter.drive(from_frame.compose(Pose2(0.29 * k, 0.0, 0.2 * k)), doubt)
             covariance = scatter.widened(pose, TOO_SURE, AS_MAPPED)
@@ -116,7 +126,7 @@ def test_it_is_the_same_wherever_the_frame_of_the_scans_lies(turn: float) -> Non
 
 
 def test_between_corrections_it_grows_as_odometry_was_seen_to_err() -> None:
-    slipping, holding, turn = Scatter(), Scatter(), Pose2(0.0, 0.0, 0.3)
+    slipping, holding, turn = CovarianceEstimator(), CovarianceEstimator(), Pose2(0.0, 0.0, 0.3)
     for _ in range(200):
         slipping.compare(Pose2(0.2, 0.0, 0.0), Pose2(0.25, 0.0, 0.02))
         holding.compare(Pose2(0.25, 0.0, 0.0), Pose2(0.25, 0.0, 0.0))

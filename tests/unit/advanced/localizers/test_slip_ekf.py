@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from measure_localizers import STD
 from scipy import stats
 
 from simscen.core.geometry import Array, Pose2
@@ -13,6 +12,8 @@ from simscen.model.localizers import Ekf
 from simscen.stack.protocols import Localizer
 from simscen.testing.room import Noise, drive, errors, localizer, nees, run
 
+STD = np.array([0.1, 0.1, 0.05])
+"""Standard deviations of the initial pose: m, m, rad."""
 SPEC = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
 AS_SPECIFIED = Noise(drift=0.01, gyro_bias=0.002)
 SILENT = Noise(translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)

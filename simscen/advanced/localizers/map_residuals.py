@@ -10,7 +10,7 @@ from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField
 
 
-class Misfit(NamedTuple):
+class ScanResiduals(NamedTuple):
     """Of one scan: `fits`, the share of the beams that the map explains, and `squares`, the mean square of what they
     are off by, over the variance that was expected of a beam; the other beams count as off by nothing."""
 
@@ -18,7 +18,7 @@ class Misfit(NamedTuple):
     squares: float
 
 
-class MapMisfit:
+class MapResiduals:
     """Compares the ends of beams with what the map shows next to them.
 
     A beam whose end is d from the nearest obstacle is one of those that hit it with probability hit / (hit + random),
@@ -33,7 +33,7 @@ class MapMisfit:
         self._field, self._beyond = field, beyond
         self._z_hit, self._z_rand, self._sigma_hit = z_hit, z_rand, sigma_hit
 
-    def of(self, beams: Beams, pose: Pose2) -> Misfit | None:
+    def of(self, beams: Beams, pose: Pose2) -> ScanResiduals | None:
         """That of a scan taken at `pose`; None where the map says nothing of any of its beams, or explains none."""
         cells = self._field.cells_seen(np.array([pose]), beams.ends)[0]
         away = self._field.table.take(cells, mode="clip")[~self._beyond.take(cells, mode="clip")] / self._sigma_hit
@@ -41,4 +41,4 @@ class MapMisfit:
         if not len(hit) or not hit.any():
             return None
         explained = hit / (hit + self._z_rand / beams.range_max)
-        return Misfit(float(explained.mean()), float(np.mean(np.square(explained * away))))
+        return ScanResiduals(float(explained.mean()), float(np.mean(np.square(explained * away))))

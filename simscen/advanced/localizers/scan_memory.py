@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simscen.advanced.localizers.global_search import REACH, SHARES, View
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane, directions, evenly
-from simscen.stack.localizers.global_search import REACH, SHARES, View
 
 REMEMBERED = 6.0
 """m driven: what is older is forgotten, for by then raw odometry bends it."""

@@ -8,14 +8,14 @@ import math
 
 import numpy as np
 
+from simscen.advanced.localizers.laser_odometry import LaserOdometry
+from simscen.advanced.localizers.slip_detector import SlipDetector
+from simscen.advanced.localizers.slip_model import AHEAD, BIAS, LEVER, PUSHED, RATE, Model, Step, motion, moved, rates
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.localization import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
 from simscen.stack.localizers.dead_reckoning import start_of
-from simscen.stack.localizers.laser_odometry import LaserOdometry
-from simscen.stack.localizers.slip_model import AHEAD, BIAS, LEVER, PUSHED, RATE, Model, Step, motion, moved, rates
-from simscen.stack.localizers.wheel_watch import WheelWatch
 from simscen.stack.odometry_history import believable
 
 # No robot turns faster than this, in rad/s: a gyroscope that says so is broken.
@@ -28,7 +28,7 @@ _GYRO = np.zeros((1, 7))
 _GYRO[0, [RATE, BIAS]] = 1.0
 
 
-class EkfLocalizer:
+class SlipEkfLocalizer:
     """Adds up odometry's translations along a heading that odometry and gyroscope agree on. No map: it drifts.
 
     Where they disagree by more than their noise the wheels slip: the step turns as the gyroscope says, and how far the
@@ -54,7 +54,7 @@ class EkfLocalizer:
         self._last: Odometry | None = None
         self._readings: list[float] = []
         self._speed, self._slipped = 0.0, False
-        self._watch = WheelWatch()
+        self._watch = SlipDetector()
         self._map_from_odom = pose
         self._laser = LaserOdometry(self._tick_rate) if self._spec.match_scans else None
 

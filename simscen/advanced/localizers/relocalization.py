@@ -5,15 +5,15 @@ from collections import deque
 
 import numpy as np
 
+from simscen.advanced.localizers.global_search import APART, GlobalSearch, View
+from simscen.advanced.localizers.map_trust import MapTrust
+from simscen.advanced.localizers.pose_prior import AROUND, ObservedMotion, PosePrior
+from simscen.advanced.localizers.scan_memory import ScanMemory, travelled
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.messages.localization import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane
 from simscen.stack.localizers.clusters import errors_about
-from simscen.stack.localizers.global_search import APART, GlobalSearch, View
-from simscen.stack.localizers.map_trust import MapTrust
-from simscen.stack.localizers.scan_memory import ScanMemory, travelled
-from simscen.stack.localizers.sure import AROUND, Moved, Sure
 
 RECENT, DOUBTFUL = 5, 0.6
 """Over so many scans that corrected the share of the beams that fit is averaged, and below this the robot may be lost.
@@ -49,11 +49,11 @@ what it saw since says it is back if it fits so, and by so much better than anyw
 Rooms that nobody mapped often look like one that somebody did, though less than that."""
 SHARPNESS = 0.02
 """Of two places that fit so much better or worse, the better is e times as likely, and gets as many more particles."""
-UNSEEN = Moved()
+UNSEEN = ObservedMotion()
 """Of a robot that does not see how it goes."""
 
 
-class Finder:
+class Relocalizer:
     """Watches how well scans fit where the robot is believed to be, and searches the whole map when they do not.
 
     The search takes the scans of the last metres together, so that one room of many that look alike is told from the
@@ -65,8 +65,8 @@ class Finder:
         """What was `told` counts for the first `settling` m, turns included."""
         self._search, self._trust, self._memory = search, trust, ScanMemory()
         self._known, self._told, self._settling = told.pose is not None, told, settling
-        self._begun: Sure | None = None
-        self._sure: Sure | None = None
+        self._begun: PosePrior | None = None
+        self._sure: PosePrior | None = None
         self._fits: deque[float] = deque(maxlen=RECENT)
         self._way, self._wait, self._driven, self._unchecked, self._doubted = 0.0, 0.0, 0.0, 0.0, False
         self._last: Pose2 | None = None
@@ -74,7 +74,7 @@ class Finder:
         self._since, self._astray, self._continuous = 0.0, 0, False
 
     def places(
-        self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float], way: Moved = UNSEEN,
+        self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float], way: ObservedMotion = UNSEEN,
         fit: float | None = None,
     ) -> tuple[Array, Array] | None:  # fmt: skip
         """Poses (k, 3) where the robot may be and the share of each (k,); None to leave it where it is believed to be.
@@ -106,18 +106,18 @@ class Finder:
             return None
         return self._sought(self._memory.about(base), base, here)
 
-    def passed(self, scan: Scan, base: Pose2, limits: tuple[float, float], way: Moved) -> Plane:
+    def passed(self, scan: Scan, base: Pose2, limits: tuple[float, float], way: ObservedMotion) -> Plane:
         """Remember a scan, and ask nothing; where it ended, about the base. As `places` otherwise."""
         self._moved(base, way)
         return self._memory.add(scan, base, *limits)
 
-    def _moved(self, base: Pose2, way: Moved) -> None:
+    def _moved(self, base: Pose2, way: ObservedMotion) -> None:
         """Carry on what is known of where the robot is; nothing is when it no longer sees what it saw."""
         last, self._last = self._last, base
         if last is None:
             if self._told.pose is not None:
                 std = np.maximum(self._told.std, AROUND)
-                self._begun = self._sure = Sure.at(np.array(self._told.pose), base, std)
+                self._begun = self._sure = PosePrior.at(np.array(self._told.pose), base, std)
             return
         self._continuous = way.parted is not None
         moved = travelled(last, base)
@@ -132,7 +132,7 @@ class Finder:
         self._begun = self._begun and self._begun.after(last, base, moved, way)
         self._sure = self._sure and self._sure.after(last, base, moved, way)
 
-    def _as_told(self, begun: Sure, base: Pose2, here: Array) -> tuple[Array, Array] | None:
+    def _as_told(self, begun: PosePrior, base: Pose2, here: Array) -> tuple[Array, Array] | None:
         """Where the robot is by what it was told and all that it saw since, where particles settled elsewhere.
 
         A scan of a room whose furniture was moved fits another place of it, and the next scans, which show the same,
@@ -164,7 +164,7 @@ class Finder:
             return None
         fit = float(self._reached(here, self._search.fit(here, view), base)[0])
         if fit > FITS:
-            self._sure = Sure.at(here[0], base)
+            self._sure = PosePrior.at(here[0], base)
             return None
         poses, fits = self._search.near(view, here[0])
         fits = self._reached(poses, fits, base)
@@ -185,7 +185,7 @@ class Finder:
     def _found(self, places: Array, base: Pose2) -> tuple[Array, Array]:
         """The one of `places` (1, 3) with all particles."""
         self._fits.clear()
-        self._sure = Sure.at(places[0], base)
+        self._sure = PosePrior.at(places[0], base)
         return places, np.ones(1)
 
     def _in_doubt(self) -> bool:
@@ -215,7 +215,7 @@ class Finder:
         if not self._known:
             self._known = plain and self._memory.length >= ENOUGH
             if self._known:
-                self._sure = Sure.at(poses[0], base)
+                self._sure = PosePrior.at(poses[0], base)
             shares = np.exp((fits - fits[0]) / SHARPNESS)
             return poses, shares / shares.sum()
         if plain and fits[0] > good and fits[0] > self._reached(here, self._search.fit(here, view), base)[0] + BETTER:

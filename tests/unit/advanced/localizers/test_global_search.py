@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from simscen.advanced.localizers.global_search import ANSWERS, SHARES, GlobalSearch, View, distinct
+from simscen.advanced.localizers.scan_memory import REMEMBERED, ScanMemory, ends_of
 from simscen.core.geometry import Pose2
-from simscen.stack.localizers.global_search import ANSWERS, SHARES, GlobalSearch, View, distinct
-from simscen.stack.localizers.scan_memory import REMEMBERED, ScanMemory, ends_of
 from simscen.testing.room import BEAMS, cast, grid, scan
 
 PLACES = (Pose2(-2.5, -1.8, 0.6), Pose2(3.0, 1.8, -2.8), Pose2(-4.0, 2.9, 1.9))

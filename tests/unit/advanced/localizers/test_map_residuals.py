@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
+from simscen.advanced.localizers.map_residuals import MapResiduals, ScanResiduals
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.likelihood_field import obstacle_field
-from simscen.stack.localizers.misfit import MapMisfit, Misfit
 
 WALL = 4.05
 """m: the x of the middles of a wall's cells."""
 SIGMA = 0.1
 
 
-def misfit(*ends: float, beyond: bool = False) -> Misfit | None:
+def misfit(*ends: float, beyond: bool = False) -> ScanResiduals | None:
     """Of beams along x from the map's corner, which end at so many m."""
     cells = np.full((40, 60), FREE, dtype=np.int8)
     cells[:, 40] = OCCUPIED
@@ -22,7 +22,7 @@ def misfit(*ends: float, beyond: bool = False) -> Misfit | None:
     says = np.full(field.table.shape, beyond)
     ranges = np.array(ends)
     beams = Beams(ranges, np.ones(len(ends), dtype=np.complex128), 0j, 10.0)
-    return MapMisfit(field, says, 0.5, 0.5, SIGMA).of(beams, Pose2(0.0, 2.0, 0.0))
+    return MapResiduals(field, says, 0.5, 0.5, SIGMA).of(beams, Pose2(0.0, 2.0, 0.0))
 
 
 def explained(away: float) -> float:

@@ -1,0 +1,1 @@
+"""Navigation components that Nav2 does not have, chosen by `stack: {profile: advanced}` or one by one."""

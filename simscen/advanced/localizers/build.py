@@ -1,0 +1,78 @@
+"""Factories of the advanced localizers, named by the `component` of their specifications."""
+
+from dataclasses import dataclass, replace
+
+from simscen.advanced.localizers import spec as model
+from simscen.advanced.localizers.global_search import GlobalSearch
+from simscen.advanced.localizers.map_residuals import MapResiduals
+from simscen.advanced.localizers.map_trust import NEAR, MapTrust
+from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter
+from simscen.advanced.localizers.scan_matching_amcl import ScanMatchingAmclLocalizer
+from simscen.advanced.localizers.tempered_likelihood import TemperedLikelihoodField, beyond_the_map
+from simscen.core.decorators import cached_on_instance
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.model.localizers import Ekf
+from simscen.stack.localizers.build import beam_skipping, motion_model, sensor_model
+from simscen.stack.localizers.dead_reckoning import DeadReckoning
+from simscen.stack.localizers.likelihood_field import SensorModel, obstacle_field
+from simscen.stack.localizers.particles import FreeSpace
+from simscen.stack.protocols import Localizer
+from simscen.stack.setting import Setting
+
+
+def scan_matching_amcl(spec: model.ScanMatchingAmcl, setting: Setting) -> Localizer:
+    """Return a scan-matching AMCL, or dead reckoning if there is no map to match scans with."""
+    if setting.map is None:
+        return DeadReckoning(setting.estimate)
+    motion, models = motion_model(spec, setting.robot.holonomic), map_models(setting.map, spec)
+    trust = models.trust if spec.map_trust_full > 0 else None
+    particles = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, setting.chance, trust)
+    search = (models.search, models.trust) if spec.relocalization == "scan_matching" else None
+    residuals = models.residuals if spec.covariance == "scatter" else None
+    tick_rate = setting.surroundings.tick_rate
+    return ScanMatchingAmclLocalizer(spec, particles, motion, setting.estimate, tick_rate, search, residuals)
+
+
+def slip_ekf(spec: Ekf, setting: Setting) -> Localizer:
+    """Return an extended Kalman filter of odometry and gyroscope that detects wheel slip."""
+    from simscen.advanced.localizers.slip_ekf import SlipEkfLocalizer
+
+    return SlipEkfLocalizer(spec, setting.estimate, setting.surroundings.tick_rate)
+
+
+@dataclass(frozen=True, eq=False)
+class MapModels:
+    """Everything that scan-matching AMCL computes from a map. Independent of the run, so all runs share it."""
+
+    sensor: SensorModel
+    free_space: FreeSpace
+    trust: MapTrust
+    residuals: MapResiduals
+    search: GlobalSearch
+
+
+@cached_on_instance
+def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
+    """Return the models of a map; cached with the map, since a map of 100 x 100 m takes 0.3 s."""
+    grid = replace(grid)  # the cache belongs to the original, which must not be kept alive by its own cache
+    field, unmapped = obstacle_field(grid, spec.laser_likelihood_max_dist), beyond_the_map(grid).ravel()
+    fit_field = field if spec.laser_likelihood_max_dist > NEAR else obstacle_field(grid, 2 * NEAR)
+    if spec.laser_model_type == "likelihood_field_prob":
+        sensor: SensorModel = TemperedLikelihoodField(
+            field, spec.z_hit, spec.z_rand, spec.sigma_hit, beam_skipping(spec), spec.likelihood_exponent,
+            unmapped if spec.beams_beyond_the_map == "say_nothing" else None,
+        )  # fmt: skip
+    else:
+        sensor = sensor_model(spec, grid, field)
+    return MapModels(
+        sensor=sensor,
+        free_space=FreeSpace(grid),
+        trust=MapTrust(fit_field, unmapped, spec.map_trust_none, spec.map_trust_full),
+        residuals=MapResiduals(fit_field, unmapped, spec.z_hit, spec.z_rand, spec.sigma_hit),
+        search=GlobalSearch(grid, field),
+    )
+
+
+def precompute(spec: model.ScanMatchingAmcl, grid: OccupancyGrid) -> None:
+    """Compute the models of a map and the tables of its search before runs are forked."""
+    map_models(grid, spec).search.ready()

@@ -1,0 +1,103 @@
+"""Particle filter that can follow scan matching, distrust an outdated map, and be redistributed."""
+
+import math
+
+import numpy as np
+
+from simscen.advanced.localizers.map_trust import MapTrust
+from simscen.advanced.localizers.relocalization import around
+from simscen.advanced.localizers.scan_matcher import Step, moved
+from simscen.advanced.localizers.scan_memory import METRES_A_RAD
+from simscen.advanced.localizers.spec import ScanMatchingAmcl
+from simscen.core.geometry import Array, Pose2
+from simscen.core.messages.localization import Estimate
+from simscen.stack.localizers.beams import Beams
+from simscen.stack.localizers.clusters import in_touch, summarise
+from simscen.stack.localizers.likelihood_field import SensorModel
+from simscen.stack.localizers.motion_models import MotionModel
+from simscen.stack.localizers.particle_filter import ParticleFilter
+from simscen.stack.localizers.particles import FreeSpace, Particles
+
+ODOMETRY_SHARE = 0.2
+"""Share of the particles that follow odometry where odometry and scan matching disagree."""
+FIRST_SCAN_WEIGHT = 0.2
+"""Exponent of the first scan's likelihood; it grows to 1 over `settling_distance`."""
+CERTAIN_FIT = 0.9
+"""Minimum share of a scan's beams that fit the map for the filter to be certain."""
+
+
+class ScanMatchingParticleFilter(ParticleFilter):
+    """The reference particle filter with other motion input and with scans that count less where the map is wrong."""
+
+    _spec: ScanMatchingAmcl
+
+    def __init__(
+        self, spec: ScanMatchingAmcl, motion: MotionModel, sensor: SensorModel, free_space: FreeSpace,
+        chance: np.random.Generator, trust: MapTrust | None = None,
+    ) -> None:  # fmt: skip
+        """Create the filter. `trust` rates how well the map shows the robot's surroundings; None trusts it fully."""
+        self._trust = trust
+        super().__init__(spec, motion, sensor, free_space, chance)
+
+    def begin(self, estimate: Estimate) -> None:
+        """Restart with particles around the estimate's pose, or over all free space if it has none."""
+        super().begin(estimate)
+        self._map_weight, self._is_one_group = 1.0, False
+        self.fitting = 0.0
+        """Share of the last scan's beams that fit the map at the particles, where the map shows anything."""
+        has_prior = estimate.pose is not None and self._spec.settling_distance > 0
+        self._scan_weight = FIRST_SCAN_WEIGHT if has_prior else 1.0
+
+    @property
+    def is_certain(self) -> bool:
+        """The map explains nearly the whole last scan, and the particles are one narrow group."""
+        is_mapped = self._map_weight == 1.0 and self.fitting >= CERTAIN_FIT
+        return is_mapped and self._is_one_group and self._recovery.share == 0
+
+    def move(self, delta: Pose2) -> None:
+        """Move each particle by its own sample of the motion model. `delta` is the odometry in the base frame."""
+        self._settle(delta)
+        super().move(delta)
+
+    def follow(self, seen: Step, delta: Pose2) -> None:
+        """Move each particle by its own sample of a motion from scan matching. `delta` is the same by odometry.
+
+        Where the two disagree, wheels slip or people walk beside the robot. Some particles then translate as odometry
+        says, and the map decides, unless it does not show the surroundings. All rotate as the scans show.
+        """
+        self._settle(delta)
+        poses = moved(self.particles.poses, seen, self._chance)
+        if self._map_weight > 0 and not seen.agrees(delta):
+            some = self._chance.random(len(poses)) < ODOMETRY_SHARE
+            driven = Step(Pose2(delta.x, delta.y, seen.delta.yaw), seen.covariance)
+            poses[some] = moved(self.particles.poses[some], driven, self._chance)
+        self.particles = Particles(poses, self.particles.weights)
+
+    def _settle(self, delta: Pose2) -> None:
+        """Increase the weight of scans with the distance driven since the initial pose was given.
+
+        One scan of a room fits many poses; several rooms together do not. Until then the initial pose counts more.
+        """
+        if self._scan_weight < 1.0:
+            distance = math.hypot(delta.x, delta.y) + METRES_A_RAD * abs(delta.yaw)
+            self._scan_weight = min(1.0, self._scan_weight + distance / self._spec.settling_distance)
+
+    def redistribute(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:
+        """Put all particles around `poses` (k, 3), each with its share (k,). Return the new pose and covariance."""
+        drawn = around(poses, shares, self._bound.most, self._chance)
+        self.particles = Particles.equal(drawn)
+        self._random = self._descendants = None
+        self._scan_weight = 1.0
+        return summarise(self.particles, self._sensor.peak)
+
+    def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
+        """Return the exponent of the scan's likelihood by map trust and settling, and the beams the map covers."""
+        if self._trust is not None and len(beams.ends):
+            self._map_weight, self.fitting, counting = self._trust.of(self.particles, beams)
+            if counting is not None and self._map_weight > 0:
+                beams = beams.of_hits(counting)
+        return self._map_weight * self._scan_weight, beams
+
+    def _resample(self) -> None:
+        self._is_one_group = in_touch(self.particles)
+        super()._resample()

@@ -1,0 +1,150 @@
+"""AMCL that matches consecutive scans, searches the map when it is lost, and compares fewer scans while certain."""
+
+from dataclasses import replace
+
+from simscen.advanced.localizers.covariance_estimator import CovarianceEstimator
+from simscen.advanced.localizers.global_search import GlobalSearch
+from simscen.advanced.localizers.map_residuals import MapResiduals
+from simscen.advanced.localizers.map_trust import TOGETHER, MapTrust
+from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter
+from simscen.advanced.localizers.pose_prior import ObservedMotion
+from simscen.advanced.localizers.relocalization import UNSEEN, Relocalizer
+from simscen.advanced.localizers.scan_matcher import ScanMatcher, Step
+from simscen.advanced.localizers.spec import ScanMatchingAmcl
+from simscen.core.geometry import Array, Pose2
+from simscen.core.messages.localization import Estimate
+from simscen.core.messages.sensor_data import Scan
+from simscen.stack.localizers.amcl import AmclLocalizer, Correction
+from simscen.stack.localizers.clusters import spread
+from simscen.stack.localizers.motion_models import MotionModel
+
+CERTAIN_AFTER_UPDATES = 8
+"""The robot is certain of its pose after this many consecutive updates in which map, scans and wheels agreed."""
+MIN_OVERLAP = 0.7
+"""Minimum share of a scan's points that earlier scans showed, for scans to weigh particles that are spread widely.
+
+A person in front of the lidar hides most of the room, and fits wherever an obstacle is equally near.
+"""
+
+
+class ScanMatchingAmclLocalizer(AmclLocalizer):
+    """AMCL with scan matching as its motion model, and optional relocalization and covariance estimation.
+
+    Extends the reference AMCL by its three hooks:
+
+    - `_correct`: moves the particles by the motion between two scans, and starts a relocalization if needed
+    - `_propagated_covariance`: uses the odometry errors that scan matching has observed
+    - `reset`: clears the state of these parts
+    """
+
+    _spec: ScanMatchingAmcl
+    _filter: ScanMatchingParticleFilter
+
+    def __init__(
+        self, spec: ScanMatchingAmcl, particle_filter: ScanMatchingParticleFilter, motion: MotionModel,
+        estimate: Estimate, tick_rate: int, search: tuple[GlobalSearch, MapTrust] | None = None,
+        residuals: MapResiduals | None = None,
+    ) -> None:  # fmt: skip
+        """Create the localizer.
+
+        search:     finds the pose of a lost robot; without it, only random particles do
+        residuals:  measures how well the map explains a scan, for the covariance; without it, particles alone give it
+        """
+        self._search, self._residuals = search, residuals
+        self._update_interval = spec.sure_update_interval if residuals is None else 1
+        super().__init__(spec, particle_filter, motion, estimate, tick_rate)
+
+    def reset(self, estimate: Estimate) -> None:
+        """Restart with particles around the estimate's pose, or over all free space if it has none."""
+        super().reset(estimate)
+        settling = self._spec.settling_distance
+        self._relocalizer = None if self._search is None else Relocalizer(*self._search, estimate, settling)
+        self._matcher = ScanMatcher() if self._spec.match_scans else None
+        estimates_covariance = self._residuals is not None and self._matcher is not None
+        self._covariance_estimator = CovarianceEstimator() if estimates_covariance else None
+        self._matched: tuple[str, Pose2] | None = None  # lidar and odometry of the last matched scan
+        self._motion_seen = UNSEEN  # the motion since the last update
+        self._consistent_updates = 0  # consecutive updates in which map, scans and wheels agreed
+        self._skipped = 0  # consecutive scans that were not compared with the map
+
+    def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
+        """Update the pose with a scan, then search elsewhere on the map if the robot may be lost."""
+        self._update(scan, odometry, delta)
+        if self._relocalizer is not None:
+            self._relocalize(self._relocalizer, scan, odometry)
+
+    def _update(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
+        """Move the particles as the scans show, and weigh them unless the robot is certain of its pose."""
+        matched = None if self._matcher is None else self._match(self._matcher, scan, odometry)
+        parted = None if self._matcher is None else self._matcher.parted
+        self._motion_seen = ObservedMotion(step=matched, parted=parted)
+        agreed = False
+        if delta is not None and matched is not None:
+            self._filter.follow(matched, delta)
+            if not (agreed := matched.agrees(delta)):
+                self._motion_seen = replace(self._motion_seen, torn=delta.between(matched.delta))
+            if self._covariance_estimator is not None:
+                self._covariance_estimator.compare(matched.delta, delta)
+        elif delta is not None:
+            self._filter.move(delta)
+        if self._covariance_estimator is not None:
+            self._covariance_estimator.drive(self._base(odometry), None if matched is None else matched.covariance)
+        self._mark_updated(scan, odometry)
+        certain = agreed and not parted and self._consistent_updates >= CERTAIN_AFTER_UPDATES
+        self._skipped = self._skipped + 1 if certain and self._skipped + 1 < self._update_interval else 0
+        estimate = None if self._skipped or self._is_view_blocked else self._filter.correct(scan)
+        if estimate is not None:
+            pose, covariance = estimate
+            if self._covariance_estimator is not None and self._residuals is not None:
+                residuals = self._residuals.of(self._filter.beams(scan), pose)
+                covariance = self._covariance_estimator.widened(pose, covariance, residuals)
+            self._correction = Correction(pose, covariance, odometry, scan.tick)
+        else:
+            last = self._correction
+            pose = last.map_from_odom.compose(odometry) if matched is None else last.pose.compose(matched.delta)
+            tick = scan.tick if self._skipped else last.tick
+            self._correction = Correction(pose, spread(self._filter.particles, pose), odometry, tick)
+        if not self._skipped:
+            consistent = agreed and estimate is not None and self._filter.is_certain
+            self._consistent_updates = self._consistent_updates + 1 if consistent else 0
+
+    @property
+    def _is_view_blocked(self) -> bool:
+        """The last scan shows little of what earlier scans showed, and the particles are spread widely."""
+        overlap = None if self._matcher is None else self._matcher.again
+        return overlap is not None and overlap < MIN_OVERLAP and not self._filter.particles.within(TOGETHER)
+
+    def _match(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
+        """Return the motion since the last update by scan matching of the first lidar; None if it cannot tell."""
+        sensor, before = self._matched or (scan.sensor, odometry)
+        if scan.sensor != sensor:
+            return None
+        step = matcher.step(scan, before.between(odometry))
+        self._matched = sensor, odometry
+        return step if before == self._last_update else None
+
+    def _relocalize(self, relocalizer: Relocalizer, scan: Scan, odometry: Pose2) -> None:
+        """Redistribute the particles if the relocalizer finds the robot elsewhere."""
+        range_limits = self._spec.laser_min_range, self._spec.farthest
+        base = self._base(odometry)
+        if self._skipped:
+            relocalizer.passed(scan, base, range_limits, self._motion_seen)
+            return
+        believed = self._correction.map_from_odom.compose(odometry)
+        fit = self._filter.fitting if self._consistent_updates else None
+        places = relocalizer.places(scan, base, believed, range_limits, self._motion_seen, fit)
+        if places is not None:
+            self._correction = Correction(*self._filter.redistribute(*places), odometry, scan.tick)
+            self._last_update, self._belief, self._consistent_updates = odometry, None, 0
+            if self._covariance_estimator is not None:
+                self._covariance_estimator.forget()
+
+    def _base(self, odometry: Pose2) -> Pose2:
+        """Return the robot's pose in the scan matcher's frame, which drifts less than odometry."""
+        if self._matcher is None or self._matched is None:
+            return odometry
+        return self._matcher.pose.compose(self._matched[1].between(odometry))
+
+    def _propagated_covariance(self, last: Correction, delta: Pose2) -> Array:
+        """Return the covariance (3, 3) after `delta`, by the observed odometry errors if they are estimated."""
+        return (self._covariance_estimator or self._motion).carry(last.covariance, last.pose.yaw, delta)

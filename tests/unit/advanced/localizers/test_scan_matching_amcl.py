@@ -1,0 +1,166 @@
+"""Tests of AMCL with scan matching: skipped comparisons, blocked views, settling and unknown space."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simscen.advanced.localizers.build import scan_matching_amcl
+from simscen.advanced.localizers.scan_matching_amcl import CERTAIN_AFTER_UPDATES
+from simscen.advanced.localizers.spec import ScanMatchingAmcl
+from simscen.core.environment.occupancy_grid import UNKNOWN
+from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.random_streams import Streams
+from simscen.stack.localizers.particle_filter import ParticleFilter
+from simscen.stack.protocols import Localizer
+from simscen.stack.setting import Setting
+from simscen.testing.room import BEAMS, cast, drive, grid, localizer, run, scan, surroundings
+
+START = Pose2(-2.5, -1.8, 0.6)
+GUESS = Estimate(Pose2(-2.3, -1.9, 0.5), (0.3, 0.3, 0.2))
+SKIPPING = ScanMatchingAmcl(sure_update_interval=2, settling_distance=0.0)
+KNOWN = Estimate(START, (0.05, 0.05, 0.02))
+
+
+def seen(pose: Pose2, tick: int) -> Scan:
+    return scan(cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0], tick)
+
+
+def odometry(tick: int, pose: Pose2) -> Odometry:
+    return Odometry("odom", tick, pose, Twist())
+
+
+def started(spec: ScanMatchingAmcl) -> Localizer:
+    """Return a localizer that has received its first odometry and its first scan."""
+    subject = localizer(spec, GUESS, 1)
+    subject.on_odometry(odometry(0, Pose2(0, 0, 0)))
+    subject.on_scan(seen(START, 0))
+    return subject
+
+
+def moved(subject: Localizer, tick: int, step: Pose2) -> Belief:
+    """Return the belief after a step from the start with exact odometry."""
+    subject.on_odometry(odometry(tick, step))
+    subject.on_scan(seen(START.compose(step), tick))
+    return subject.belief
+
+
+@pytest.fixture
+def compared(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return the ticks of the scans that are compared with the map."""
+    ticks: list[int] = []
+    correct = ParticleFilter.correct
+
+    def watched(self: ParticleFilter, scan: Scan) -> tuple[Pose2, Array] | None:
+        ticks.append(scan.tick)
+        return correct(self, scan)
+
+    monkeypatch.setattr(ParticleFilter, "correct", watched)
+    return ticks
+
+
+@pytest.mark.parametrize("interval", [1, 2, 3])
+def test_a_certain_robot_compares_every_nth_scan_with_the_map(interval: int, compared: list[int]) -> None:
+    driven = drive(20.0)
+    spec = SKIPPING.model_copy(update={"sure_update_interval": interval})
+    beliefs = run(localizer(spec, Estimate(Pose2(*driven.truth[0]), KNOWN.std), 1), driven, 1)
+    looked_at = list(dict.fromkeys(belief.updated for belief in beliefs))
+    assert compared == looked_at[: CERTAIN_AFTER_UPDATES + 1] + looked_at[CERTAIN_AFTER_UPDATES + interval :: interval]
+
+
+@pytest.mark.parametrize(("std", "expected"), [(1.0, [0, 48]), (0.1, [0, 24, 48])])
+def test_a_blocked_view_is_ignored_while_particles_are_spread_widely(
+    std: float, expected: list[int], compared: list[int]
+) -> None:
+    """A person 0.3 m from the lidar hides half of the room. Narrow particles use the scan nevertheless."""
+    subject = localizer(ScanMatchingAmcl(settling_distance=400.0), Estimate(START, (std, std, 0.2)), 1)
+    for tick, metres in ((0, 0.0), (24, 0.26), (48, 0.52)):
+        there = Pose2(metres, 0.0, 0.0)
+        view = seen(START.compose(there), tick)
+        if tick == 24:
+            view.ranges[: BEAMS // 2] = 0.3
+        subject.on_odometry(odometry(tick, there))
+        subject.on_scan(view)
+    assert compared == expected
+
+
+def test_covariance_estimation_compares_every_scan(compared: list[int]) -> None:
+    driven = drive(10.0)
+    spec = SKIPPING.model_copy(update={"covariance": "scatter"})
+    beliefs = run(localizer(spec, Estimate(Pose2(*driven.truth[0]), KNOWN.std), 1), driven, 1)
+    assert compared == list(dict.fromkeys(belief.updated for belief in beliefs))
+    assert len(compared) > CERTAIN_AFTER_UPDATES + 4
+
+
+def turning(subject: Localizer, until: int) -> None:
+    for k in range(until):
+        moved(subject, 24 * k, Pose2(0.0, 0.0, 0.26 * k))
+
+
+def test_a_skipped_scan_still_measures_the_motion(compared: list[int]) -> None:
+    """Odometry that is 2 cm off does not count as disagreement, and does not move the pose either."""
+    subject = localizer(SKIPPING, KNOWN, 1)
+    turning(subject, CERTAIN_AFTER_UPDATES + 1)
+    before, tick = subject.belief, 24 * (CERTAIN_AFTER_UPDATES + 1)
+    said = Pose2(0.0, 0.0, 0.26 * (CERTAIN_AFTER_UPDATES + 1))
+    truth = START.compose(said).compose(Pose2(0.02, 0.0, 0.0))
+    subject.on_odometry(odometry(tick, said))
+    subject.on_scan(seen(truth, tick))
+    after = subject.belief
+    assert after.updated == tick
+    assert tick not in compared
+    drifted = (
+        truth.between(after.pose),
+        START.compose(Pose2(0.0, 0.0, 0.26 * CERTAIN_AFTER_UPDATES)).between(before.pose),
+    )
+    assert math.dist(drifted[0][:2], drifted[1][:2]) < 0.008
+    assert np.linalg.eigvalsh(after.covariance).min() > 0
+    assert np.trace(after.covariance) > np.trace(before.covariance)
+
+
+def test_slipping_wheels_end_the_skipping_at_once(compared: list[int]) -> None:
+    subject = localizer(SKIPPING, KNOWN, 1)
+    turning(subject, CERTAIN_AFTER_UPDATES + 1)
+    tick, said = 24 * (CERTAIN_AFTER_UPDATES + 1), Pose2(0.0, 0.0, 0.26 * (CERTAIN_AFTER_UPDATES + 1))
+    slipped = said.compose(Pose2(0.3, 0.0, 0.0))
+    subject.on_odometry(odometry(tick, said))
+    subject.on_scan(seen(START.compose(slipped), tick))
+    assert compared[-1] == tick
+    assert math.dist(START.compose(slipped)[:2], subject.belief.pose[:2]) < 0.1
+
+
+@pytest.mark.parametrize("strange_at", [CERTAIN_AFTER_UPDATES + 3, CERTAIN_AFTER_UPDATES + 4])
+def test_a_scan_that_does_not_fit_the_map_ends_the_skipping(strange_at: int, compared: list[int]) -> None:
+    subject = localizer(SKIPPING, KNOWN, 1)
+    for k in range(CERTAIN_AFTER_UPDATES + 10):
+        step = Pose2(0.0, 0.0, 0.26 * k)
+        here = seen(START.compose(step), 24 * k)
+        subject.on_odometry(odometry(24 * k, step))
+        subject.on_scan(replace(here, ranges=np.full_like(here.ranges, 1.2)) if k == strange_at else here)
+    numbers = [tick // 24 for tick in compared]
+    sure = [k for k in range(CERTAIN_AFTER_UPDATES + 1, strange_at) if (k - CERTAIN_AFTER_UPDATES) % 2]
+    assert numbers == [k for k in range(CERTAIN_AFTER_UPDATES + 10) if k not in sure]
+
+
+def test_in_unknown_space_the_pose_follows_the_scans_and_not_slipping_wheels() -> None:
+    unknown = replace(grid(), cells=np.full_like(grid().cells, UNKNOWN))
+    subject = scan_matching_amcl(
+        ScanMatchingAmcl(), Setting(replace(surroundings(), map=unknown), "localizer", Streams(1))
+    )
+    subject.reset(Estimate(START, (0.01, 0.01, 0.01)))
+    for k in range(8):
+        subject.on_odometry(odometry(24 * k, Pose2(0.3 * k, 0.03 * k, 0.04 * k)))
+        subject.on_scan(seen(START.compose(Pose2(0.26 * k, 0.0, 0.0)), 24 * k))
+    off = START.compose(Pose2(0.26 * 7, 0.0, 0.0)).between(subject.belief.pose)
+    assert np.hypot(off.x, off.y) < 0.06
+    assert abs(off.yaw) < 0.03
+
+
+def test_the_first_scan_has_little_weight_beside_the_initial_pose() -> None:
+    settling, at_once = (started(ScanMatchingAmcl(settling_distance=metres)).belief for metres in (4.0, 0.0))
+    assert np.trace(settling.covariance) > 1.5 * np.trace(at_once.covariance)
+    assert np.hypot(*(np.array(START) - settling.pose)[:2]) < 0.2
