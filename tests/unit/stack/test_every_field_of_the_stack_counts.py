@@ -89,7 +89,7 @@ PARTS = [
         "alpha5": ((plain_amcl(robot_model="omni"), scenes.moved),),
         "min_particles": ((plain_amcl(min_particles=20), scenes.moved),),
         "selective_resampling": ((plain_amcl(max_beams=5), scenes.moved),),
-        **dict.fromkeys(("pf_err", "pf_z"), ((plain_amcl(), scenes.unknown),)),
+        **dict.fromkeys(("pf_err", "pf_z"), ((plain_amcl(max_particles=3000), scenes.unknown),)),
         "recovery_alpha_slow": ((plain_amcl(**LOST, recovery_alpha_fast=0.9), scenes.kidnapped),),
         "recovery_alpha_fast": ((plain_amcl(**LOST, recovery_alpha_slow=0.01), scenes.kidnapped),),
         **dict.fromkeys(("z_short", "z_max", "lambda_short"), ((plain_amcl(laser_model_type="beam"), scenes.moved),)),
