@@ -128,7 +128,7 @@ class LoadedScenario:
         return robot is None or not self.robot_name or robot == self.robot_name
 
     @property
-    def scenario_title(self) -> str:
+    def title(self) -> str:
         """What it is called: its id, with its variation."""
         return scenario_title(self.id, self.variation)
 

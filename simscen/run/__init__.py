@@ -1,1 +1,1 @@
-"""A run: assembled from a scenario, stepped in lockstep, one process each."""
+"""Run scenarios: prepare, assemble, simulate in lockstep, record, and judge, with one process for each run."""

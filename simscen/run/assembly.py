@@ -1,4 +1,4 @@
-"""The composition root: the only place that builds engines, sensors and stacks."""
+"""Build the simulation, robots, sensors, stacks, and faults of a run (the composition root)."""
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -35,9 +35,9 @@ from simscen.worlds.rays import RayScene
 
 
 def assemble(prepared: PreparedScenario, seed: int, printed: Path | None = None) -> RunSetup:
-    """Build the rig of one run of a prepared scenario with this seed; its stacks have not been started.
+    """Build everything that one run needs. The stacks are not started yet.
 
-    `printed` is the file for what an external stack prints.
+    `printed` is the file that receives the output of an external stack.
     """
     spec, world = prepared.spec, prepared.built.world
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed)
@@ -78,9 +78,9 @@ def assemble(prepared: PreparedScenario, seed: int, printed: Path | None = None)
 def _directors(
     prepared: PreparedScenario, streams: Streams, agents: Mapping[str, RobotUnderTest]
 ) -> Iterator[Director]:
-    """Who lets things happen: to the world, then to each robot; for a single robot that is one.
+    """Yield a director for events in the world, then one for the faults of each robot; a single robot needs only one.
 
-    What is about no robot is the same for all, so that any of them may stand for it.
+    Events that concern no robot are the same for all, so the first robot's stage is used.
     """
     spec = prepared.spec
     first, *_ = agents.values()
@@ -103,7 +103,7 @@ def _agent(
     stages: dict[str, LiveStage],
     printed: Path | None,
 ) -> RobotUnderTest:
-    """One robot with its senses and its stack; its stage is added to those of the others."""
+    """Build one robot with its sensors and its stack, and add its stage to `stages`."""
     spec, robot = prepared.spec, simulation.robots[name]
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed, name)
     rays = LiveRayCaster(RayScene(scene), robot)
@@ -155,7 +155,7 @@ def _stack(
     printed: Path | None,
     told: Callable[[Belief], Belief],
 ) -> Stack:
-    """The stack of a robot; it is `told` what becomes of what its localizer says."""
+    """Build the stack of a robot. Active faults change each belief of its localizer through `told`."""
     world = prepared.built.world
     surroundings = Surroundings(
         robot=robot_model(prepared.body),
@@ -180,7 +180,7 @@ def _stack(
 
 
 class TruthSensor:
-    """Tells the `ground_truth` localizer the true pose, as an odometry that never errs and lives in the map frame."""
+    """Sensor for the `ground_truth` localizer: the true pose in the map frame as an odometry message."""
 
     name = "ground_truth"
 
@@ -188,6 +188,6 @@ class TruthSensor:
         self._robot, self.period = robot, period
 
     def read(self, tick: int) -> Odometry:
-        """The true pose now."""
+        """Return the true pose."""
         truth = self._robot.truth()
         return Odometry(self.name, tick, truth.pose.plane, truth.twist)

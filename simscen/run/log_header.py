@@ -1,4 +1,4 @@
-"""What a log says about its run: worked out once for all runs of a scenario, before the first of them is forked."""
+"""Header of a log, built once for all runs of a scenario."""
 
 from dataclasses import replace
 from weakref import WeakKeyDictionary
@@ -17,7 +17,7 @@ _KNOWN: WeakKeyDictionary[PreparedScenario, LogHeader] = WeakKeyDictionary()
 
 
 def log_header(prepared: PreparedScenario, seed: int) -> LogHeader:
-    """What the log says about a run."""
+    """Return the log header of a run."""
     known = _KNOWN.get(prepared)
     if known is None:
         known = _KNOWN[prepared] = _of_all_runs(prepared)
@@ -44,7 +44,7 @@ def _of_one(prepared: PreparedScenario) -> LogHeader:
 
 
 def _key_facts(prepared: PreparedScenario) -> dict[str, str]:
-    """The stack that was chosen in place of the scenario's own, as it was given, and what the run is called."""
+    """Return the stack chosen on the command line, and the names of stack and variation."""
     loaded = prepared.loaded
     told = {CHOSEN: loaded.stack, STACK_NAME: loaded.stack_name, VARIATION: loaded.variation}
     return {name: value for name, value in told.items() if value}

@@ -1,4 +1,4 @@
-"""What a stack is told of its robot: the datasheet of the body that the simulator drives."""
+"""Properties of a robot that stacks and logs need: its model, its sensors, and its latencies."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -18,7 +18,7 @@ from simscen.stack.protocols import RobotModel
 
 
 def robot_model(body: RobotBody) -> RobotModel:
-    """The datasheet of a body."""
+    """Return the robot model that a stack receives."""
     limits, drive = body.limits, body.drive
     holonomic = isinstance(drive, Holonomic)
     return RobotModel(
@@ -36,25 +36,23 @@ def robot_model(body: RobotBody) -> RobotModel:
     )
 
 
-# MERGED: What senses on a robot, by name: as logs and external stacks are told.
 def sensor_kinds(prepared: PreparedScenario) -> dict[str, str]:
-    """The kinds of readings of all that senses, by name, in the order in which they are read."""
+    """Return the type of readings of each sensor by name, in the order in which they are read."""
     told = {TRUTH: Odometry.__name__} if prepared.stack.told_truth else {}
     return {name: sensor.says for name, sensor in prepared.robot.sensors.items()} | told
 
 
 def sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:
-    """Where sensors that look somewhere sit on the base."""
+    """Return the mount pose of each sensor that has one, relative to the base."""
     mounts = {name: getattr(sensor.chosen, "mount", None) for name, sensor in robot.sensors.items()}
     return {name: mount.pose for name, mount in mounts.items() if isinstance(mount, Mount)}
 
 
-# MERGED: How late readings and commands are, by the files of the robot and of its stack.
 AnyStack = TypeVar("AnyStack", bound=StackBase)
 
 
 def with_robot_latency(stack: AnyStack, robot: RobotSpec) -> AnyStack:
-    """The stack, with the durations of the robot's file in place of `latency: robot`."""
+    """Return the stack with `latency: robot` replaced by the latencies in the robot's file."""
     if not _as_robot(stack):
         return stack
     return stack.model_copy(
@@ -63,7 +61,7 @@ def with_robot_latency(stack: AnyStack, robot: RobotSpec) -> AnyStack:
 
 
 def sensor_latencies(prepared: PreparedScenario, clock: Clock) -> Mapping[str, int]:
-    """Ticks from a reading to the stack, by the sensor's name: what it says itself, or what is usual on the robot."""
+    """Return the latency of each sensor in ticks, by name."""
     usual = prepared.robot.latency.sensors if _as_robot(prepared.stack) else {}
     own = {name: sensor.chosen for name, sensor in prepared.robot.sensors.items()}
     return {
@@ -74,7 +72,7 @@ def sensor_latencies(prepared: PreparedScenario, clock: Clock) -> Mapping[str, i
 
 
 def command_latencies(prepared: PreparedScenario, clock: Clock) -> Iterator[int]:
-    """Ticks after each question to the controller at which something comes of it."""
+    """Yield the delays in ticks from a control step to the resulting commands."""
     stack = with_robot_latency(prepared.stack, prepared.robot)
     if isinstance(stack, StackSpec) and isinstance(stack.latency, Latency):
         yield clock.ticks(stack.latency.controller)

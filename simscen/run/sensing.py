@@ -1,4 +1,4 @@
-"""All sensors of the robot, each at its own rate."""
+"""Read the sensors of a robot at their rates, and compute the ticks at which anything is due."""
 
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,13 +8,13 @@ from simscen.sensors.sensor import Sensor
 
 
 class SensorSuite:
-    """Reads the sensors that are due at a tick, in the order of the robot's specification.
+    """The sensors of a robot, in the order of its specification.
 
-    A reading shows the moment it carries the tick of; of a sensor that is late it comes so many ticks after that.
+    A reading carries the tick at which it was measured. It reaches the stack after the latency of its sensor.
     """
 
     def __init__(self, sensors: Sequence[Sensor], latencies: Mapping[str, int] | None = None) -> None:
-        """`latencies`: ticks from a reading to the stack, by the sensor's name."""
+        """`latencies`: ticks from measurement to arrival at the stack, by sensor name."""
         self._sensors = tuple(sensors)
         latencies = latencies or {}
         self._latencies = [latencies.get(sensor.name, 0) for sensor in self._sensors]
@@ -29,12 +29,12 @@ class SensorSuite:
 
     @property
     def arrivals(self) -> tuple[tuple[int, int], ...]:
-        """For each sensor that is late its period, and how much later its readings come, in ticks."""
+        """Period and latency in ticks of each sensor with a latency."""
         pairs = zip(self.periods, self._latencies, strict=True)
         return tuple((period, latency) for period, latency in pairs if latency)
 
     def read(self, tick: int) -> Readings:
-        """The readings that come at this tick."""
+        """Return the readings that arrive at this tick."""
         if self._punctual is not None:
             return tuple([sensor.read(tick) for sensor, period in self._punctual if tick % period == 0])
         come: list[Reading] = []
@@ -46,32 +46,31 @@ class SensorSuite:
         return tuple(come)
 
 
-# MERGED: At which ticks anything is due.
 class TickSchedule:
-    """The ticks that are a multiple of at least one period, or so much later than one, in order.
+    """Schedule of all ticks that are a multiple of a period, or a fixed number of ticks later.
 
-    Nothing is tabulated: the pattern repeats only after the least common multiple of the periods, which may be long.
+    Computes each tick on demand, because the least common multiple of the periods can be large.
     """
 
     def __init__(self, periods: Iterable[int], later: Iterable[tuple[int, int]] = ()) -> None:
-        """`later`: periods, and ticks after each multiple."""
+        """`later`: pairs of a period and the delay after each multiple of it, in ticks."""
         beats = {(period, 0) for period in periods} | {(period, ticks % period) for period, ticks in later}
         first, *rest = sorted(beat for beat in beats if not any(_among(beat, other) for other in beats))
         (self._period, self._late), self._rest = first, rest
 
     def due(self, tick: int) -> bool:
-        """Whether anything is due at `tick`."""
+        """Return whether anything is due at a tick."""
         return self.until_next(tick - 1) == 1
 
     def until_next(self, tick: int) -> int:
-        """How many ticks lie between `tick` and the next one at which something is due; at least 1."""
+        """Return the number of ticks from `tick` to the next due tick; at least 1."""
         until = self._period - (tick - self._late) % self._period
-        if self._rest:  # of most robots a single one is left
+        if self._rest:  # most robots have a single period left
             return min(until, *[period - (tick - ticks) % period for period, ticks in self._rest])
         return until
 
 
 def _among(beat: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Whether all ticks of a beat are among those of another."""
+    """Return whether another entry covers all ticks of this one."""
     (period, ticks), (finer, its) = beat, other
     return beat != other and period % finer == 0 and ticks % finer == its

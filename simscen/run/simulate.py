@@ -1,4 +1,4 @@
-"""The one way from a description to a result: assemble, step in lockstep, record, judge."""
+"""Simulate a prepared scenario: assemble, run in lockstep, record, and judge."""
 
 import traceback
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -29,7 +29,7 @@ from simscen.sim.alone import NAMELESS
 from simscen.spec.registry import Entry
 
 Attach = Callable[[RunSetup, Sequence[Log]], Sequence[Log]]
-"""Is shown the setup and the logs of its first robot before the first beat; what it returns listens to that, too."""
+"""Receives the setup and the logs of its first robot before the first beat; what it returns listens to that, too."""
 
 
 def simulate(
@@ -40,9 +40,9 @@ def simulate(
     attach: Attach | None = None,
     printed: Path | None = None,
 ) -> Run:
-    """Run a prepared scenario with this seed (default: its own) and judge it; `log` is the MCAP file to write.
+    """Run a prepared scenario with a seed (default: its own) and judge it; `log` is the MCAP file to write.
 
-    `printed` is the file for what an external stack prints; of several robots, `printed` with the robot's name in it.
+    `printed` is the file for the output of an external stack; with several robots, each name is added to it.
 
     *Given* the same scenario and seed *then* the same run and the same bytes in `log`, whatever ran before in this
     process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.
@@ -51,10 +51,10 @@ def simulate(
         return _simulated(prepared, prepared.spec.seed if seed is None else seed, log, attach, printed)
     except (RunError, InvalidInput, MemoryError):
         raise
-    except Exception as error:  # the boundary to code of others, which can raise anything
+    except Exception as error:  # plug-ins can raise any exception
         if (whose := plugin_error(error, prepared.plugins)) is None:
             raise
-        traceback.print_exc()  # into the run's own log: what its author wants to see
+        traceback.print_exc()  # into worker.log, for the author of the plug-in
         raise whose from error
 
 
@@ -65,7 +65,7 @@ def _simulated(
     clock = Clock(prepared.spec.physics.tick_rate)
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
-        # Code of others may write into an array that it has handed out.
+        # Plug-ins could modify an array after they returned it, so logging must not be delayed.
         waits, written = 0 if prepared.plugins else clock.ticks(WAITS), recorder.robots if recorder else {}
         backlog = closing.enter_context(Backlog(waits, next(iter(written.values()), None)))
         kept = {name: one.thinning for name, one in written.items()}
@@ -98,7 +98,7 @@ def _simulated(
 
 
 def _close(stacks: Collection[ExternalStack]) -> None:
-    """End them all at once, so that many that are slow to end take no longer than one."""
+    """End all external stacks concurrently."""
     for stack in stacks:
         stack.release()
     for stack in stacks:
@@ -106,7 +106,7 @@ def _close(stacks: Collection[ExternalStack]) -> None:
 
 
 def _stack_facts(externals: Mapping[str, ExternalStack]) -> dict[str, str]:
-    """What the external stacks were, for the log: of several robots, each fact with the robot's name in front."""
+    """Return the facts about external stacks for the log; with several robots, prefixed with the robot's name."""
     return {
         f"{name}.{fact}" if name else fact: value
         for name, stack in externals.items()
@@ -115,7 +115,7 @@ def _stack_facts(externals: Mapping[str, ExternalStack]) -> dict[str, str]:
 
 
 def _with_stacks(run: Run, said: Mapping[str, Mapping[str, Any]]) -> Run:
-    """The run with what the external stacks said of themselves, by robot."""
+    """Return the run with the descriptions of the external stacks by robot."""
     robots = {name: replace(one, stack=said.get(name, {})) for name, one in run.robots.items()}
     return replace(run, robots=robots, stack=said.get(next(iter(robots), NAMELESS), {}))
 
@@ -128,7 +128,7 @@ def simulate_file(
 
 
 def judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Trace], log: Path | None = None) -> Run:
-    """The run that the traces of its robots show."""
+    """Judge the traces of all robots."""
     if not prepared.robots:
         return _judged(prepared, seed, traces[NAMELESS], log)
     runs = {name: _judged(part, seed, traces[name], log) for name, part in prepared.robots.items()}
@@ -137,10 +137,10 @@ def judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Tra
 
 
 def _judged(prepared: PreparedScenario, seed: int, trace: Trace, log: Path | None) -> Run:
-    """What came of one robot."""
+    """Judge the trace of one robot."""
     loaded = prepared.loaded
     places = [loaded.place_of("pass", index) for index in range(len(prepared.spec.pass_))]
-    # One that the scenario extends or takes from defaults.yaml has its line in another file than reports name.
+    # Entries from `extends` or defaults.yaml have no line in the file that reports name.
     lines = tuple(place.line if place.path == loaded.path else 0 for place in places)
     result = judge_run(
         loaded.key(seed),
@@ -155,9 +155,8 @@ def _judged(prepared: PreparedScenario, seed: int, trace: Trace, log: Path | Non
     return Run(replace(result, stack=loaded.stack), trace, prepared.case, log)
 
 
-# MERGED: Whose mistake an exception is: the engine's, or that of an installed package that a run uses.
 def plugin_error(error: Exception, plugins: Sequence[Entry]) -> RunError | None:
-    """The error of the run where it passed through code of these packages, naming type and line; None elsewhere."""
+    """Return a RunError that names the plug-in whose code raised the exception, or None."""
     own = {entry.value.partition(":")[0].partition(".")[0] for entry in plugins}
     for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
         module = str(frame.f_globals.get("__name__", ""))
@@ -170,7 +169,7 @@ def plugin_error(error: Exception, plugins: Sequence[Entry]) -> RunError | None:
 
 
 def _nearest(module: str, plugins: Sequence[Entry]) -> Entry:
-    """The one that is defined in this module, or the first of its package."""
+    """Return the plug-in that is defined in a module, or the first of its package."""
     package = module.partition(".")[0]
     same = [entry for entry in plugins if entry.value.partition(":")[0].partition(".")[0] == package]
     return next((entry for entry in same if entry.value.partition(":")[0] == module), same[0])

@@ -1,4 +1,4 @@
-"""When a run is over."""
+"""Conditions that end a run."""
 
 from collections.abc import Iterable
 
@@ -10,23 +10,22 @@ TIME_LIMIT = "time limit"
 
 
 class EndCondition:
-    """Ends a robot's part in a run a while after its navigation task has ended, or at the time limit.
+    """Condition that ends a robot's part of a run: some time after its navigation task, or at the time limit.
 
-    It hears of every beat of the robot that has events. A task that was given anew in the meantime (a goal sent by an
-    event) takes the ending back. A run ends with the first sample of the truth from then on, so that all its samples
-    are evenly spaced: what is derived from them (accelerations, windows of time) means the same at its end as before.
+    A goal that an event sends in the meantime withdraws the end. A run ends at a truth sample, so that all samples are
+    evenly spaced.
     """
 
     def __init__(self, clock: Clock, time_limit: float, linger: float, idle: bool = False) -> None:
-        """`idle`: the robot has no task until it is given one, so that nobody waits for it."""
+        """`time_limit` and `linger` in seconds. An `idle` robot has no task at first and does not delay the end."""
         self._limit = clock.ticks(time_limit)
         self._linger = clock.ticks(linger)
         self._over: int | None = 0 if idle else None
         self.earliest_tick = self._earliest()
-        """The tick before which the robot's part is not over, as far as known."""
+        """Earliest tick at which the robot's part can end."""
 
     def update(self, decision: Decision) -> None:
-        """What the stack decided at a beat; tell each in which something happened."""
+        """Update with a decision. Must be called for each decision that has events."""
         for event in decision.events:
             if event.kind == EventKind.NAVIGATION_ENDED:
                 self._over = event.tick + self._linger
@@ -38,7 +37,7 @@ class EndCondition:
         return self._limit if self._over is None else min(self._over, self._limit)
 
     def reached(self, tick: int) -> Event | None:
-        """The event that ends the robot's part at this beat, which samples the truth, or None."""
+        """Return the event that ends the robot's part at this tick, or None. The tick must have a truth sample."""
         if self._over is not None and tick >= self._over:
             return Event(tick, EventKind.RUN_ENDED, "navigation ended")
         if tick >= self._limit:
@@ -47,7 +46,7 @@ class EndCondition:
 
 
 def run_end(tick: int, endings: Iterable[EndCondition]) -> Event | None:
-    """The event that ends a run at this beat, which samples the truth, or None: it ends when all its robots have."""
+    """Return the event that ends the run at this tick, or None while any robot continues."""
     last: Event | None = None
     for ending in endings:
         end = ending.reached(tick)

@@ -20,7 +20,7 @@ import simscen.cli.session.run_session
 from simscen.cli.main import main
 from simscen.run.process import supervisor
 simscen.cli.session.run_session.WARM_PROCESS = ({str(TELLING)!r},)
-supervisor.SILENCE = 5.0
+supervisor.MAX_SILENCE_S = 5.0
 main()
 """
 Mounted = Callable[[str, str], "subprocess.CompletedProcess[str]"]

@@ -1,7 +1,7 @@
-"""What earlier sessions worked out, as files under the user's cache folder, by a key that says all it depends on.
+"""Cache on disk that sessions share, in the user's cache folder.
 
-Nothing is ever wrong because of it: what cannot be read, is damaged, or was put there by others counts as not there,
-and what cannot be written costs the time to work it out again.
+A key contains everything that the entry depends on. Unreadable or damaged entries and folders of other users count as
+missing. Write errors are ignored.
 """
 
 import contextlib
@@ -14,17 +14,17 @@ from pathlib import Path
 
 CACHE_DIR_VARIABLE, CACHE_OFF = "SIMSCEN_CACHE_DIR", "off"
 CACHE_FORMAT = "worlds-1"
-"""The folder of what this simscen writes; of another format, another folder."""
+"""Name of the cache folder; changes with the format."""
 MAX_CACHE_BYTES = 256_000_000
-"""Of all files together; those that were not used for longest go first."""
+"""Size limit of the cache. The least recently used entries are deleted first."""
 MAX_ENTRY_BYTES = 32_000_000
 _DIGEST = hashlib.sha256().digest_size
 
 
 def cache_folder(environment: Mapping[str, str]) -> Path | None:
-    """$SIMSCEN_CACHE_DIR, where "off" is none; else simscen in $XDG_CACHE_HOME or ~/.cache (XDG Base Directory).
+    """Return $SIMSCEN_CACHE_DIR, or simscen in $XDG_CACHE_HOME or ~/.cache (XDG Base Directory).
 
-    None also where there is no home.
+    Returns None for $SIMSCEN_CACHE_DIR=off and if there is no home folder.
     """
     if (own := environment.get(CACHE_DIR_VARIABLE)) is not None:
         return Path(own) / CACHE_FORMAT if own != CACHE_OFF and Path(own).is_absolute() else None
@@ -35,7 +35,7 @@ def cache_folder(environment: Mapping[str, str]) -> Path | None:
 
 
 class DiskCache:
-    """A file for each key, which is a hexadecimal number; sessions that run at once may share the folder."""
+    """Cache with one file per key, a hexadecimal number. Concurrent sessions can share the folder."""
 
     def __init__(self, folder: Path | None, most_bytes: int = MAX_CACHE_BYTES) -> None:
         self._folder, self._most = folder, most_bytes
@@ -43,11 +43,11 @@ class DiskCache:
 
     @property
     def on(self) -> bool:
-        """Whether anything is kept at all."""
+        """Whether the cache is enabled."""
         return self._folder is not None
 
     def get(self, key: str) -> bytes | None:
-        """What was put there under this key; None where there is nothing, or nothing sound."""
+        """Return the entry of a key, or None if it is missing or damaged."""
         if self._folder is None or not is_private_folder(self._folder):
             return None
         try:
@@ -58,17 +58,17 @@ class DiskCache:
                     return None
                 data = file.read(MAX_ENTRY_BYTES)
                 os.utime(descriptor)
-        except OSError:  # not there, or not to be read: it is worked out anew
+        except OSError:  # missing or unreadable: the caller computes it again
             return None
         content = data[_DIGEST:]
         return content if hashlib.sha256(key.encode() + content).digest() == data[:_DIGEST] else None
 
     def put(self, key: str, content: bytes) -> None:
-        """Keep this, where there is room and a folder that is nobody else's."""
+        """Store an entry if it fits and the folder belongs to this user alone."""
         data = hashlib.sha256(key.encode() + content).digest() + content
         if self._folder is None or len(data) > min(MAX_ENTRY_BYTES, self._most):
             return
-        # A full disk, a home that is read-only: the next session works it out again.
+        # A full disk or a read-only home must not fail the session.
         with contextlib.suppress(OSError):
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if is_private_folder(self._folder):
@@ -89,7 +89,7 @@ class DiskCache:
 
 
 def is_private_folder(folder: Path) -> bool:
-    """Whether it is a folder of this user into which nobody else may write."""
+    """Return whether a folder belongs to this user and no other user can write to it."""
     try:
         found = folder.lstat()
     except OSError:
@@ -98,13 +98,13 @@ def is_private_folder(folder: Path) -> bool:
 
 
 def disk_usage(folder: Path) -> tuple[int, int]:
-    """How many files a folder holds, and their bytes."""
+    """Return the number of files in a folder and their total size in bytes."""
     sizes = [size for _, size, _ in _files(folder)]
     return len(sizes), sum(sizes)
 
 
 def _pruned(folder: Path, most: int) -> int:
-    """The bytes of a folder, after what was not used for longest has gone as far as `most` asks, also what was left."""
+    """Delete the least recently used files until at most `most` bytes remain; return the remaining size."""
     files = sorted(_files(folder))
     total = sum(size for _, size, _ in files)
     for _, size, name in files:
@@ -116,11 +116,11 @@ def _pruned(folder: Path, most: int) -> int:
 
 
 def _files(folder: Path) -> list[tuple[int, int, str]]:
-    """When each file was used, its size and its name."""
+    """Return time of last use (ns), size (bytes), and name of each file."""
     found = []
     with os.scandir(folder) as entries:
         for entry in entries:
-            with contextlib.suppress(FileNotFoundError):  # another session was faster
+            with contextlib.suppress(FileNotFoundError):  # deleted by another session
                 about = entry.stat(follow_symlinks=False)
                 if stat.S_ISREG(about.st_mode):
                     found.append((about.st_mtime_ns, about.st_size, entry.name))

@@ -1,8 +1,7 @@
-"""Shortest ways and maps of worlds, kept between sessions: they are what takes longest to prepare.
+"""Cache prepared scenarios in memory, and maps and shortest paths of worlds on disk.
 
-For a house, the ways to the goals take 50 to 250 ms and the map 4, to read both takes 1; of a map of 100 x 100 m or a
-warehouse of 5000 objects, 0.5 to 0.7 s and 0.4 s against 30 ms, most of which goes into the key. Solids are fused in
-1 to 2 ms (150 ms in the large ones), which is less than to look whether that is known; meshes are read anew.
+Maps and shortest paths take most of the time to prepare a scenario. Fusing solids and reading meshes is faster than
+looking them up, so these are not cached.
 """
 
 import hashlib
@@ -35,11 +34,11 @@ from simscen.worlds.slicing import map_of
 _LEGS = TypeAdapter(list[Leg])
 _MAP = struct.Struct("<II4d")
 _ROOMS = ("core", "worlds", "ways")
-"""Where the code is that the results depend on."""
+"""Packages whose code affects the cached results."""
 
 
 class CachedWorldBuilder:
-    """Works out what `build` and `legs_between` do, or knows it. Equal worlds give equal results, to the last bit."""
+    """Builds maps and shortest paths, or reads them from the disk cache. Results are identical to the last bit."""
 
     def __init__(self, files: DiskCache) -> None:
         self._files = files
@@ -73,7 +72,7 @@ class CachedWorldBuilder:
 
 
 def cache_key(*parts: object) -> str:
-    """The key of what is worked out from these: numbers, texts, arrays, and sequences of them."""
+    """Return the cache key of a result that depends on these numbers, strings, arrays, and sequences of them."""
     sha = hashlib.sha256(_circumstances())
     _take(sha, parts)
     return sha.hexdigest()
@@ -81,7 +80,7 @@ def cache_key(*parts: object) -> str:
 
 @cache
 def _circumstances() -> bytes:
-    """What else decides the last bit."""
+    """Return the versions, code, and arithmetic that affect the last bit of a result."""
     return repr((software_versions(), source_digest(*_ROOMS), arithmetic_fingerprints())).encode()
 
 
@@ -123,22 +122,21 @@ def _map_of_bytes(data: bytes | None) -> OccupancyGrid | None:
     return OccupancyGrid(cells, resolution, Pose2(x, y, yaw))
 
 
-# MERGED: Keeps what has been prepared, so that a world is built once for all the runs in it.
 MAX_SCENARIOS = 100
-"""Scenarios that are kept; their runs follow each other, and a file may have a thousand variations."""
+"""Number of scenarios in the cache; a file can have a thousand variations."""
 
 
 class ScenarioCache:
-    """Prepares scenarios; lives in the warm process, whose forks inherit what is here."""
+    """Prepares each scenario and builds each world once. Workers inherit its content from the fork server."""
 
     def __init__(self, kept: CachedWorldBuilder) -> None:
-        """`kept` is what earlier sessions left."""
+        """`kept` uses the disk cache of earlier sessions."""
         self._kept = kept
         self._worlds: dict[str, BuiltWorld] = {}
         self._scenarios: dict[tuple[str, str, str], PreparedScenario] = {}
 
     def prepared(self, loaded: LoadedScenario) -> PreparedScenario:
-        """The prepared scenario; the first one in a world builds it. Raises InvalidInput."""
+        """Return the prepared scenario. Raises InvalidInput."""
         name = loaded.id, loaded.variation, loaded.stack_name
         if name not in self._scenarios:
             if len(self._scenarios) == MAX_SCENARIOS:
@@ -147,7 +145,7 @@ class ScenarioCache:
         return self._scenarios[name]
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Remove all entries."""
         self._worlds.clear()
         self._scenarios.clear()
 

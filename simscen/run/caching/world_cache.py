@@ -1,4 +1,4 @@
-"""The worlds of one command, each built once however many scenarios are in it."""
+"""Cache of the worlds that one command uses."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Bounds = tuple[float, float, float, float]
 
 @dataclass
 class WorldCache:
-    """Remembers worlds by what their files say, and where a robot of some size gets in them."""
+    """Caches worlds by the content of their files, and the shortest paths of discs in them."""
 
     _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
     _plain: list[tuple[tuple[Solid, ...], float, tuple[float, float], PlainWays | None]] = field(default_factory=list)
@@ -31,7 +31,7 @@ class WorldCache:
     )
 
     def world(self, loaded: LoadedScenario) -> World:
-        """The world of a scenario; files that it was made of are noted as read. Raises InvalidInput."""
+        """Return the world of a scenario and record its files as read. Raises InvalidInput."""
         known = next((entry for entry in self._worlds if entry[0] == loaded.world), None)
         if known is None:
             with collect_read_files() as read:
@@ -43,7 +43,7 @@ class WorldCache:
         return known[1]
 
     def plain_ways(self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]) -> PlainWays | None:
-        """The ways of a disc between solids in plain numbers; None where the solids are not plain."""
+        """Return the paths of a disc between simple solids without numpy; None if a solid is not simple."""
         for known in self._plain:
             if known[0] is solids and known[1:3] == (radius, z_range):
                 return known[3]
@@ -54,7 +54,7 @@ class WorldCache:
     def ways(
         self, solids: tuple[Solid, ...], bounds: Bounds, radius: float, z_range: tuple[float, float]
     ) -> ShortestWays:
-        """The ways of a disc between solids."""
+        """Return the shortest paths of a disc between solids."""
         for known in self._ways:
             if known[0] is solids and known[1:4] == (bounds, radius, z_range):
                 return known[4]
@@ -62,12 +62,15 @@ class WorldCache:
         from simscen.worlds.shortest import ShortestWays
 
         ways = ShortestWays(fuse(solids), bounds, radius, z_range)
-        self._ways = [*self._ways[-3:], (solids, bounds, radius, z_range, ways)]  # large: only the last few
+        self._ways = [
+            *self._ways[-3:],
+            (solids, bounds, radius, z_range, ways),
+        ]  # large objects: keep only the last four
         return ways
 
 
 def bounds_with(bounds: Bounds, places: list[Pose2]) -> Bounds:
-    """Bounds that hold the places, too."""
+    """Return the bounds, enlarged to contain the places."""
     left, low, right, high = bounds
     xs, ys = [place.x for place in places], [place.y for place in places]
     return min([left, *xs]), min([low, *ys]), max([right, *xs]), max([high, *ys])

@@ -1,1 +1,1 @@
-"""A stack in a process of its own: what its name runs, how it is started, spoken with, and ended."""
+"""External stacks: navigation stacks in processes of their own that use the stack protocol."""

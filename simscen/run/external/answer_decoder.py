@@ -1,4 +1,4 @@
-"""What an external stack says in an answer, message by message; what does not fit its type is refused."""
+"""Decode and validate the answer of an external stack."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ if TYPE_CHECKING:
 
 MAX_PARTICLES = 1_000_000
 _PLANAR_INDICES = (0, 1, 5, 6, 7, 11, 30, 31, 35)
-"""Where the nine numbers of a covariance over x, y, yaw stand among the 36 of a message."""
+"""Indices of the covariance over x, y, yaw in the 36 numbers of a message."""
 _TYPES = {topic.name: topic.type for topic in STACK_TOPICS}
 
 MessagesByTopic = dict[str, list[bytes]]
-"""The messages of an answer by topic, in order."""
+"""Messages of an answer by topic, in order."""
 T = TypeVar("T")
 
 MAX_QUATERNION_COMPONENT = 1.01
-"""No number of a unit quaternion is larger, however it was rounded."""
+"""Largest component of a unit quaternion, with rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """An answer, understood. None: nothing was said. A path without poses says that no plan is followed."""
+    """A decoded answer; None for missing messages. A path without poses means that no plan is followed."""
 
     command: Twist | None = None
     plan: Path | None = None
@@ -58,7 +58,7 @@ class Answer:
 
 
 def group_by_topic(said: Messages, answers: dict[int, str]) -> MessagesByTopic:
-    """The messages of an answer. Raises NotAllowed for a topic that no stack may speak on."""
+    """Return the messages of an answer by topic. Raises ProtocolViolation for an unknown topic."""
     found: MessagesByTopic = {}
     for number, data in said:
         if number not in answers:
@@ -70,10 +70,10 @@ def group_by_topic(said: Messages, answers: dict[int, str]) -> MessagesByTopic:
 def decode_answer(
     said: MessagesByTopic, tick: int, time: SimTime, correction: Pose2 | None, dead_reckoned: Pose2 | None
 ) -> Answer:
-    """The answer at `tick`.
+    """Decode the answer at `tick`.
 
-    Where no transform was ever told (`correction`, the last one), a belief is one of the odometry's pose
-    `dead_reckoned`. Raises NotAllowed.
+    `correction` is the last transform from map to odom. If the stack never sent one, it is computed from the belief and
+    the odometry's pose `dead_reckoned`. Raises ProtocolViolation.
     """
     if len(said.get(topics.COMMAND.name, ())) > 1:
         raise ProtocolViolation("two commands in one answer")
@@ -107,7 +107,7 @@ def _belief(said: MessagesByTopic, correction: Pose2 | None, dead_reckoned: Pose
 
 
 def _correction(said: MessagesByTopic) -> Pose2 | None:
-    """Where the odometry's frame is in the map."""
+    """Return the pose of the odom frame in the map frame."""
     exact = _last(said, topics.TF.name + EXACT_SUFFIX, _pose2d)
     if exact is not None:
         return exact
@@ -129,7 +129,7 @@ def _path(said: MessagesByTopic, name: str, tick: int, time: SimTime) -> Path | 
 
 
 def _costmaps(said: MessagesByTopic) -> Iterator[CostGrid]:
-    """The newest of each."""
+    """Yield the newest global and local costmap."""
     for name, topic in (("global", topics.GLOBAL_COSTMAP.name), ("local", topics.LOCAL_COSTMAP.name)):
         if said.get(topic):
             yield _taken(topic, partial(_costmap, name), said[topic][-1])

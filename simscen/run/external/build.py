@@ -1,4 +1,4 @@
-"""From a prepared scenario to its external stack, ready to `start`."""
+"""Build the external stack of a prepared scenario."""
 
 import sys
 from dataclasses import replace
@@ -23,9 +23,9 @@ from simscen.stack.protocols import Surroundings
 def build_external_stack(
     prepared: PreparedScenario, spec: ExternalStackSpec, surroundings: Surroundings, seed: int, printed: Path | None
 ) -> ExternalStack:
-    """The stack that a scenario names; what it prints goes to the file `printed`, as `for_robot` calls it.
+    """Build the external stack of a scenario. Its output goes to `printed`, renamed by `robot_file`.
 
-    Raises InvalidInput when nobody says what the name runs.
+    Raises InvalidInput if the name of the stack is not defined.
     """
     command = prepared.loaded.runs
     if command is None:
@@ -46,13 +46,12 @@ def build_external_stack(
 
 
 def robot_file(file: Path, robot: str) -> Path:
-    """What the file of a stack is called for that one of several robots: `stack.a.log`."""
+    """Return the file name for one of several robots, e.g. `stack.a.log`."""
     return file.with_stem(f"{file.stem}.{robot}") if robot else file
 
 
-# MERGED: The same scenario with simscen's own stack as a process of its own.
 def with_external_reference(prepared: PreparedScenario) -> PreparedScenario:
-    """A prepared scenario whose stack, simscen's own, runs behind the stack protocol; of several robots, each one's."""
+    """Return the scenario with the reference stack of each robot as an external process, for tests and benchmarks."""
     if prepared.robots:
         parts = {name: with_external_reference(part) for name, part in prepared.robots.items()}
         loaded = replace(prepared.loaded, robots={name: part.loaded for name, part in parts.items()})

@@ -1,7 +1,7 @@
-"""What an external stack says of its goals, kept as the task of any stack: its events are what criteria read.
+"""Track the goals of an external stack from the events that it reports.
 
-The stack says what becomes of a goal; which goal that is, where it lies, which number it has, what preempted it and how
-the whole task ended is not its to say. So a log cannot contradict itself, whatever a stack claims.
+The stack reports only the outcome of a goal. The tracker knows which goal is current, and derives preemption and the
+end of the task, so that the events of a log are always consistent.
 """
 
 from typing import Any
@@ -19,11 +19,11 @@ _FREE = {kind.value for kind in EventKind if kind.value.split(".")[0] in ("plan"
     EventKind.ROBOT_HELD.value,
     EventKind.ROBOT_RELEASED.value,
 }
-"""Kinds that a stack may tell of as it likes."""
+"""Kinds of events that a stack may report at any time."""
 
 
 class GoalTracker:
-    """The goals of a run, and how they stand by what the stack says."""
+    """The goals of a run and their state as reported by the stack."""
 
     def __init__(self, stop_on_failure: bool, tick_rate: int, mode: Mode = "navigate_to_pose") -> None:
         self._events: list[Event] = []
@@ -32,21 +32,21 @@ class GoalTracker:
         self._dropped: set[str] = set()
 
     def start(self, goals: tuple[Goal, ...]) -> None:
-        """A new task."""
+        """Start a new task."""
         self._task.start(goals)
 
     @property
     def goal(self) -> Goal | None:
-        """The goal that is being driven to."""
+        """The current goal."""
         return self._task.goal
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Another goal takes the place of the current one, as the stack will be told."""
+        """Replace the current goal by another one."""
         self._drop()
         self._events += self._task.preempt(tick, goal)
 
     def hear(self, tick: int, said: dict[str, Any]) -> None:
-        """An event as the stack tells it. Raises NotAllowed."""
+        """Process an event that the stack reports. Raises ProtocolViolation."""
         kind, name, data = said.get("kind"), said.get("name", ""), said.get("data", {})
         if not isinstance(kind, str) or not isinstance(name, str) or not isinstance(data, dict):
             raise ProtocolViolation(f"an event that is none: {str(said)[:100]}")
@@ -75,11 +75,11 @@ class GoalTracker:
                 raise ProtocolViolation(f"an event `{kind[:60]}`, which is not a stack's to tell")
 
     def rest(self, tick: int) -> None:
-        """Time has come to this tick: a wait may be over, and with it the task."""
+        """Advance to a tick, which can end a wait at a goal and the task."""
         self._events += self._task.rest(tick)
 
     def overdue(self, tick: int) -> bool:
-        """Whether the time of the current goal is over, and the stack does not say so itself: then it fails now."""
+        """Fail the current goal if its timeout is over; return whether it was."""
         goal = self._task.goal
         if goal is None or goal.timeout is None or tick - self._task.since <= goal.timeout * self._rate:
             return False
@@ -88,12 +88,12 @@ class GoalTracker:
         return True
 
     def take(self) -> tuple[Event, ...]:
-        """The events since this was last asked."""
+        """Return the events since the last call."""
         events, self._events = tuple(self._events), []
         return events
 
     def _drop(self) -> None:
-        """That the current goal was canceled will be told, too late to mean anything."""
+        """Ignore the `goal.canceled` that the stack will report for the current goal."""
         if self._task.goal is not None:
             self._dropped.add(self._task.goal.name)
 
@@ -125,7 +125,7 @@ class GoalTracker:
 
 
 def _code(told: Any) -> ErrorCode | int:
-    """One of Nav2's codes by number or name; a number that has no name here stays a number."""
+    """Return Nav2's error code for a number or name; unknown numbers are kept."""
     if told is None:
         return ErrorCode.NAVIGATE_UNKNOWN
     if isinstance(told, str) and told in ErrorCode.__members__:
@@ -136,7 +136,7 @@ def _code(told: Any) -> ErrorCode | int:
 
 
 def _plain(data: dict[str, Any]) -> dict[str, Value]:
-    """Data that JSON brought and a log takes: what reports print is text, numbers and lists of them."""
+    """Return the data of an event, limited in size."""
     if len(str(data)) > MAX_TEXT_LENGTH:
         raise ProtocolViolation("an event with too much data")
     return data

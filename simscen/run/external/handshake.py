@@ -1,4 +1,4 @@
-"""What an external stack is told before the first step: the objects of HELLO and GOAL."""
+"""Handshake with an external stack: contents of HELLO and GOAL, and its WELCOME."""
 
 import json
 from dataclasses import dataclass, field, replace
@@ -18,7 +18,7 @@ from simscen.stack.protocols import RobotModel, Surroundings
 
 @dataclass(frozen=True)
 class RunParameters:
-    """What of a run a stack is told besides its surroundings; `robot_name` is "" where there is one robot."""
+    """Parameters of a run that a stack receives besides its surroundings; `robot_name` is "" for a single robot."""
 
     seed: int
     control_period: int
@@ -38,7 +38,7 @@ def hello_content(
     named: list[tuple[str, Topic]],
     answer_limit: float,
 ) -> dict[str, Any]:
-    """The object of HELLO; `named` are the topics of each sensor."""
+    """Return the content of HELLO; `named` are the topics of each sensor."""
     masks = surroundings.masks
     sensor_of = {topic.name: sensor for sensor, topic in named}
     return {
@@ -72,7 +72,7 @@ def hello_content(
 
 
 def goal_content(estimate: Estimate, goals: tuple[Goal, ...], ordered: RunParameters) -> dict[str, Any]:
-    """The object of GOAL."""
+    """Return the content of GOAL."""
     pose = estimate.pose
     return {
         "initial_estimate": {"pose": None if pose is None else list(pose), "std": list(estimate.std)},
@@ -83,7 +83,7 @@ def goal_content(estimate: Estimate, goals: tuple[Goal, ...], ordered: RunParame
 
 
 def goal_data(goal: Goal) -> dict[str, Any]:
-    """A goal as GOAL and PREEMPT say it."""
+    """Return a goal as in GOAL and PREEMPT."""
     x, y, yaw = map(float, goal.pose)
     tolerances = {"xy_tolerance": goal.xy_tolerance, "yaw_tolerance": goal.yaw_tolerance}
     drive = {"timeout": goal.timeout, "via": goal.via, "wait": goal.wait}
@@ -123,7 +123,7 @@ def _topic(topic: Topic, number: int, sensor_of: dict[str, str]) -> dict[str, An
 
 
 def _grid(grid: OccupancyGrid | None) -> dict[str, Any] | None:
-    """What a nav_msgs/msg/OccupancyGrid rounds or turns into a quaternion."""
+    """Return the facts of a grid that nav_msgs/msg/OccupancyGrid rounds."""
     if grid is None:
         return None
     height, width = grid.shape
@@ -134,14 +134,13 @@ def _polygon(corners: Any) -> list[list[float]]:
     return [[float(x), float(y)] for x, y in corners]
 
 
-# MERGED: How an external stack introduces itself.
 MAX_NAME_LENGTH = 200
 MAX_ABOUT_LENGTH = 65_536
 
 
 @dataclass(frozen=True)
 class Welcome:
-    """Its name and version, the topics it wants, when it wants to be asked, and what else it says of itself."""
+    """Introduction of an external stack: name, version, topics, step mode, and further information."""
 
     name: str = ""
     version: str = ""
@@ -151,7 +150,7 @@ class Welcome:
 
     @classmethod
     def of(cls, kind: int, body: bytes, offer: TopicTable, mode: Mode = "navigate_to_pose") -> "Welcome":
-        """From its first frame. Raises Malformed, or NotAllowed, as of a stack that does not know the `mode`."""
+        """Parse the first frame of a stack. Raises Malformed or ProtocolViolation, e.g. for an unsupported `mode`."""
         if kind != wire.WELCOME:
             raise ProtocolViolation("its first frame is no WELCOME")
         told = wire.from_json(body)
@@ -178,7 +177,7 @@ class Welcome:
         return cls(_text(told, "name"), _text(told, "version"), tuple(topics), step == "beat", _about(told))
 
     def with_farewell(self, body: bytes) -> "Welcome":
-        """The same, with what it said at the end; what cannot be read changes nothing, as the run is over."""
+        """Add the information of its BYE. An invalid BYE is ignored, since the run is over."""
         try:
             return replace(self, about=self.about | _about(wire.from_json(body)))
         except (ProtocolViolation, wire.Malformed):
@@ -186,7 +185,7 @@ class Welcome:
 
     @property
     def facts(self) -> dict[str, str]:
-        """For the log."""
+        """Facts for the log."""
         about = {"about": json.dumps(self.about, sort_keys=True)} if self.about else {}
         return {"name": self.name, "version": self.version, "protocol": str(wire.PROTOCOL), **about}
 

@@ -1,7 +1,7 @@
-"""The program that keeps an external stack: `python -I -m simscen.run.external.launcher CONTROL REPORT SOCKET`.
+"""Launcher of an external stack: `python -I -m simscen.run.external.launcher CONTROL REPORT SOCKET`.
 
-It starts the stack, tells how it ended, and when the run is over, or when the run's process is no more, whatever became
-of it, it ends the stack with all that the stack has started. Not for people.
+Internal program. It starts the stack and reports how it exits. When the run is over or its process has ended, it kills
+the stack and all of its descendants.
 """
 
 import ctypes
@@ -22,19 +22,19 @@ from typing import Any
 from simscen.run.process.isolation import adopt_orphans, kill_children_except
 
 TERM_GRACE_S = 0.5
-"""Seconds between SIGTERM and SIGKILL."""
+"""Time between SIGTERM and SIGKILL."""
 MAX_OPEN_FILES = 1024
 _PR_SET_PDEATHSIG = 1
 
 
 def main() -> None:
-    """Keep one stack from its start to its end."""
+    """Run one stack from start to end."""
     control, report, stream = map(int, sys.argv[1:])
     (size,) = struct.unpack("<I", _exactly(control, 4))
     told: dict[str, Any] = json.loads(_exactly(control, size))
     adopt_orphans()
     _own_limits()
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # the run's process ignores it, which a program would inherit
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # the worker ignores SIGINT, which the stack would inherit
     try:
         process = subprocess.Popen(
             told["argv"],
@@ -55,7 +55,7 @@ def main() -> None:
 
 
 def _why(error: Exception) -> str:
-    """Why the program could not be started, in more words than the kernel has."""
+    """Explain why the program could not be started."""
     if not isinstance(error, OSError) or error.strerror is None:
         return str(error)
     if error.errno == errno.ENOEXEC:
@@ -66,7 +66,7 @@ def _why(error: Exception) -> str:
 
 
 def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> None:
-    """Wait for the end of the run; tell of the end of the stack should that come first."""
+    """Wait for the end of the run; report the exit of the stack if it comes first."""
     pidfd = os.pidfd_open(process.pid)
     waiting = [control, pidfd]
     while True:
@@ -79,7 +79,7 @@ def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> Non
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
-    """End the stack and its group by asking, then all that it has started by force."""
+    """Terminate the process group of the stack, then kill all of its descendants."""
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGTERM)
     end = time.monotonic() + TERM_GRACE_S
@@ -89,7 +89,7 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 
 
 def _own_limits() -> None:
-    """The limits of the run's process are for engines; a stack has those of whoever called simscen."""
+    """Restore the resource limits of the user, because those of the worker are meant for the engines."""
     for what in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
         hard = resource.getrlimit(what)[1]
         resource.setrlimit(what, (hard, hard))
@@ -111,7 +111,7 @@ def _exactly(pipe: int, size: int) -> bytes:
     data = b""
     while len(data) < size:
         if not (piece := os.read(pipe, size - len(data))):
-            sys.exit()  # whoever started this is no more
+            sys.exit()  # the worker has ended
         data += piece
     return data
 

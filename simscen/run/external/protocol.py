@@ -1,7 +1,7 @@
-"""The topics of the stack protocol: those of a log, and beside some of them one that keeps every bit.
+"""Topics and error kinds of the stack protocol.
 
-A log's messages round: headings become quaternions, ranges become float32. A topic `NAME/exact` has no stamp of its
-own: in one frame, its n-th message belongs to the n-th on `NAME`.
+ROS messages lose precision: headings become quaternions, ranges become float32. A topic `NAME/exact` carries the values
+of `NAME` in full precision. It has no stamp: in one frame, its n-th message belongs to the n-th message on `NAME`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -28,42 +28,41 @@ STACK_TOPICS = (
     Topic(topics.TF.name + EXACT_SUFFIX, POSE2D),
     *(topics.GLOBAL_COSTMAP, topics.LOCAL_COSTMAP),
 )
-"""What a stack may say."""
+"""Topics on which a stack may publish."""
 
 
 @dataclass(frozen=True)
 class TopicTable:
-    """The topics of one run, numbered: what a stack may hear (`says`) and what it may say (`hears`)."""
+    """Numbered topics of one run: `says` are sent to the stack, `hears` are accepted from it."""
 
     says: Mapping[str, Topic]
     hears: Mapping[str, Topic]
 
     @classmethod
     def of(cls, says: Iterable[Topic]) -> "TopicTable":
-        """Of these and of HEARD."""
+        """Return the table for these topics to the stack, and STACK_TOPICS from it."""
         return cls({topic.name: topic for topic in says}, {topic.name: topic for topic in STACK_TOPICS})
 
     @property
     def numbers(self) -> dict[str, int]:
-        """The number of each topic to be heard."""
+        """The number of each topic that is sent to the stack."""
         return {name: number for number, name in enumerate(self.says, start=1)}
 
     @property
     def answers(self) -> dict[int, str]:
-        """The topic of each number in an answer."""
+        """The topic of each number in an answer of the stack."""
         return dict(enumerate(self.hears, start=1))
 
 
-# MERGED: How a run with an external stack can fail; kinds of RunError, and of errors in JUnit.
 TIMEOUT = "stack-timeout"
-"""No answer within its limit of wall time."""
+"""No answer within the limit of wall time."""
 CRASHED = "stack-crashed"
-"""The process has ended, could not be started, or has hung up."""
+"""The process exited, could not be started, or closed the connection."""
 PROTOCOL = "stack-protocol"
-"""What it said is not what the protocol allows."""
+"""A message violates the protocol."""
 FAILED = "stack-failed"
-"""It said itself that it cannot go on."""
+"""The stack reported an error itself."""
 
 
 class ProtocolViolation(ValueError):
-    """What a stack said is not what the protocol allows; the message says what, without who and when."""
+    """A message of a stack violates the protocol."""

@@ -1,4 +1,4 @@
-"""What an external stack hears: the messages of a log, packed by what packs the log, as far as it wants them."""
+"""Collect the messages for an external stack, in the encoding of the log."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ _START = (0, 0)
 
 
 class StepPublisher:
-    """Collects what is to be said with the next step."""
+    """Collects the messages to send with the next step."""
 
     def __init__(self, tick_rate: int, sensors: Mapping[str, str], mounts: Mapping[str, Pose3]) -> None:
-        """`sensors` are the kinds of readings by sensor, in the order of the robot; `mounts` where they sit on it."""
+        """`sensors` are the reading types by sensor name, `mounts` their poses on the base."""
         self._waiting: Messages = []
         self._numbers: dict[str, int] = {}
         self._heard: frozenset[str] = frozenset()
@@ -43,12 +43,12 @@ class StepPublisher:
         self.named = self._sensors.declared
 
     def latch(self, grid: OccupancyGrid | None, topic: Topic) -> None:
-        """A map or a mask, where there is one: comes with the first step."""
+        """Publish a map or mask with the first step, if there is one."""
         if grid is not None:
             self._latched.append((topic, pack_many.occupancy_grid(frames.MAP, _START, grid)))
 
     def latch_robot(self, description: str, estimate: Estimate) -> None:
-        """What is known of the robot from the start."""
+        """Publish robot description and initial pose with the first step."""
         self._latched.append((topics.ROBOT_DESCRIPTION, pack_rare.string(description)))
         if estimate.pose is not None:
             told = pack.pose_with_covariance(frames.MAP).packer()
@@ -56,7 +56,7 @@ class StepPublisher:
             self._latched.append((INITIAL_POSE, told(_START, Pose3.planar(estimate.pose), covariance)))
 
     def offer(self) -> TopicTable:
-        """All that can be heard."""
+        """Return the table of all topics."""
         says: list[Topic] = []
         for _, topic in self.named:
             says += [topic, *_exact(topic)]
@@ -64,7 +64,7 @@ class StepPublisher:
         return TopicTable.of([*says, topics.TF, *known])
 
     def want(self, offer: TopicTable, names: Collection[str]) -> None:
-        """From now on these are collected, the latched ones first."""
+        """Select the topics to collect, and publish the latched ones."""
         self._numbers, self._heard = offer.numbers, frozenset(names)
         self._listened = {
             sensor
@@ -76,7 +76,7 @@ class StepPublisher:
             self.publish(topic, 0, data)
 
     def take(self, tick: int, readings: Readings) -> None:
-        """The readings of a beat."""
+        """Publish the readings of a beat."""
         now = self._time.nanoseconds(tick)
         for reading in readings:
             if reading.sensor not in self._listened:
@@ -87,25 +87,25 @@ class StepPublisher:
 
     @property
     def waiting(self) -> bool:
-        """Whether there is anything to be heard."""
+        """Whether there are messages to send."""
         return bool(self._waiting)
 
     def drain(self) -> Messages:
-        """What has been collected since this was last asked."""
+        """Return the messages since the last call."""
         messages, self._waiting = self._waiting, []
         return messages
 
     def line(self, topic: Topic) -> Line:
-        """As record's Publisher."""
+        """Implement record's Publisher."""
         return Line(lambda: partial(self.publish, topic))
 
     def together(self, messages: Layouts) -> Together:
-        """As record's Publisher."""
+        """Implement record's Publisher."""
         return Together(self, messages)
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """As record's Publisher, with a stack instead of a log."""
-        if topic is topics.TF_STATIC and not self._numbers:  # before anybody was asked: where the sensors sit
+        """Publish a message if the stack wants its topic (record's Publisher)."""
+        if topic is topics.TF_STATIC and not self._numbers:  # sensor mounts, published before topics are selected
             self._latched.append((topic, data))
         self._put(topic.name, data)
 
@@ -133,6 +133,6 @@ def _exact(topic: Topic) -> list[Topic]:
 
 
 def _scan(scan: Scan) -> Array:
-    """First angle, angle between beams, shortest and longest range, the lidar's x, y, yaw, then the ranges."""
+    """Return first angle, angle increment, minimum and maximum range, the lidar's x, y, yaw, and the ranges."""
     head = (scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max, *scan.mount)
     return np.concatenate((np.array(head, dtype=np.float64), scan.ranges))

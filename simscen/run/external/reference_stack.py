@@ -1,8 +1,7 @@
-"""simscen's own stack as a process of its own: `python -m simscen.run.external.reference_stack STACK`.
+"""The reference stack as an external process: `python -m simscen.run.external.reference_stack STACK`.
 
-STACK is a `stack:` section as JSON (default: an empty one). It exists to prove the protocol: a run with this stack
-gives the same log as one with the stack in the engine, to the last bit. `simscen bench` measures with it what a beat
-costs.
+STACK is a `stack:` section as JSON (default: empty). Tests use it to verify the protocol: the log of a run is identical
+to the log with the stack inside the worker. `simscen bench` uses it to measure the cost of a beat.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ _NO_PIXELS = Image("", 0, np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.flo
 
 
 class ReferenceStackPeer(Peer):
-    """Hands what it hears to a ReferenceStack, and says what that decides."""
+    """Peer that passes readings to the reference stack and sends its decisions."""
 
     def __init__(self, spec: StackSpec) -> None:
         self._spec = spec
@@ -54,7 +53,7 @@ class ReferenceStackPeer(Peer):
         self._sensors = {topic["topic"]: topic.get("sensor", "") for topic in self.hello["says"]}
 
     def serve(self) -> None:
-        """Answer until the run is over."""
+        """Answer steps until the run is over."""
         for step in self:
             stack = self._stack or self._started(step)
             for kind, told in self._orders:
@@ -104,7 +103,7 @@ class ReferenceStackPeer(Peer):
         return self._stack
 
     def _readings(self, heard: list[Message]) -> Iterator[Reading]:
-        """The readings as the engine had them."""
+        """Yield the readings in full precision."""
         exact = {m.topic: iter([e.content for e in heard if e.topic == m.topic + EXACT_SUFFIX]) for m in heard}
         for message in heard:
             sensor = self._sensors[message.topic]
@@ -158,7 +157,7 @@ class ReferenceStackPeer(Peer):
             if event.kind is EventKind.GOAL_ACCEPTED:
                 self._under_way = event.data["index"]
             if event.data.get("index", self._under_way) != self._under_way:
-                continue  # what ends with the goal that it follows in the same drive, nobody needs to be told
+                continue  # simscen derives the end of the other goals of the same drive
             if event.kind is not EventKind.NAVIGATION_ENDED:
                 said = {"kind": event.kind.value, "name": event.name, "data": dict(event.data)}
                 step.publish(EVENTS, messages.string(json.dumps(said)))
@@ -185,7 +184,7 @@ def _numbers(table: Array) -> bytes:
 
 
 def main() -> None:
-    """Serve the stack that the command line says."""
+    """Serve the stack given on the command line."""
     written = json.loads(sys.argv[1]) if len(sys.argv) > 1 else {}
     ReferenceStackPeer(StackSpec.model_validate(written, by_alias=True, by_name=False)).serve()
 

@@ -1,4 +1,4 @@
-"""A stack in a process of its own that keeps the promises of any stack: readings in, one command out, each beat."""
+"""External stack: implements the Stack protocol by exchanging frames with another process."""
 
 from collections.abc import Callable
 from pathlib import Path as FilePath
@@ -26,18 +26,18 @@ from simscen.run.external.stack_process import StackProcess
 from simscen.stack.protocols import Surroundings
 
 END_GRACE_S = 2.0
-"""Seconds of wall time that a stack may take to end by itself after the last step."""
+"""Wall time that a stack may take to exit after the last step."""
 T = TypeVar("T")
 _GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 
 
 class ExternalStack:
-    """Speaks with the process of a stack; `begin` and `start` start it, `end`, `finish` and `close` end it.
+    """A stack in another process: `begin` and `start` start it, `end`, `finish`, `release`, and `close` end it.
 
-    With several robots each has a stack of its own: all begin before the first is waited for, all are told the end
-    before any is waited for, and all are released before the first is closed.
+    With several robots, call each method for all stacks before the next one, so that the processes start and end
+    concurrently.
 
-    Raises RunError of a kind in simscen.run.external.protocol from whatever needs the process.
+    Raises RunError of a kind in simscen.run.external.protocol from all methods that use the process.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class ExternalStack:
         self._wheels = next((name for name, says in ordered.sensors.items() if says == Odometry.__name__), "")
 
     def begin(self, estimate: Estimate) -> None:
-        """Start the process and say hello."""
+        """Start the process and send HELLO."""
         surroundings, feed = self._surroundings, self._feed
         feed.latch(surroundings.map, topics.MAP)
         feed.latch(surroundings.masks.keepout, KEEPOUT_MASK)
@@ -77,7 +77,7 @@ class ExternalStack:
         self._process.send(wire.json_frame(wire.HELLO, told))
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Begin, unless that is done, hear its answer, and tell it its goals."""
+        """Call `begin` if necessary, receive WELCOME, and send the goals."""
         if self._process is None:
             self.begin(estimate)
         assert self._process is not None
@@ -95,7 +95,7 @@ class ExternalStack:
         self._goals.start(goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Drive to this goal first; it takes the place of the current one."""
+        """Replace the current goal by this one."""
         self._goals.preempt(tick, goal)
         self._interrupt(wire.PREEMPT, {"tick": tick, "goal": goal_data(goal)})
 
@@ -106,26 +106,26 @@ class ExternalStack:
 
     @property
     def plan(self) -> Path | None:
-        """The plan that it says it follows."""
+        """The plan that the stack reports to follow."""
         return self._plan
 
     @property
     def goal(self) -> Goal | None:
-        """The goal it has accepted and not yet ended, as it says."""
+        """The current goal as reported by the stack."""
         return None if self._canceling else self._goals.goal
 
     @property
     def facts(self) -> dict[str, str]:
-        """What ran, for the log."""
+        """Facts about the stack for the log."""
         return {"external": self._name, **self._welcome.facts}
 
     @property
     def described(self) -> dict[str, Any]:
-        """The same, for people and programs that read files."""
+        """Facts about the stack for stack.json."""
         return {**self.facts, "about": self._welcome.about}
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """Take the readings of this beat and say what to drive."""
+        """Send the readings of this beat and return the decision."""
         self._feed.take(tick, readings)
         self._odometry = next(
             (r for r in readings if isinstance(r, Odometry) and r.sensor == self._wheels), self._odometry
@@ -138,29 +138,29 @@ class ExternalStack:
         return self._decided(tick, answer, due)
 
     def end(self, reason: str) -> None:
-        """Tell the stack that the run is over."""
+        """Send END to the stack."""
         if self._process is not None:
             self._process.dismiss(wire.json_frame(wire.END, {"reason": reason}))
 
     def finish(self) -> None:
-        """Let it end by itself, which it was told to."""
+        """Wait until the stack exits after END."""
         if self._process is not None:
             farewell = self._process.farewell(END_GRACE_S)
             self._welcome = self._welcome.with_farewell(farewell)
 
     def release(self) -> None:
-        """Have the process ended, and all that it has started, without waiting for it."""
+        """Request the end of the process without waiting for it."""
         if self._process is not None:
             self._process.release()
 
     def close(self) -> None:
-        """End the process and all that it has started."""
+        """End the process and its descendants."""
         if self._process is not None:
             self._process.close()
             self._process = None
 
     def _asked(self, tick: int, due: bool) -> Answer:
-        """The answer to the step of `tick`."""
+        """Send a step and return the answer."""
         assert self._process is not None
         limit = self._command.answer_limit
         sec, nanosec = self._time.stamp(tick)
@@ -204,7 +204,7 @@ class ExternalStack:
         return Decision(command, answer.belief, followed, answer.local_plan, events, answer.lines, answer.costmaps)
 
     def _interrupt(self, kind: int, content: dict[str, Any]) -> None:
-        """Tell the stack something that it answers at this very beat."""
+        """Send an order that the stack answers at this beat."""
         self._told, self._plan = True, None
         self._send(kind, content)
 

@@ -1,4 +1,4 @@
-"""The process of an external stack: started with a socket, heard within a limit, ended with all it has started."""
+"""Process of an external stack and the socket to it."""
 
 import json
 import os
@@ -24,7 +24,7 @@ from simscen.run.process.isolation import clean_environment
 READ_BYTES = 1 << 20
 TAIL_BYTES = 16_384
 EXIT_TIMEOUT_S = 2.0
-"""Seconds in which the process of a socket that was hung up is expected to have ended."""
+"""Time in which a process is expected to exit after it closed its socket."""
 CLEANUP_TIMEOUT_S = 5.0
 MAX_MESSAGE_LENGTH = 2000
 PEER_PATH_VARIABLE = "SIMSCEN_PEER_PATH"
@@ -34,14 +34,13 @@ ROBOT_VARIABLE = "SIMSCEN_ROBOT"
 
 
 class StackProcess:
-    """A running stack. What it prints goes to the file `printed`, and its end into every error.
+    """A running stack. Its output goes to the file `printed`; errors contain the end of it.
 
-    Nothing here waits without an end, and whatever one side sends, the other's bytes are taken in meanwhile: big
-    answers, big frames and floods of output cannot block each other.
+    All waits have a time limit. Frames, answers, and output are transferred concurrently, so that none blocks another.
     """
 
     def __init__(self, name: str, command: ExternalCommand, printed: Path | None, robot: str = "") -> None:
-        """Start what a stack's name runs, for that `robot` of several."""
+        """Start the command of a stack, for `robot` if there are several."""
         self._name = f"{name} of robot `{robot}`" if robot else name
         self._outbox, self._inbox, self._reports = bytearray(), bytearray(), bytearray()
         self._ended = ""
@@ -93,7 +92,7 @@ class StackProcess:
         os.write(self._control, struct.pack("<I", len(order)) + order)
 
     def exchange(self, frame: bytes, limit: float, what: str) -> tuple[int, bytes]:
-        """Send a frame and give the kind and body of the next one that comes; `what` says what is waited for.
+        """Send a frame and return kind and body of the next one; `what` names the expected answer in errors.
 
         Raises RunError of a kind in simscen.run.external.protocol.
         """
@@ -107,17 +106,17 @@ class StackProcess:
         return kind, body
 
     def send(self, frame: bytes) -> None:
-        """Send a frame as soon as there is room, with the next exchange at the latest."""
+        """Queue a frame and send as much as possible."""
         self._outbox += frame
         self._post()
 
     def dismiss(self, frame: bytes) -> None:
-        """Send the last frame."""
+        """Send the last frame and start the grace period."""
         self.send(frame)
         self._dismissed = time.monotonic()
 
     def farewell(self, grace: float) -> bytes:
-        """Wait until the stack hangs up, at most `grace` after it was dismissed; the body of a BYE, else "{}"."""
+        """Wait up to `grace` seconds after `dismiss` until the stack hangs up; return the body of BYE or "{}"."""
         self._pump(lambda: self._hung_up, max(0.0, self._dismissed + grace - time.monotonic()))
         with suppress(RunError):
             if self._has_frame():
@@ -126,19 +125,19 @@ class StackProcess:
         return b"{}"
 
     def error(self, kind: str, message: str) -> RunError:
-        """An error of this stack, with the end of what it printed."""
+        """Return an error of this stack, with the end of its output."""
         self._pump(lambda: False, 0.0)
         printed = self._log.last(TAIL_BYTES).decode(errors="replace")
         return RunError(kind, f"stack {self._name}: {message}", output_tail(printed))
 
     def release(self) -> None:
-        """Have the process ended, if it still runs, and all that it has started; `close` waits for that."""
+        """Request the end of the process and its descendants; `close` waits for it."""
         if self._control >= 0:
             os.close(self._control)
             self._control = -1
 
     def close(self) -> None:
-        """End the process, if it still runs, and all that it has started."""
+        """End the process and its descendants."""
         self.release()
         self._pump(lambda: self._shown not in self._takers and self._report not in self._takers, CLEANUP_TIMEOUT_S)
         self._keeper.kill()
@@ -155,7 +154,7 @@ class StackProcess:
         return self.error(protocol.CRASHED, self._ended or unsaid)
 
     def _pump(self, done: Callable[[], bool], limit: float) -> None:
-        """Take in and send whatever there is until it is `done` or `limit` seconds are over."""
+        """Transfer data until `done` or until `limit` seconds have passed."""
         end = time.monotonic() + limit
         while not done():
             left = end - time.monotonic()
@@ -173,13 +172,13 @@ class StackProcess:
             del self._takers[descriptor]
 
     def _post(self) -> None:
-        """Send what there is room for."""
+        """Send as much as the socket accepts."""
         try:
             while self._outbox and not self._hung_up:
                 del self._outbox[: self._stream.send(self._outbox[:READ_BYTES])]
         except BlockingIOError:
             pass
-        except OSError:  # it has hung up; what it said before that is still to be heard
+        except OSError:  # it closed the socket; its last frames can still be read
             self._outbox.clear()
         if self._stream.fileno() in self._takers:
             self._poll.modify(self._stream, select.POLLIN | (select.POLLOUT if self._outbox else 0))
@@ -224,7 +223,7 @@ class StackProcess:
 
 
 def _ended(report: dict[str, Any]) -> str:
-    """What a keeper reports, in words."""
+    """Describe a report of the launcher."""
     if "failed" in report:
         return f"its process cannot be started: {report['failed']}"
     code = report["exit"]

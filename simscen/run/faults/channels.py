@@ -1,4 +1,4 @@
-"""cmd_vel between stack and base, for runs in which commands come late or get lost."""
+"""Channels that faults can disturb: the velocity commands to the base and the beliefs of the localizer."""
 
 from collections.abc import Callable
 
@@ -9,11 +9,11 @@ from simscen.stack.protocols import Localizer
 
 
 class CommandLink:
-    """The last command that the base has heard of.
+    """The cmd_vel connection between stack and base, in which commands can be late or lost.
 
-    The stack sends one message each `period` ticks, and one at once when it wants something else in between. A base
-    that hears nothing for `timeout` ticks stops, as ros2_control's drives do (`cmd_vel_timeout`); a timeout shorter
-    than the time between two messages would never let it drive.
+    The stack sends one message each `period` ticks, and another one whenever the command changes. The base stops if no
+    message arrives for `timeout` ticks, like the drives of ros2_control (`cmd_vel_timeout`). The timeout is at least
+    one period, because the base could never drive otherwise.
     """
 
     def __init__(self, period: int, timeout: int) -> None:
@@ -22,44 +22,43 @@ class CommandLink:
         self._heard, self._since = STOP, 0
 
     def sends(self, tick: int, command: Twist) -> bool:
-        """Whether the stack sends a message at this beat."""
+        """Return whether the stack sends a message at this beat."""
         sends = tick % self._period == 0 or command != self._sent
         self._sent = command
         return sends
 
     def hear(self, tick: int, command: Twist) -> None:
-        """A message has arrived."""
+        """Receive a message."""
         self._heard, self._since = command, tick
 
     def driven(self, tick: int) -> Twist:
-        """What the base drives by what it has heard."""
+        """Return the command that the base executes."""
         return self._heard if tick - self._since <= self._timeout else STOP
 
 
-# MERGED: What stands between the localizer and the navigator, so that a fault can tell the navigator something else.
 class LocalizerWithFaults:
-    """A localizer whose belief reaches the others as `told` makes it; it goes on believing what it believes."""
+    """A localizer whose published belief is changed by faults; its internal state is not affected."""
 
     def __init__(self, inner: Localizer, told: Callable[[Belief], Belief]) -> None:
         self._inner, self._told = inner, told
 
     def reset(self, estimate: Estimate) -> None:
-        """Start over at an estimate."""
+        """Reset to an initial estimate."""
         self._inner.reset(estimate)
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Take a step of dead reckoning."""
+        """Update with odometry."""
         self._inner.on_odometry(odometry)
 
     def on_scan(self, scan: Scan) -> None:
-        """Correct with a lidar scan."""
+        """Update with a lidar scan."""
         self._inner.on_scan(scan)
 
     def on_imu(self, imu: Imu) -> None:
-        """Take a turn rate."""
+        """Update with an IMU reading."""
         self._inner.on_imu(imu)
 
     @property
     def belief(self) -> Belief:
-        """What the navigator hears."""
+        """The belief after the faults."""
         return self._told(self._inner.belief)

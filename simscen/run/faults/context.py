@@ -1,4 +1,4 @@
-"""What each fault of a scenario is told of the instance that it affects."""
+"""Information about the affected sensor or actuator that a fault receives when it begins."""
 
 from collections.abc import Callable, Collection
 from functools import cache
@@ -17,11 +17,11 @@ from simscen.model.robot import Camera, Mount, RobotSpec
 from simscen.sensors.sensor import SensorView
 
 RayCasterFactory = Callable[[TriangleMesh, frozenset[str]], RayCaster]
-"""Makes rays against a mesh that never moves, and against all that does but what is called so."""
+"""Creates a ray caster for a static mesh and all moving objects except the named ones."""
 
 
 class FaultContexts:
-    """Makes the setting of each fault of one robot."""
+    """Creates the FaultSetting of each fault of one robot."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class FaultContexts:
         self._rays = cache(lambda names: rays(_without(mesh, names), names))
 
     def __call__(self, entry: FaultEntry) -> FaultSetting:
-        """What the fault of an entry may know."""
+        """Return the setting for the fault of an entry."""
         sensor = self._robot.sensors.get(entry.sensor)
         return FaultSetting(
             separation=getattr(self._robot.drive, "wheel_separation", 0.0),
@@ -51,19 +51,18 @@ class FaultContexts:
 
 
 def _without(mesh: TriangleMesh, names: frozenset[str]) -> TriangleMesh:
-    """The mesh without what is called so."""
+    """Return the mesh without the named objects."""
     gone = [number for number, name in enumerate(mesh.names) if name in names]
     kept = ~np.isin(mesh.owners, gone)
     return TriangleMesh(mesh.vertices, mesh.faces[kept], mesh.owners[kept], mesh.names)
 
 
-# MERGED: What a lidar or a camera would see now if it sat elsewhere, or if something were not there: for faults.
 RayCasterWithout = Callable[[frozenset[str]], RayCaster]
-"""Gives rays that go through what is called so."""
+"""Creates a ray caster that ignores the named objects."""
 
 
 class HypotheticalSensor:
-    """Implements faults.base.Sight for one sensor of a robot."""
+    """Readings that a lidar or camera would produce from another pose or without some objects (faults.base.Sight)."""
 
     def __init__(
         self, spec: object, view: SensorView, rays: RayCasterWithout, now: Callable[[], int], name: str
@@ -95,6 +94,6 @@ class HypotheticalSensor:
 
 
 def _floor(height: float, slopes: Array) -> Array:
-    """Where beams from a height end at the floor (z = 0); inf for those that do not point down."""
+    """Return the distance along each beam from `height` to the floor (z = 0); inf for beams that do not point down."""
     down = slopes < -1e-9
     return np.where(down, height / np.where(down, -slopes, 1.0), np.inf)

@@ -1,7 +1,7 @@
-"""The faults of a robot, between its sensors and the stack, in the stack, and between the stack and the wheels.
+"""Inject the faults of a robot into its readings, its localizer, and its commands.
 
-What several faults do to one instance adds up in the order of the scenario: each gets what the one before it made. What
-a fault kept back (a delay) arrives where that fault stands: those after it see it when it arrives.
+Several faults of one instance form a chain in the order of the scenario: each receives the output of the one before. A
+reading that a fault delays continues along the rest of the chain when it arrives.
 """
 
 import math
@@ -26,12 +26,12 @@ from simscen.run.live_world.random_streams import stream_names
 from simscen.stack.localizers.ground_truth import TRUTH
 
 ROUNDING = 1e-9
-"""What a fault that changes nothing may still change in a number, by adding increments up."""
+"""Largest difference of a number that is attributed to rounding and not to the fault."""
 
 
 @dataclass
 class _Active:
-    """A fault at work; `touched` counts the messages and commands that it changed or kept back."""
+    """An active fault; `touched` counts the messages and commands that it changed or withheld."""
 
     index: int
     sensor: str
@@ -41,14 +41,14 @@ class _Active:
     over: bool = False
 
     def hears(self, reading: Reading) -> bool:
-        """Whether it affects such a reading: that of its sensor; of wheels, all that count how they turn."""
+        """Return whether the fault affects this reading. A fault of the wheels affects all wheel odometry."""
         if self.kind == WHEELS:
             return isinstance(reading, Odometry) and reading.sensor != TRUTH
         return reading.sensor == self.sensor
 
 
 class FaultInjector:
-    """Disturbs readings, commands, beliefs and the map with the faults that are under way, in the scenario's order."""
+    """Applies the active faults to readings, commands, and beliefs, in the order of the scenario."""
 
     def __init__(
         self,
@@ -59,15 +59,15 @@ class FaultInjector:
         note: Callable[[Event], None],
         mapped: Collection[int] = (),
     ) -> None:
-        """`note` takes a fault.took_effect when a fault changes its first message or command.
+        """`note` receives a `fault.took_effect` event when a fault changes its first message or command.
 
-        `mapped` are the numbers of those faults that have changed the map before the run.
+        `mapped` are the indices of the faults that changed the map before the run.
         """
         self._mapped = set(mapped)
         self._faults, self._streams, self._setting, self._link, self._note = faults, streams, setting, link, note
         self._names = stream_names(faults)
         self.possible = bool(faults)
-        """Whether it has any fault that may begin."""
+        """Whether the robot has any fault."""
         self._begun: Counter[int] = Counter()
         # By number of the fault and count of its activations: what one activation leaves behind, the next builds on.
         self.active: dict[tuple[int, int], _Active] = {}
@@ -75,9 +75,9 @@ class FaultInjector:
         self._believed: tuple[int, Belief, Belief] | None = None
 
     def begin(self, index: int) -> str:
-        """Start the scenario's fault number `index`; each time its chance is a stream of its own.
+        """Start the fault with this index. Each activation draws from a random stream of its own.
 
-        Returns the kind of what it affects.
+        Returns the kind of the affected sensor or actuator.
         """
         entry = self._faults[index]
         self._begun[index] += 1
@@ -91,7 +91,7 @@ class FaultInjector:
         return setting.kind
 
     def end(self, index: int) -> int:
-        """End it; what it leaves behind stays at work. Returns how many messages and commands it has touched."""
+        """End a fault and return how many messages and commands it changed. Delayed messages still arrive later."""
         key = index, self._begun[index]
         active = self.active.pop(key)
         if rest := active.disturbance.end():
@@ -99,7 +99,7 @@ class FaultInjector:
         return active.touched
 
     def disturb(self, readings: Readings) -> Readings:
-        """The readings as the stack gets them."""
+        """Return the readings as the stack receives them."""
         if not self.active:
             return readings
         for active in self._at_work():
@@ -112,7 +112,7 @@ class FaultInjector:
         return readings
 
     def command(self, tick: int, command: Twist) -> Twist:
-        """The command as the wheels get it: what cmd_vel lets through, then what else befalls the wheels."""
+        """Return the command as the wheels receive it: after faults of cmd_vel, then faults of the wheels."""
         sends = self._link.sends(tick, command)
         if not self._linked and not self.active:
             if sends:
@@ -129,7 +129,7 @@ class FaultInjector:
         return command
 
     def belief(self, tick: int, belief: Belief) -> Belief:
-        """What the navigator is told instead of a belief of the localizer."""
+        """Return the belief that the navigator receives."""
         if not self.active or not any(active.kind == BELIEF for active in self.active.values()):
             return belief
         if self._believed is None or self._believed[:2] != (tick, belief):
@@ -163,7 +163,7 @@ class FaultInjector:
         return disturbed
 
     def _transmit(self, tick: int, command: Twist | None) -> None:
-        """Hand what is sent, and what was kept back, from fault to fault, and the rest to the base."""
+        """Pass the new command and delayed ones through the chain of faults; what remains reaches the base."""
         for active in self._at_work():
             if active.kind == COMMAND:
                 late = active.disturbance.arriving_command()
@@ -211,7 +211,7 @@ class FaultInjector:
 
 
 def _kept(reading: Reading) -> Reading:
-    """The reading, its arrays kept from being written to: what a fault changes in place would not count as changed."""
+    """Make the arrays of a reading read-only, so that a fault cannot change them in place unnoticed."""
     for array in (getattr(reading, field.name) for field in fields(reading)):
         if isinstance(array, np.ndarray):
             array.flags.writeable = False
@@ -223,7 +223,7 @@ def _signed(reading: object) -> tuple[type, object]:
 
 
 def _equal(one: Reading, other: Reading) -> bool:
-    """Whether two readings of one sensor say the same but for rounding; beams without an answer (nan) do."""
+    """Return whether two readings are equal except for rounding; nan equals nan."""
     if one is other:
         return True
     said = [(getattr(one, field.name), getattr(other, field.name)) for field in fields(one) if field.name != "sensor"]

@@ -1,4 +1,4 @@
-"""Faults of the map, which the stack gets once: they change it before anything starts."""
+"""Apply faults of the map, before the run starts."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from simscen.run.preparation.scenario import PreparedScenario
 
 
 def apply_map_faults(prepared: PreparedScenario, seed: int) -> PreparedScenario:
-    """The same with the map that each stack gets in a run with this seed, and which faults have changed it."""
+    """Return the scenario with the disturbed map of each robot for this seed, and the indices of the faults applied."""
     if not prepared.robots:
         return _of_one(prepared, Streams(seed))
     parts = {name: _of_one(part, Streams(seed, name)) for name, part in prepared.robots.items()}

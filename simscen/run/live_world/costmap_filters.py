@@ -1,4 +1,4 @@
-"""The costmap filters of a stack while a scenario runs: which of their zones are on."""
+"""State of the costmap filters of a stack: which zones are enabled."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,19 +10,19 @@ from simscen.model.stackbase import StackBase
 
 @dataclass
 class _Filter:
-    """Zones by region, in the order in which they came, each with its speed limit (0 for none) and whether it is on."""
+    """Zones of one filter by region: speed limit in m/s (0 for none) and whether the zone is enabled."""
 
     zones: dict[str, tuple[float, bool]]
     masked: bool
     on: bool = True
 
     def holds(self, region: str) -> bool:
-        """Whether the zone is in force."""
+        """Return whether the zone is enabled."""
         return self.on and self.zones.get(region, (0.0, False))[1]
 
 
 class CostmapFilters:
-    """Keeps what is on; `zones` is what a stack has to be told."""
+    """Tracks which zones are enabled; `zones` is the state to send to the stack."""
 
     def __init__(self, stack: StackBase, regions: Mapping[str, Polygon], masks: FilterMasks) -> None:
         self._regions, self._masks = regions, masks
@@ -34,7 +34,7 @@ class CostmapFilters:
         }
 
     def refused(self, order: ZoneSwitch) -> str:
-        """Why an order changes nothing; "" where it does."""
+        """Return why an order has no effect, or ""."""
         chosen, state = self._filters[order.filter], "on" if order.enabled else "off"
         if order.region is None:
             if not chosen.zones and not chosen.masked:
@@ -49,7 +49,7 @@ class CostmapFilters:
         return f"`{order.region}` was {state} already" if on == order.enabled and same else ""
 
     def switch(self, order: ZoneSwitch) -> tuple[str, ...]:
-        """Carry out an order that is not refused; the regions for which it changed something, "" for the mask."""
+        """Carry out an order; return the regions that changed, "" for the mask."""
         chosen = self._filters[order.filter]
         if order.region is None:
             chosen.on = order.enabled
@@ -59,12 +59,12 @@ class CostmapFilters:
         return (order.region,)
 
     def limit(self, region: str) -> float:
-        """The speed limit of a zone in m/s; 0 for none."""
+        """Return the speed limit of a zone in m/s; 0 for none."""
         return self._filters["speed"].zones.get(region, (0.0, False))[0]
 
     @property
     def zones(self) -> Zones:
-        """What is in force now."""
+        """The zones and masks that are enabled."""
         keepout, speed = self._filters["keepout"], self._filters["speed"]
         return Zones(
             tuple(self._regions[name] for name in keepout.zones if keepout.holds(name)),

@@ -1,4 +1,4 @@
-"""The director watches the triggers of a scenario and lets its events and faults happen."""
+"""Start the events and faults of a scenario when their triggers fire."""
 
 from typing import cast
 
@@ -17,7 +17,7 @@ _AT_ONCE = Trigger(time=Time(0.0))
 
 
 class Director:
-    """Directs one run: first events and what follows them, then faults, each in the order of the scenario."""
+    """Evaluates all triggers at each beat: first of events, then of faults, each in the order of the scenario."""
 
     def __init__(
         self, steps: list[Step], faults: list[FaultEntry], streams: Streams, stage: LiveStage, rig: FaultInjector
@@ -36,11 +36,11 @@ class Director:
 
     @property
     def needed(self) -> bool:
-        """Whether there is anything to direct."""
+        """Whether there is any event or fault."""
         return bool(self._steps or self._starts)
 
     def direct(self) -> None:
-        """Let happen what is due at this beat; the stage keeps the record."""
+        """Perform the events and start and end the faults that are due at this beat."""
         for number, (step, firing) in enumerate(self._steps):
             view = self._views.get(number)
             for _ in range(0 if view is None or firing.spent else firing.fires(view)):
@@ -60,7 +60,7 @@ class Director:
         self._stage.tell(Event(0, EventKind.EVENT_ENDED, step.name, {"entry": number, "effects": told}))
 
     def _go_on(self, number: int) -> None:
-        """From now on the step of the story that comes after this one is waited for."""
+        """Start to evaluate the trigger of the step that follows this one."""
         if number + 1 < len(self._steps) and self._steps[number + 1][0].after == number:
             self._views[number + 1] = cast(Situation, RelativeSituation(self._stage))
 

@@ -1,4 +1,4 @@
-"""The people of a run: what they see of it, how their bodies move in it, and what they did."""
+"""Simulate the pedestrians of a run."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -22,15 +22,15 @@ from simscen.worlds.section import section
 from simscen.worlds.shortest import ShortestWays, ways_in
 
 MAX_STEP_S = 0.05
-"""Seconds in which somebody walks straight on."""
+"""Longest step of the pedestrian model."""
 OBSTACLE_HEIGHTS_M = (0.15, 0.5, 0.95)
-"""m above the ground at which what stands is in somebody's way; what reaches the last hides what is behind it."""
+"""Heights at which walls block pedestrians; walls at the last height also block their view."""
 BODY_HEIGHT_RANGE_M = (0.05, 1.7)
-"""m above the ground between which a thing is in somebody's way."""
+"""Range of heights above the ground in which an object blocks a pedestrian."""
 PATH_CELL_M = 0.1
-"""m; the cells in which ways of people are searched."""
+"""Cell size of the grid for path planning."""
 PREFERRED_CLEARANCE_M = 0.2
-"""m of air that people like to have beside them where they plan a way."""
+"""Clearance that planned paths keep where there is enough space."""
 EVENT_KINDS = {
     "reached": EventKind.PEDESTRIAN_REACHED,
     "reacted": EventKind.PEDESTRIAN_REACTED,
@@ -39,7 +39,7 @@ EVENT_KINDS = {
 
 
 class PedestrianSimulation:
-    """Everybody who walks in a run; costs nothing until somebody comes. `tell` is told what they do."""
+    """Steps all pedestrians of a run and passes their events to `tell`. Set up when the first one appears."""
 
     def __init__(self, built: BuiltWorld, simulation: Simulation, clock: Clock) -> None:
         self._built, self._simulation = built, simulation
@@ -63,7 +63,7 @@ class PedestrianSimulation:
         return People(self._walls, self._way)
 
     def come(self, walker: WalkingPedestrian) -> Body:
-        """Let somebody come; the body they have."""
+        """Add a pedestrian and return its body."""
         people = self._people
         people.add(walker)
         self._behaviors[walker.name] = walker.behavior
@@ -75,16 +75,16 @@ class PedestrianSimulation:
         return body
 
     def walks(self, name: str) -> bool:
-        """Whether somebody walks by themselves."""
+        """Return whether a pedestrian with this name is simulated."""
         return name in self._behaviors
 
     def go(self, name: str) -> None:
-        """Somebody walks no more by themselves; who does not anyway is nobody."""
+        """Stop simulating a pedestrian. Has no effect on other names."""
         if self._behaviors.pop(name, None) is not None:
             self._people.remove(name)
 
     def room(self, place: Point, radius: float, walls_only: bool) -> bool:
-        """Whether a person of a radius could stand somewhere."""
+        """Return whether a pedestrian with this radius in m fits at a place."""
         if walls_only or self._walls.gap(place) < radius:
             return self._walls.gap(place) >= radius
         around = self._surroundings()
@@ -114,7 +114,7 @@ class PedestrianSimulation:
             data = {"goal": int(deed.about)}
         return Event(self._simulation.tick, EVENT_KINDS[deed.what], deed.name, data)
 
-    # what they see
+    # Perception of the pedestrians
 
     def _surroundings(self) -> Surroundings:
         robots = tuple(self._seen(robot) for robot in self._simulation.robots.values())
@@ -123,7 +123,7 @@ class PedestrianSimulation:
         return Surroundings(robots, tuple(SeenThing(name, self._placed(body, pose)) for name, body, pose in known))
 
     def _placed(self, body: Body, pose: Pose3) -> tuple[Array, ...]:
-        """The outlines of a thing where it is."""
+        """Return the outlines of an object in the world frame."""
         known = self._outlines.get(body.name)
         if known is None or known[0] is not body.solids:
             known = body.solids, tuple(np.array(outline) for outline in parts(body.solids, BODY_HEIGHT_RANGE_M))
@@ -139,7 +139,7 @@ class PedestrianSimulation:
         return SeenRobot(robot.name, robot.base_pose().plane, (vx, vy), radius, outline)
 
     def _way(self, start: Point, goal: Point, radius: float) -> list[Point]:
-        """Around walls with room to spare, or without, or straight on where there is no way."""
+        """Return a path around walls, with extra clearance if possible; a straight line if there is no path."""
         for room in (radius + PREFERRED_CLEARANCE_M, radius):
             if room not in self._ways:
                 self._ways[room] = ways_in(self._built, (), room, BODY_HEIGHT_RANGE_M, PATH_CELL_M)

@@ -1,4 +1,4 @@
-"""What the random streams of events and faults are called: never by their place in a list."""
+"""Names of the random streams of events and faults, independent of their order in the scenario."""
 
 import json
 from collections import Counter
@@ -13,11 +13,11 @@ from simscen.spec.choice import Choice
 
 
 def stream_names(entries: Sequence[EventEntry | StepEntry | FaultEntry]) -> list[str]:
-    """A name for the chance of each entry that neither other entries nor the order of the list can change.
+    """Return a random stream name for each entry that does not depend on other entries or on their order.
 
-    An entry with a name draws from the stream of its name, whatever else is edited in it. One without draws from the
-    stream of what it says: editing it gives it other draws, and only it. Of entries that say the same the k-th draws
-    from the k-th stream, so that it does not matter which is which.
+    An entry with a name uses the stream of its name, even if the entry is edited. An entry without a name uses the
+    stream of its content, so that editing it changes only its own draws. The k-th of several equal entries uses the
+    k-th stream of this content.
     """
     said = [f"/{entry.name}" if entry.name is not None else f"={_written(entry)}" for entry in entries]
     before: Counter[str] = Counter()
@@ -36,10 +36,10 @@ def _written(entry: BaseModel) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """What is written in a specification, without defaults.
+    """Return the content of a specification as plain data, without defaults.
 
-    A choice of an installed package is an instance of a wider class than its field says, of which pydantic would write
-    what the field knows alone.
+    pydantic would serialize only the fields of the declared class, and a choice from an installed package is an
+    instance of another class.
     """
     if isinstance(value, RootModel):
         return _plain(value.root)
@@ -56,7 +56,7 @@ def _plain(value: Any) -> Any:
 
 
 def _build(value: object) -> None:
-    """Have the serializers of all models in it built: pydantic 2.11 does not, of models that came from a pickle."""
+    """Build the serializers of all nested models, because pydantic 2.11 does not do so for unpickled models."""
     if isinstance(value, BaseModel):
         type(value).model_rebuild()
         for _, inner in value:

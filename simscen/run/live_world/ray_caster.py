@@ -1,4 +1,4 @@
-"""What a robot's rays meet, wherever everything is when they are cast."""
+"""Ray casting against the static world and all moving objects."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -13,14 +13,14 @@ from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 
 REFRESH_DISTANCE_M = 4.0
-"""m that rays may begin elsewhere before what scripts move is looked through again."""
+"""Distance that the origin of the rays may move before the reachable objects are determined again."""
 
 
 class LiveRayCaster(RayCaster):
-    """Rays of a robot against the static world and against everything else that moves, where it is now."""
+    """Casts rays of a robot against the static world and all objects that move, at their current poses."""
 
     def __init__(self, scene: RayScene, robot: Robot, without: frozenset[str] = frozenset()) -> None:
-        """Of what moves, the rays go through what is called as in `without`."""
+        """The rays ignore the moving objects named in `without`."""
         self._scene, self._robot, self._without = scene, robot, without
         self._bodies: Mapping[str, Body] | None = None
         self._meshes: dict[str, TriangleMesh] = {}
@@ -39,31 +39,31 @@ class LiveRayCaster(RayCaster):
         return self._scene.sweep(fan, pose, reach)
 
     def _look(self, place: Vector, reach: float) -> None:
-        """See where everything is now that rays from a place may meet within their reach."""
+        """Update the poses of the moving objects that rays from a place can reach."""
         robot, looked = self._robot, self._looked
-        if robot.bodies is not self._bodies:  # it is the same one for as long as nothing comes or goes
+        if robot.bodies is not self._bodies:  # the same object until a body is added or removed
             self._meshes, self._bodies = self._surfaces(robot.bodies), robot.bodies
             self._extent = max([_extent(mesh) for mesh in self._meshes.values()], default=0.0)
             self._near = looked = None
         where, homes = robot.objects(), robot.homes
         names = self._names(where.foreseen, place, reach) if type(where) is PosesAtTick else self._meshes
-        # The same ones for as long as nothing has moved.
+        # Identical objects mean that nothing has moved.
         if looked is None or names is not looked[0] or where is not looked[1] or homes is not looked[2]:
             self._looked = names, where, homes
             self._scene.set_moving({name: (self._meshes[name], where[name]) for name in names}, homes)
 
     def _names(self, foreseen: PredictedPoses, place: Vector, reach: float) -> Iterable[str]:
-        """All but those that scripts keep out of reach."""
+        """Return the objects that can be in reach according to their scripted paths."""
         near = self._near
         if near is None or not near.holds(foreseen, place, reach):
-            # A little more, for rays end a little beyond their reach.
+            # 1 % more, because rays end slightly beyond their reach.
             far = foreseen.far(place, 1.01 * (reach + REFRESH_DISTANCE_M + self._extent))
             names = [name for name in self._meshes if name not in far]
             near = self._near = ReachableObjects(foreseen, place, reach + REFRESH_DISTANCE_M, names)
         return near.names
 
     def _surfaces(self, bodies: Mapping[str, Body]) -> dict[str, TriangleMesh]:
-        """By name, the surface of each, which is the same one for all that are alike: a row of chairs is built once."""
+        """Return the surface of each body by name; bodies of equal shape share one mesh."""
         before = self._bodies or {}
         known = [(_parts(before[name]), mesh) for name, mesh in self._meshes.items()]
         meshes = dict[str, TriangleMesh]()
@@ -77,7 +77,7 @@ class LiveRayCaster(RayCaster):
 
 
 class ReachableObjects(NamedTuple):
-    """What rays from a place may meet within their reach for as long as scripts are `foreseen`."""
+    """Moving objects that rays from a place can reach, as long as the scripted paths stay as `foreseen`."""
 
     foreseen: PredictedPoses
     place: Vector
@@ -85,15 +85,15 @@ class ReachableObjects(NamedTuple):
     names: list[str]
 
     def holds(self, foreseen: PredictedPoses, place: Vector, reach: float) -> bool:
-        """Whether rays from another place meet no others."""
+        """Return whether the list is valid for rays from another place."""
         return foreseen is self.foreseen and math.dist(place, self.place) + reach <= self.reach
 
 
 def _parts(body: Body) -> list[tuple[Shape, Pose3]]:
-    """What it is made of, whatever that is called."""
+    """Return shapes and poses of the parts of a body, without their names."""
     return [(solid.shape, solid.pose) for solid in body.solids]
 
 
 def _extent(mesh: TriangleMesh) -> float:
-    """How far in metres it reaches from the origin of its frame."""
+    """Return the largest distance of a vertex from the origin in m."""
     return math.sqrt(float((mesh.vertices**2).sum(axis=1).max(initial=0.0)))

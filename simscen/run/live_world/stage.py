@@ -1,4 +1,4 @@
-"""The running world as triggers see it and as actions change it."""
+"""The running world as triggers observe it and actions change it."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -30,9 +30,9 @@ from simscen.worlds.shortest import Z_RANGE
 
 
 class LiveStage:
-    """Implements core.stage.Stage for one robot, on the simulation and its stack, and keeps the events of its run.
+    """The world from the point of view of one robot: implements core.stage.Stage and keeps the robot's events.
 
-    What happens to the world happens to all robots, and is in the events of each.
+    An event of the world is added to the events of all robots.
     """
 
     def __init__(
@@ -48,9 +48,9 @@ class LiveStage:
         streams: Streams,
         fellows: "dict[str, LiveStage]",
     ) -> None:
-        """`filters` are those of its stack's costmap, `goals` those that events may send.
+        """`filters` are the costmap filters of the robot's stack, `goals` the goals that events can send.
 
-        To `fellows`, the stages of all robots, this one is added.
+        The stage adds itself to `fellows`, the stages of all robots by name.
         """
         self._world, self._simulation, self._robot, self._stack = world, simulation, robot, stack
         self._filters, self.clock = filters, clock
@@ -66,19 +66,19 @@ class LiveStage:
         self._travelled = 0.0
         self._due = True
         self.pending_orders: list[Callable[[int], None]] = []
-        """What the stack is to be told at its next beat."""
+        """Orders to deliver to the stack at its next beat."""
         self._history: tuple[Event, ...] = ()
         self.new_events: list[Event] = []
-        """What has been noted since `take_events` was last asked."""
+        """Events since the last call of `take_events`."""
         self.is_observed = True
-        """Whether anybody looks at it; else it need not be told of beats and of what the stack does."""
+        """Whether a director uses the stage. Otherwise it is not updated at each beat."""
 
-    # what the lockstep tells it
+    # Updates by the lockstep loop
 
     def begin_beat(self, truth: Truth | None, due: bool = True) -> None:
-        """Time has passed: see where the robot is now, by the truth where it was sampled.
+        """Update the robot's pose, from the truth sample if there is one.
 
-        Where the beat is not `due` for this robot but for another, its stack hears orders at the next that is.
+        If the beat is due for another robot only, the stack receives orders at its own next beat.
         """
         self._due = due
         before = self._pose
@@ -86,7 +86,7 @@ class LiveStage:
         self._travelled += math.hypot(self._pose.x - before.x, self._pose.y - before.y)
 
     def deliver_orders(self, tick: int) -> None:
-        """Give the stack the orders that have waited for this beat of its own."""
+        """Deliver the pending orders to the stack."""
         orders, self.pending_orders = self.pending_orders, []
         for order in orders:
             order(tick)
@@ -103,7 +103,7 @@ class LiveStage:
             self._pose, self._twist = self._robot.base_pose(), self._robot.base_twist()
 
     def update_from_stack(self, decision: Decision, readings: Readings = ()) -> None:
-        """What the stack was told, and what it decided and published."""
+        """Update from the readings that the stack received and from its decision."""
         for reading in readings:
             if isinstance(reading, Scan):
                 self._scanned[reading.sensor] = self.tick
@@ -111,34 +111,34 @@ class LiveStage:
         self._history += decision.events
 
     def take_events(self) -> tuple[Event, ...]:
-        """What has been noted since this was last asked, in the order of its ticks."""
+        """Return the events since the last call, ordered by tick."""
         fresh = tuple(sorted(self.new_events, key=lambda event: event.tick))
         self.new_events.clear()
         return fresh
 
-    # what triggers see
+    # Observed by triggers
 
     @property
     def clearance(self) -> float | None:
-        """Metres from the robot's hull to the nearest obstacle by the newest sample of the truth."""
+        """Distance from the robot's hull to the nearest obstacle in m, in the newest truth sample."""
         return self._clearance
 
     def scanned(self, sensor: str | None) -> int | None:
-        """The tick at which the stack last received a scan of this lidar, or of any."""
+        """Return the tick at which the stack last received a scan of this lidar, or of any lidar for None."""
         return max(self._scanned.values(), default=None) if sensor is None else self._scanned.get(sensor)
 
     @property
     def tick(self) -> int:
-        """Simulated time in whole ticks."""
+        """The simulated time in ticks."""
         return self._simulation.tick
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """The names of all robots; none where there is one only."""
+        """The names of all robots; empty if there is only one."""
         return tuple(self._fellows) if len(self._fellows) > 1 else ()
 
     def of(self, robot: str) -> "LiveStage":
-        """The stage of another robot."""
+        """Return the stage of another robot."""
         return self._fellows[robot]
 
     @property
@@ -153,103 +153,103 @@ class LiveStage:
 
     @property
     def travelled(self) -> float:
-        """Metres driven so far; being set down elsewhere is no drive."""
+        """Distance driven in m; being placed elsewhere does not count."""
         return self._travelled
 
     @property
     def belief(self) -> Belief | None:
-        """What the stack last said about its pose."""
+        """The last belief that the stack published."""
         return self._belief
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """Everything that has happened so far."""
+        """All events so far."""
         return self._history
 
     @property
     def plan(self) -> Path | None:
-        """The plan the robot is following."""
+        """The plan that the robot follows."""
         return self._stack.plan
 
     @property
     def goal(self) -> Goal | None:
-        """The goal the robot is driving to."""
+        """The goal that the robot drives to."""
         return self._stack.goal
 
     def region(self, name: str) -> Polygon:
-        """A named region of the world."""
+        """Return a named region of the world."""
         return self._world.regions[name]
 
     def object(self, name: str) -> Pose2 | None:
-        """Where a named object is now."""
+        """Return the pose of a named object, or None if it does not exist."""
         pose = self._simulation.object_pose(name)
         return pose.plane if pose else None
 
-    # what actions change
+    # Changed by actions
 
     def spawn(self, body: Body) -> None:
-        """Put a body into the world; one of the same name is replaced."""
+        """Add a body to the world, replacing one of the same name."""
         if self._simulation.object_pose(body.name):
             self.remove(body.name)
         self._simulation.spawn(body)
         self.tell(Event(0, EventKind.OBJECT_SPAWNED, body.name, body_data(body)))
 
     def remove(self, name: str) -> None:
-        """Take a body out of the world."""
+        """Remove a body from the world."""
         self._walking.go(name)
         self._simulation.remove(name)
         self.tell(Event(0, EventKind.OBJECT_REMOVED, name))
 
     def walk(self, walker: WalkingPedestrian) -> None:
-        """Let somebody come; one of the same name is replaced."""
+        """Add a pedestrian, replacing a body of the same name."""
         if self._simulation.object_pose(walker.name):
             self.remove(walker.name)
         about = {**body_data(self._walking.come(walker)), "person": True, "behavior": walker.behavior}
         self.tell(Event(0, EventKind.OBJECT_SPAWNED, walker.name, about))
 
     def room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Whether a person of a radius in metres can stand there."""
+        """Return whether a pedestrian with this radius in m fits at a place."""
         return self._walking.room(place, radius, walls_only)
 
     def chance(self, name: str) -> np.random.Generator:
-        """The random stream of this name, anew each time it is asked for."""
+        """Return a new generator for the random stream of this name."""
         return self._streams.generator(name)
 
     def door(self, name: str) -> tuple[Pose2, Pose2]:
-        """The poses of a door's panel when closed and when open."""
+        """Return the poses of a door panel when closed and when open."""
         return self._world.doors[name]
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Let a body follow a path that begins now."""
+        """Move a body along a path that starts now."""
         self._walking.go(name)
         self._simulation.move(name, path)
         self.tell(Event(0, EventKind.OBJECT_MOVED, name, path_data(path)))
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """The path that moves an object now, and the seconds since it was set off."""
+        """Return the path that an object follows and the seconds since its start, or None."""
         here = self.object(name)
         if here is not None and self._walking.walks(name):
-            return MotionPath((0.0, 1.0), (here, here), "loop"), 0.0  # no path says where somebody walks next
+            return MotionPath((0.0, 1.0), (here, here), "loop"), 0.0  # the future path of a pedestrian is unknown
         return self._simulation.motion(name)
 
     def mass(self, name: str) -> float:
-        """In kg, of an object that can be pushed."""
+        """Return the mass of a movable object in kg."""
         return self._simulation.mass(name)
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Set an object down somewhere else."""
+        """Place an object at a pose."""
         self._walking.go(name)
         self._simulation.place(name, pose)
         self.tell(Event(0, EventKind.OBJECT_PLACED, name, {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def place_robot(self, pose: Pose2) -> None:
-        """Set the robot down somewhere else."""
+        """Place the robot at a pose."""
         self._robot.place(pose)
         self._look()
         self.note(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
-        """Push the robot, or an object."""
+        """Push the robot or, if `name` is given, an object."""
         if name is not None:
             self._simulation.push_object(name, impulse, seconds)
         elif seconds:
@@ -261,7 +261,7 @@ class LiveStage:
         (self.note if name is None else self.tell)(Event(0, kind, name or "", about))
 
     def lay(self, name: str, patch: Patch) -> None:
-        """Make a piece of floor slippery, or dry again."""
+        """Change the friction of a patch of floor."""
         self._simulation.lay(name, patch)
         outline: list[Value] = [[round(x, 3), round(y, 3)] for x, y in patch.outline]
         about: dict[str, Value] = {"outline": outline, "friction": patch.friction}
@@ -269,21 +269,21 @@ class LiveStage:
         self.tell(Event(0, EventKind.FLOOR_CHANGED, name, about))
 
     def send_goal(self, name: str) -> None:
-        """Preempt with a new goal."""
+        """Preempt the current goal with another one."""
         goal = self._goals[name]
         self._order(lambda tick: self._stack.preempt(tick, goal))
 
     def cancel_goal(self) -> None:
-        """Cancel what the robot is doing."""
+        """Cancel the current goal and all later ones."""
         self._order(self._stack.cancel)
 
     def tell(self, event: Event) -> None:
-        """Write an event to the logs of all robots: it happened to the world."""
+        """Add an event of the world to the events of all robots."""
         for stage in self._fellows.values():
             stage.note(event)
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Tell the stack that a zone is on or off."""
+        """Switch a zone of a costmap filter; return why it is impossible, or ""."""
         if not isinstance(self._stack, InstalledStack) or not self._stack.can_switch_zones:
             return "the stack cannot be told of zones that are switched"
         if refused := self._filters.refused(order):
@@ -298,21 +298,21 @@ class LiveStage:
         return ""
 
     def note(self, event: Event) -> None:
-        """Write an event to the log of this robot; one without a tick happened now."""
+        """Add an event of this robot; tick 0 stands for now."""
         stamped = event if event.tick else replace(event, tick=self.tick)
         self.new_events.append(stamped)
         self._history += (stamped,)
 
 
 def path_data(path: MotionPath) -> dict[str, Value]:
-    """All that tells where something on the path is when; see core.shapes.MotionPath."""
+    """Return the parameters of a path as event data."""
     poses: list[Value] = [[pose.x, pose.y, pose.yaw] for pose in path.poses]
     clock: dict[str, Value] = {"start": path.start, "phase": path.phase}
     return {"waypoints": poses, "times": list(path.times), "repeat": path.mode, "ease": path.ease, **clock}
 
 
 def body_data(body: Body) -> dict[str, Value]:
-    """Pose, first shape, and the outlines in its own frame of what a robot may touch, for pictures and judging."""
+    """Return pose, first shape, and contact outlines (body frame) of a body as event data."""
     pose = body.pose.plane
     place: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
     outlines: list[Value] = [

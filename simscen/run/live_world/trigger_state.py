@@ -1,4 +1,4 @@
-"""When a trigger fires: edges, delays, repetitions and chance."""
+"""State of triggers during a run: edges, delays, repetitions, and probability."""
 
 from typing import Any
 
@@ -10,9 +10,10 @@ from simscen.triggers.trigger import Test, Trigger
 
 
 class TriggerState:
-    """Watches one trigger, beat by beat.
+    """Evaluates one trigger at each beat.
 
-    A rising trigger whose condition holds from the start fires at once; a falling one needs to have seen it hold.
+    A rising trigger fires at the first beat if its condition holds. A falling trigger fires only after its condition
+    has held.
     """
 
     def __init__(self, trigger: Trigger, chance: np.random.Generator) -> None:
@@ -23,7 +24,7 @@ class TriggerState:
         self._due: list[int] = []
 
     def fires(self, now: Situation) -> int:
-        """How often it fires at this beat."""
+        """Return how often the trigger fires at this beat."""
         if self._left and self._edge(now) and self._lucky():
             self._left -= 1
             self._due.append(now.tick + now.clock.ticks(self._trigger.delay))
@@ -33,7 +34,7 @@ class TriggerState:
 
     @property
     def spent(self) -> bool:
-        """Whether it can never fire again."""
+        """Whether the trigger can never fire again."""
         return not self._left and not self._due
 
     def _edge(self, now: Situation) -> bool:
@@ -45,7 +46,7 @@ class TriggerState:
 
 
 class ConditionState:
-    """Remembers since when a condition and each of its parts have been true, for their `for`; asked at every beat."""
+    """Tracks how long a condition and each of its parts have held, for `for`. Must be evaluated at every beat."""
 
     def __init__(self, test: Test) -> None:
         self._test = test
@@ -54,7 +55,7 @@ class ConditionState:
         self._since: int | None = None
 
     def holds(self, now: Situation) -> bool:
-        """Whether it is true, and has been for long enough."""
+        """Return whether the condition has held for long enough."""
         if not self._is_true(now):
             self._since = None
             return False
@@ -63,7 +64,7 @@ class ConditionState:
         return self._test.for_ is None or now.tick - self._since >= now.clock.ticks(self._test.for_)
 
     def _is_true(self, now: Situation) -> bool:
-        """Whether it is true at this beat; each part is asked, as it has to see all of them."""
+        """Return whether the condition holds at this beat. Evaluates all parts, since each tracks its own duration."""
         if not self._parts:
             return self._test.holds(now)
         now = self._test.seen(now)
@@ -73,9 +74,8 @@ class ConditionState:
         return all(answers) if self._test.all is not None else any(answers)
 
 
-# MERGED: The run as a step of a story sees it: what counts, counts from when the step before it happened.
 class RelativeSituation:
-    """A core.stage.Situation that begins now: time, way and events count from here, all else is as it is."""
+    """View of the run for a step of a sequence: time, distance, and events count from the end of the previous step."""
 
     def __init__(self, now: Situation, others: "dict[str, RelativeSituation] | None" = None) -> None:
         self._now, self._others = now, {} if others is None else others
@@ -84,26 +84,26 @@ class RelativeSituation:
         self._start, self._way, self._past = now.tick, now.travelled, len(now.events)
 
     def of(self, robot: str) -> "RelativeSituation":
-        """The same for another robot."""
+        """Return the view for another robot."""
         return self._others[robot]
 
     @property
     def tick(self) -> int:
-        """Ticks since then."""
+        """Ticks since the start of the view."""
         return self._now.tick - self._start
 
     @property
     def travelled(self) -> float:
-        """Metres driven since then."""
+        """Distance driven in m since the start of the view."""
         return self._now.travelled - self._way
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """What has happened since then."""
+        """Events since the start of the view."""
         return self._now.events[self._past :]
 
     def scanned(self, sensor: str | None) -> int | None:
-        """When the stack last received a scan, on the same clock; before the first, the start of the run."""
+        """Return the tick of the last scan that the stack received; the start of the run if there was none."""
         last = self._now.scanned(sensor)
         return (0 if last is None else last) - self._start
 

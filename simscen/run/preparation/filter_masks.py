@@ -1,4 +1,4 @@
-"""The filter masks of a scenario, read: those of its stack, and those that its criteria judge by."""
+"""Load the filter masks of a scenario: those of its stack and those of its criteria."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -14,14 +14,14 @@ KEEPOUT_KEYS: tuple[Key, ...] = ("stack", "keepout_mask")
 SPEED_KEYS: tuple[Key, ...] = ("stack", "speed_mask", "file")
 
 MAX_BLOCKS = 100_000
-"""Rectangles of equal cells that a mask may fall into; the log of each run carries them."""
+"""Largest number of rectangles of equal cells in a mask of a criterion. Each log contains them."""
 
 AddSource = Callable[[Problem], Problem]
-"""Gives a problem the text of its line."""
+"""Adds the source line to a problem."""
 
 
 def load_masks(loaded: LoadedScenario) -> FilterMasks:
-    """The masks that the stack gets. Raises InvalidInput, at the line that names it, for one that cannot be read."""
+    """Load the masks of the stack. Raises InvalidInput at the line that names an unreadable mask."""
     keepout = _of_stack(loaded, KEEPOUT_KEYS, loaded.keepout_mask)
     grid, spec = _of_stack(loaded, SPEED_KEYS, loaded.speed_mask), loaded.spec.stack.speed_mask
     if grid is None or spec is None:
@@ -32,7 +32,7 @@ def load_masks(loaded: LoadedScenario) -> FilterMasks:
 def load_criterion_masks(
     masks: Mapping[str, JudgedMask], tree: MappingNode, sourced: AddSource
 ) -> dict[str, MaskBlocks]:
-    """The masks that criteria judge by. Raises InvalidInput, at the line that names it, for one that is unusable."""
+    """Load the masks of criteria. Raises InvalidInput at the line that names an unusable mask."""
     return {name: _judged(mask, tree, sourced) for name, mask in masks.items()}
 
 

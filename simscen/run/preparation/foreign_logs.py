@@ -1,4 +1,4 @@
-"""What a file of criteria says about the runs of a real robot: its goals, the regions, how large it is."""
+"""Build the case by which logs of real robots are judged, from a criteria file."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ from simscen.worlds.own import build_own
 
 
 def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
-    """The case by which a log of others is judged; without a robot it has no footprint. Raises InvalidInput."""
+    """Return the case of a criteria file; without a robot it has no footprint. Raises InvalidInput."""
     loaded_world, loaded_robot = criteria.surroundings()
     root = criteria.library.fence.root
     world = (
@@ -40,7 +40,7 @@ def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()
 
 
 def masks_from_criteria(criteria: LoadedCriteria) -> dict[str, MaskBlocks]:
-    """The filter masks that the file's criteria judge by. Raises InvalidInput."""
+    """Load the filter masks of the file's criteria. Raises InvalidInput."""
 
     def sourced(problem: Problem) -> Problem:
         return criteria.library.with_source([problem])[0]

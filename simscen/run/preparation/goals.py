@@ -1,4 +1,4 @@
-"""What a scenario's robot is sent to."""
+"""Goals of a scenario."""
 
 import math
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from simscen.model.stackbase import StackBase
 
 
 def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
-    """All goals in order, named, with their tolerances; of further loops with `#2`, `#3`, … to their names."""
+    """Return all goals in order, with names and tolerances; names in further loops end in `#2`, `#3`, …"""
     once = [_goal(name, entry, spec.stack) for name, entry in zip(spec.goal_names, spec.goals, strict=True)]
     if spec.navigation.mode == "navigate_through_poses":
         passed = [_passed(goal, entry, spec.navigation.radius) for goal, entry in zip(once, spec.goals, strict=True)]
@@ -26,7 +26,7 @@ def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
 
 
 def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, str]:
-    """The goals at which the robot is to fail, and how; in navigate_through_poses all of a drive that is to fail."""
+    """Return the expected failure by goal; navigate_through_poses fails at all goals or none."""
     through = spec.navigation.mode == "navigate_through_poses"
     found = {}
     for number, goal in enumerate(goals):
@@ -41,7 +41,7 @@ def _passed(goal: Goal, entry: GoalEntry, radius: float) -> Goal:
 
 
 def event_goals(spec: ScenarioSpec, concerns: Callable[[str | None], bool]) -> dict[tuple[str | int, ...], Goal]:
-    """The goals that events send to the robot that `concerns`, by where each is written, in the order of the file."""
+    """Return the goals that events send to the robot selected by `concerns`, by their path in the scenario file."""
     checker = spec.stack.goal_checker
     found: dict[tuple[str | int, ...], Goal] = {}
     for keys, action in (placed for step in spec.steps for placed in step.placed()):

@@ -1,4 +1,4 @@
-"""Where a scenario's world, map and robot come from."""
+"""Load the world, the map, and the robot of a scenario."""
 
 from __future__ import annotations
 
@@ -22,15 +22,14 @@ if TYPE_CHECKING:
 
 
 def load_world(loaded: LoadedScenario) -> World:
-    """The world of a scenario. Raises InvalidInput for a map image or an SDF file that cannot be used."""
+    """Build the world of a scenario. Raises InvalidInput for an unusable map image or SDF file."""
     return world_from_file(loaded.world, loaded.root, loaded.world_path, loaded.lenient)
 
 
 def world_from_file(source: LoadedWorld, root: Path, world_path: Sequence[Path] = (), lenient: bool = False) -> World:
-    """The world of a file; what SDF names stays inside `root` and `world_path`.
+    """Build the world of a world file. Files that SDF refers to must lie in `root` or `world_path`.
 
-    Raises InvalidInput for a map image or an SDF file that cannot be used; with `lenient`, the elements of SDF that
-    cannot be used become notes.
+    Raises InvalidInput for an unusable map image or SDF file; with `lenient`, unsupported SDF elements become notes.
     """
     base: World | None = None
     if source.sdf is not None:
@@ -43,7 +42,7 @@ def world_from_file(source: LoadedWorld, root: Path, world_path: Sequence[Path] 
 
 
 def load_map(source: LoadedMap) -> OccupancyGrid:
-    """The grid of a ROS map."""
+    """Load the grid of a ROS map."""
     return _map_and_notes(source)[0]
 
 
@@ -54,7 +53,7 @@ def _map_and_notes(source: LoadedMap) -> tuple[OccupancyGrid, tuple[str, ...]]:
 
 
 def read_mesh(path: Path) -> Mesh:
-    """For a URDF, which tells what is wrong with a mesh at the line that names it."""
+    """Read a mesh for a URDF. Raises ValueError, which the URDF reader reports at the line that names the mesh."""
     from simscen.worlds.sdf.meshes import read_mesh as read
 
     try:
@@ -64,9 +63,9 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
-    """The robot as specified (a bare URDF as far as it makes plain), and made ready for physics, with what it carries.
+    """Load the specification of the robot (inferred for a bare URDF) and its body, including the payload.
 
-    Raises InvalidInput also for a load under which it would fall over where it stands.
+    Raises InvalidInput for unusable files and for a payload that would tip the robot over.
     """
     try:
         spec, body = robot_from_file(loaded.robot, (loaded.root, *loaded.world_path))
@@ -93,7 +92,7 @@ def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
 
 
 def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, RobotBody]:
-    """The same of a robot whose files lie in `roots`."""
+    """Load the specification and body of a robot. Files that it refers to must lie in `roots`."""
     from simscen.sim.embody import robot_body
     from simscen.sim.urdf.files import Found
     from simscen.sim.urdf.xacro.expand import UnknownArgument

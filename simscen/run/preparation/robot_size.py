@@ -1,4 +1,4 @@
-"""How much room a robot takes."""
+"""Size of a robot, and the parts of a world that block it."""
 
 import math
 from dataclasses import dataclass, replace
@@ -14,12 +14,12 @@ from simscen.sim.robot_body import RobotBody
 from simscen.worlds.flat import is_flat
 
 CIRCLE_CORNERS = 24
-"""Of the polygon that stands for a round footprint."""
+"""Corners of the polygon that approximates a round footprint."""
 
 
 @dataclass(frozen=True)
 class RobotSize:
-    """Its `footprint` in its base frame, the `radius` of a round one, and the `height` of its hull in metres."""
+    """Size of a robot: `footprint` (base frame, m), `radius` of a round one (m), and `height` of the hull (m)."""
 
     footprint: Polygon
     radius: float | None
@@ -27,12 +27,12 @@ class RobotSize:
 
     @property
     def inscribed(self) -> float:
-        """Metres: no part of the footprint's edge is nearer to the base's origin."""
+        """The inscribed radius in m."""
         return inscribed_radius(self.radius, self.footprint)
 
 
 def inscribed_radius(radius: float | None, footprint: Polygon) -> float:
-    """The largest circle about the base's origin inside a robot's footprint, in metres; a round one is its own."""
+    """Return the radius in m of the largest circle around the base's origin inside the footprint."""
     if radius is not None:
         return radius
     ends = (*footprint[1:], footprint[0])
@@ -40,9 +40,9 @@ def inscribed_radius(radius: float | None, footprint: Polygon) -> float:
 
 
 def robot_size(loaded: LoadedScenario) -> RobotSize:
-    """That of a scenario's robot. Raises InvalidInput for a robot that cannot be used.
+    """Return the size of a scenario's robot. Raises InvalidInput for an unusable robot.
 
-    One of simple shapes whose file says how much ground it covers need not be built for that.
+    A robot of simple shapes with a footprint or radius in its file need not be built for this.
     """
     spec = loaded.robot.spec
     if spec is not None and spec.body is not None and (spec.radius is not None or spec.footprint is not None):
@@ -68,9 +68,8 @@ def _height_of_hull(body: RobotBody) -> float:
     return max(float(solid.pose.apply(extremes(solid.shape))[:, 2].max()) for solid in body.hull)
 
 
-# MERGED: What of a world is in the way of one robot, which depends on what it can climb.
 def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, ...]:
-    """The same solids where the robot finds no ground but the floor; else without the ramps that it climbs."""
+    """Return the solids that block a robot: all except the ramps that it can climb."""
     reach = max((wheel.radius for wheel in body.wheels), default=0.0)
     if is_flat(solids, reach):
         return solids
@@ -81,9 +80,9 @@ def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, 
 
 
 def blocking_world(loaded: LoadedScenario, world: World) -> World:
-    """The world with what of its solids is in the way of the scenario's robot, which a flat one need not be built for.
+    """Return the world with only the solids that block the scenario's robot.
 
-    Raises InvalidInput for a robot that cannot be used.
+    The robot is built only if the world is not flat. Raises InvalidInput for an unusable robot.
     """
     spec = loaded.robot.spec
     radius = None if spec is None else getattr(spec.drive, "wheel_radius", 0.0)

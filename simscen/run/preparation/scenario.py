@@ -1,6 +1,6 @@
-"""From a loaded scenario to all that its runs share: the built world, the robot's map, goals, the shortest ways.
+"""Prepare a scenario: build everything that all of its runs share, such as world, map, goals, and shortest paths.
 
-Plain data and numpy arrays only, so that it can be made once in the warm process and survive the fork.
+The result holds only plain data and numpy arrays, so that the fork server can build it once for all workers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -40,10 +40,10 @@ DEFAULT_LIDAR_HEIGHT = 0.2
 
 @dataclass(frozen=True, eq=False)
 class PreparedScenario:
-    """Everything of a scenario but chance.
+    """A scenario with its world, map, and robots built: everything about a run except the seed.
 
-    Where there are several robots, `robots` has it as each of them needs it, by name; what stands here of a robot is
-    then that of the first.
+    With several robots, `robots` holds a PreparedScenario for each by name, and the fields about a robot are those of
+    the first.
     """
 
     loaded: LoadedScenario
@@ -57,41 +57,41 @@ class PreparedScenario:
     estimate: Estimate
     case: Case
     obstacles: TriangleMesh
-    """What of the built world's mesh is in the robot's way; the same where it is all of it."""
+    """The part of the world's mesh that blocks the robot."""
     mapped: tuple[int, ...] = ()
-    """The numbers of the faults that have changed the map."""
+    """The indices of the faults that changed the map."""
     plugins: tuple[Entry, ...] = ()
-    """What it takes from installed packages."""
+    """The plug-ins that the scenario uses."""
     robots: Mapping[str, "PreparedScenario"] = field(default_factory=dict)
 
     @property
     def each(self) -> Mapping[str, "PreparedScenario"]:
-        """It as each of its robots needs it, by name in order; the only one has none."""
+        """The prepared scenario of each robot by name; a single robot has no name."""
         return self.robots or {NAMELESS: self}
 
     @property
     def spec(self) -> ScenarioSpec:
-        """The scenario as written."""
+        """The specification of the scenario."""
         return self.loaded.spec
 
 
 BuildWorld = Callable[[LoadedScenario, float], BuiltWorld]
-"""Gives the built world of a scenario, as a lidar at a height in metres maps it."""
+"""Returns the built world of a scenario, mapped by a lidar at a height in m."""
 
 
 FindLegs = Callable[[BuiltWorld, Sequence[tuple[Pose2, Goal]], float], list[Leg]]
-"""Gives the shortest way of a disc of a radius from each pose to its goal."""
+"""Returns the shortest path of a disc with a radius from each pose to its goal."""
 
 
 def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
-    """Build it anew."""
+    """Build the world of a scenario without a cache."""
     return build(load_world(loaded), height)
 
 
 def prepare(
     loaded: LoadedScenario, world_of: BuildWorld = build_world, legs: FindLegs = legs_between
 ) -> PreparedScenario:
-    """Build what the runs of this scenario share. Raises InvalidInput for files that cannot be used."""
+    """Build what the runs of this scenario share. Raises InvalidInput for unusable files."""
     if not loaded.robots:
         return _prepared(loaded, world_of, legs)
     parts: dict[str, PreparedScenario] = {}
@@ -110,7 +110,7 @@ def prepare(
 
 
 def _prepared(loaded: LoadedScenario, world_of: BuildWorld, legs: FindLegs) -> PreparedScenario:
-    """For its only robot, or one of several."""
+    """Prepare the scenario of one robot."""
     spec = loaded.spec
     robot, body = load_robot(loaded)
     built = world_of(loaded, lidar_height(robot))
@@ -149,9 +149,9 @@ def _prepared(loaded: LoadedScenario, world_of: BuildWorld, legs: FindLegs) -> P
 
 
 def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, find_legs: FindLegs) -> Case:
-    """The case with the shortest ways past the obstacles to its goals, and what they pass between.
+    """Return the case with the shortest paths to its goals and the passages along them.
 
-    Where the robot is to fail at a goal, the way to the next one begins where the way to that one did.
+    If the robot is expected to fail at a goal, the path to the next goal starts where the path to this one did.
     """
     ends, at = [], case.start
     for goal in case.goals:
@@ -166,7 +166,7 @@ def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, 
 
 
 def _clearance_range(spec: ScenarioSpec) -> float:
-    """As far as any criterion or trigger needs it."""
+    """Return the largest clearance range in m that a criterion or trigger needs."""
     asked = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
     near = (test.clearance_below for trigger in spec.triggers for test in trigger.parts())
     asked += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]
@@ -180,13 +180,13 @@ def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | Non
 
 
 def lidar_height(robot: RobotSpec) -> float:
-    """The height that the robot's map shows: that of its first lidar."""
+    """Return the height in m at which the world is mapped: that of the first lidar."""
     heights = [sensor.lidar.mount.z for sensor in robot.sensors.values() if sensor.lidar]
     return heights[0] if heights else DEFAULT_LIDAR_HEIGHT
 
 
 def effective_stack(spec: ScenarioSpec) -> AnyStack:
-    """The stack as written; without a map, AMCL cannot work, so dead reckoning is the default there."""
+    """Return the stack of a scenario; without a map, the default localizer is dead reckoning instead of AMCL."""
     stack = spec.stack
     if not isinstance(stack, StackSpec):
         return stack

@@ -1,4 +1,4 @@
-"""What there is to see in a prepared world, for logs and pictures."""
+"""Collect the visible parts of a prepared world for logs and pictures."""
 
 from collections.abc import Iterator
 
@@ -21,11 +21,11 @@ from simscen.sim.outline import convex_hull, footprint, parts
 from simscen.worlds.shortest import Z_RANGE
 
 MILLIMETRES = 3
-"""Decimals of what is drawn."""
+"""Decimals of coordinates in m."""
 
 
 def world_scenery(prepared: PreparedScenario) -> Scenery:
-    """All of it; of several robots the zones of each."""
+    """Return objects, ground, regions, and the zones of all robots."""
     world, each = prepared.built.world, prepared.each
     reach = max((2 * wheel.radius for part in each.values() for wheel in part.body.wheels), default=0.0)
     same = all(part.map is prepared.built.map for part in each.values())
@@ -47,7 +47,7 @@ def _thing(body: Body, world: World) -> MovableObject:
 
 
 def _ground(mesh: TriangleMesh, reach: float) -> Iterator[DrivableSurface]:
-    """What of the static world wheels may roll on, which are `reach` metres tall at most."""
+    """Yield the parts of the static world on which wheels with a diameter of up to `reach` m can roll."""
     owners = sorted(drivable_solids(mesh, reach))
     if not owners:
         return  # as most worlds: normals of many thousand faces take a while
@@ -62,7 +62,7 @@ def _ground(mesh: TriangleMesh, reach: float) -> Iterator[DrivableSurface]:
 
 
 def _zones(part: PreparedScenario, robot: str) -> Iterator[FilterZone]:
-    """What its stack is told from the start."""
+    """Yield the zones of a robot's stack at the start of the run."""
     regions, masks = part.built.world.regions, part.masks
     for region in part.stack.keepout:
         yield FilterZone("keepout", region, regions[region], robot=robot)

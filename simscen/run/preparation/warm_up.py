@@ -1,4 +1,4 @@
-"""What the runs of a scenario are built of is imported and worked out once, rather than in each of their processes."""
+"""Work that the fork server does once before it forks the workers of a scenario."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
@@ -16,14 +16,14 @@ from simscen.worlds import rays
 
 
 def import_components(prepared: PreparedScenario) -> None:
-    """Import the components of its stacks and sensors that simscen ships."""
+    """Import the shipped components of the scenario's stacks and sensors."""
     for part in prepared.each.values():
         for module in shipped_modules(_components((part.stack, part.robot.sensors))):
             import_module(module)
 
 
 def precompute(prepared: PreparedScenario) -> None:
-    """What each of its runs would need of the world and of the map: 0.6 s for a map of 100 x 100 m."""
+    """Compute data structures of world and map that each run would otherwise compute itself."""
     from simscen.run.robot_interface import robot_model
     from simscen.stack.costmap import costmap
 
@@ -45,7 +45,7 @@ def precompute_localizer(spec: LocalizerSpec, grid: OccupancyGrid) -> None:
 
 
 def shipped_modules(components: Iterable[Component]) -> Iterator[str]:
-    """Where those that simscen ships are; those of packages are only ever imported in the process of a run."""
+    """Yield the modules of the shipped components. Plug-ins are imported only in the worker process."""
     for component in components:
         module = component.component.partition(":")[0]
         if module.startswith("simscen."):
@@ -53,7 +53,7 @@ def shipped_modules(components: Iterable[Component]) -> Iterator[str]:
 
 
 def _components(value: object) -> Iterator[Component]:
-    """All specifications of components in a specification."""
+    """Yield all component specifications in a specification."""
     if isinstance(value, Component):
         yield value
     inner: Iterable[object] = ()

@@ -1,1 +1,1 @@
-"""One process for each run: what starts it, hears it, ends it, and tells what became of it."""
+"""One process for each run: supervisor, fork server, and worker processes."""

@@ -1,4 +1,4 @@
-"""worker.log: what a run prints, of a flood only the beginning and the end."""
+"""Capture the output of a process in a log of limited size, and find a Python stack dump in it."""
 
 import os
 import re
@@ -10,15 +10,15 @@ READ_BYTES = 1 << 20
 
 
 class CappedLog:
-    """Takes what a process writes: the first HEAD bytes go to the file at once, of the rest the last TAIL at the end.
+    """Log file with the first MAX_HEAD_BYTES and the last MAX_TAIL_BYTES of the output of a process.
 
-    A file that cannot be written, or none at all, costs nothing but the file: `last` still has the end.
+    Without a writable file, `last` still returns the end of the output.
     """
 
     def __init__(self, path: Path | None) -> None:
         self._room, self._left_out = MAX_HEAD_BYTES, 0
-        self._end = bytearray()  # the last TAIL bytes of all, written or not
-        self._waiting = 0  # how many of these are not in the file
+        self._end = bytearray()  # the last MAX_TAIL_BYTES of the output
+        self._waiting = 0  # how many of these are not in the file yet
         self._file: int | None = None
         if path is None:
             return
@@ -26,10 +26,10 @@ class CappedLog:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644)
         except OSError:
-            self._room = 0  # the run meets the same folder, and says so
+            self._room = 0  # the run reports the unusable folder itself
 
     def take(self, data: bytes) -> None:
-        """Take in what was printed."""
+        """Add output."""
         head = data[: self._room]
         self._room -= len(head)
         self._write(head)
@@ -41,11 +41,11 @@ class CappedLog:
         self._waiting = min(self._waiting, MAX_TAIL_BYTES)
 
     def last(self, most: int) -> bytes:
-        """The end of what was printed."""
+        """Return the last bytes of the output."""
         return bytes(self._end[-most:])
 
     def close(self) -> None:
-        """Write the end down."""
+        """Write the remaining output to the file."""
         if self._left_out:
             self._write(f"\n… simscen left out {self._left_out} bytes here …\n".encode())
         if self._waiting:
@@ -59,26 +59,25 @@ class CappedLog:
             return
         try:
             os.write(self._file, data)
-        except OSError:  # no space left: the run's own files tell so
+        except OSError:  # no space left: the run reports it for its own files
             os.close(self._file)
             self._file = None
 
 
-# MERGED: Finds in what a process printed last the Python stack that `faulthandler` dumped.
 TAIL_LINES = 20
 _HEAD = re.compile(r"^(Current thread|Thread|Stack) .*\(most recent call first\):$", re.MULTILINE)
 _FRAME = re.compile(r'^  File "(?P<file>.*)", line (?P<line>\d+) in (?P<name>\S+)$', re.MULTILINE)
 
 
 def innermost_frame(printed: str) -> str:
-    """Where the process was, e.g. "step (simulation.py:88)"; "" when no stack was dumped."""
+    """Return the innermost frame of a dumped stack, e.g. "step (simulation.py:88)"; "" without a dump."""
     heads = list(_HEAD.finditer(printed))
     frame = _FRAME.search(printed, heads[-1].end()) if heads else None
     return f"{frame['name']} ({PurePath(frame['file']).name}:{frame['line']})" if frame else ""
 
 
 def output_tail(printed: str) -> str:
-    """The last lines; of a dumped stack the first, where the innermost call is."""
+    """Return the last lines of the output, or the first lines of a dumped stack."""
     heads = list(_HEAD.finditer(printed))
     if heads:
         before = printed[: heads[-1].start()].splitlines()[-3:]

@@ -1,8 +1,7 @@
-"""The warm process: it has its imports done and its worlds built, and forks one process for each run.
+"""Fork server: imports the engines and builds worlds once, then forks a worker process for each run.
 
-It never creates an OMPL object, and of Bullet two clients with nothing but the ground in them, which it never steps:
-every fork starts from the same blank state. It speaks with the supervisor over two pipes: jobs come in pickled, one
-line of JSON goes back for each thing that happens.
+It never creates an OMPL object and never steps a Bullet client, so that every worker starts from the same state. It
+receives pickled jobs from the supervisor over one pipe and sends one line of JSON per message over another.
 """
 
 import contextlib
@@ -22,11 +21,11 @@ from simscen.run.process.worker import ExecuteJob, WorkerPipes, run_worker
 from simscen.run.process.worker_handle import WorkerHandle, enlarge_pipe
 
 HEARTBEAT_S = 1.0
-"""Seconds between two signs of life of the warm process, as long as it prepares nothing."""
+"""Time between two heartbeats while the fork server is not preparing a scenario."""
 
 
 class ForkServer:
-    """Serves jobs until its input ends, then kills what is still running."""
+    """Runs jobs until its input ends, then kills all workers."""
 
     def __init__(self, jobs: int, replies: int, warm_up: Callable[[Job], object], perform: ExecuteJob) -> None:
         self._jobs, self._replies, self._warm_up, self._perform = jobs, replies, warm_up, perform
@@ -34,7 +33,7 @@ class ForkServer:
         self._children: dict[int, WorkerHandle] = {}
 
     def serve(self) -> None:
-        """Take jobs and look after children until the supervisor closes its end."""
+        """Run jobs and supervise workers until the supervisor closes the pipe."""
         die_with_parent(os.getppid())
         faulthandler.enable()
         limit_memory()
@@ -44,7 +43,9 @@ class ForkServer:
         while True:
             self._tell({"alive": True})
             for key, _ in self._selector.select(self._patience()):
-                stale = self._selector.get_map().get(key.fileobj) is not key  # closed by what came before it
+                stale = (
+                    self._selector.get_map().get(key.fileobj) is not key
+                )  # closed while an earlier event was handled
                 if not stale and key.data() is False:
                     self._kill_all()
                     return
@@ -56,7 +57,7 @@ class ForkServer:
             return False
         self._tell({"started": job.number})
         log = CappedLog(job.folder / "worker.log")
-        # A mistake is met again in the run's own process, where it is reported as that run's error.
+        # An error occurs again in the worker, which reports it as the error of the run.
         with contextlib.suppress(Exception, SystemExit), _at_most(job.wall_limit):
             self._warm_up(job)
         log.take(_printed_meanwhile())
@@ -68,7 +69,7 @@ class ForkServer:
         parent = os.getpid()
         report, told = os.pipe()
         shown, printed = os.pipe()
-        gc.freeze()  # what is here the run need not look through for garbage, which would copy all of its memory
+        gc.freeze()  # exclude existing objects from garbage collection, which would copy their memory in the worker
         pid = os.fork()
         if pid == 0:
             self._forget_everything()
@@ -84,7 +85,7 @@ class ForkServer:
         self._selector.register(child.pidfd, selectors.EVENT_READ, lambda: self._bury(child))
 
     def _forget_everything(self) -> None:
-        """In the child: close what belongs to the zygote and to the other children."""
+        """Close the file descriptors of the fork server and of other workers. Called in the worker."""
         self._selector.close()
         for child in self._children.values():
             child.let_go()
@@ -97,7 +98,9 @@ class ForkServer:
         return True
 
     def _bury(self, child: WorkerHandle) -> bool:
-        """The child is dead but not yet reaped: its group can still be killed without hitting a stranger."""
+        """Reap a worker that has exited, and report its end.
+
+        Its group is killed before it is reaped, because its id could be reused afterwards."""
         for descriptor in (child.pidfd, child.report, child.printed):
             if descriptor in self._selector.get_map():
                 self._selector.unregister(descriptor)
@@ -129,9 +132,9 @@ class ForkServer:
 
 
 def _printed_meanwhile() -> bytes:
-    """What libraries printed here since the last call: standard error is a file, which is emptied.
+    """Return and remove the output of this process since the last call; standard error is a file.
 
-    What they printed while they prepared a run is of more use in that run's log.
+    Output during the preparation of a scenario belongs to the log of its run.
     """
     size = os.fstat(2).st_size
     data = os.pread(2, size, 0)
@@ -142,9 +145,9 @@ def _printed_meanwhile() -> bytes:
 
 @contextlib.contextmanager
 def _at_most(seconds: float) -> Iterator[None]:
-    """Raise TimeoutError inside a block that takes longer.
+    """Raise TimeoutError inside a block that takes longer than `seconds`.
 
-    What does not even listen to this is ended by the supervisor.
+    The supervisor ends a fork server that hangs in C code, which this cannot interrupt.
     """
 
     def ring(*_: object) -> None:

@@ -1,4 +1,4 @@
-"""The warm process from the outside: what is sent to it, what it says, and how it ended."""
+"""Process handle of the fork server in the supervisor."""
 
 import os
 import select
@@ -17,11 +17,11 @@ READ_BYTES = 1 << 16
 
 
 class Unresponsive(Exception):
-    """It has said nothing for too long."""
+    """The fork server sent no message for too long."""
 
 
 class ProcessDeath(NamedTuple):
-    """How it ended, in words and as Popen's return code, and the end of what it printed."""
+    """How the fork server ended: description, return code of Popen, and the end of its output."""
 
     how: str
     code: int
@@ -29,9 +29,9 @@ class ProcessDeath(NamedTuple):
 
 
 class ForkServerProcess:
-    """Starts it; `leave` ends it with all that it runs.
+    """Starts a fork server; `leave` ends it and all of its workers.
 
-    Nothing here waits without an end: neither a stopped process nor one that hangs in C takes the session with it.
+    All waits have a time limit, so that a hanging fork server cannot block the session.
     """
 
     def __init__(self, entry: Sequence[str]) -> None:
@@ -53,11 +53,11 @@ class ForkServerProcess:
         self._outbox, self._inbox = bytearray(), bytearray()
 
     def send(self, data: bytes) -> None:
-        """Put a message into its pipe as soon as that has room."""
+        """Send a message, as soon as the pipe has room."""
         self._outbox += data
 
     def hear(self, patience: float) -> bytes:
-        """Its next line. Raises EOFError when it has gone, Silent when it says nothing for `patience` seconds."""
+        """Return the next line. Raises EOFError if the process has exited, Unresponsive after `patience` seconds."""
         end = time.monotonic() + patience
         while b"\n" not in self._inbox:
             readable, writable, _ = select.select(
@@ -76,7 +76,7 @@ class ForkServerProcess:
     def _post(self) -> None:
         try:
             del self._outbox[: os.write(self._send, self._outbox[:READ_BYTES])]
-        except BrokenPipeError:  # it is dead; what it said before that is still to be heard
+        except BrokenPipeError:  # it has exited; its last messages can still be read
             self._outbox.clear()
 
     def _received(self) -> bytes:
@@ -86,7 +86,7 @@ class ForkServerProcess:
         return data
 
     def leave(self) -> None:
-        """Close its input, which makes it kill what is left, and wait for it; one that does not listen is killed."""
+        """Close its input, so that it kills its workers and exits; kill it if it does not."""
         os.close(self._send)
         try:
             self._process.wait(timeout=5)
@@ -96,11 +96,11 @@ class ForkServerProcess:
         self._printed.close()
 
     def abort(self) -> None:
-        """Let it dump its stack and die."""
+        """Make it dump its stack and exit."""
         self._process.send_signal(signal.SIGABRT)
 
     def autopsy(self) -> ProcessDeath:
-        """Look at one that is dead, or should be in a second."""
+        """Return how the process ended; kill it if it does not end within a second."""
         try:
             self._process.wait(timeout=1)
         except subprocess.TimeoutExpired:

@@ -1,4 +1,4 @@
-"""What a run's process may do: bounded in memory, files and life."""
+"""Isolation of processes: resource limits, environment, and cleanup of descendants."""
 
 import ctypes
 import os
@@ -17,13 +17,13 @@ _ARITHMETIC = {
     *("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE"),
     *("NPY_DISABLE_CPU_FEATURES", "NPY_ENABLE_CPU_FEATURES", "GLIBC_TUNABLES"),
 }
-"""Which instructions are used, so that a run has the last bits that the caller's own process would give it."""
+"""Variables that select processor instructions and so affect the last bits of results."""
 
 
 def die_with_parent(parent: int) -> None:
-    """Be killed when the process `parent` ends, even if it is killed itself.
+    """Have the kernel kill this process when `parent` ends for any reason.
 
-    The request is lost when the parent ended before it was made, so that is checked afterwards.
+    Exits at once if the parent has already ended.
     """
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
@@ -31,22 +31,22 @@ def die_with_parent(parent: int) -> None:
 
 
 def limit_memory() -> None:
-    """Bound the memory of this process and of what it forks; no core dumps."""
+    """Limit the memory of this process and its children, and disable core dumps."""
     for what, most in ((resource.RLIMIT_AS, MAX_MEMORY_BYTES), (resource.RLIMIT_CORE, 0)):
         hard = resource.getrlimit(what)[1]
         resource.setrlimit(what, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
 
 
 def prefer_for_oom_kill() -> None:
-    """Ask the kernel to end this process rather than the one that watches over it when the machine is out of memory."""
-    with suppress(OSError):  # a kernel or sandbox that does not let itself be asked
+    """Make this process the preferred victim of the OOM killer, so that the supervisor survives."""
+    with suppress(OSError):  # not permitted in some sandboxes
         Path("/proc/self/oom_score_adj").write_text("500")
 
 
 def limit_resources() -> None:
-    """Bound memory, file sizes and open files of this process; no core dumps.
+    """Limit memory, file size, and open files of this process, and disable core dumps.
 
-    The hard limits stay, so that what an external stack may do can be given back to it.
+    The hard limits stay, so that an external stack can have its original limits restored.
     """
     for what, most in (
         (resource.RLIMIT_AS, MAX_MEMORY_BYTES),
@@ -60,26 +60,24 @@ def limit_resources() -> None:
 
 
 def clean_environment() -> dict[str, str]:
-    """The environment of the processes that run scenarios: nothing secret, one BLAS thread, no hash seed."""
+    """Return the environment of worker processes: no secrets, one BLAS thread, a fixed hash seed."""
     kept = {k: v for k, v in os.environ.items() if k in _PASSED_ON | _ARITHMETIC or k.startswith("LC_")}
     one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "TBB")}
     return {**kept, **one_thread, "PYTHONHASHSEED": "0"}
 
 
-# MERGED: Processes that a run leaves behind: adopted rather than lost, so that they can be found and killed.
-# MERGED:
-# MERGED: A group or a session can be left (`setsid`, a double fork), the adoption by a subreaper cannot: whose parent has died
-# MERGED: becomes a child of the nearest ancestor that asked for it. That takes no rights and no cgroup.
 _PR_SET_CHILD_SUBREAPER = 36
 
 
 def adopt_orphans() -> None:
-    """Become the parent of every descendant whose own parent dies. Children do not inherit this."""
+    """Become the parent of descendants whose own parent exits (PR_SET_CHILD_SUBREAPER).
+
+    A descendant can leave its process group or session, but not its subreaper. Children do not inherit the setting."""
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
 def has_descendants() -> bool:
-    """Whether anything that this process started, or adopted, still runs; what has ended is reaped."""
+    """Return whether a child or adopted process still runs. Reaps those that have exited."""
     while True:
         try:
             ended, _ = os.waitpid(-1, os.WNOHANG)
@@ -90,7 +88,7 @@ def has_descendants() -> bool:
 
 
 def kill_children_except(known: Iterable[int]) -> bool:
-    """Kill and reap the children of this process that are not `known`, and what they leave in turn.
+    """Kill and reap all children that are not `known`, and their descendants.
 
     Returns whether there were any.
     """
@@ -104,7 +102,7 @@ def kill_children_except(known: Iterable[int]) -> bool:
 
 
 def _children() -> list[int]:
-    """The children of this process, dead ones too (Linux: /proc/PID/task/TID/children, or all of /proc)."""
+    """Return the children of this process, including zombies."""
     own = os.getpid()
     try:
         return [int(pid) for pid in Path(f"/proc/{own}/task/{own}/children").read_text().split()]
@@ -114,7 +112,7 @@ def _children() -> list[int]:
 
 
 def _parent(pid: int) -> int:
-    """Field 4 of /proc/PID/stat; 0 when the process has ended meanwhile."""
+    """Return the parent of a process, or 0 if the process has ended."""
     try:
         return int(Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[1])
     except OSError:

@@ -1,4 +1,4 @@
-"""What the supervisor asks the warm process for, and what it hears back."""
+"""Jobs and messages between the supervisor and the fork server."""
 
 import json
 import os
@@ -16,20 +16,20 @@ _LENGTH = struct.Struct("<I")
 
 
 class ReplayMode(str, Enum):
-    """Which runs get a page that plays them."""
+    """Which runs get a replay page."""
 
     NONE = "none"
     FAILED = "failed"
     ALL = "all"
 
     def wants(self, outcome: Outcome) -> bool:
-        """Whether a run that came out so gets one."""
+        """Return whether a run with this outcome gets a replay page."""
         return self is ReplayMode.ALL or (self is ReplayMode.FAILED and not outcome.good)
 
 
 @dataclass(frozen=True)
 class Job:
-    """One run: a scenario that has been validated, a seed, the folder its files go to, and whether it gets a page."""
+    """One run of a session: scenario, key with seed, output folder, wall limit in s, and replay mode."""
 
     number: int
     scenario: LoadedScenario
@@ -41,9 +41,9 @@ class Job:
 
 @dataclass(frozen=True)
 class ProcessEnd:
-    """How the process of a job ended. `last_word` is the worker's own, None when it had none.
+    """How a worker process ended. `last_word` is its final message, or None.
 
-    `printed` is the end of what it printed.
+    `printed` is the end of its output.
     """
 
     number: int
@@ -60,9 +60,9 @@ class ProcessEnd:
 
 @dataclass(frozen=True)
 class ForkServerDeath:
-    """The warm process died under a job, or was killed because it no longer answered.
+    """The fork server died while a job was running, or was killed because it did not respond.
 
-    `how` says so in words; `at_fault` = it was preparing this very job; `printed` is the end of what it printed.
+    `how` says so in words; `at_fault` = it was preparing this very job; `printed` is the end of its output.
     """
 
     how: str
@@ -72,13 +72,13 @@ class ForkServerDeath:
 
 
 def pack_job(job: Job) -> bytes:
-    """One job as bytes; the other side is our own process, so pickle is safe."""
+    """Return a job as bytes. Pickle is safe here, because both ends are simscen processes."""
     data = pickle.dumps(job)
     return _LENGTH.pack(len(data)) + data
 
 
 def receive_job(pipe: int) -> Job | None:
-    """Read one job; None at the end of the stream. Nothing beyond it is read, so that `select` sees the next one."""
+    """Read one job; None at the end of the stream. Reads no further bytes, so that `select` reports the next job."""
     head = _exactly(pipe, _LENGTH.size)
     if len(head) < _LENGTH.size:
         return None
@@ -99,5 +99,5 @@ def _exactly(pipe: int, size: int) -> bytes:
 
 
 def json_line(message: dict[str, Any]) -> bytes:
-    """A message as one line of JSON."""
+    """Return a message as one line of JSON."""
     return json.dumps(message, separators=(",", ":")).encode() + b"\n"

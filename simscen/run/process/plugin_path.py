@@ -1,7 +1,7 @@
-"""Where installed packages lie: told to the warm process, which is kept from all that only a user's environment says.
+"""Pass the locations of plug-ins to the fork server.
 
-It runs with `python -I`, so that neither PYTHONPATH nor the user's own site-packages can change the engine. A package
-that adds to the language may lie there all the same, and both processes must find the same one.
+The fork server runs with `python -I`, so that neither PYTHONPATH nor the user's site-packages can change the engine.
+Plug-ins may be installed there, and both processes must find the same ones.
 """
 
 import json
@@ -15,7 +15,7 @@ from simscen.spec.registry import Entry, search_path
 
 
 def plugin_path_arguments(plugins: Iterable[Entry]) -> tuple[str, ...]:
-    """What the warm process is called with, in order to find these: nothing where there are none."""
+    """Return the arguments with which the fork server finds these plug-ins; empty if there are none."""
     used = sorted({(entry.distribution, entry.folder) for entry in plugins})
     if not used:
         return ()
@@ -26,22 +26,22 @@ def plugin_path_arguments(plugins: Iterable[Entry]) -> tuple[str, ...]:
 
 
 def apply_plugin_path(told: str) -> None:
-    """In the warm process: look for packages where the one that called it does.
+    """Extend sys.path in the fork server, so that it finds the same plug-ins as its parent.
 
-    What it knows already stays in front, so that the engine is what it is without them; only where that would hide a
-    package that is used behind another of its name, the folder of that one comes first.
+    New folders come last, so that the engine does not change. A folder comes first only if another version of a used
+    package would be found otherwise.
     """
     wanted = json.loads(told)
     for folder in wanted["path"]:
         if folder not in sys.path:
-            # The user's site-packages may have .pth files, and through them packages that are being worked on.
+            # addsitedir reads .pth files, which are used by editable installations.
             site.addsitedir(folder) if folder == wanted["user"] else sys.path.append(folder)
     from importlib.metadata import PackageNotFoundError, distribution
 
     for name, folder in wanted["used"]:
         try:
             found = str(distribution(name).locate_file(""))
-        except PackageNotFoundError:  # its runs will say what they miss
+        except PackageNotFoundError:  # its runs report the missing package
             continue
         if os.path.realpath(found) != os.path.realpath(folder):
             sys.path.insert(0, folder)

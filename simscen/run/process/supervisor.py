@@ -1,7 +1,6 @@
-"""The supervisor: hands jobs to the warm process, hears how they go, and loses none of them.
+"""Supervisor: sends jobs to the fork server, follows their progress, and reports exactly one end for each.
 
-It never imports an engine, so that nothing an engine does can take it down. Every job it is given yields exactly one
-answer: the worker's own last word counts only if its process also exited with status 0 and was not killed by us.
+The supervisor never imports PyBullet or OMPL, so that a crash in these cannot end it.
 """
 
 import json
@@ -15,19 +14,19 @@ from simscen.run.process.fork_server_process import ForkServerProcess, ProcessDe
 from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd, pack_job
 
 MAX_SILENCE_S = 30.0
-"""Seconds without a sign of life after which the warm process is taken for dead; it gives one each second."""
+"""Time without a message after which the fork server counts as dead. It sends a heartbeat each second."""
 
 
 @dataclass(frozen=True)
 class Started:
-    """A job has begun."""
+    """A job has started."""
 
     job: Job
 
 
 @dataclass(frozen=True)
 class Progressed:
-    """A job has got so far, in simulated seconds."""
+    """A job has reached a simulated time in seconds."""
 
     job: Job
     seconds: float
@@ -35,14 +34,14 @@ class Progressed:
 
 @dataclass(frozen=True)
 class Ended:
-    """A job's process has ended, or the warm process under it."""
+    """The worker process of a job has ended, or the fork server has died."""
 
     job: Job
     end: ProcessEnd | ForkServerDeath
 
 
 class Interrupted(BaseException):
-    """The user or the system asks to stop; `number` is the signal's."""
+    """The session was interrupted by the signal `number`."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -55,20 +54,20 @@ JobUpdate = Started | Progressed | Ended
 def supervise(
     jobs: Iterable[Job], workers: int, entry: Sequence[str], go_on: Callable[[], bool]
 ) -> Iterator[JobUpdate]:
-    """Run all jobs, `workers` at a time, yielding what happens as it happens.
+    """Run all jobs, `workers` at a time, and yield their updates.
 
-    `entry` is how Python is called to be the warm process, e.g. `-m module`. `go_on` is asked before each new job.
-    When the consumer stops early (or an exception passes through), everything that still runs is killed.
+    `entry` are the Python arguments that start the fork server, e.g. `-m module`. `go_on` is called before each job.
+    If the consumer stops early or an exception passes through, all running processes are killed.
     """
     return Supervisor(jobs, workers, entry, go_on).happenings()
 
 
 class Supervisor:
-    """Jobs wait, run, and are answered.
+    """Runs jobs in worker processes of a fork server, which is restarted if it dies.
 
-    When the warm process dies by itself, the job that it was preparing is to blame, and its neighbours run again in
-    the next one. Otherwise any of those under way may have killed it: they are `suspects`, each of which runs again by
-    itself, and is to blame when that happens again.
+    If the fork server dies while it prepares a job, this job fails, and the others that were running are repeated.
+    Otherwise any running job may be the cause: these are suspects, each of which is repeated alone and fails if the
+    fork server dies again.
     """
 
     def __init__(self, jobs: Iterable[Job], workers: int, entry: Sequence[str], go_on: Callable[[], bool]) -> None:
@@ -81,11 +80,11 @@ class Supervisor:
         self._alive = False
 
     def add(self, job: Job) -> None:
-        """One more job, behind the others; of `happenings` that have come to an end nothing more is heard."""
+        """Add a job at the end of the queue. An iterator of `happenings` that has ended does not resume."""
         self._waiting.append(job)
 
     def happenings(self) -> Generator[JobUpdate, None, None]:
-        """What happens, until there is nothing left to do; where its consumer closes it, everything is killed."""
+        """Yield updates until all jobs have ended. Closing the generator kills all processes."""
         while (self._waiting or self._suspects) and self._go_on():
             self._alive = False
             warm = ForkServerProcess(self._entry)
@@ -111,7 +110,7 @@ class Supervisor:
                 yield happening
 
     def _next(self) -> Job | None:
-        """The job to start now. A suspect has the warm process to itself."""
+        """Return the job to start now, or None. A suspect runs alone."""
         suspected = self._tried & self._running.keys()
         if self._suspects and not self._running:
             return self._suspects.popleft()
@@ -120,7 +119,7 @@ class Supervisor:
         return self._waiting.popleft()
 
     def _patience(self) -> float:
-        """Preparing has the wall limit of the job, and nothing else is heard meanwhile."""
+        """Return how long to wait for a message. Preparing a job may take its wall limit, without heartbeats."""
         return MAX_SILENCE_S + (self._preparing.wall_limit if self._preparing else 0.0)
 
     def _understood(self, text: bytes) -> JobUpdate | None:
@@ -143,14 +142,14 @@ class Supervisor:
         return None
 
     def _after_death(self, death: ProcessDeath, silent: bool) -> Iterator[JobUpdate]:
-        """Answer the jobs that are to blame; the others run again."""
+        """Report the jobs that caused the death as ended, and queue the others again."""
         under_way, prepared = list(self._running.values()), self._preparing
         self._running.clear()
         self._preparing = None
-        # A SIGKILL comes from outside, perhaps from a neighbour; everything else it did by itself.
+        # A SIGKILL comes from outside, perhaps from another job; other exits are caused by the fork server itself.
         culprit = prepared if silent or death.code != -signal.SIGKILL or len(under_way) == 1 else None
         how = f"did not answer and {death.how}" if silent else death.how
-        if not self._alive:  # it cannot even start, and will not for any other
+        if not self._alive:  # it cannot even start
             under_way += [*self._suspects, *self._waiting]
             self._suspects.clear()
             self._waiting.clear()
@@ -164,11 +163,10 @@ class Supervisor:
                 self._suspects.append(job)
 
 
-# MERGED: A warm process that waits for jobs which come one by one, for a caller who has other things to do in between.
 class OnDemandRunner:
-    """Runs jobs as a session does, each in a process of its own; what was imported and built stays for the next.
+    """Runs single jobs on demand, each in a worker process; imports and built worlds are reused.
 
-    `entry` is how Python is called to be the warm process. A context, which ends that process.
+    `entry` are the Python arguments that start the fork server. Use as a context manager, which ends it.
     """
 
     def __init__(self, entry: Sequence[str]) -> None:
@@ -182,7 +180,7 @@ class OnDemandRunner:
         self.close()
 
     def run(self, job: Job) -> ProcessEnd | ForkServerDeath:
-        """Run it; how its process ended. Whatever is raised meanwhile (Ctrl-C) ends the warm process, too."""
+        """Run a job and return how its process ended. An exception, such as Ctrl-C, ends the fork server."""
         self._supervisor.add(job)
         if self._happenings is None:
             self._happenings = self._supervisor.happenings()
@@ -193,7 +191,7 @@ class OnDemandRunner:
             raise
 
     def close(self) -> None:
-        """End the warm process, if there is one."""
+        """End the fork server if it runs."""
         if self._happenings is not None:
             self._happenings.close()
             self._happenings = None

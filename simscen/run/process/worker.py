@@ -1,4 +1,4 @@
-"""The process of one run, from its first instruction to its last."""
+"""Worker process of one run."""
 
 import errno
 import faulthandler
@@ -23,27 +23,27 @@ from simscen.run.process.isolation import (
 from simscen.run.process.jobs import Job, json_line
 
 PROGRESS_INTERVAL_S = 5.0
-"""Simulated seconds between two signs of life."""
+"""Simulated time between two progress messages."""
 
 ExecuteJob = Callable[[Job, Callable[[float], None]], dict[str, Any]]
-"""Runs a job; is handed what to tell simulated seconds to; returns the end record."""
+"""Runs a job, reports progress in simulated seconds to a callback, and returns the end record."""
 
 
 _OUT_OF_MEMORY = {"error": "out-of-memory", "message": "the run used more memory than it may"}
 
 
 class WorkerPipes(NamedTuple):
-    """Where a worker tells how it goes, and where it prints; descriptors."""
+    """File descriptors for messages and for output of a worker."""
 
     report: int
     printed: int
 
 
 def run_worker(job: Job, parent: int, pipes: WorkerPipes, perform: ExecuteJob) -> NoReturn:
-    """Run the job, tell how it ended, and leave without looking back, whatever happens.
+    """Run the job, send the end record, and exit.
 
-    `os._exit` because nanobind and Bullet have nothing to say at the end that a user should read, and because nothing
-    may return into the warm process, of which this is a copy.
+    Uses `os._exit`, because the worker is a copy of the fork server and must not return into its code, and to suppress
+    exit messages of nanobind and Bullet.
     """
     code = 1
     try:
@@ -60,7 +60,7 @@ def run_worker(job: Job, parent: int, pipes: WorkerPipes, perform: ExecuteJob) -
 
 
 def _settle(parent: int, printed: int) -> None:
-    """Become a process of its own: session, output, limits, and a stack to show when it is asked for or crashes."""
+    """Set up session, signals, output, resource limits, and the fault handler."""
     os.setsid()
     die_with_parent(parent)
     adopt_orphans()
@@ -91,7 +91,7 @@ def _end_record(job: Job, report: int, perform: ExecuteJob) -> dict[str, Any]:
             return _OUT_OF_MEMORY
         return {"error": "output", "message": f"{error.strerror or error} writing {error.filename or job.folder}"}
     except Exception as error:
-        # The boundary of the process: whatever went wrong becomes this run's error, with the line it came from.
+        # The boundary of the process: any exception becomes the error of this run.
         traceback.print_exc()
         return {"error": "crashed", "message": f"{type(error).__name__}: {error} ({_innermost(error)})"}
 
@@ -106,7 +106,7 @@ def _tell(report: int, seconds: float) -> None:
 
 
 def _redirect_output(printed: int) -> None:
-    """Send what libraries print (also from C) to the run's own log, out of the command line's way."""
+    """Redirect standard output and error, also of C libraries, to the log of the run."""
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.dup2(printed, 1)
@@ -116,14 +116,14 @@ def _redirect_output(printed: int) -> None:
 
 
 class ProgressReporter:
-    """A log that only tells how far the run is."""
+    """A log that reports the progress of a run."""
 
     def __init__(self, tick_rate: int, tell: Callable[[float], None]) -> None:
         self._rate, self._tell = tick_rate, tell
         self._next = 0.0
 
     def append(self, moment: Moment) -> None:
-        """Tell now and then."""
+        """Report the simulated time at regular intervals."""
         seconds = moment.tick / self._rate
         if seconds >= self._next:
             self._next = seconds + PROGRESS_INTERVAL_S

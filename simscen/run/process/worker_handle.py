@@ -1,4 +1,4 @@
-"""A worker as the warm process sees it: its pipes, its deadline and its end."""
+"""Handle of a worker process in the fork server: its pipes, its deadline, and its exit."""
 
 import fcntl
 import json
@@ -13,23 +13,23 @@ from simscen.run.process.captured_output import READ_BYTES, CappedLog
 from simscen.run.process.jobs import Job
 
 MAX_MESSAGE_BYTES = 1 << 20
-"""Bytes of one message; a longer one is none of a worker's."""
+"""Longest valid message of a worker."""
 
 DUMP_TIME_S = 0.5
 TERM_GRACE_S = 2.0
-"""Seconds between SIGTERM and SIGKILL for a run that has exceeded its wall limit."""
+"""Time between SIGTERM and SIGKILL for a run that exceeded its wall limit."""
 
 TAIL_BYTES = 16_384
 _F_SETPIPE_SZ = 1031  # Linux; in Python's fcntl from 3.10 on only where it was built with it
 
 _ENDING = ((signal.SIGUSR1, DUMP_TIME_S), (signal.SIGTERM, TERM_GRACE_S), (signal.SIGKILL, TERM_GRACE_S))
-"""How a run beyond its limit is ended: the worker dumps its Python stack, may leave by itself, is killed."""
+"""Steps to end a run that exceeded its wall limit: dump the Python stack, terminate, kill."""
 
 Hear = Callable[[dict[str, Any]], None]
 
 
 class WorkerHandle:
-    """One worker. `hear` gets its signs of life; its last word is kept for `end`."""
+    """A worker process. `hear` receives its progress messages; its final message is kept for `end`."""
 
     def __init__(self, job: Job, pid: int, report: int, printed: int, log: CappedLog, hear: Hear) -> None:
         self.job, self.pid, self.pidfd, self.report, self.printed = job, pid, os.pidfd_open(pid), report, printed
@@ -45,7 +45,7 @@ class WorkerHandle:
             os.set_blocking(end, False)
 
     def listen(self) -> bool:
-        """Take in what the worker tells; False at the end of its pipe."""
+        """Read messages of the worker; return False at the end of the pipe."""
         data = os.read(self.report, READ_BYTES)
         self._words += data
         *lines, rest = self._words.split(b"\n")
@@ -55,13 +55,13 @@ class WorkerHandle:
         return bool(data)
 
     def read_print(self) -> bool:
-        """Take in what the worker prints; False at the end of its pipe."""
+        """Read output of the worker; return False at the end of the pipe."""
         data = os.read(self.printed, READ_BYTES)
         self._log.take(data)
         return bool(data)
 
     def _understand(self, text: bytes) -> None:
-        """Stray bytes of a library, or of memory gone wrong, are no message: a run without a last word is an error."""
+        """Parse a message. Ignore anything else, such as stray bytes of a library."""
         try:
             message = json.loads(text)
         except (ValueError, RecursionError):
@@ -73,7 +73,7 @@ class WorkerHandle:
                 self._hear({"job": self.job.number, "seconds": seconds})
 
     def press(self) -> None:
-        """Its time is up: take the next step to end it."""
+        """Take the next step to end a worker that exceeded its deadline."""
         how, patience = next(self._steps, _ENDING[-1])
         self._killed_for, self.deadline = "timeout", time.monotonic() + patience
         if how is signal.SIGUSR1:
@@ -82,25 +82,25 @@ class WorkerHandle:
             self.kill(how)
 
     def kill(self, how: signal.Signals = signal.SIGKILL) -> None:
-        """Signal the worker and all of its group."""
+        """Send a signal to the worker and its process group."""
         try:
             os.killpg(self.pid, how)
         except ProcessLookupError:
-            # It was killed before it could make its own group.
+            # It was killed before it created its own group.
             os.kill(self.pid, how)
 
     def let_go(self) -> None:
-        """Close what this process holds of it."""
+        """Close the file descriptors of the worker."""
         for descriptor in (self.pidfd, self.report, self.printed):
             os.close(descriptor)
 
     def end(self, status: int, cpu: float, peak_bytes: int) -> dict[str, Any]:
-        """Say how it ended, when it has been reaped and can write no more."""
+        """Return the exit message for the supervisor. Call this after the worker was reaped."""
         for read in (self.listen, self.read_print):
             try:
                 while read():
                     pass
-            except BlockingIOError:  # what it left behind holds the pipe open
+            except BlockingIOError:  # a process it left behind keeps the pipe open
                 pass
         self.let_go()
         self._log.close()
@@ -119,6 +119,6 @@ class WorkerHandle:
 
 
 def enlarge_pipe(pipe: int) -> None:
-    """Let a pipe hold more than 64 KiB, so that a run need not wait while the warm process prepares another."""
-    with suppress(OSError):  # the user's share of pipe memory is used up: it works with less, too
+    """Enlarge the buffer of a pipe, so that a worker need not wait while the fork server prepares a scenario."""
+    with suppress(OSError):  # the user's limit of pipe memory is reached; a smaller buffer works, too
         fcntl.fcntl(pipe, _F_SETPIPE_SZ, READ_BYTES)

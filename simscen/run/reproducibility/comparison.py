@@ -1,4 +1,4 @@
-"""A run beside the same run of an earlier session, perhaps on another machine."""
+"""Compare a run with the same run of an earlier session, possibly from another machine."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,10 +11,10 @@ from simscen.run.sessions.output_folder import run_folder
 
 
 def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
-    """The answer to a run; an error unless the session in the folder `earlier` has it with the same verdicts and way.
+    """Return the run, or an error if it differs from the same run of the session in the folder `earlier`.
 
-    Logs that are equal byte for byte agree; others by record.agreement, since last bits differ between machines. A run
-    that the earlier session does not have agrees with nothing.
+    Logs that are equal byte for byte agree. Other logs agree if verdicts and trajectories do (see record.agreement),
+    because the last bits differ between machines. A run that is missing in the earlier session is an error.
     """
     if run.result.outcome is Outcome.ERROR or not run.artifacts.mcap:
         return run
@@ -34,14 +34,14 @@ def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
 
 
 def _folder(run: RunFinished, earlier: Path) -> Path:
-    """Where the earlier session has it: a stack that is alone here may have been one of several there."""
+    """Return the folder of the run in the earlier session, which may have used several stacks."""
     stack = run.result.stack.partition("=")[0]
     labelled = run_folder(earlier, replace(run.key.first, stack_name=stack))
     return labelled if not run.key.first.stack_name and labelled.is_dir() else run_folder(earlier, run.key.first)
 
 
 def _disagreement(here: Path, there: Path) -> str | None:
-    """How two logs disagree. Raises InvalidInput for one that cannot be read."""
+    """Describe the first difference of two logs, or return None. Raises InvalidInput for an unreadable log."""
     from simscen.record.agreement import first_disagreement
     from simscen.record.replay import read_log
 

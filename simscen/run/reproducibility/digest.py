@@ -1,4 +1,4 @@
-"""Whether a scenario is still what it was: all that its runs depend on, as one number."""
+"""Digest of everything that the runs of a scenario depend on, and the files among it."""
 
 import hashlib
 import json
@@ -11,20 +11,19 @@ from simscen.loading.yaml.library import DEFAULTS_FILE
 from simscen.run.reproducibility.environment import (
     arithmetic_fingerprints,
     cpu_flags,
+    plugin_files,
     plugin_fingerprints,
     software_versions,
     source_digest,
 )
-from simscen.run.reproducibility.environment import plugin_files as plugin_files
 
 
 def scenario_digest(loaded: LoadedScenario) -> str:
-    """SHA-256 over the files that were read, the options that change a run, and what it is computed with.
+    """Return the SHA-256 of all files, options, versions, and processor features that affect a run.
 
-    Files are those of the language (`extends`, `defaults.yaml`, world, map and robot) and those their content names:
-    map images, SDF and URDF files, what these include, meshes, heightmaps, xacro's includes. A file that moves, or that
-    another folder of --world-path now offers first, changes it too, and so does an installed package whose types the
-    scenario uses. Raises OSError.
+    The files are the scenario with `extends`, `defaults.yaml`, world, map, and robot, and all files that these refer
+    to, such as map images, SDF and URDF files, meshes, heightmaps, and xacro includes. Moving a file changes the
+    digest, and so does a change of an installed package that the scenario uses. Raises OSError.
     """
     sha = hashlib.sha256(json.dumps(_circumstances(loaded), sort_keys=True).encode())
     for name, text in sorted(loaded.sources.items()):
@@ -35,7 +34,7 @@ def scenario_digest(loaded: LoadedScenario) -> str:
 
 
 def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
-    """What besides files decides how a run goes. The seed is part of a run's key."""
+    """Return everything besides files that affects a run. The seed is not included: it is part of the run's key."""
     return {
         "versions": software_versions(),
         "code": source_digest(),
@@ -50,7 +49,7 @@ def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
 
 
 def _stacks(loaded: LoadedScenario) -> dict[str, object]:
-    """What drives otherwise than the files say, or what they do not say."""
+    """Return stacks that were chosen on the command line or in the user's configuration."""
     return {
         **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
         **({} if loaded.runs is None else {"runs": loaded.runs.digest}),
@@ -59,7 +58,7 @@ def _stacks(loaded: LoadedScenario) -> dict[str, object]:
 
 
 def referenced_files(loaded: LoadedScenario) -> list[Path]:
-    """Map images, SDF and URDF files."""
+    """Return the map images, SDF files, and URDF files of a scenario."""
     views = list(loaded.each.values())
     maps = [loaded.world.map, *(view.map for view in views if view.map != "none")]
     return [
@@ -69,7 +68,7 @@ def referenced_files(loaded: LoadedScenario) -> list[Path]:
 
 
 def _name(file: Path, loaded: LoadedScenario) -> str:
-    """The file within the root, so that a project that is moved as a whole stays what it was."""
+    """Return the path relative to the root, so that moving a whole project does not change the digest."""
     return file.relative_to(loaded.root).as_posix() if file.is_relative_to(loaded.root) else str(file)
 
 
@@ -78,11 +77,10 @@ def _take(sha: "hashlib._Hash", name: str, data: bytes) -> None:
     sha.update(data)
 
 
-# MERGED: Every file that a scenario's runs depend on, for whoever waits until one of them is saved.
 def scenario_files(loaded: LoadedScenario) -> set[Path]:
-    """Its own file and what it extends, world, map, meshes, robot, stack files, the programs of its stacks, plug-ins.
+    """Return all files that a scenario depends on, including programs of external stacks and plug-ins.
 
-    A `defaults.yaml` that could stand beside it is among them, whether or not it is there.
+    A `defaults.yaml` next to the scenario is included even if it does not exist yet.
     """
     choice = loaded.choice
     programs = [part for view in loaded.each.values() if view.runs is not None for part in _program(view)]
@@ -99,7 +97,7 @@ def scenario_files(loaded: LoadedScenario) -> set[Path]:
 
 
 def _program(loaded: LoadedScenario) -> list[Path]:
-    """The files among the words of an external stack's command."""
+    """Return the files among the arguments of an external stack's command."""
     assert loaded.runs is not None
     words = [Path(loaded.runs.cwd, word) for word in loaded.runs.argv]
     return [word for word in words if word.is_file()]

@@ -1,4 +1,4 @@
-"""Which software and which processor a result comes from: with others, it may differ in its last bits."""
+"""Software, plug-ins, and processor features that affect the last bits of a result."""
 
 import hashlib
 import importlib
@@ -17,18 +17,18 @@ PACKAGES = (
     *("simscen", "pybullet", "ompl", "filterpy", "numpy", "scipy", "embreex", "trimesh", "mapbox-earcut", "pycollada"),
     *("pillow", "mcap", "zstandard", "pydantic", "pyyaml"),
 )
-"""Every package that simscen needs and that shapes a result or the bytes of a log."""
+"""Packages that affect results or the bytes of a log."""
 _LAST_BITS = frozenset({"fma", "avx", "avx2", "avx512f", "sse4_2"})
-"""The instruction sets that change last bits."""
+"""Instruction sets that affect the last bits of a result."""
 
 
 def software_versions() -> dict[str, str]:
-    """Python and the packages that shape results, by name; "" for one that is not installed."""
+    """Return the versions of Python and all packages that affect results; "" for a missing package."""
     return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
 
 
 def cpu_flags() -> list[str]:
-    """Which of the instruction sets that change last bits this machine has; nothing where Linux does not say."""
+    """Return the relevant instruction sets of this machine; empty if /proc/cpuinfo cannot be read."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -39,9 +39,9 @@ def cpu_flags() -> list[str]:
 
 @cache
 def arithmetic_fingerprints() -> dict[str, str]:
-    """Fingerprints of what the C library and numpy compute here: equal ones compute alike, down to the last bit.
+    """Return fingerprints of results of the C math library and numpy; equal fingerprints mean equal last bits.
 
-    They depend on the instructions that both choose at run time (`numpy` lists its own), which flags alone do not say.
+    Both libraries choose instructions at run time, so the processor flags alone are not sufficient.
     """
     import numpy as np
 
@@ -66,9 +66,9 @@ def _numpy_features() -> dict[str, bool]:
 
 @cache
 def source_digest(*rooms: str) -> str:
-    """SHA-256 of simscen's own files: an installation from a working copy changes without a new version.
+    """Return the SHA-256 of simscen's source files, because a working copy changes without a new version.
 
-    Of those in some `rooms` only, where any are named.
+    If `rooms` are given, only these subpackages count.
     """
     sha, folder = hashlib.sha256(), PACKAGE
     files = [path for room in rooms or (".",) for path in (folder / room).rglob("*")]
@@ -84,9 +84,8 @@ def _version(package: str) -> str:
         return ""
 
 
-# MERGED: What installed packages are, down to their files: a package in development changes without a new version.
 def plugin_packages(plugins: Iterable[Entry]) -> dict[str, dict[str, object]]:
-    """The packages by name, each with its version and what of it is used, for run.json."""
+    """Return version and used entry points by package, for run.json."""
     found: dict[str, dict[str, object]] = {}
     for entry in plugins:
         package = found.setdefault(entry.distribution, {"version": entry.version, "used": []})
@@ -97,7 +96,7 @@ def plugin_packages(plugins: Iterable[Entry]) -> dict[str, dict[str, object]]:
 
 
 def plugin_fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
-    """What of an installed package could change a run: its version, its class, and all of its files."""
+    """Return version, class, and digest of all files by plug-in."""
     return {
         f"{entry.group} {entry.name}": [entry.distribution, entry.version, entry.value, _files_digest(entry.value)]
         for entry in plugins
@@ -106,7 +105,7 @@ def plugin_fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
 
 @cache
 def _files_digest(value: str) -> str:
-    """SHA-256 over the files of the outermost package that the class is in; of its module alone where there is none."""
+    """Return the SHA-256 of the top-level package that contains the class, or of its module."""
     sha = hashlib.sha256()
     for name, file in _files(value):
         data = file.read_bytes()
@@ -115,7 +114,7 @@ def _files_digest(value: str) -> str:
 
 
 def plugin_files(plugins: Iterable[Entry]) -> list[Path]:
-    """The files of the outermost packages that their classes are in."""
+    """Return the files of the top-level packages that contain the plug-ins."""
     return [file for entry in plugins for _, file in _files(entry.value)]
 
 

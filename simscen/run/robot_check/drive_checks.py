@@ -1,4 +1,4 @@
-"""Does a robot drive what it is told, and does its odometry say so? Judged from one drive in an empty world."""
+"""Check a robot in a trial drive: does it follow its commands, and is its odometry correct?"""
 
 import math
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ STRAIGHT, SLIP = 0.02, 0.01
 HEADING, TILT = math.radians(2.0), math.radians(3.0)
 """rad: heading at the end of the line, and how far the base may lean at any time."""
 FITTING = 0.005
-"""Share by which a dimension that fits may be off."""
+"""Relative deviation of a dimension that needs no correction."""
 ROLLING = (0.02, 0.02, 0.02, 0.05)
 SKIDDING = (0.10, 0.03, 0.04, 0.50)
 """Angle turned over commanded, and over what the encoders say; end of the square by odometry from the true one, over
@@ -27,7 +27,7 @@ al., Experimental kinematics for wheeled skid-steer mobile robots, IROS 2007).""
 
 @dataclass(frozen=True)
 class DriveCheck:
-    """A figure that must not exceed its limit; both in `unit`. `advice` is what would mend it."""
+    """A measured value and its limit, both in `unit`. `advice` is a possible correction."""
 
     name: str
     value: float
@@ -37,13 +37,13 @@ class DriveCheck:
 
     @property
     def held(self) -> bool:
-        """Whether it is within its limit."""
+        """Whether the value is within its limit."""
         return self.value <= self.limit
 
 
 @dataclass(frozen=True)
 class RobotCheckResult:
-    """A robot that was driven once."""
+    """Results of all checks of a robot."""
 
     rest: RestingState
     trials: tuple[Trial, ...]
@@ -52,12 +52,12 @@ class RobotCheckResult:
 
     @property
     def failed(self) -> int:
-        """How many checks did not hold."""
+        """Number of failed checks."""
         return sum(not check.held for check in self.checks)
 
 
 def check_robot(body: RobotBody) -> RobotCheckResult:
-    """Drive a robot and judge it. Raises RunError when the physics loses it."""
+    """Drive a robot and check it. Raises RunError if the simulation becomes unstable."""
     rest, trials = run_trials(body)
     return RobotCheckResult(
         rest, trials, tuple(_checks(body, rest, {trial.name: trial for trial in trials})), climb_of(body)
@@ -94,7 +94,7 @@ def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> It
 
 
 def _share(name: str, value: float, right: float, limit: float, advice: str = "") -> DriveCheck:
-    """By how much a value differs from the right one, in per cent of that."""
+    """Return a check of the deviation from the correct value, in percent of it."""
     return DriveCheck(name, 100 * abs(value - right) / max(abs(right), 1e-9), 100 * limit, "%", advice)
 
 
@@ -103,7 +103,7 @@ def _degrees(angle: float) -> float:
 
 
 def _offset(body: RobotBody) -> str:
-    """Where the mass is: wheels that skid turn about a place nearer to it."""
+    """Describe the offset of the center of mass, which shifts the center of rotation of a skid-steer robot."""
     x, y, _ = body.chassis.centre.tolist()
     along = f"{abs(x):.3f} m {'ahead of' if x > 0 else 'behind'}"
     across = f"{abs(y):.3f} m to the {'left' if y > 0 else 'right'} of"
@@ -111,7 +111,7 @@ def _offset(body: RobotBody) -> str:
 
 
 def _radius_that_fits(drive: Drive, line: Trial) -> str:
-    """The wheel radius with which the encoders would have said the truth."""
+    """Return the wheel radius for which odometry would be correct."""
     radius = getattr(drive, "wheel_radius", None)
     if radius is None or line.odometry.driven <= 0:
         return ""
@@ -119,7 +119,7 @@ def _radius_that_fits(drive: Drive, line: Trial) -> str:
 
 
 def _track_that_fits(drive: Drive, turn: Trial, line: Trial) -> str:
-    """The effective track width with which the encoders would have said the truth, with the wheel radius that fits."""
+    """Return the effective track width for which odometry would be correct."""
     separation = getattr(drive, "wheel_separation", None)
     if separation is None or turn.truth.turned * turn.odometry.turned <= 0 or line.odometry.driven <= 0:
         return ""

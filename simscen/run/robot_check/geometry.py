@@ -1,4 +1,4 @@
-"""Where what a robot's files say of its geometry does not agree: all of it is warnings."""
+"""Check the geometry of a robot's file against its URDF."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,11 +16,11 @@ from simscen.sim.robot_body import RobotBody
 from simscen.sim.undercarriage import Wheel
 
 DIMENSION_TOLERANCE = 0.01
-"""Share by which a dimension of the drive may differ from the URDF's."""
+"""Relative difference from the URDF that a dimension of the drive may have."""
 
 
 def geometry_warnings(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, roots: tuple[Path, ...]) -> list[Problem]:
-    """Warnings about a robot with a URDF: other dimensions in its drive, wheels and casters off the ground."""
+    """Return warnings about a robot with a URDF: different dimensions, or wheels and casters off the ground."""
     if robot.urdf is None:
         return []
     from simscen.sim.urdf.body import tree_of_spec
@@ -32,7 +32,7 @@ def geometry_warnings(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, root
 
 
 def dimension_warnings(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]:
-    """Warnings about dimensions of the drive that are not those of the URDF."""
+    """Yield warnings about dimensions of the drive that differ from the URDF."""
     if robot.tree is None or robot.urdf is None:
         return
     drawn = _drawn(body.wheels)
@@ -47,7 +47,7 @@ def dimension_warnings(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]
 
 
 def _drawn(wheels: tuple[Wheel, ...]) -> dict[str, float]:
-    """Dimensions as the wheels have them."""
+    """Return the dimensions of the drive according to the wheels of the body."""
     driven = [wheel for wheel in wheels if wheel.driven]
     if not driven:
         return {}
@@ -61,9 +61,8 @@ def _drawn(wheels: tuple[Wheel, ...]) -> dict[str, float]:
     }
 
 
-# MERGED: What only building a robot can tell of its file.
 def robot_problems(file: RobotFile) -> list[Problem]:
-    """Why a robot cannot be used, or warnings about it; one of simple shapes need not be built."""
+    """Return errors and warnings about a robot that only building it reveals."""
     robot = file.robot
     try:
         if robot.urdf is not None:

@@ -1,4 +1,4 @@
-"""A robot driven once in an empty world: what it was told, what its encoders say and what is true."""
+"""Drive a robot in an empty world and record commands, odometry, and truth."""
 
 import math
 from collections.abc import Iterator
@@ -17,22 +17,22 @@ from simscen.worlds.meshing import fuse, triangulate
 
 TICK_RATE = 240
 PERIOD = TICK_RATE // FIRMWARE_RATE
-"""Ticks between two commands: each is reached before the next, so that no ramp of the firmware lags behind."""
+"""Ticks between two commands; each is reached before the next one."""
 RESTING, SETTLING = 240, 60
-"""Ticks at rest before the first trial, and after each leg."""
+"""Ticks at rest before the first trial and after each leg."""
 LINE, SIDE = 2.0, 1.0
-"""m of the straight line and of a side of the square."""
+"""Length of the straight line and of a side of the square, in m."""
 SPEED, TURN = 0.5, 1.0
-"""m/s and rad/s at most; and no more than SHARE of the robot's limits."""
+"""Largest speeds in m/s and rad/s; at most SHARE of the robot's limits."""
 SHARE, EFFORT = 0.8, 0.5
-"""Of the limits of speed, and of those of acceleration."""
+"""Fraction of the robot's limits of speed and of acceleration."""
 WIDER = 1.05
-"""A car's circle over its smallest: at the very end of the steering nothing could be corrected."""
+"""Radius of a car's circle relative to its smallest one, so that the steering can still correct."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A way from the origin: `driven` metres, `turned` rad anticlockwise, and the `path` of poses."""
+    """A motion from the origin: distance `driven` in m, angle `turned` in rad, and the `path` of poses."""
 
     driven: float
     turned: float
@@ -40,15 +40,15 @@ class Motion:
 
     @property
     def end(self) -> Pose2:
-        """Where it leads."""
+        """The last pose."""
         return self.path[-1]
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial: the same way as it was commanded, as the encoders say without any noise, and in truth.
+    """One trial: the motion as commanded, by noise-free odometry, and in truth.
 
-    `tilt` is by how many rad the base leaned away from how it rests, at most.
+    `tilt` is the largest angle in rad between the base and its orientation at rest.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class RestingState:
-    """A second at rest: `tilt` of the base in rad, `height` of its frame above the ground and how far it `crept`, m."""
+    """State after a second at rest: `tilt` in rad, `height` of the base frame and drift `crept` in m."""
 
     tilt: float
     height: float
@@ -69,7 +69,7 @@ class RestingState:
 
 @dataclass(frozen=True)
 class _Leg:
-    """From rest to rest: m forward, m to the left and rad, all at once."""
+    """A motion from rest to rest: m forward, m to the left, and rad, simultaneously."""
 
     forward: float = 0.0
     left: float = 0.0
@@ -77,9 +77,9 @@ class _Leg:
 
 
 def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
-    """At rest, a line of 2 m, a full turn (a car: its smallest circle), a square; a holonomic base also sideways.
+    """Drive a line, a full turn (a car: a circle), a square, and sideways if the base is holonomic.
 
-    Raises RunError when the physics loses the robot.
+    Raises RunError if the simulation becomes unstable.
     """
     simulation = Alone(fuse([]), [], body, Pose2(0.0, 0.0, 0.0), triangulate)
     try:
@@ -122,12 +122,12 @@ def _trial(simulation: Alone, body: RobotBody, name: str, legs: list[_Leg]) -> T
         pose = simulation.base_pose()
         true.to(start.between(pose.plane))
         most = max(most, _tilt(pose, level))
-    simulation.truth()  # tells when the physics has lost it
+    simulation.truth()  # raises RunError if the simulation became unstable
     return Trial(name, told.motion, reckoned.motion, true.motion, most)
 
 
 def _commands(leg: _Leg, body: RobotBody) -> Iterator[Twist]:
-    """A trapezoid of speed, in steps of the firmware's period, that sums up to the leg; then standing still."""
+    """Yield a trapezoidal velocity profile for a leg, then a stop."""
     model = robot_model(body)
     spans = [
         (leg.forward, min(SPEED, SHARE * model.max_linear), min(model.linear_acceleration, model.linear_deceleration)),
@@ -147,7 +147,7 @@ def _commands(leg: _Leg, body: RobotBody) -> Iterator[Twist]:
 
 
 class _Way:
-    """Poses one after the other."""
+    """Recorder of a motion."""
 
     def __init__(self) -> None:
         self._path, self._driven, self._turned = [Pose2(0.0, 0.0, 0.0)], 0.0, 0.0
@@ -167,11 +167,11 @@ class _Way:
 
 
 def _tilt(pose: Pose3, level: Pose3) -> float:
-    """The angle in rad between the upward axes of two poses whose headings do not matter."""
+    """Return the angle in rad between the upward axes of two poses."""
     return math.dist(_lean(pose), _lean(level))
 
 
 def _lean(pose: Pose3) -> tuple[float, float]:
-    """How far the upward axis leans forward and to the left of the base: small angles in rad."""
+    """Return the lean of the upward axis forward and to the left, in rad (small angles)."""
     x, y, z, w = pose.quaternion
     return 2 * (w * y - z * x), -2 * (w * x + y * z)

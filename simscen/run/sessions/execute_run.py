@@ -1,4 +1,4 @@
-"""One run of a session in its own process: simulate it and leave its files in its folder."""
+"""Execute one run of a session and write its files."""
 
 import gc
 import hashlib
@@ -17,25 +17,24 @@ from simscen.run.simulate import simulate
 from simscen.sim.alone import NAMELESS
 
 GC_THRESHOLD = 20_000
-"""So many more objects than before, and Python looks for garbage in a run's process, which hardly makes any. Its own
-700 are what moments hold that wait: thirty searches a minute of the patrol, a hundred where twenty carts drive.
+"""Threshold of garbage collection in a worker. Runs create hardly any cycles; the default of 700 wastes time.
 """
 
 WriteExtras = Callable[[PreparedScenario, Run, Path], None]
-"""What is made of a run in its folder besides its log and its result, e.g. a picture."""
+"""Writes further files of a run, for example a picture."""
 
 
 def execute_run(
     prepared: PreparedScenario, seed: int, folder: Path, logs: tuple[Log, ...], finish: WriteExtras
 ) -> dict[str, Any]:
-    """Do the run and leave run.mcap, result.json, scenario.yaml and what `finish` makes in `folder`.
+    """Execute a run and write run.mcap, result.json, scenario.yaml, and the files of `finish` to `folder`.
 
-    What an external stack prints goes to stack.log there, what it says of itself to stack.json; of several robots, to
+    The output of an external stack goes to stack.log and its description to stack.json; with several robots, to
     stack.ROBOT.log and stack.ROBOT.json.
 
-    Returns the end record: the outcome and the log's SHA-256, for the supervisor.
+    Returns the end record for the supervisor: the outcome and the SHA-256 of the log.
     """
-    if not prepared.plugins:  # code of others may make any amount
+    if not prepared.plugins:  # plug-ins can create any amount of garbage
         gc.set_threshold(GC_THRESHOLD)
     log = folder / "run.mcap"
     (folder / "scenario.yaml").write_text(log_header(prepared, seed).scenario, encoding="utf-8")

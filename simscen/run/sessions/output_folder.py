@@ -1,4 +1,4 @@
-"""The output folder of a session: made at the start, so that an unusable one is known before anything runs."""
+"""Output folder of a session, created before the first run starts."""
 
 import os
 import secrets
@@ -12,13 +12,13 @@ from simscen.core.records.run_result import RunKey
 
 DEFAULT_FOLDER = Path("simscen-out")
 RUNS_FOLDER = "runs"
-"""What every run's folder lies below, so that no scenario's name is that of a report."""
+"""Folder of all run folders, so that no scenario name collides with a report."""
 
 
 def create_output_folder(out: Path | None) -> Path:
-    """The folder `out`, which must be new or empty, or simscen-out/<UTC time>-<4 hex>, to which `latest` then links.
+    """Create the folder `out`, which must be new or empty, or simscen-out/<UTC time>-<4 hex> with a link `latest`.
 
-    Raises UsageError when it cannot be made or written to; what is in it is never touched.
+    Raises UsageError if it cannot be created or written to. Existing files are never changed.
     """
     folder = out or DEFAULT_FOLDER / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}"
     try:
@@ -34,12 +34,12 @@ def create_output_folder(out: Path | None) -> Path:
 
 
 def run_folder(folder: Path, key: RunKey) -> Path:
-    """Where a run of the session in `folder` leaves its files."""
+    """Return the folder of a run in the session in `folder`."""
     return folder / RUNS_FOLDER / key.scenario / key.folder
 
 
 def probe_writable(path: Path) -> None:
-    """Raise OSError unless a plain file can be written at `path`; leaves no trace."""
+    """Raise OSError unless a regular file can be written at `path`. Leaves no file behind."""
     require_regular_file(path)
     existed = path.exists()
     with path.open("ab"):
@@ -49,9 +49,9 @@ def probe_writable(path: Path) -> None:
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Replace a file as a whole: whoever reads it sees the old one or the new one, even after a crash.
+    """Replace a file atomically, so that readers see the old or the new content, even after a crash.
 
-    Raises OSError, also where something other than a plain file would be replaced.
+    Raises OSError, also if the target is not a regular file.
     """
     require_regular_file(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -69,11 +69,11 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def _link_latest(folder: Path) -> None:
-    """`latest` beside the folder; a file system without links does without."""
+    """Link `latest` to the folder if the file system supports links."""
     link = folder.parent / "latest"
     part = folder.parent / f".latest.{os.getpid()}"
     if link.exists() and not link.is_symlink():
-        return  # someone's own
+        return  # a file of the user
     with suppress(OSError):
         part.symlink_to(folder.name)
         try:

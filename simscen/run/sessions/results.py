@@ -1,4 +1,4 @@
-"""What the end of a process says about its run."""
+"""Build the result of a run from the end of its process, and the command that repeats it."""
 
 import os
 import shlex
@@ -19,11 +19,11 @@ from simscen.run.process.isolation import MAX_MEMORY_BYTES
 from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd
 
 MAX_RECOVER_BYTES = 64 << 20
-"""Bytes of a log that is made whole while other runs wait to be heard: a second or two."""
+"""Largest log that is recovered during the session; larger ones would delay other runs."""
 
 
 def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
-    """The answer to a run. It passed or failed only if its process ended by itself, with status 0 and a last word."""
+    """Return the result of a run; an error unless its process exited with status 0 and a final message."""
     failure = _with_log(_failure(end), job.folder)
     printed = output_tail(end.printed)
     result = (
@@ -42,25 +42,25 @@ def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
 
 
 def unfinished_run(job: Job, failure: RunFailure) -> RunFinished:
-    """The answer to a run that was never finished, or never begun."""
+    """Return the result of a run that did not finish or did not start."""
     result = error_result(job.key, job.scenario.path, failure, job.scenario.stack)
     return _told(job, result)
 
 
 def skipped_run(job: Job, reason: str) -> RunFinished:
-    """The answer to a run that its scenario says to skip."""
+    """Return the result of a run whose scenario has `skip`."""
     result = skipped_result(job.key, job.scenario.path, reason, job.scenario.stack)
     return _told(job, result)
 
 
 def _told(job: Job, result: RunResult) -> RunFinished:
-    """The answer to a run that never began, or was never finished."""
+    """Return the result of a run without a log."""
     again, file = repeat_command(job.scenario, job.key.seed), shown(job.scenario.file)
     return RunFinished(result, again=again, file=file, tags=tuple(job.scenario.spec.tags))
 
 
 def _result(job: Job, said: str) -> RunResult:
-    """What the run says of itself. Its second performance says the same as the first, so the key is ours to give."""
+    """Read result.json of a run. The key is replaced, since the second run of a pair stores the key of the first."""
     try:
         return replace(from_json((job.folder / "result.json").read_text(encoding="utf-8")), key=job.key)
     except (OSError, ValueError) as error:
@@ -102,7 +102,7 @@ def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
 
 
 def _with_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
-    """The same, with where the log of what happened until then is. What the worker could not finish is finished now."""
+    """Add the location of the partial log to a failure, and recover the log."""
     log = folder / f"run{PARTIAL_SUFFIX}"
     if failure is None or not log.exists():
         return failure
@@ -124,14 +124,13 @@ def _fault(end: ProcessEnd, message: str, kind: str = "crashed") -> RunFailure:
 
 
 def _place(end: ProcessEnd | ForkServerDeath) -> str:
-    """Where it was, if it had time to say so."""
+    """Return the innermost Python frame, if a stack was dumped."""
     place = innermost_frame(end.printed)
     return f", in {place}" if place else ""
 
 
-# MERGED: How to repeat a run: the command that does, from where we are.
 def repeat_command(scenario: LoadedScenario, seed: int) -> str:
-    """The command that repeats a run, called from the working folder. Options are named only where they matter."""
+    """Return the command that repeats a run from the working folder, with only the necessary options."""
     words = ["simscen", "run", shown(scenario.file), "--seed", str(seed)]
     if scenario.variation:
         words += ["--variation", scenario.variation]
@@ -149,5 +148,5 @@ def _seen_from_here(choice: StackChoice) -> str:
 
 
 def shown(path: Path) -> str:
-    """A file or folder as seen from the working folder, or absolute where that is shorter."""
+    """Return a path relative to the working folder, or the absolute path if it is shorter."""
     return min(os.path.relpath(path), str(path), key=len)

@@ -1,4 +1,4 @@
-"""A session: many runs, each answered exactly once, told to whoever listens."""
+"""Run a session: plan the runs, supervise their processes, and report exactly one result for each."""
 
 import filecmp
 from collections.abc import Sequence
@@ -22,11 +22,12 @@ from simscen.run.sessions.results import finished_run, skipped_run, unfinished_r
 
 @dataclass(frozen=True)
 class SessionOptions:
-    """How to run. `seed` None = each scenario's own; `repeat` runs use consecutive seeds.
+    """Options of a session.
 
-    `twice` runs everything a second time with the same seed, to compare; `against` is the output folder of an earlier
-    session to compare with. `wall_limit` in seconds bounds each run. `only` are the keys of all that is to be run, with
-    their seeds; None = everything. `replay` says which runs get a page that plays them.
+    `seed` None stands for each scenario's own seed; `repeat` runs use consecutive seeds. `twice` runs everything a
+    second time with the same seed and compares. `against` is the output folder of an earlier session to compare with.
+    `wall_limit` limits each run, in seconds. `only` restricts the session to these keys. `replay` selects the runs
+    that get a replay page.
     """
 
     workers: int = 1
@@ -41,7 +42,7 @@ class SessionOptions:
 
 
 def scenario_seeds(scenario: LoadedScenario, options: SessionOptions) -> range:
-    """The seeds that a scenario is run with. Raises UsageError when they lead beyond the largest there is."""
+    """Return the seeds of a scenario. Raises UsageError if one exceeds the largest seed."""
     first = options.seed if options.seed is not None else scenario.spec.seed
     if first + options.repeat - 1 > LARGEST_SEED:
         told = f"{options.repeat} runs of {scenario.title} from seed {first} on"
@@ -50,7 +51,7 @@ def scenario_seeds(scenario: LoadedScenario, options: SessionOptions) -> range:
 
 
 def plan_jobs(scenarios: Sequence[LoadedScenario], options: SessionOptions, out: Path) -> list[Job]:
-    """All runs of a session in the order they are started: variation by variation, seed by seed, stack by stack."""
+    """Return all runs of a session in the order in which they start: by scenario, seed, variation, and stack."""
     jobs: list[Job] = []
     skipped = [scenario for scenario in scenarios if scenario.spec.skip is not None]
     scenarios = [scenario for scenario in scenarios if scenario.spec.skip is None]
@@ -65,7 +66,7 @@ def plan_jobs(scenarios: Sequence[LoadedScenario], options: SessionOptions, out:
                     jobs.append(
                         Job(len(jobs), scenario, each, run_folder(out, each), options.wall_limit, options.replay)
                     )
-    # Once each, whatever the number of seeds, and behind the others: twins are told by their numbers.
+    # Once each and after all others, because twins are identified by their job numbers.
     for scenario in skipped if options.only is None else ():
         key = scenario.key(scenario_seeds(scenario, options)[0])
         jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), options.wall_limit))
@@ -73,7 +74,7 @@ def plan_jobs(scenarios: Sequence[LoadedScenario], options: SessionOptions, out:
 
 
 def _seeds(title: str, scenario: LoadedScenario, options: SessionOptions) -> Sequence[int]:
-    """The seeds to run a scenario with, those of `only` where that is given."""
+    """Return the seeds of a scenario, restricted to `only` if that is given."""
     if options.only is None:
         return scenario_seeds(scenario, options)
     return sorted({key.seed for key in options.only if key.test == title})
@@ -82,9 +83,9 @@ def _seeds(title: str, scenario: LoadedScenario, options: SessionOptions) -> Seq
 def run_session(
     jobs: Sequence[Job], options: SessionOptions, entry: Sequence[str], listen: Listener
 ) -> tuple[list[RunFinished], Exit | None]:
-    """Do all jobs; every one of them is answered, in the order they finish, whatever happens.
+    """Run all jobs and report exactly one result for each, in the order in which they finish.
 
-    Returns the answers and, when the session was interrupted, the exit code that says so.
+    Returns the results, and the exit code if the session was interrupted.
     """
     answers: dict[int, RunFinished] = {}
     begun: set[int] = set()
@@ -125,7 +126,7 @@ def run_session(
 
 
 def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:
-    """The answer to the later of two runs that should be equal: an error that names where their logs part."""
+    """Return the second of two runs with equal seed, as an error with the first difference if their logs differ."""
     if twin is None or not run.artifacts.mcap or not twin.artifacts.mcap:
         return run
     if filecmp.cmp(run.artifacts.mcap, twin.artifacts.mcap, shallow=False):

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from simscen.cli.session.selection import Selection, load_all
-from simscen.run import scenario_digest as module
+from simscen.run.reproducibility import digest as module
 from simscen.run.reproducibility.digest import scenario_digest
 
 SCENARIO = """\
@@ -190,7 +190,7 @@ def test_every_scenario_in_a_world_knows_all_files_of_it(project: Path, of: Dige
     assert {"model.sdf", "crate.stl", "hill.png", "cart.xacro", "size.xacro", "mast.stl"} <= {f.name for f in first}
 
 
-@pytest.mark.parametrize("what", ["versions", "cpu_flags", "arithmetic", "code"])
+@pytest.mark.parametrize("what", ["software_versions", "cpu_flags", "arithmetic_fingerprints", "source_digest"])
 def test_software_and_processor_matter(of: Digest, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
     """Another release of Bullet, other vector instructions or another simscen may change last bits."""
     before = of()

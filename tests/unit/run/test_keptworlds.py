@@ -79,6 +79,6 @@ def test_another_world_another_goal_and_another_robot_have_ways_of_their_own(tmp
 def test_results_of_other_code_are_not_used(monkeypatch) -> None:
     before = scenario_cache.cache_key("map", 1.0)
     scenario_cache._circumstances.cache_clear()
-    monkeypatch.setattr(scenario_cache, "code", lambda *rooms: "of another version")
+    monkeypatch.setattr(scenario_cache, "source_digest", lambda *rooms: "of another version")
     assert scenario_cache.cache_key("map", 1.0) != before
     scenario_cache._circumstances.cache_clear()

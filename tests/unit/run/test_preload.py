@@ -20,7 +20,7 @@ pass: [{goals_reached: {}}]
 PROGRAM = """\
 import sys
 from pathlib import Path
-from simscen.cli import warm_process
+from simscen.cli.session import warm_process
 from simscen.loading.scenario import load_scenario
 from simscen.run.process.jobs import Job
 from simscen.stack.costmap import inflation_layer, static_layer

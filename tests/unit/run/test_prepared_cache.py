@@ -18,7 +18,7 @@ variations: {grid: {robot.pose.x: [1, 2, 3]}}
 
 
 def test_variations_of_one_world_build_it_once_and_keep_only_the_last(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(scenario_cache, "MOST", 2)
+    monkeypatch.setattr(scenario_cache, "MAX_SCENARIOS", 2)
     (tmp_path / "a.scenario.yaml").write_text(TEXT)
     variations = try_variations(tmp_path / "a.scenario.yaml", tmp_path)
     assert isinstance(variations, tuple)

@@ -36,7 +36,7 @@ def carts() -> list[Body]:
 
 def test_a_scan_is_that_of_a_scene_that_was_told_of_everything(simulate, monkeypatch) -> None:
     """Whoever else looks, from wherever and however far; also once something is given a script."""
-    monkeypatch.setattr(ray_caster, "STRAY", 0.5)
+    monkeypatch.setattr(ray_caster, "REFRESH_DISTANCE_M", 0.5)
     simulation, chance = simulate(solids=[WALL], bodies=carts(), drive=(0.02, 0.0, 0.1)), np.random.default_rng(2)
     robot, told = simulation.robot, RayScene(fuse([WALL]))
     rays, watched = (LiveRayCaster(RayScene(fuse([WALL])), robot) for _ in range(2))

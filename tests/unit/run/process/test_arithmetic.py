@@ -7,9 +7,9 @@ import sys
 SHOWN = "from simscen.run.reproducibility.environment import arithmetic; print(arithmetic())"
 BOTH = f"""
 import subprocess, sys
-from simscen.run.process.isolation import environment
+from simscen.run.process.isolation import clean_environment
 {SHOWN}
-print(subprocess.run([sys.executable, "-c", {SHOWN!r}], env=environment(), capture_output=True, text=True).stdout)
+print(subprocess.run([sys.executable, "-c", {SHOWN!r}], env=clean_environment(), capture_output=True, text=True).stdout)
 """
 CHOSEN = {
     "OPENBLAS_CORETYPE": "Prescott",

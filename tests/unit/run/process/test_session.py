@@ -136,7 +136,7 @@ def test_neighbours_of_a_world_whose_preparation_crashes_are_answered_once_and_p
 
 
 def test_a_preparation_that_hangs_in_c_is_a_timeout_with_its_stack(session, monkeypatch):
-    monkeypatch.setattr(supervisor, "SILENCE", 2.0)
+    monkeypatch.setattr(supervisor, "MAX_SILENCE_S", 2.0)
     answers, _ = session("prepare-hang", "fine", wall_limit=1.0)
     assert answers["prepare-hang"].result.error.kind == "timeout"
     assert ", in prepare (faulty_zygote.py:" in answers["prepare-hang"].result.error.message
@@ -145,7 +145,7 @@ def test_a_preparation_that_hangs_in_c_is_a_timeout_with_its_stack(session, monk
 
 @pytest.mark.slow
 def test_a_warm_process_that_is_stopped_is_replaced(session, monkeypatch):
-    monkeypatch.setattr(supervisor, "SILENCE", 2.0)
+    monkeypatch.setattr(supervisor, "MAX_SILENCE_S", 2.0)
     answers, _ = session("stop-parent", "fine")
     assert "did not answer and was killed" in answers["stop-parent"].result.error.message
     assert answers["fine"].outcome is Outcome.PASSED
