@@ -34,7 +34,7 @@ class VelocitySmoother(Spec):
     """Of its turn rate; default: what the controller commands."""
     counter_turn_slip: bool = True
     """Whether the turn is taken off the command that wheels of which one side slips more add to it, as the gyroscope
-    shows; with the localizer `ekf` only. Nav2 does not."""
+    shows; with the localizers `ekf` and `slip_ekf` only. Nav2 does not."""
 
 
 class CollisionMonitor(Spec):

@@ -115,38 +115,38 @@ class Amcl(AmclParameters):
     type: Literal["amcl"] = "amcl"
 
 
-class Ekf(LocalizerSpec):
-    """Odometry and gyroscope in an extended Kalman filter; no map, so it drifts."""
+class EkfParameters(LocalizerSpec):
+    """Noise of wheel odometry and gyroscope."""
 
-    component: ClassVar[str] = "simscen.advanced.localizers.build:slip_ekf"
     fuses_odometry: ClassVar[bool] = True
-    type: Literal["ekf"]
     translation_noise: Annotated[NonNegativeLength, Field(le=100)] = 0.02
-    """Standard deviation of the position after one metre."""
+    """Standard deviation of the position after one meter."""
     rotation_noise: NonNegativeAngle = 0.02
-    """Standard deviation of the heading after one rad or one metre."""
+    """Standard deviation of the heading after one rad or one meter."""
     gyro_noise: NonNegativeAngularSpeed = 0.005
-    """Standard deviation of the turn rate."""
+    """Standard deviation of the yaw rate."""
     gyro_bias: NonNegativeAngularSpeed | None = None
-    """Standard deviation of the gyroscope's bias at the start; default: as `gyro_noise`."""
+    """Standard deviation of the gyroscope's bias at the start; default: the same as `gyro_noise`."""
     gyro_bias_walk: NonNegativeAngularSpeed = 0.0001
-    """Standard deviation of how far the bias has wandered after a second."""
-    wheel_slip: Probability = 0.0
-    """Standard deviation of the share of its way by which a robot slips; a slip lasts about a second."""
-    match_scans: bool = False
-    """Correct how far odometry says that the robot came by how each scan fits those of the last metres: a laser scan
-    matcher beside wheels and gyroscope. The covariance stays that of the wheels."""
+    """Standard deviation of the change of the bias within one second."""
+
+
+class Ekf(EkfParameters):
+    """Extended Kalman filter of odometry and gyroscope, as in robot_localization. Uses no map, so it drifts."""
+
+    component: ClassVar[str] = "simscen.stack.localizers.build:ekf"
+    type: Literal["ekf"]
 
 
 class GroundTruth(LocalizerSpec):
-    """The true pose, to tell faults of localisation from faults of navigation."""
+    """The true pose, to separate faults of localization from faults of navigation."""
 
     component: ClassVar[str] = "simscen.stack.localizers.build:ground_truth"
     type: Literal["ground_truth"]
 
 
 class OdometryOnly(LocalizerSpec):
-    """Dead reckoning from the start pose."""
+    """Dead reckoning from the initial pose."""
 
     component: ClassVar[str] = "simscen.stack.localizers.build:odometry"
     type: Literal["odometry"]
@@ -159,7 +159,8 @@ _Localizers = Annotated[
     | Annotated[Ekf, Tag("ekf")]
     | Annotated[GroundTruth, Tag("ground_truth")]
     | Annotated[OdometryOnly, Tag("odometry")]
-    | Annotated[LocalizerSpec, LazySpec("simscen.advanced.localizers.spec", "ScanMatchingAmcl"), Tag(DEFAULT_TYPE)],
+    | Annotated[LocalizerSpec, LazySpec("simscen.advanced.localizers.spec", "ScanMatchingAmcl"), Tag(DEFAULT_TYPE)]
+    | Annotated[LocalizerSpec, LazySpec("simscen.advanced.localizers.spec", "SlipEkf"), Tag("slip_ekf")],
     Discriminator(type_discriminator(DEFAULT_TYPE)),
 ]
 
@@ -174,4 +175,5 @@ LOCALIZERS = {
     "ground_truth": _HERE + "GroundTruth",
     "odometry": _HERE + "OdometryOnly",
     "scan_matching_amcl": "simscen.advanced.localizers.spec:ScanMatchingAmcl",
+    "slip_ekf": "simscen.advanced.localizers.spec:SlipEkf",
 }

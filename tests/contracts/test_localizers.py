@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.spec import ScanMatchingAmcl
+from simscen.advanced.localizers.spec import ScanMatchingAmcl, SlipEkf
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.localization import Estimate
@@ -23,7 +23,8 @@ SPECS: dict[str, LocalizerSpec] = {
     "amcl recovering": Amcl(recovery_alpha_slow=0.001, recovery_alpha_fast=0.1),
     "amcl cocksure": Amcl(laser_model_type="likelihood_field_prob", z_rand=0.0, sigma_hit=0.001, max_beams=2000),
     "ekf": Ekf(type="ekf"),
-    "ekf with laser odometry": Ekf(type="ekf", match_scans=True),
+    "slip_ekf": SlipEkf(type="slip_ekf"),
+    "slip_ekf with laser odometry": SlipEkf(type="slip_ekf", match_scans=True),
     "ekf noiseless": Ekf(type="ekf", translation_noise=0.0, rotation_noise=0.0, gyro_noise=0.0),
     "ground_truth": GroundTruth(type="ground_truth"),
     "odometry": OdometryOnly(type="odometry"),

@@ -11,7 +11,6 @@ from simscen.advanced.localizers.scan_matching_amcl import ScanMatchingAmclLocal
 from simscen.advanced.localizers.tempered_likelihood import TemperedLikelihoodField, beyond_the_map
 from simscen.core.decorators import cached_on_instance
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.model.localizers import Ekf
 from simscen.stack.localizers.build import beam_skipping, motion_model, sensor_model
 from simscen.stack.localizers.dead_reckoning import DeadReckoning
 from simscen.stack.localizers.likelihood_field import SensorModel, obstacle_field
@@ -33,7 +32,7 @@ def scan_matching_amcl(spec: model.ScanMatchingAmcl, setting: Setting) -> Locali
     return ScanMatchingAmclLocalizer(spec, particles, motion, setting.estimate, tick_rate, search, residuals)
 
 
-def slip_ekf(spec: Ekf, setting: Setting) -> Localizer:
+def slip_ekf(spec: model.SlipEkf, setting: Setting) -> Localizer:
     """Return an extended Kalman filter of odometry and gyroscope that detects wheel slip."""
     from simscen.advanced.localizers.slip_ekf import SlipEkfLocalizer
 

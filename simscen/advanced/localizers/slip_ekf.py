@@ -11,10 +11,10 @@ import numpy as np
 from simscen.advanced.localizers.laser_odometry import LaserOdometry
 from simscen.advanced.localizers.slip_detector import SlipDetector
 from simscen.advanced.localizers.slip_model import AHEAD, BIAS, LEVER, PUSHED, RATE, Model, Step, motion, moved, rates
+from simscen.advanced.localizers.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.localization import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
-from simscen.model.localizers import Ekf
 from simscen.stack.localizers.dead_reckoning import start_of
 from simscen.stack.odometry_history import believable
 
@@ -35,7 +35,7 @@ class SlipEkfLocalizer:
     robot got is as uncertain as it was fast.
     """
 
-    def __init__(self, spec: Ekf, estimate: Estimate, tick_rate: int) -> None:
+    def __init__(self, spec: SlipEkf, estimate: Estimate, tick_rate: int) -> None:
         self._spec, self._tick_rate = spec, tick_rate
         self.reset(estimate)
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simscen.advanced.localizers.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2
-from simscen.model.localizers import Ekf
 
 X, Y, YAW, RATE, BIAS, AHEAD, ASIDE = range(7)
 """The state: pose in the map, turn rate, the gyroscope's bias, and slip: the speed ahead and aside that no wheel sees,
@@ -51,7 +51,7 @@ class Model:
     q: Array
 
 
-def rates(spec: Ekf, step: Step, noise: float, slipped: bool) -> Model:
+def rates(spec: SlipEkf, step: Step, noise: float, slipped: bool) -> Model:
     """What becomes of turn rate, bias and slip from one step to the next.
 
     `noise`: variance of the turn rate that the wheels say. `slipped`: they did not hold in the step before.
@@ -76,7 +76,7 @@ def moved(state: Array, step: Step) -> Array:
     return after
 
 
-def motion(spec: Ekf, state: Array, step: Step) -> Model:
+def motion(spec: SlipEkf, state: Array, step: Step) -> Model:
     """How the errors of the state before a step become those of the pose after it."""
     dx, dy = _way(state, step)
     c, s = _along(state, step)

@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from simscen.model.localizers import AmclParameters
+from simscen.model.localizers import AmclParameters, EkfParameters
 from simscen.spec.quantities import Length, NonNegativeLength, Probability
 
 PARAMETER_SETS: Mapping[str, Mapping[str, object]] = {
@@ -59,3 +59,15 @@ class ScanMatchingAmcl(AmclParameters):
         name = values.get("parameters") if isinstance(values, Mapping) else None
         chosen = PARAMETER_SETS.get(name) if isinstance(name, str) else None
         return {**chosen, **values} if chosen else values
+
+
+class SlipEkf(EkfParameters):
+    """EKF of odometry and gyroscope that detects wheel slip in turns, with optional laser odometry. Uses no map."""
+
+    component: ClassVar[str] = "simscen.advanced.localizers.build:slip_ekf"
+    type: Literal["slip_ekf"]
+    wheel_slip: Probability = 0.0
+    """Standard deviation of the share of the distance by which the robot slips; a slip lasts about one second."""
+    match_scans: bool = False
+    """Correct the distance by matching each scan with those of the last meters. The covariance stays that of the
+    wheels."""

@@ -19,7 +19,7 @@ DWA = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
 
 START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
 
-WHEELS = "type: ekf, rotation_noise: 0.5"
+WHEELS = "type: slip_ekf, rotation_noise: 0.5"
 """As the Jackal's own robot_localization: wheels for the way, the gyroscope for turns, of which skidding wheels know
 little."""
 LOCALIZER = f"{{{WHEELS}, match_scans: true}}"

@@ -33,6 +33,13 @@ def amcl(spec: model.Amcl, setting: Setting) -> Localizer:
     return AmclLocalizer(spec, particle_filter, motion, setting.estimate, setting.surroundings.tick_rate)
 
 
+def ekf(spec: model.Ekf, setting: Setting) -> Localizer:
+    """Return an extended Kalman filter of odometry and gyroscope."""
+    from simscen.stack.localizers.ekf import EkfLocalizer
+
+    return EkfLocalizer(spec, setting.estimate, setting.surroundings.tick_rate)
+
+
 def ground_truth(_spec: model.GroundTruth, setting: Setting) -> Localizer:
     """Return a localizer that reports the true pose."""
     return GroundTruthLocalizer(setting.estimate)

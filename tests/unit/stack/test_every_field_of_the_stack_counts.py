@@ -17,7 +17,7 @@ import scenes
 from pydantic import BaseModel, ValidationError
 from scenes import Scene
 
-from simscen.advanced.localizers.spec import ScanMatchingAmcl
+from simscen.advanced.localizers.spec import ScanMatchingAmcl, SlipEkf
 from simscen.model import checkers, costmaps, guards, localizers, planners
 from simscen.model import recovery as behaviors
 from simscen.model.controllerspec import ControllerSpec
@@ -89,7 +89,6 @@ PARTS = [
         "alpha5": ((plain_amcl(robot_model="omni"), scenes.moved),),
         "min_particles": ((plain_amcl(min_particles=20), scenes.moved),),
         "selective_resampling": ((plain_amcl(max_beams=5), scenes.moved),),
-        **dict.fromkeys(("pf_err", "pf_z"), ((plain_amcl(max_particles=3000), scenes.unknown),)),
         "recovery_alpha_slow": ((plain_amcl(**LOST, recovery_alpha_fast=0.9), scenes.kidnapped),),
         "recovery_alpha_fast": ((plain_amcl(**LOST, recovery_alpha_slow=0.01), scenes.kidnapped),),
         **dict.fromkeys(("z_short", "z_max", "lambda_short"), ((plain_amcl(laser_model_type="beam"), scenes.moved),)),
@@ -117,6 +116,7 @@ PARTS = [
     }, {"laser_min_range": [0.5, 1.5], "laser_max_range": [0.5, 1.5], "min_particles": [100],
         "laser_likelihood_max_dist": [0.2]}),
     Part(("localizer",), localizers.Ekf, (({"localizer": {"type": "ekf"}}, scenes.slipped),)),
+    Part(("localizer",), SlipEkf, (({"localizer": {"type": "slip_ekf"}}, scenes.slipped),)),
     Part(("costmap",), costmaps.Costmap, SEEN, {
         "rolling_size": ((SMALL, scenes.no_map),),
         **dict.fromkeys(SEEN_BY_A_CAMERA, ((TRUTH, scenes.seen_by_a_camera),)),
@@ -186,6 +186,8 @@ ELSEWHERE = {
     "ClearCostmap.clear_entirely": "tests/unit/stack/behaviors/test_motions.py",
     "Recovery.retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",
     "VelocitySmoother.counter_turn_slip": "tests/unit/stack/test_slipping_wheels.py",
+    "Amcl.pf_err": "tests/unit/stack/localizers/test_kld.py",
+    "Amcl.pf_z": "tests/unit/stack/localizers/test_kld.py",
     "ScanMatchingAmcl.sure_update_interval": "tests/unit/advanced/localizers/test_scan_matching_amcl.py",
     # Whoever makes goals reads these.
     "SimpleGoalChecker.xy_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",

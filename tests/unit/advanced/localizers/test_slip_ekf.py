@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from simscen.advanced.localizers.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.localization import Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
-from simscen.model.localizers import Ekf
 from simscen.stack.protocols import Localizer
 from simscen.testing.room import Noise, drive, errors, localizer, nees, run
 
 STD = np.array([0.1, 0.1, 0.05])
 """Standard deviations of the initial pose: m, m, rad."""
-SPEC = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
+SPEC = SlipEkf(type="slip_ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
 AS_SPECIFIED = Noise(drift=0.01, gyro_bias=0.002)
 SILENT = Noise(translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)
 
@@ -75,7 +75,9 @@ def test_standing_still_reveals_the_bias_of_the_gyroscope() -> None:
 
 def test_a_turn_that_the_gyroscope_corrects_bends_the_way_too() -> None:
     """Chords of odometry's 1 rad/s arcs, driven at the gyroscope's 0: a straight line."""
-    subject = localizer(Ekf(type="ekf", rotation_noise=50.0, gyro_noise=1e-5), Estimate(Pose2(0, 0, 0), (0, 0, 0)), 1)
+    subject = localizer(
+        SlipEkf(type="slip_ekf", rotation_noise=50.0, gyro_noise=1e-5), Estimate(Pose2(0, 0, 0), (0, 0, 0)), 1
+    )
     arc = Pose2(0.0125 * np.cos(0.0125), 0.0125 * np.sin(0.0125), 0.025)
     feed(subject, 40, arc, 0.0)
     assert subject.belief.pose == pytest.approx((0.5, 0, 0), abs=2e-3)

@@ -8,11 +8,11 @@ from scipy import stats
 from test_slip_ekf_slip import RATE, replayed
 
 from simscen.advanced.localizers.slip_detector import SlipDetector
+from simscen.advanced.localizers.spec import SlipEkf
 from simscen.core.geometry import Array
-from simscen.model.localizers import Ekf
 from simscen.testing.room import nees
 
-SPEC = Ekf(type="ekf")
+SPEC = SlipEkf(type="slip_ekf")
 TRACK = 0.4
 SEEDS = range(4000, 4020)
 Chance = np.random.Generator

@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from simscen.advanced.localizers.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.localization import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
-from simscen.model.localizers import Ekf
 from simscen.testing.room import localizer, nees
 
 RATE, EVERY = 40, 6
 
 
-def replayed(spec: Ekf, twists: Array, wheels: Array, gyro: Array, start: Pose2 | None = None) -> tuple[Belief, Array]:
+def replayed(
+    spec: SlipEkf, twists: Array, wheels: Array, gyro: Array, start: Pose2 | None = None
+) -> tuple[Belief, Array]:
     """What the EKF believes at the end, and how wrong that is.
 
     `twists` (n, 3) are the true velocities at 40 Hz, `wheels` (n, 3) those that the wheels claim, `gyro` (n,) readings.
@@ -48,7 +50,7 @@ def test_wheels_that_lock_in_a_turn_are_not_believed() -> None:
     truth = turning()
     claimed = truth.copy()
     claimed[60:100] = 0.0
-    spec = Ekf(type="ekf", gyro_noise=0.005)
+    spec = SlipEkf(type="slip_ekf", gyro_noise=0.005)
     belief, error = replayed(spec, truth, claimed, truth[:, 2] + np.random.default_rng(1).normal(0, 0.005, len(truth)))
     assert abs(error[2]) < 0.02
     assert nees(belief, error) < stats.chi2.ppf(0.999, 3)
@@ -59,7 +61,9 @@ def test_wheels_that_lock_in_a_turn_are_not_believed() -> None:
 def test_wheels_that_spin_on_the_spot_are_not_believed_to_turn_the_robot() -> None:
     claimed = turning()
     truth = np.zeros_like(claimed)
-    belief, error = replayed(Ekf(type="ekf"), truth, claimed, np.random.default_rng(2).normal(0, 0.005, len(truth)))
+    belief, error = replayed(
+        SlipEkf(type="slip_ekf"), truth, claimed, np.random.default_rng(2).normal(0, 0.005, len(truth))
+    )
     assert abs(error[2]) < 0.02
     assert nees(belief, error) < stats.chi2.ppf(0.999, 3)
 
@@ -70,7 +74,7 @@ def test_a_lock_does_not_pass_for_the_gyroscopes_bias() -> None:
     claimed = truth.copy()
     claimed[100:140] = 0.0
     bias = 0.004
-    belief, error = replayed(Ekf(type="ekf"), truth, claimed, truth[:, 2] + bias)
+    belief, error = replayed(SlipEkf(type="slip_ekf"), truth, claimed, truth[:, 2] + bias)
     assert abs(error[2]) < 0.04
     assert abs(error[2]) < 4 * math.sqrt(belief.covariance[2, 2])
 
@@ -82,7 +86,7 @@ def test_what_no_wheel_sees_is_forgotten_when_the_wheels_hold_again() -> None:
         truth = turning(seconds)
         claimed = truth.copy()
         claimed[60:100] = 0.0
-        belief, _ = replayed(Ekf(type="ekf"), truth, claimed, truth[:, 2])
+        belief, _ = replayed(SlipEkf(type="slip_ekf"), truth, claimed, truth[:, 2])
         return float(np.sqrt(np.trace(belief.covariance[:2, :2])))
 
     before, after, later = spread(1.5), spread(2.5), spread(5.0)
@@ -93,7 +97,7 @@ def test_what_no_wheel_sees_is_forgotten_when_the_wheels_hold_again() -> None:
 def test_a_long_stand_leaves_some_doubt_about_the_bias() -> None:
     """Variance floor: after ten minutes at rest a bias that wanders off is still noticed."""
     n = 600 * RATE // 10  # at 4 Hz, to be quick
-    subject = localizer(Ekf(type="ekf"), Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
+    subject = localizer(SlipEkf(type="slip_ekf"), Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
     for k in range(n):
         subject.on_imu(Imu("imu", 60 * k, (0.0, 0.0, 0.003), (0.0, 0.0, 9.81)))
         subject.on_odometry(Odometry("odom", 60 * k, Pose2(0, 0, 0), Twist()))
@@ -127,8 +131,8 @@ def sampled(case: dict[str, float], slip: float, seed: int) -> tuple[Belief, Arr
         truth[k, 0] *= 1 + share
         share = share * math.exp(-dt) + chance.normal(0, slip * math.sqrt(1 - math.exp(-2 * dt)))
     bias = chance.normal(0, case["bias"])
-    spec = Ekf(
-        type="ekf", translation_noise=case["translation"], rotation_noise=case["rotation"], gyro_noise=case["gyro"],
+    spec = SlipEkf(
+        type="slip_ekf", translation_noise=case["translation"], rotation_noise=case["rotation"], gyro_noise=case["gyro"],
         gyro_bias=case["bias"], gyro_bias_walk=0.0, wheel_slip=slip,
     )  # fmt: skip
     return replayed(spec, truth, claimed, truth[:, 2] + bias + chance.normal(0, case["gyro"], n))

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.slip_ekf import SlipEkfLocalizer
 from simscen.core.geometry import Pose2
 from simscen.core.messages.localization import Estimate
 from simscen.core.random_streams import Streams
 from simscen.model import localizers as model
 from simscen.stack.localizers.amcl import AmclLocalizer
 from simscen.stack.localizers.dead_reckoning import DeadReckoning
+from simscen.stack.localizers.ekf import EkfLocalizer
 from simscen.stack.localizers.ground_truth import GroundTruthLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
 from simscen.stack.setting import Setting
@@ -29,7 +29,7 @@ def built(spec: model.LocalizerSpec, around: Surroundings) -> Localizer:
     ("spec", "kind"),
     [
         (model.Amcl(), AmclLocalizer),
-        (model.Ekf(type="ekf"), SlipEkfLocalizer),
+        (model.Ekf(type="ekf"), EkfLocalizer),
         (model.GroundTruth(type="ground_truth"), GroundTruthLocalizer),
         (model.OdometryOnly(type="odometry"), DeadReckoning),
     ],

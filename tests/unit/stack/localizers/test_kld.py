@@ -54,3 +54,9 @@ def test_enough_is_where_one_by_one_counting_stops(keys: list[int], least: int) 
             stop = count
             break
     assert bound.enough(np.array(keys)) == stop
+
+
+@pytest.mark.parametrize(("pf_err", "pf_z"), [(0.01, 0.99), (0.05, 0.5)])
+def test_pf_err_and_pf_z_change_the_number_of_samples(pf_err: float, pf_z: float) -> None:
+    default, other = KldBound(0.05, 0.99, 10, 50_000), KldBound(pf_err, pf_z, 10, 50_000)
+    assert other.samples(40) != default.samples(40)

@@ -1,0 +1,146 @@
+"""Extended Kalman filter that fuses wheel odometry and a gyroscope, as robot_localization's ekf_node does.
+
+Probabilistic Robotics, section 3.3. Prediction and update are those of filterpy's ExtendedKalmanFilter (Labbe).
+"""
+
+import math
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2, wrap
+from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.sensor_data import Imu, Odometry, Scan
+from simscen.model.localizers import Ekf
+from simscen.stack.localizers.dead_reckoning import start_of
+from simscen.stack.odometry_history import believable
+
+X, Y, YAW, VX, VY, VYAW, BIAS = range(7)
+"""State: the pose in the map frame, the velocity in the base frame, and the bias of the gyroscope."""
+VELOCITY_VARIANCE = 1e6
+"""Process noise of the velocity in (m/s)² and (rad/s)²: each step's velocity is known from its measurements only."""
+MIN_YAW_RATE_STD_RADPS = 0.002
+"""Encoders count whole ticks, so that wheels at rest do not exclude a slow rotation."""
+MAX_YAW_RATE_RADPS = 100.0
+"""A gyroscope that measures more is broken."""
+
+_WHEELS = np.zeros((3, 7))
+_WHEELS[[0, 1, 2], [VX, VY, VYAW]] = 1.0
+_GYROSCOPE = np.zeros((1, 7))
+_GYROSCOPE[0, [VYAW, BIAS]] = 1.0
+
+
+class EkfLocalizer:
+    """Planar EKF of odometry and gyroscope. Uses no map, so that its error grows with the distance.
+
+    Each odometry reading is a measurement of the velocity since the previous one, whose noise follows from the error
+    model of the wheels. The gyroscope measures the yaw rate plus a bias, which robot_localization does not estimate.
+    """
+
+    def __init__(self, spec: Ekf, estimate: Estimate, tick_rate: int) -> None:
+        self._spec, self._tick_rate = spec, tick_rate
+        self.reset(estimate)
+
+    def reset(self, estimate: Estimate) -> None:
+        """Restart at an estimate."""
+        from filterpy.kalman import ExtendedKalmanFilter
+
+        pose, covariance = start_of(estimate)
+        bias = self._spec.gyro_noise if self._spec.gyro_bias is None else self._spec.gyro_bias
+        self._filter = ExtendedKalmanFilter(dim_x=7, dim_z=1)
+        self._filter.predict_x = self._set_state
+        self._filter.x = np.array([*pose, 0.0, 0.0, 0.0, 0.0])
+        self._filter.P = np.zeros((7, 7))
+        self._filter.P[:VX, :VX], self._filter.P[BIAS, BIAS] = covariance, bias**2
+        self._last: Odometry | None = None
+        self._yaw_rates: list[float] = []
+        self._map_from_odom = pose
+
+    def on_odometry(self, odometry: Odometry) -> None:
+        """Measure the velocity since the last reading, and move the pose by it."""
+        last = self._last
+        if not believable(odometry.pose) or (last is not None and odometry.tick <= last.tick):
+            return
+        self._last = odometry
+        if last is not None:
+            seconds = (odometry.tick - last.tick) / self._tick_rate
+            self._measure_velocity(last.pose.between(odometry.pose), seconds)
+            self._move(seconds)
+        self._yaw_rates.clear()
+        self._map_from_odom = self.pose.compose(odometry.pose.inverse())
+
+    def on_scan(self, scan: Scan) -> None:
+        """Ignore scans."""
+
+    def on_imu(self, imu: Imu) -> None:
+        """Store the yaw rate until the next odometry."""
+        rate = imu.angular_velocity[2]
+        if abs(rate) < MAX_YAW_RATE_RADPS:
+            self._yaw_rates.append(rate)
+
+    @property
+    def belief(self) -> Belief:
+        """The state at the newest odometry."""
+        covariance: Array = self._filter.P[:VX, :VX]
+        tick = self._last.tick if self._last is not None else 0
+        return Belief(self.pose, (covariance + covariance.T) / 2, self._map_from_odom, updated=tick)
+
+    @property
+    def pose(self) -> Pose2:
+        """The pose of the belief."""
+        x, y, yaw = self._filter.x[:VX].tolist()
+        return Pose2(x, y, wrap(yaw))
+
+    def _measure_velocity(self, step: Pose2, seconds: float) -> None:
+        """Update the velocity with `step`, the odometry since the last reading, and with the gyroscope."""
+        transition, noise = np.eye(7), np.zeros((7, 7))
+        velocities = [VX, VY, VYAW]
+        transition[velocities, velocities], noise[velocities, velocities] = 0.0, VELOCITY_VARIANCE
+        noise[BIAS, BIAS] = self._spec.gyro_bias_walk**2 * seconds
+        self._predict(transition @ self._filter.x, transition, noise)
+        # A step along an arc has its chord at half the turn.
+        c, s = math.cos(step.yaw / 2), math.sin(step.yaw / 2)
+        velocity = np.array([c * step.x + s * step.y, c * step.y - s * step.x, step.yaw]) / seconds
+        self._update(velocity, _WHEELS, self._wheel_noise(step, velocity, seconds))
+        if self._yaw_rates:
+            mean = sum(self._yaw_rates) / len(self._yaw_rates)
+            variance = self._spec.gyro_noise**2 / len(self._yaw_rates)
+            self._update(np.array([mean]), _GYROSCOPE, np.array([[variance]]))
+
+    def _wheel_noise(self, step: Pose2, velocity: Array, seconds: float) -> Array:
+        """Return the covariance (3, 3) of the velocity by the wheels: errors grow with the distance driven."""
+        length = math.hypot(step.x, step.y)
+        along = velocity[:2] * seconds
+        noise = np.zeros((3, 3))
+        if length > 0:
+            noise[:2, :2] = self._spec.translation_noise**2 / length * np.outer(along, along)
+        noise[2, 2] = self._spec.rotation_noise**2 * (length + abs(step.yaw))
+        noise /= seconds**2
+        noise[2, 2] += MIN_YAW_RATE_STD_RADPS**2
+        return noise
+
+    def _move(self, seconds: float) -> None:
+        """Move the pose by the velocity, at the mean heading of the step."""
+        state: Array = self._filter.x.copy()
+        heading = float(state[YAW] + state[VYAW] * seconds / 2)
+        c, s = math.cos(heading), math.sin(heading)
+        dx = (c * state[VX] - s * state[VY]) * seconds
+        dy = (s * state[VX] + c * state[VY]) * seconds
+        state[X] += dx
+        state[Y] += dy
+        state[YAW] = math.remainder(state[YAW] + state[VYAW] * seconds, 2 * math.pi)
+        jacobian = np.eye(7)
+        jacobian[:2, YAW] = -dy, dx
+        jacobian[:2, VX], jacobian[:2, VY] = (c * seconds, s * seconds), (-s * seconds, c * seconds)
+        jacobian[:3, VYAW] = -dy * seconds / 2, dx * seconds / 2, seconds
+        self._predict(state, jacobian, np.zeros((7, 7)))
+
+    def _predict(self, state: Array, jacobian: Array, noise: Array) -> None:
+        self._filter.F, self._filter.Q = jacobian, noise
+        self._filter.predict(state)
+
+    def _set_state(self, state: Array) -> None:
+        """Replace filterpy's linear prediction of the state, as it provides for nonlinear motion."""
+        self._filter.x = state
+
+    def _update(self, measurement: Array, matrix: Array, noise: Array) -> None:
+        self._filter.update(measurement, lambda _: matrix, lambda state: matrix @ state, R=noise)
