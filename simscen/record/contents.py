@@ -8,9 +8,11 @@ from mcap import records
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
+from simscen.core.records.evidence import LogCoverage
 from simscen.core.records.trace import Trace
 from simscen.record import event_text, frames, header, topics, unpack
 from simscen.record.header import LogHeader
+from simscen.record.message_counts import MessageCounts
 from simscen.record.rows import Rows
 from simscen.record.seen import Seen
 from simscen.record.simtime import SECOND, SimTime
@@ -40,6 +42,7 @@ class Contents:
         self._robot_description = ""
         self._frames: dict[str, Pose3] = {}
         self._types: dict[int, str] = {}
+        self._counts = MessageCounts()
         self._handlers: dict[int, Handler] = {}
         self._whose: dict[int, str] = {}
         self.robots: dict[str, Contents] = {}
@@ -52,8 +55,11 @@ class Contents:
                 self._message(record)
             case records.Metadata(name="simscen"):
                 self._begin(record.metadata)
-            case records.Metadata(name="simscen.end"):
+            case records.Metadata(name=header.END):
                 self.end = int(record.metadata["tick"])
+                self._counts.expect(record.metadata)
+                for name, contents in self.robots.items():
+                    contents._counts.expect(record.metadata, name)
             case records.Attachment():
                 self._attached(record)
             case records.Schema():
@@ -101,6 +107,10 @@ class Contents:
             contents.end, contents._last = self.end, max(self._last, contents._last)
         return {name: contents.trace() for name, contents in self.robots.items()}
 
+    def coverage(self) -> LogCoverage:
+        """Return which evidence is missing, because the log holds fewer messages than were recorded."""
+        return LogCoverage() if self.end is None else self._counts.coverage()
+
     def seen(self) -> Seen:
         """What no trace holds, where it was asked for."""
         return self._seen
@@ -130,6 +140,7 @@ class Contents:
         if not self._facts:
             raise Foreign("it has no metadata record `simscen`")
         self._last = self._time.tick(message.log_time)
+        self._counts.add(message.channel_id, message.log_time)
         if message.channel_id in self._whose:
             self.robots[self._whose[message.channel_id]]._message(message)
             return
@@ -144,6 +155,7 @@ class Contents:
             self.robots[robot]._open(replace(channel, topic=f"/{rest}"))
             return
         kind = self._types.get(channel.schema_id, "")
+        self._counts.open(channel.id, channel.topic, kind)
         by_topic: dict[tuple[str, str], Handler] = {
             topics.TRUTH[:2]: self._truth,
             topics.CLEARANCE[:2]: lambda tick, data: self._rows.clearance.add(tick, *unpack.float64(data)),

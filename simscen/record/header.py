@@ -23,6 +23,8 @@ CHOSEN, STACK_NAME, VARIATION = "stack", "variation", "varied"
 are several, and the scenario's variation."""
 ROBOTS, RESOLUTION, ORIGIN = "robots", "map.resolution", "map.origin"
 """In the metadata record: the names of several robots, and where the map of a robot is."""
+END, COUNT_PREFIX = "simscen.end", "messages:"
+"""Metadata record at the end of a whole log, and what the names of its message counts by topic begin with."""
 OWN_FILES = CASE, SCENARIO, RESULT = "case.json", "scenario.yaml", "result.json"
 _MEDIA_TYPES = {
     ".json": "application/json",

@@ -60,7 +60,8 @@ class Recorder:
             self._writer.attach(header.RESULT, "application/json", result.encode())
         if stack:
             self._writer.note(header.STACK, dict(stack))
-        self._writer.note("simscen.end", {"tick": str(end_tick)})
+        counts = {f"{header.COUNT_PREFIX}{topic}": str(n) for topic, n in sorted(self._writer.message_counts().items())}
+        self._writer.note(header.END, {"tick": str(end_tick), **counts})
         self._writer.finish()
         if self._file is not None:
             self._file.finish()

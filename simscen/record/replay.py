@@ -10,6 +10,7 @@ from mcap.exceptions import McapError
 from zstandard import ZstdError
 
 from simscen.core.errors import InvalidInput, Problem
+from simscen.core.records.evidence import COMPLETE_COVERAGE, LogCoverage
 from simscen.core.records.trace import Trace
 from simscen.record.contents import Contents, Foreign
 from simscen.record.header import LogHeader
@@ -47,6 +48,8 @@ class Log:
     complete: bool
     robots: Mapping[str, "Log"] = field(default_factory=dict)
     seen: Seen = field(default_factory=Seen)
+    coverage: LogCoverage = COMPLETE_COVERAGE
+    """Evidence that the log lacks, because it holds fewer messages than were recorded."""
 
     @property
     def traces(self) -> list[Trace]:
@@ -81,10 +84,10 @@ def read_log(path: "str | Path", partial: bool | None = None, looks: bool = Fals
             hint = "to read what there is, name it *.partial.mcap"
             raise invalid(path, "SC803", "the log ends too early: its run broke off", hint)
         robots = {
-            name: Log(about.robots[name], trace, "", whole, seen=contents.robots[name].seen())
-            for name, trace in contents.traces().items()
+            name: Log(about.robots[name], trace, "", whole, {}, one.seen(), one.coverage())
+            for (name, trace), one in zip(contents.traces().items(), contents.robots.values(), strict=True)
         }
-        return Log(about, contents.trace(), contents.result(), whole, robots, contents.seen())
+        return Log(about, contents.trace(), contents.result(), whole, robots, contents.seen(), contents.coverage())
     except OSError as error:
         raise invalid(path, "SC800", f"cannot read the log: {error.strerror}") from error
     except Foreign as error:

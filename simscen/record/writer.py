@@ -51,6 +51,7 @@ class McapWriter:
         self._schemas: dict[str, int] = {}
         self._schema_records: list[bytes] = []
         self._channel_records: list[bytes] = []
+        self._topics: list[str] = []
         self._counts: Counter[int] = Counter()
         self._chunks: list[bytes] = []
         self._times: list[int] = []
@@ -70,6 +71,7 @@ class McapWriter:
         number = len(self._channel_records) + 1
         record = _encoded(records.Channel(number, topic, "cdr", dict(metadata), schema))
         self._channel_records.append(record)
+        self._topics.append(topic)
         self._chunk.put(record)
         return Channel(number, self._chunk)
 
@@ -85,6 +87,13 @@ class McapWriter:
         note = _encoded(records.Metadata(name, dict(values)))
         self._notes.append(records.MetadataIndex(self._written, len(note), name))
         self._put(note)
+
+    def message_counts(self) -> dict[str, int]:
+        """Return the number of messages so far by topic."""
+        pending = {channel.number: len(channel.entries) // 2 for channel in self._chunk.channels}
+        return {
+            topic: self._counts[number] + pending.get(number, 0) for number, topic in enumerate(self._topics, start=1)
+        }
 
     def settle(self) -> None:
         """Nothing more comes for a while: let the chunk leave if it is worth one."""

@@ -101,14 +101,14 @@ class Judging:
         if self._criteria is None:
             spec = criteria_of_text(about.scenario, str(log), about.facts, robot)
             expected = expectation_of(spec)
-            result = judge_run(key, str(log), spec.pass_, read.trace, case, metrics=spec.metrics, expected=expected)
+            result = judge_run(key, str(log), spec.pass_, read.trace, case, (), read.coverage, spec.metrics, expected)
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         with _told_from_here(self._criteria):
             criteria = self._criteria.of(robot)
         # What had to happen stands in the scenario of the log, at lines that the file of criteria does not have.
         case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
         case = replace(case, masks={**case.masks, **self._masks(criteria)})
-        return self._finished(log, key, read.trace, case, LogCoverage(), criteria)
+        return self._finished(log, key, read.trace, case, read.coverage, criteria)
 
     def _foreign(self, log: Path) -> RunFinished:
         self.foreign += 1

@@ -81,4 +81,4 @@ def recorded_result(log: Log, file: Path) -> RunResult:
 def _judged(log: Log, file: Path, robot: str) -> RunResult:
     about = log.about
     spec = criteria_of_text(about.scenario, str(file), about.facts, robot)
-    return judge_run(about.key, about.name, spec.pass_, log.trace, about.case, metrics=spec.metrics)
+    return judge_run(about.key, about.name, spec.pass_, log.trace, about.case, (), log.coverage, spec.metrics)

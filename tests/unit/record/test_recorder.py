@@ -209,4 +209,7 @@ def test_what_an_external_stack_was_stands_in_a_record_of_its_own_at_the_end() -
     Recorder(stream, CLOCK, about(7)).close(0, stack={"name": "mine"})
     log = stream.getvalue()
     records = [(record.name, record.metadata) for record in make_reader(io.BytesIO(log)).iter_metadata()]
-    assert records[1:] == [("simscen.stack", {"name": "mine"}), ("simscen.end", {"tick": "0"})]
+    assert records[1] == ("simscen.stack", {"name": "mine"})
+    ((name, end),) = records[2:]
+    assert (name, end["tick"]) == ("simscen.end", "0")
+    assert end["messages:/map"] == "1"
