@@ -1,16 +1,24 @@
-"""An inertial unit at the base frame's origin."""
+"""An inertial measurement unit at the base frame's origin."""
+
+import math
 
 from simscen.core.geometry import rotated
 from simscen.core.messages.sensor_data import Imu
 from simscen.model.robot import InertialUnit
 from simscen.sensors.normals import Normals
-from simscen.sensors.sensor import SensorSetting
+from simscen.sensors.sensor import SensorSetting, Vector
 
 GRAVITY = 9.81
+"""m/s²"""
+MAX_UNEXPLAINED_STEP_M = 0.05
+"""A robot that moved this much farther than its velocity explains was placed elsewhere (`kidnap`)."""
 
 
 class ImuSensor:
-    """Turn rates with a bias that stays for a run, and specific force: the mean since the last reading."""
+    """Measures angular velocity with a constant bias, and the mean specific force since the last reading.
+
+    A robot that is placed elsewhere by an action has not been accelerated: that reading shows gravity only.
+    """
 
     def __init__(self, spec: InertialUnit, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
@@ -19,12 +27,16 @@ class ImuSensor:
         self._bias: list[float] = setting.chance.normal(0.0, spec.gyro_bias, 3).tolist()
         self._normals = Normals(setting.chance)
         self._velocity, _ = self._view.base_velocity()
+        self._position = self._view.base_pose()[:3]
 
     def read(self, tick: int) -> Imu:
-        """Measure in the base frame; at rest and level the accelerometer shows +9.81 m/s² along z."""
-        _, _, _, i, j, k, w = self._view.base_pose()
+        """Return a reading in the base frame. A level robot at rest measures +9.81 m/s² along z."""
+        px, py, pz, i, j, k, w = self._view.base_pose()
         (ax, ay, az), (linear, angular) = self._velocity, self._view.base_velocity()
+        if self._was_placed((px, py, pz), linear):
+            ax, ay, az = linear
         self._velocity = vx, vy, vz = linear
+        self._position = px, py, pz
         seconds, base_from_world = self._seconds, (-i, -j, -k, w)
         p, q, r = rotated(base_from_world, angular)
         x, y, z = rotated(base_from_world, ((vx - ax) / seconds, (vy - ay) / seconds, (vz - az) / seconds + GRAVITY))
@@ -36,3 +48,8 @@ class ImuSensor:
             (p + bp + gyro * np, q + bq + gyro * nq, r + br + gyro * nr),
             (x + force * nx, y + force * ny, z + force * nz),
         )
+
+    def _was_placed(self, position: Vector, velocity: Vector) -> bool:
+        """Return whether the robot is farther from its last position than its velocities explain."""
+        speed = max(math.hypot(*self._velocity), math.hypot(*velocity))
+        return math.dist(position, self._position) > speed * self._seconds + MAX_UNEXPLAINED_STEP_M

@@ -52,3 +52,12 @@ def test_noise_is_new_each_time_and_the_bias_stays():
     assert np.abs(rates.mean(axis=0)).max() > 0.05
     biases = [imu(Puppet(), seed, gyro_noise=0.0, gyro_bias=0.5).read(0).angular_velocity[2] for seed in range(400)]
     assert np.std(biases) == pytest.approx(0.5, rel=0.12)
+
+
+def test_being_placed_elsewhere_is_no_acceleration():
+    view = Puppet(linear=(0.4, 0.0, 0.0))
+    sensor = imu(view, **EXACT)
+    view.pose, view.linear = Pose3.from_rpy(3, 1, 0, 0, 0, 2), (0.0, 0.0, 0.0)
+    assert sensor.read(4).linear_acceleration == pytest.approx((0.0, 0.0, 9.81))
+    view.linear = (0.02, 0.0, 0.0)
+    assert math.hypot(*sensor.read(8).linear_acceleration[:2]) == pytest.approx(1.2)
