@@ -105,7 +105,8 @@ def resource_limits() -> str:
         raise CheckFailed(f"a process may open {files} files; raise `ulimit -n` to {MAX_OPEN_FILES}")
     if length < MIN_DISK_BYTES:
         raise CheckFailed(f"a file may have {_mib(length)}; raise `ulimit -f`, or logs are truncated")
-    return f"a run may use {_mib(memory)} of memory, {min(files, MAX_OPEN_FILES)} files of {_mib(min(length, MAX_FILE_BYTES))}"
+    size = _mib(min(length, MAX_FILE_BYTES))
+    return f"a run may use {_mib(memory)} of memory, {min(files, MAX_OPEN_FILES)} files of {size}"
 
 
 def shared_memory() -> str:

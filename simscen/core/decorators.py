@@ -46,9 +46,6 @@ def _init_function(slotted: type) -> Any:
     return known["__init__"]
 
 
-# MERGED: What is worked out from a thing that never changes, once for as long as that thing lives.
-# MERGED:
-# MERGED: Runs of one scenario share its world: the warm process works out what they all need of it, and its forks inherit that.
 Thing = TypeVar("Thing")
 More = ParamSpec("More")
 Result = TypeVar("Result")

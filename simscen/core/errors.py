@@ -71,7 +71,6 @@ class RunError(SimscenError):
         return type(self), (self.kind, str(self), self.tail)
 
 
-# MERGED: A mistake in a file, told so that it can be mended.
 @dataclass(frozen=True, order=True)
 class Problem:
     """What is wrong, where (`line` and `col` count from 1; 0 = the file as a whole), and how to mend it.

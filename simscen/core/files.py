@@ -33,7 +33,6 @@ def require_not_input(path: Path, inputs: Iterable[Path]) -> None:
         raise OSError(errno.EINVAL, "it is one of the files that are read")
 
 
-# MERGED: Which files a world or a robot was made of, told by the few functions that open them.
 _READ: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)
 
 

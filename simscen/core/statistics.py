@@ -56,7 +56,6 @@ def sign_test(more: int, less: int) -> float:
     return min(1.0, 2 * tail)
 
 
-# MERGED: How sure a success rate is.
 Z_95 = 1.959963984540054
 """Two-sided 95 % quantile of the normal distribution."""
 
@@ -75,7 +74,6 @@ def wilson_interval(successes: float, runs: int, z: float = Z_95) -> tuple[float
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-# MERGED: Quantiles of the chi-square distribution; scipy, which has them, takes half a second to import.
 def chi2_quantile(probability: float, freedom: int) -> float:
     """The value that a chi-square variable of `freedom` degrees stays below with this probability.
 

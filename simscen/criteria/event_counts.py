@@ -57,7 +57,6 @@ class CountBounds(Spec):
         return findings
 
 
-# MERGED: `replans`: how often the robot changed its plan.
 class Replans(CountBounds, Criterion):
     """The robot replanned as often as it should.
 
@@ -90,7 +89,6 @@ class Replans(CountBounds, Criterion):
         return self.bound(trace, "replans", "replan", again, told or ["no plan was ever made"])
 
 
-# MERGED: `recoveries`: how often the robot had to help itself.
 class Recoveries(CountBounds, Criterion):
     """Recovery behaviours ran as often as they should.
 

@@ -104,7 +104,6 @@ def _read_happening(data: dict[str, Any]) -> DisturbanceOutcome:
     return DisturbanceOutcome(ordered, tuple(data["fired"]), data["happened"], data["effect"], data["tick"])
 
 
-# MERGED: Verdicts as plain data that JSON can hold, and back.
 def verdict_data(verdict: Verdict, line: int, tick_rate: int) -> dict[str, Any]:
     """A verdict with all its findings. `line` is where the criterion is written; 0 = unknown."""
     return {

@@ -94,7 +94,6 @@ def _checked(model: type[Model], tree: Node) -> Model:
     return spec
 
 
-# MERGED: The events and faults of a scenario as it orders them, with their triggers as they are written.
 def disturbances_of(loaded: LoadedScenario) -> tuple[Disturbance, ...]:
     """Events, each with the steps of its story after it, then faults, in the order of the scenario."""
     return (*_events(loaded), *_faults(loaded))

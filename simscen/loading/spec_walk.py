@@ -71,7 +71,6 @@ def _mark(kind: Any) -> Refers | None:
     return next((found for member in get_args(kind) if (found := _mark(member))), None)
 
 
-# MERGED: Go through all of a specification, with where each part of it stands in the file.
 Keys = tuple[Key, ...]
 
 

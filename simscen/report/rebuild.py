@@ -35,7 +35,7 @@ class Past:
         """An answer for every planned run: an error where simscen ended before there was one."""
         return [self.answered.get(run.key) or self._unanswered(run) for run in self.planned]
 
-    def session_started(self, folder: Path) -> SessionStarted:
+    def started(self, folder: Path) -> SessionStarted:
         """The event that the session began with."""
         return session_started(self.version, [run.key for run in self.planned], self.workers, folder, self.stacks)
 

@@ -85,10 +85,6 @@ def type_discriminator(default: str) -> Callable[[Any], str | None]:
     return tag
 
 
-# MERGED: The docstring under each field of a specification, read from its source when somebody asks.
-# MERGED:
-# MERGED: Pydantic can collect them itself (`use_attribute_docstrings`), but it does so when a class is made, by reading and
-# MERGED: parsing source for each class: 45 ms of start-up for every command. Only schema, explain and the reference need them.
 def field_docs(model: type) -> dict[str, str]:
     """Field name → docstring, those of base classes included."""
     docs: dict[str, str] = {}

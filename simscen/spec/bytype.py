@@ -101,7 +101,6 @@ def _unknown(group: str, name: str) -> PydanticCustomError:
     return PydanticCustomError("unknown_type", "no such type", {"value": name, "names": ", ".join(every)})
 
 
-# MERGED: Specifications of installed packages: imported when a file uses them, and a problem of that file where broken.
 _ASKED = ("horizon", "clearance_range")
 """What a criterion says of itself, in seconds and metres."""
 

@@ -139,7 +139,6 @@ Friction = Annotated[float, Field(ge=0, le=2), Quantity("ratio")]
 Probability = Annotated[float, Field(ge=0, le=1), Quantity("ratio")]
 
 
-# MERGED: Numbers of whatever dimension, with the unit that they are written with.
 class Amount(NamedTuple):
     """A number and the unit behind it; "" = a bare number."""
 

@@ -49,7 +49,6 @@ def distance_to(rows: Array, point: Sequence[float]) -> Array:
     return away
 
 
-# MERGED: Office floors of more than 40 m without symmetry: a corridor that is off the middle, rooms of all sizes.
 LENGTH, DEPTH, CORRIDOR = (41.0, 48.0), (17.0, 24.0), (1.8, 2.6)
 """Of a floor and of its corridor in m: least and most."""
 ROOM, DOOR, THICKNESS = (3.2, 8.5), (0.95, 1.3), (0.12, 0.2)

@@ -60,7 +60,6 @@ def first_half(grid: OccupancyGrid, middle: float) -> OccupancyGrid:
     return OccupancyGrid(cells, grid.resolution, grid.origin)
 
 
-# MERGED: Logs of drives through buildings, each under one circumstance, with the map that the robot has.
 LIDARS = ((181, 5.0), (361, 5.0), (181, 10.0), (361, 10.0))
 """Beams over 180° and scans a second: what logs with a SICK LMS have."""
 MOUNT = Pose2(0.1, 0.0, 0.0)

@@ -38,7 +38,6 @@ def people_in(floor: Building, count: int, seconds: float, people: int, chance: 
     return np.stack(tracks, axis=1)
 
 
-# MERGED: What a lidar on a base sees of a building: what stands there, people who walk, and through glass.
 LEG, STRIDE = 0.07, 0.14
 """m: the radius of a leg, and how far legs are from the middle between them."""
 WALKING = 1.1

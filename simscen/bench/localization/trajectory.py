@@ -85,7 +85,6 @@ def tour(floor: Building) -> Array:
     return np.column_stack((found, np.zeros(len(found))))
 
 
-# MERGED: What raw wheel odometry says of a drive: the errors of a base that nobody calibrated, and wheels that slip.
 STUMBLES_EACH = 25.0
 """Seconds between two stretches of slipping wheels, on average."""
 STUMBLE = (0.3, 1.5)

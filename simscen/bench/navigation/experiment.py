@@ -43,7 +43,6 @@ def write_scenario(file: Path, text: str) -> Path:
     return file
 
 
-# MERGED: An experiment once more, with other parameters of the stack.
 def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
     """The same drives with these parameters on top of their own, as files in `folder` that extend theirs.
 

@@ -56,7 +56,6 @@ def _near(pose: Pose2, built: BuiltWorld) -> bool:
     return any(math.hypot(pose.x - body.pose.x, pose.y - body.pose.y) < MOVABLE for body in built.world.bodies)
 
 
-# MERGED: Drives from anywhere to anywhere: in the shipped worlds, in generated buildings, with sensors that fail.
 RADIUS = 0.22
 """Metres: the disc of the default robot, a TurtleBot."""
 SLOWEST = 0.2

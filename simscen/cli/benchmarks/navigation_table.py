@@ -52,7 +52,6 @@ def widths_of(table: Sequence[TableRow]) -> list[int]:
     return [max(map(len, cells)) for cells in zip(*table, strict=True)]
 
 
-# MERGED: The table of `simscen bench nav`, for people and for machines.
 PUBLISHED = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
     f"{name} {value:.3f}" for name, value in DWA.items()
 )

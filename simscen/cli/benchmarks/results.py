@@ -70,7 +70,6 @@ def _figure(entry: dict[str, Any]) -> Measurement:
     return Measurement(float(entry["value"]), str(entry["unit"]), rounds, bool(entry["more_is_better"]))
 
 
-# MERGED: Two results of `simscen bench` against each other.
 HEAD = ("", "before", "after", "ratio", "rounds before", "rounds after", "")
 FEWEST = 2
 """Rounds from which on something can be said about noise."""
@@ -134,7 +133,6 @@ def _aligned(row: tuple[str, ...], widths: list[int]) -> str:
     return "  ".join((first[0].ljust(first[1]), *(cell.rjust(width) for cell, width in rest))).rstrip()
 
 
-# MERGED: What the commands of `simscen bench` share: how they tell what they are doing and what they have found.
 class Format(str, Enum):
     """What is printed."""
 

@@ -54,7 +54,6 @@ def growth_text(figures: Measurements) -> str:
     return "\n".join(lines)
 
 
-# MERGED: `simscen bench worlds`: what a simulated second costs in large worlds.
 def worlds_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print all numbers as JSON.")] = False,
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Runs in each world; the median counts.")] = 3,
@@ -85,7 +84,6 @@ def worlds_text(costs: "Sequence[Cost]") -> str:
     return "\n".join(lines)
 
 
-# MERGED: `simscen bench suite`: how fast a suite is run on all cores.
 def suite_command(
     paths: Annotated[
         list[Path] | None,

@@ -90,7 +90,6 @@ def _told(code: ErrorCode) -> str:
     return f"{NAV2[code]} {BY_OTHERS}" if code in OF_OTHERS else NAV2[code]
 
 
-# MERGED: The named signals, for `simscen explain signals` and the reference.
 CLOCK = """\
 A signal has one value for each sample of the truth (`physics: truth_rate`, 40 Hz by default), and it is the same from
 the run and from its log. What comes more rarely (belief, command, scans, plans) is held from when it came until the
@@ -164,7 +163,6 @@ def _cell(signal: Signal) -> str:
     return " or ".join(names)
 
 
-# MERGED: The metrics of every run and of a session, for `simscen explain metrics` and the reference.
 REPORTED = """\
 Every run reports these numbers in result.json, whether a criterion asks for them or not; they are computed from the
 trace, so that `simscen judge` of its log gives the same. They are of the truth unless they say otherwise. Where a
@@ -219,7 +217,6 @@ def _metric_text(metric: Metric) -> str:
     return metric.text + unit + (f"\n\nSource: {metric.source}." if metric.source else "")
 
 
-# MERGED: All that `explain` knows.
 def everything() -> list[Topic]:
     """Every topic, in the order of the overview; codes of problems apart."""
     return [*topics(installed=True), *signal_topics(), *metric_topics(installed=True), *code_topics()]

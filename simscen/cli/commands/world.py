@@ -159,7 +159,6 @@ def _relative(file: Path, out: Path) -> str:
     return Path(os.path.relpath(file.resolve(), out.resolve().parent)).as_posix()
 
 
-# MERGED: A world in numbers, as lines of text.
 MOST_LISTED = 20
 LONGEST = 44
 

@@ -54,7 +54,6 @@ def is_bag(names: Sequence[str]) -> bool:
     return BAG in names and any(name.endswith((".db3", ".mcap", ".db3.zstd", ".mcap.zstd")) for name in names)
 
 
-# MERGED: A recorded run for commands that show it: its log, and what it says of itself.
 LOGS = ("run.mcap", "run.partial.mcap")
 
 

@@ -157,7 +157,6 @@ def _written(path: Path, data: bytes) -> bool:
     return True
 
 
-# MERGED: Where a session runs: all that may differ between two sessions with equal results.
 def session_info_json(used: Mapping[str, object], wall: float | None = None) -> bytes:
     """run.json; `used` are installed packages and external stacks, `wall` the seconds that the session took.
 
@@ -180,7 +179,6 @@ def session_info_json(used: Mapping[str, object], wall: float | None = None) -> 
     ).encode()
 
 
-# MERGED: Files that a command is told to write.
 def save(path: Path, write: Callable[[Path], None], inputs: Iterable[Path] = ()) -> None:
     """Let `write` make the file; raises UsageError where that cannot be done or would overwrite what was read."""
     try:

@@ -33,7 +33,7 @@ class PendingRuns:
     workers: int
     stacks: tuple[str, ...] = ()
 
-    def session_started(self, folder: Path) -> SessionStarted:
+    def started(self, folder: Path) -> SessionStarted:
         """The first event of the session."""
         keys = [*(job.key for job in self.jobs), *(answer.key for answer in self.kept)]
         return session_started(__version__, keys, self.workers, folder, self.stacks)
@@ -94,7 +94,6 @@ def _asked(job: Job) -> tuple[str, str, str]:
     return job.scenario.id, job.scenario.variation, job.scenario.stack_name
 
 
-# MERGED: `simscen run --last-failed`: which runs that means, and what to say of it.
 EVERYTHING = "everything that is chosen runs"
 
 

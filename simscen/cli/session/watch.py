@@ -141,7 +141,6 @@ class Watching:
             return ()
 
 
-# MERGED: `simscen run --watch`: stay, and run again what a saved file touches.
 PAUSE = 0.25
 """Seconds between two looks at the files; two looks that are equal end a burst of saving."""
 STOPPED = (Exit.HUNG_UP, Exit.INTERRUPTED, Exit.TERMINATED)

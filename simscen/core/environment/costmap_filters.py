@@ -72,7 +72,6 @@ def in_keepout_mask(mask: OccupancyGrid, points: Array) -> npt.NDArray[np.bool_]
     return np.asarray(mask.values_at(points) == OCCUPIED)
 
 
-# MERGED: Filter masks as plain data, so that a log can carry them: equal cells side by side are one block.
 Block = tuple[int, int, int, int, int]
 """Column, row, width and height in cells, and the value of them all."""
 
@@ -135,7 +134,6 @@ def _runs(cells: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
     return [(a, b - a, int(cells[a])) for a, b in pairwise(edges) if b > a and cells[a] > FREE]
 
 
-# MERGED: Where a stack is told to keep out, and where to drive slowly, as its costmap filters have it.
 Filter = Literal["keepout", "speed"]
 
 

@@ -45,7 +45,6 @@ class BuiltWorld:
     map: OccupancyGrid
 
 
-# MERGED: Patches of floor on which wheels hold less, or more, than on dry concrete.
 DISC_CORNERS = 32
 """Corners of the polygon that stands for a round patch."""
 

@@ -15,7 +15,6 @@ class Twist(NamedTuple):
 STOP = Twist()
 
 
-# MERGED: The kinematics of four mecanum wheels.
 WheelValues = tuple[float, float, float, float]
 """Of the wheels front left, front right, rear left, rear right."""
 

@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     Faces = npt.NDArray[np.int32]
     Numbers = npt.NDArray[np.int64]
 
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    Faces = npt.NDArray[np.int32]
-
 MAX_CONVEX_FACES = 400
 """A mesh of more faces is taken as concave without a look."""
 _YZX, _ZXY = (1, 2, 0), (2, 0, 1)
@@ -58,7 +53,6 @@ def is_convex(mesh: Mesh) -> bool:
     return bool((heights <= CONVEX_TOLERANCE_M * lengths[:, None]).all())
 
 
-# MERGED: The faces of a large world in lots that lie together, so that one can take what is near.
 @dataclass(frozen=True, eq=False)
 class FaceTiles:
     """`faces[starts[k]:starts[k + 1]]` are lot k; `low` and `high` are the corners (n, 2) around it."""

@@ -123,7 +123,6 @@ def _is_left_of(point: tuple[float, float], a: tuple[float, float], b: tuple[flo
     return point[0] < a[0] + (point[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
 
 
-# MERGED: A polygon cut into convex pieces.
 Piece = tuple[Corner, ...]
 
 

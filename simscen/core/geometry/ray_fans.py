@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from ctypes import c_void_p
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose3, Vector
 
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    Singles = npt.NDArray[np.float32]
+Singles = npt.NDArray[np.float32]
 
 PACKET_SIZE = 16
 """Rays in a packet."""
@@ -68,8 +65,6 @@ class RayPackets:
         return self.ends.flatten()[: self._count]
 
 
-# MERGED: The one thing sensors ask of a ray-casting scene.
-Singles = npt.NDArray[np.float32]
 ALL_PACKETS = slice(None)
 
 

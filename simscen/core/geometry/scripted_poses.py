@@ -68,7 +68,6 @@ class PosesAtTick(Mapping[str, Pose3]):
         return len(self.foreseen.everything)
 
 
-# MERGED: Where several scripted paths lead at many times, worked out at once.
 class BatchPathSampler:
     """Paths, each at a height z, asked at many times at once: `Track.at` to the last bit, by the same operations.
 

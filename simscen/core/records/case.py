@@ -44,7 +44,6 @@ class Passage:
         return f"the passage of {self.width:.2f} m{between} at ({self.middle[0]:.2f}, {self.middle[1]:.2f})"
 
 
-# MERGED: What a criterion may know of a scenario besides the trace.
 CLEARANCE_RANGE = 2.0
 """Metres around the robot's hull in which clearance is always measured."""
 

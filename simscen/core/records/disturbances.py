@@ -47,7 +47,6 @@ class DisturbanceOutcome:
         return self.ordered.required and not self.happened
 
 
-# MERGED: The kinds of readings, and of what else faults can affect, by name: what a light command may know of them.
 READING_KINDS = ("Scan", "Odometry", "Imu", "Bump", "Image")
 """The classes of core.sensing."""
 COMMAND = "Command"

@@ -142,7 +142,6 @@ class Trace:
         return float(x), float(y)
 
 
-# MERGED: A signal over the ticks of a run.
 @dataclass(frozen=True, eq=False)
 class Samples:
     """A signal: `ticks` (n,) ascending, `values` (n, k)."""

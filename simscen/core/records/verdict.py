@@ -55,7 +55,6 @@ class Verdict:
         return min(deciding, key=lambda f: f.margin if f.margin is not None else float("inf"), default=None)
 
 
-# MERGED: That a run is known to fail.
 @dataclass(frozen=True)
 class ExpectedFailure:
     """Why a run is expected to fail; `criteria` are the ids of the verdicts that do, () = whichever.

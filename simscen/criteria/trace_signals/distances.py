@@ -137,7 +137,6 @@ def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
     return nearest
 
 
-# MERGED: How near the robot was to people: to their bodies, which are round.
 POINT = ((0.0, 0.0),)
 INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M = 0.45, 1.2, 3.6
 """m of gap below which somebody's space is entered (Hall, The hidden dimension, 1966; as in HuNavSim)."""

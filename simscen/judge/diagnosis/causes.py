@@ -57,7 +57,6 @@ def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
     return lines[:MAX_LINES]
 
 
-# MERGED: Which faults and events were under way when something failed, or had just been.
 RECENT_FAULT_S, RECENT_EVENT_S = 3.0, 5.0
 """Seconds after the end of a fault, and after an event, in which it is still told."""
 

@@ -154,7 +154,6 @@ def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
     )
 
 
-# MERGED: A comparison of stacks as results.json holds it.
 def comparison_data(comparison: Comparison) -> dict[str, Any]:
     """As plain data: stacks and scenarios as lists in their order."""
     return {

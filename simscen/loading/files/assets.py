@@ -200,7 +200,6 @@ def shipped_robots() -> dict[str, Path]:
     return {path.name.removesuffix(ROBOT): path for path in sorted(folder.glob(f"*{ROBOT}"))}
 
 
-# MERGED: The filter masks that criteria judge by.
 def load_judged_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, JudgedMask]:
     """The masks that the criteria below `pass` name, by their files as written; what is wrong goes to `assets`.
 

@@ -83,7 +83,6 @@ def file_kind(file: Path, root: Path) -> str:
     return "robot" if keys & _ONLY_ROBOTS else "world" if keys & _ONLY_WORLDS else "scenario"
 
 
-# MERGED: Files that are there to be extended: `*.base.yaml`, and the `defaults.yaml` beside scenarios.
 def check_base_file(file: Path, library: Library) -> list[Problem]:
     """What is wrong with what a partial scenario says, and with the files that it names.
 

@@ -81,7 +81,6 @@ def class_of(plugin: object) -> str:
     return str(plugin).replace("/", "::").rpartition("::")[2]
 
 
-# MERGED: What becomes of a parameter of Nav2 in the reference stack.
 Path = tuple[str, ...]
 """Keys below `stack:`."""
 Parameters = Mapping[str, Any]

@@ -73,7 +73,6 @@ def _of_layer(
         yield from translate_same_name(node, name, value, (section, "denoise_layer"), known["denoise_layer"], last)
 
 
-# MERGED: Nav2's velocity smoother and collision monitor.
 def velocity_smoother(node: str, parameters: Parameters, _: Known) -> Iterator[Translation]:
     """Limits ahead, sideways and of the turn rate; here sideways is as ahead, and backward as forward."""
     for name, turning in (
@@ -137,7 +136,6 @@ def _axes(value: Any) -> list[float]:
     return value if fits else []
 
 
-# MERGED: Which parameters of Nav2's nodes are parameters of the reference stack, too, and where they stand there.
 def translate(nodes: Mapping[str, Parameters], known: Known) -> Iterator[Translation]:
     """What becomes of each parameter. `known` are our parameters by section, or by type of what is in it."""
     for node, parameters in nodes.items():

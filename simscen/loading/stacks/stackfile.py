@@ -87,7 +87,6 @@ def _misplaced(section: MappingNode) -> list[Problem]:
     ]
 
 
-# MERGED: Parameters of a stack where a scenario is asked for: told as what they are, and what they are for.
 STACK_FILE_KIND, NAV2_FILE_KIND = "stack file", "parameter file of Nav2"
 _OF_A_STACK_FILE = frozenset({"simscen", "name", "description", "stack"})
 

@@ -66,7 +66,6 @@ def load_config(file: Path) -> UserConfig:
     return UserConfig(file, spec, tree, library)
 
 
-# MERGED: Whether anybody says what the external stack of a scenario runs.
 def undefined_stack(loaded: LoadedScenario, known: Iterable[str] = (), config: Path | None = None) -> Problem | None:
     """The problem of a scenario whose external stack has a name of which nobody says what it runs.
 

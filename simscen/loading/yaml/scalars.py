@@ -43,7 +43,6 @@ def parse_scalar(text: str) -> Scalar:
     return float(text) if _FLOAT.fullmatch(text) else text
 
 
-# MERGED: YAML as our reader reads it: plain scalars mean what they mean in YAML 1.2, not in PyYAML's 1.1.
 _TAGS = {str: "str", bool: "bool", int: "int", float: "float", type(None): "null"}
 # What source.py refuses in a file, and line breaks of YAML 1.1; a string with one of them is written with escapes.
 _UNSPEAKABLE = re.compile("[\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")

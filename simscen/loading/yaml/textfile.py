@@ -79,7 +79,6 @@ def _position(text: str, index: int) -> tuple[int, int]:
     return line, index - (text.rfind("\n", 0, index) + 1) + 1
 
 
-# MERGED: Characters that look like those of YAML and are none: they come with text that was copied from a page or a chat.
 _SPACE = "a plain space"
 LOOKALIKES = {
     "\u00a0": ("no-break space", _SPACE),

@@ -44,7 +44,8 @@ def test_a_world_of_thousands_of_solids_is_searched_in_milliseconds():
 
 def test_asking_imports_no_heavy_library():
     code = (
-        "import sys; from simscen.worlds.contain import blocking_solid; from simscen.core.environment.world_model import World;"
+        "import sys; from simscen.worlds.contain import blocking_solid;"
+        "from simscen.core.environment.world_model import World;"
         "from simscen.core.geometry.shapes import Box, Solid, Extrusion;"
         "w = World('w', (Solid(Box((1, 1, 1)), name='b'), Solid(Extrusion(((0, 0), (1, 0), (0, 1)), 1.0))));"
         "assert blocking_solid(w, (5, 5), 0.1, (0, 1)) is None;"

@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 
-SHOWN = "from simscen.run.reproducibility.environment import arithmetic; print(arithmetic())"
+SHOWN = "from simscen.run.reproducibility.environment import arithmetic_fingerprints; print(arithmetic_fingerprints())"
 BOTH = f"""
 import subprocess, sys
 from simscen.run.process.isolation import clean_environment
