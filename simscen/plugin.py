@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     )
     from simscen.spec.references import GoalName, MaskFile, MovableName, ObjectName, RegionName
     from simscen.stack.footprint import Footprint, distances
-    from simscen.stack.prediction.moving import Moving
+    from simscen.stack.moving_obstacles import MovingObstacles
     from simscen.stack.protocols import (
         Behavior,
         Controller,
@@ -136,7 +136,7 @@ __all__ = [
     "MotionPath",
     "Mount",
     "MovableName",
-    "Moving",
+    "MovingObstacles",
     "NavigationFailure",
     "NonNegativeLength",
     "ObjectName",
@@ -293,7 +293,7 @@ _WHERE = {
         "distances",
     ),
     "simscen.stack.tasks": ("Task",),
-    "simscen.stack.prediction.moving": ("Moving",),
+    "simscen.stack.moving_obstacles": ("MovingObstacles",),
     "simscen.sensors.sensor": (
         "Sensor",
         "SensorSetting",

@@ -80,7 +80,7 @@ class Retrace(BehaviorSpec):
     Backs up straight where nobody knows that way.
     """
 
-    component: ClassVar[str] = "simscen.stack.behaviors.retrace:Retrace"
+    component: ClassVar[str] = "simscen.advanced.recovery.retrace:Retrace"
     type: Literal["retrace"] = "retrace"
     backup_dist: NonNegativeLength = 0.30
     """How far it drives back at least."""

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+from simscen.advanced.prediction.motion_prediction import MotionPrediction
+from simscen.advanced.recovery.costmap_clearing import ClearingBackoff
 from simscen.core.clock import Clock
 from simscen.core.messages.goal_names import Mode
 from simscen.core.random_streams import Streams
@@ -12,7 +14,6 @@ from simscen.model.stack import InProcessStack, StackSpec
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import Commands
 from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.forgetting import Forgetting
 from simscen.stack.installed.behavior import InstalledBehavior
 from simscen.stack.installed.controller import InstalledController
 from simscen.stack.installed.goal_checker import InstalledGoalChecker
@@ -22,8 +23,7 @@ from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.installed.watched import made
 from simscen.stack.navigator import Navigator
 from simscen.stack.odometry_history import WAY, OdometryHistory
-from simscen.stack.plan_keeper import PlanKeeper
-from simscen.stack.prediction.motion_prediction import MotionPrediction
+from simscen.stack.plan_manager import PlanManager
 from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import Behavior, Controller, Localizer, Surroundings
 from simscen.stack.recovery import RoundRobin
@@ -78,7 +78,7 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
     monitor = CollisionMonitor(spec.collision_monitor, robot, surroundings.lidars, surroundings.tick_rate)
     driving = replace(driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around, allowed=monitor.allow)
     planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
-    plans = PlanKeeper(
+    plans = PlanManager(
         spec.planner,
         InstalledPlanner(spec.planner, planning),
         costmaps.wide,
@@ -97,7 +97,7 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
         costmaps,
         setting.control_period,
         spec.failure_tolerance,
-        Forgetting(always=spec.recovery.clear_entirely),
+        ClearingBackoff(always=spec.recovery.clear_entirely),
     )
     commands = Commands(
         VelocitySmoother(spec.velocity_smoother, robot, setting.control_period),

@@ -14,7 +14,7 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
-from simscen.stack.prediction.moving import Moving, nothing
+from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
 from simscen.stack.protocols import RobotModel
 
 STEPS = 8
@@ -46,7 +46,7 @@ class CollisionMonitor:
         """For how long it may allow nothing until that is a failure."""
         self._seen, self._oldest, self._began = dict.fromkeys(lidars, -math.inf), -math.inf, 0
         self._scans: dict[str, Seen] = {}
-        self._moving, self._moves = nothing(), False
+        self._moving, self._moves = no_moving_obstacles(), False
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
@@ -72,7 +72,7 @@ class CollisionMonitor:
         self._oldest = min(self._seen.values())
         self._scans[scan.sensor] = Seen(scan, odometry, nearest - math.hypot(scan.mount.x, scan.mount.y))
 
-    def on_moving(self, moving: Moving) -> None:
+    def on_moving(self, moving: MovingObstacles) -> None:
         """What moves around the robot now, in its base frame; beams that hit it are left to this."""
         self._moving, self._moves = moving, len(moving) > 0
 

@@ -3,7 +3,7 @@
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.underway import Underway
+from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.velocity_smoother import VelocitySmoother
 
 CRAWL = 0.02
@@ -18,7 +18,7 @@ class Commands:
     ) -> None:
         """`period` of the controller in ticks; `latency` of controller and monitor in ticks."""
         self._smoother, self._monitor, self._period = smoother, monitor, period
-        self._wanted, self._allowed = Underway[tuple[Twist, int]](latency[0]), Underway[Twist](latency[1])
+        self._wanted, self._allowed = LatencyQueue[tuple[Twist, int]](latency[0]), LatencyQueue[Twist](latency[1])
         self._at_once: tuple[Twist, int] | None = None
         self._asked, self._free_at = 0, 0
         self.latency = latency[0]

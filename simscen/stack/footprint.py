@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
-from simscen.stack.prediction.moving import Moving
+from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView, RobotModel
 
 Mask = npt.NDArray[np.bool_]
@@ -101,7 +101,7 @@ class Footprint:
             edge[touching] = (near[touching] - self._depth).min(axis=1)
         return np.asarray(np.minimum(edge, middle))
 
-    def gap(self, moving: Moving, poses: Array, times: Array, sigmas: float = 0.0) -> Array:
+    def gap(self, moving: MovingObstacles, poses: Array, times: Array, sigmas: float = 0.0) -> Array:
         """Metres (…,) from the hull at poses (…, 3) to what moves, where it will be `times` seconds from now.
 
         `times` broadcast with them. Negative where they will meet; of a hull that is not round less than it is, by
@@ -155,7 +155,7 @@ class Discs:
         assert least is not None
         return np.asarray(least - np.float32(self.radius))
 
-    def gap(self, moving: Moving, x: Reals, y: Reals, yaw: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
+    def gap(self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
         """Metres (…,) from the discs at poses (…,) to what moves, where it will be at `times`; see Moving.gap."""
         least, *others = [moving.gap(*at, times, sigmas) for at in self._placed(x, y, yaw)]
         for other in others:
@@ -164,7 +164,7 @@ class Discs:
         return least
 
     def nearness(
-        self, moving: Moving, x: Reals, y: Reals, yaw: Reals, times: Reals, kept_off: float
+        self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, kept_off: float
     ) -> tuple[Reals, Mask]:
         """How near the discs at poses (…,) come to what moves, and which touch it; see Moving.nearness."""
         places = self._placed(x, y, yaw)

@@ -2,9 +2,9 @@
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Goal, Path
+from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.frames import Frames, placed
 from simscen.stack.protocols import Controller
-from simscen.stack.replanning import PlanInForce
 
 REACH = 1.0
 """Metres ahead at which the way a controller takes is decided."""
@@ -24,12 +24,12 @@ class LocalPath:
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
-        self._plan: PlanInForce | None = None
+        self._plan: FollowedPlan | None = None
         self._told = self._odom_from_map = Pose2(0.0, 0.0)
         self._goal: Goal | None = None
         self._local_goal: Goal | None = None
 
-    def tell(self, plan: PlanInForce, goal: Goal, frames: Frames) -> Goal:
+    def tell(self, plan: FollowedPlan, goal: Goal, frames: Frames) -> Goal:
         """The plan in force, while the robot is here. Returns the goal in the odom frame."""
         stands = frames.moved(self._odom_from_map, REACH) <= STANDS
         if not stands:
@@ -44,6 +44,6 @@ class LocalPath:
             self._goal, self._local_goal = goal, (local := goal.at(self._odom_from_map.compose(goal.pose)))
         return local
 
-    def _follow(self, plan: PlanInForce, points: Array) -> None:
+    def _follow(self, plan: FollowedPlan, points: Array) -> None:
         self._plan, self._told = plan, self._odom_from_map
         self._controller.set_path(Path(placed(self._told, points), plan.path.tick))

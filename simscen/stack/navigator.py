@@ -10,14 +10,14 @@ map or inside a mapped wall fails after the first retry: no recovery changes tha
 
 from typing import NamedTuple
 
+from simscen.advanced.recovery.costmap_clearing import ClearingBackoff
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.forgetting import Forgetting
 from simscen.stack.frames import Frames
 from simscen.stack.local_path import LocalPath
-from simscen.stack.plan_keeper import PlanKeeper
+from simscen.stack.plan_manager import PlanManager
 from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import Behavior, Controller, GoalChecker, NavigationFailure
 from simscen.stack.recovery import RoundRobin
@@ -40,7 +40,7 @@ class Navigator:
 
     def __init__(
         self,
-        plans: PlanKeeper,
+        plans: PlanManager,
         controller: Controller,
         recovery: RoundRobin,
         goal_checker: GoalChecker,
@@ -48,7 +48,7 @@ class Navigator:
         costmaps: Costmaps,
         period: float,
         failure_tolerance: float,
-        forgetting: Forgetting,
+        forgetting: ClearingBackoff,
     ) -> None:
         """`period` between two steps and `failure_tolerance` in seconds; -1 bears a failing controller for ever."""
         self.plans = plans

@@ -23,7 +23,7 @@ from simscen.core.messages.localization import Belief, Estimate
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.core.messages.sensor_data import Imu, Odometry, Readings, Scan
 from simscen.core.records.trace import Decision
-from simscen.stack.prediction.moving import NOTHING, Moving
+from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
 
 
 class NavigationFailure(Exception):
@@ -144,7 +144,7 @@ class CostmapView:
     origin: tuple[float, float]
     revision: int = 0
     inflation_radius: float = 0.55
-    moving: Moving = NOTHING
+    moving: MovingObstacles = NO_MOVING_OBSTACLES
 
     def with_less_room(self, metres: float) -> "CostmapView":
         """The same place with every obstacle so much larger all round."""

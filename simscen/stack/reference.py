@@ -3,6 +3,8 @@
 from functools import partial
 from typing import Any
 
+from simscen.advanced.prediction.motion_prediction import MotionPrediction
+from simscen.advanced.turn_slip import TurnSlipObserver
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
@@ -15,16 +17,14 @@ from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import Commands
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
+from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.localizers.ground_truth import TRUTH
 from simscen.stack.navigator import Navigator
 from simscen.stack.odometry_history import OdometryHistory, believable
-from simscen.stack.prediction.motion_prediction import MotionPrediction
 from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings, tells_pose
 from simscen.stack.publishing import NOTHING_NEW, Published, Publishing
 from simscen.stack.standstill import Standstill
 from simscen.stack.tasks import Task
-from simscen.stack.turn_slip import TurnSlip
-from simscen.stack.underway import Underway
 from simscen.stack.zones import SpeedFilter
 
 HERE = Pose2(0.0, 0.0)
@@ -68,8 +68,8 @@ class ReferenceStack:
             surroundings.tick_rate, localizer, controller, "map" if fuses_odometry else "odom"
         )
         self._fuses_odometry = fuses_odometry
-        self._turn_slip = TurnSlip() if fuses_odometry and counters_turn_slip else None
-        self._matched = Underway[Scan](localizer_latency)
+        self._turn_slip = TurnSlipObserver() if fuses_odometry and counters_turn_slip else None
+        self._matched = LatencyQueue[Scan](localizer_latency)
         self._events: list[Event] = []
         self._moves = False
         self._tick = 0

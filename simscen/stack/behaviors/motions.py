@@ -6,9 +6,9 @@ from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model import recovery as model
-from simscen.stack.lookahead import time_free
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
+from simscen.stack.time_to_collision import time_to_collision
 
 TIME_ALLOWANCE = 10.0
 """Nav2's default for every behaviour, in seconds."""
@@ -42,7 +42,7 @@ class Spin:
         fastest = min(self._spec.max_rotational_vel, self._robot.max_angular)
         command = Twist(0.0, 0.0, math.copysign(min(max(stopping, MIN_ROTATIONAL_VEL), fastest), self._spec.spin_dist))
         horizon = min(self._spec.simulate_ahead_time, left / abs(command.wz))
-        if time_free(self._footprint, costmap, pose, command, horizon) < horizon:
+        if time_to_collision(self._footprint, costmap, pose, command, horizon) < horizon:
             raise NavigationFailure(ErrorCode.SPIN_COLLISION_AHEAD, "no room to spin")
         return command
 
@@ -79,7 +79,7 @@ class BackUp:
             raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "backing up took too long")
         command = Twist(-speed, 0.0, 0.0)
         horizon = min(self._spec.simulate_ahead_time, left / speed)
-        free = time_free(self._footprint, costmap, pose, command, horizon)
+        free = time_to_collision(self._footprint, costmap, pose, command, horizon)
         if free >= horizon or (self._spec.backup_partial and free * speed >= costmap.resolution):
             return command
         if self._spec.backup_partial and self._from.distance(pose) >= costmap.resolution:

@@ -9,9 +9,9 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
 from simscen.stack.arcs import poses_along
 from simscen.stack.footprint import Footprint
-from simscen.stack.lookahead import time_free
-from simscen.stack.prediction.moving import WIDEST
+from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M
 from simscen.stack.protocols import CostmapView, NavigationFailure
+from simscen.stack.time_to_collision import time_to_collision
 
 CREEP = 0.1
 """m/s. When only slower than this would keep the time to collision, the way is blocked."""
@@ -31,7 +31,7 @@ class FreeWay:
 
     def seconds(self, costmap: CostmapView, pose: Pose2, command: Twist, horizon: float) -> float:
         """For how long the command can be driven; `horizon` if for all of it. Of what stands."""
-        return horizon if command == STOP else time_free(self._footprint, costmap, pose, command, horizon)
+        return horizon if command == STOP else time_to_collision(self._footprint, costmap, pose, command, horizon)
 
     def within(self, command: Twist, free: float, horizon: float, demanded: float) -> Twist:
         """The command, so slow that what is free now lasts for the seconds demanded. Raises NO_VALID_CONTROL.
@@ -53,7 +53,7 @@ class FreeWay:
         """
         if not costmap.moving.things or command == STOP:
             return command
-        reach, speed = self._footprint.discs.reach + WIDEST, math.hypot(command.vx, command.vy)
+        reach, speed = self._footprint.discs.reach + MAX_UNCERTAINTY_M, math.hypot(command.vx, command.vy)
         near = costmap.moving.near(pose.x, pose.y, reach, speed, horizon)
         if not near.things:
             return command

@@ -8,8 +8,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.stack.arcs import poses_along
 from simscen.stack.footprint import Footprint, distance_at
-from simscen.stack.lookahead import time_free
 from simscen.stack.protocols import CostmapView
+from simscen.stack.time_to_collision import time_to_collision
 
 ROOM = 1.01
 """Cells between the hull and the nearest lethal cell's centre that a turn must keep: cells stand for obstacles that
@@ -43,4 +43,6 @@ class TurningRoom:
     def back_out(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
         """Back, where the robot came from, as straight as is free; None when all bends are blocked, too."""
         backs = (Twist(-BACK_OUT, 0.0, rate) for rate in BENDS)
-        return next((one for one in backs if time_free(self._footprint, costmap, pose, one, AHEAD) >= AHEAD), None)
+        return next(
+            (one for one in backs if time_to_collision(self._footprint, costmap, pose, one, AHEAD) >= AHEAD), None
+        )

@@ -21,8 +21,8 @@ from simscen.stack.costmap.obstacle_layer import crossed
 from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
 from simscen.stack.costmap.static_layer import Mask, StaticLayer, empty_layer, free_layer, static_layer, walls_within
 from simscen.stack.localizers.beams import Plane
+from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES
 from simscen.stack.nearest import FARTHEST, SquaredWithin
-from simscen.stack.prediction.moving import NOTHING
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 
 BEYOND_HULL = 0.5
@@ -65,7 +65,7 @@ class Costmap:
         self._view: CostmapView | None = None
         self._changed: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._changes = deque[Numbers | None](maxlen=CHANGES)
-        self.moving = NOTHING
+        self.moving = NO_MOVING_OBSTACLES
         """What moves, in its frame; shown with it."""
         layer = self._layer(Pose2(0.0, 0.0))
         self._frame: Frame = layer.frame

@@ -12,9 +12,9 @@ from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.costmap.rolling import NO_FARTHER
 from simscen.stack.frames import Frames, placed_polygon
+from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
-from simscen.stack.underway import Underway
 
 SMALLEST = 3.0
 """Metres: the edge of Nav2's local costmap, and the least of ours unless somebody asks for less."""
@@ -112,7 +112,7 @@ class _Rhythm:
 
     def __init__(self, period: int, latency: int) -> None:
         self._period, self._updated = max(period, latency), -period
-        self._underway = Underway[_View](latency)
+        self._underway = LatencyQueue[_View](latency)
         self.next: float = 0
         """The tick before which there is nothing to take."""
         self.seen: dict[str, Scan | Image] = {}

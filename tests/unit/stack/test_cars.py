@@ -9,8 +9,8 @@ from simscen.core.messages.navigation import Path
 from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.stack.costmap.costmap import CostmapView
 from simscen.stack.cusps import cusps
+from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import RobotModel
-from simscen.stack.replanning import PlanInForce
 from simscen.stack.velocity_smoother import VelocitySmoother
 from simscen.testing.flatland import box_robot
 
@@ -30,7 +30,7 @@ def test_cusps_are_where_forward_becomes_backward() -> None:
 
 
 def test_a_plan_is_missed_beside_it_and_at_its_end() -> None:
-    plan = PlanInForce(Path(line(0, 1, 0.0)), 0.2, OPEN)
+    plan = FollowedPlan(Path(line(0, 1, 0.0)), 0.2, OPEN)
     for pose, missed in ((Pose2(0.2, 0.1), False), (Pose2(0.4, 0.3), True), (Pose2(0.9, 0.0), False)):
         plan.locate(pose)
         assert plan.missed(pose) is missed

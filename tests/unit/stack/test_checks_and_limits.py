@@ -23,15 +23,15 @@ from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import Wait
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.footprint import Footprint
 from simscen.stack.goal_checker import AT_REST, SimpleGoalChecker
-from simscen.stack.lookahead import time_free
-from simscen.stack.prediction.moving import Moving
+from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.stack.recovery import RoundRobin
-from simscen.stack.replanning import PlanInForce
 from simscen.stack.tasks import Task
+from simscen.stack.time_to_collision import time_to_collision
 from simscen.stack.velocity_smoother import VelocitySmoother
 from simscen.stack.zones import SpeedFilter
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
@@ -238,7 +238,7 @@ def test_arcs_are_those_of_a_fine_integration() -> None:
 def test_time_free_is_the_way_to_the_obstacle_over_the_speed() -> None:
     robot = round_robot()
     view = view_of(Flatland(boxes=[(2.0, -1.0, 2.5, 1.0)]), robot)
-    free = time_free(Footprint(robot, 0.05), view, Pose2(0, 0), Twist(0.5), 10.0)
+    free = time_to_collision(Footprint(robot, 0.05), view, Pose2(0, 0), Twist(0.5), 10.0)
     assert free == pytest.approx((2.0 - 0.22) / 0.5, abs=0.06 / 0.5)
 
 
@@ -246,8 +246,8 @@ def test_a_robot_in_collision_may_move_out_but_not_further_in() -> None:
     robot = round_robot()
     view = view_of(Flatland(boxes=[(2.0, -1.0, 2.5, 1.0)]), robot)
     footprint = Footprint(robot, 0.05)
-    assert time_free(footprint, view, Pose2(1.85, 0), Twist(-0.5), 1.0) == 1.0
-    assert time_free(footprint, view, Pose2(1.85, 0), Twist(0.5), 1.0) < 0.2
+    assert time_to_collision(footprint, view, Pose2(1.85, 0), Twist(-0.5), 1.0) == 1.0
+    assert time_to_collision(footprint, view, Pose2(1.85, 0), Twist(0.5), 1.0) < 0.2
 
 
 def with_posts(*posts: tuple[float, float]) -> CostmapView:
@@ -261,9 +261,11 @@ def test_who_touches_one_thing_may_not_drive_into_another(robot: RobotModel) -> 
     """It seems to be 4 cm deep in a post at its left, and backs up: to the post behind it, no further."""
     footprint, beside, behind = Footprint(robot, 0.05), (0.025, 0.175), (-0.375, 0.025)
     back = Twist(-0.15, 0.0, 0.0)
-    assert time_free(footprint, with_posts(beside), Pose2(0, 0), back, 2.0) == 2.0
+    assert time_to_collision(footprint, with_posts(beside), Pose2(0, 0), back, 2.0) == 2.0
     assert not footprint.free(with_posts(beside), np.zeros((1, 3)))[0]
-    assert time_free(footprint, with_posts(beside, behind), Pose2(0, 0), back, 2.0) == pytest.approx(1.0, abs=0.3)
+    assert time_to_collision(footprint, with_posts(beside, behind), Pose2(0, 0), back, 2.0) == pytest.approx(
+        1.0, abs=0.3
+    )
 
 
 def test_a_footprint_collides_where_its_edge_or_its_inside_is_on_something() -> None:
@@ -292,8 +294,8 @@ def test_the_clearance_of_a_long_hull_in_collision_is_how_deep_it_is_in_it(x: fl
 def test_a_long_robot_that_touches_something_may_turn_out_of_it_but_not_further_in() -> None:
     footprint, view = Footprint(box_robot(1.0, 0.4), 0.05), with_a_post(0.425, 0.19)
     assert not footprint.free(view, np.array([[0.0, 0.0, 0.0]]))[0]
-    assert time_free(footprint, view, Pose2(0, 0), Twist(0.0, 0.0, -0.5), 1.0) == 1.0
-    assert time_free(footprint, view, Pose2(0, 0), Twist(0.0, 0.0, 0.5), 1.0) < 0.4
+    assert time_to_collision(footprint, view, Pose2(0, 0), Twist(0.0, 0.0, -0.5), 1.0) == 1.0
+    assert time_to_collision(footprint, view, Pose2(0, 0), Twist(0.0, 0.0, 0.5), 1.0) < 0.4
 
 
 def test_discs_cover_the_hull() -> None:
@@ -350,7 +352,7 @@ def test_recoveries_help_after_the_codes_that_are_named_and_after_codes_that_nob
 def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> None:
     robot = round_robot()
     line = np.column_stack((np.arange(0.0, 4.0, 0.05), np.zeros(80), np.zeros(80)))
-    plan = PlanInForce(Path(line), robot.inscribed_radius, view_of(Flatland(), robot))
+    plan = FollowedPlan(Path(line), robot.inscribed_radius, view_of(Flatland(), robot))
     for x, blocked in ((2.0, True), (-0.5, False)):
         plan.locate(Pose2(1.0, 0.0))
         plan.see(view_of(Flatland(discs=[(x, 0.1, 0.1)]), robot))
@@ -361,7 +363,7 @@ def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> 
 @pytest.mark.parametrize(("length", "better"), [(1.0, True), (2.4, True), (2.6, False)])
 def test_another_plan_must_be_clearly_shorter(length: float, better: bool) -> None:
     line = np.column_stack((np.linspace(0, 3, 61), np.zeros(61), np.zeros(61)))
-    plan = PlanInForce(Path(line), 0.2, view_of(Flatland(), round_robot()))
+    plan = FollowedPlan(Path(line), 0.2, view_of(Flatland(), round_robot()))
     assert plan.worse_than(length) == better
 
 
@@ -370,7 +372,7 @@ def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_
     line = Path(np.column_stack((np.arange(0.0, 4.0, 0.05), np.zeros(80), np.zeros(80))))
     roomy, narrow = (view_of(Flatland(discs=discs), robot) for discs in ((), [(2.0, 0.45, 0.1)]))
     for made, now, tighter in ((roomy, narrow, True), (narrow, narrow, False), (narrow, roomy, False)):
-        plan = PlanInForce(line, robot.inscribed_radius, made)
+        plan = FollowedPlan(line, robot.inscribed_radius, made)
         plan.see(now)
         assert plan.tightened() == tighter
 
@@ -409,7 +411,7 @@ def test_the_monitor_brakes_for_what_moves_wherever_the_whole_look_at_the_hull_w
     chance, braked, spared = np.random.default_rng(4), 0, 0
     for _ in range(400):
         places, speeds = chance.normal(0.0, 1.2, (2, 2)), chance.normal(0.0, 0.7, (2, 2))
-        moving = Moving(places, speeds, np.array((0.3, 0.1)), np.zeros((2, 4, 4)), 0.0)
+        moving = MovingObstacles(places, speeds, np.array((0.3, 0.1)), np.zeros((2, 4, 4)), 0.0)
         wanted = Twist(*chance.normal(0.0, (0.5, 0.1, 0.8)).tolist())
         hasty.on_moving(moving)
         thorough.on_moving(moving)

@@ -2,12 +2,12 @@
 
 import pytest
 
+from simscen.advanced.recovery.costmap_clearing import ClearingBackoff
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Goal
 from simscen.model.localizers import GroundTruth
 from simscen.model.recovery import Recovery
 from simscen.model.stack import StackSpec
-from simscen.stack.forgetting import Forgetting
 from simscen.testing.flatland import Drive, Flatland, drive
 
 FAR = Goal("far", Pose2(10.0, 3.0), timeout=150.0)
@@ -49,7 +49,7 @@ def test_a_door_that_was_seen_shut_and_has_opened_out_of_sight_is_driven_to() ->
 
 
 def test_all_is_forgotten_at_first_and_then_ever_more_rarely() -> None:
-    forgetting = Forgetting(always=False)
+    forgetting = ClearingBackoff(always=False)
     assert [t for t in range(100) if forgetting.entirely(float(t), 5.0)] == [0, 10, 30, 70]
     forgetting.reset()
     assert forgetting.entirely(100.0, 5.0)
@@ -57,7 +57,7 @@ def test_all_is_forgotten_at_first_and_then_ever_more_rarely() -> None:
 
 @pytest.mark.parametrize(("to_go", "again"), [(4.5, False), (3.9, True)])
 def test_who_has_come_a_metre_nearer_may_forget_at_once(to_go: float, again: bool) -> None:
-    forgetting = Forgetting(always=False)
+    forgetting = ClearingBackoff(always=False)
     assert forgetting.entirely(0.0, 5.0)
     assert forgetting.entirely(1.0, to_go) == again
     assert not forgetting.entirely(2.0, to_go)

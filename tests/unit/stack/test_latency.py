@@ -15,10 +15,10 @@ from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
+from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
 from simscen.stack.reference import ReferenceStack
-from simscen.stack.underway import Underway
 from simscen.testing.flatland import CONTROL, ODOMETRY, RATE, Drive, Flatland, drive, round_robot
 
 START, FAR = Pose2(1.0, 1.0), Goal("far", Pose2(9.0, 1.0), timeout=60.0)
@@ -111,7 +111,7 @@ def test_a_localizer_is_handed_scans_when_it_would_be_done_with_them_with_the_ti
 
 
 def test_what_is_under_way_is_there_after_its_time_and_in_order() -> None:
-    underway = Underway[str](5)
+    underway = LatencyQueue[str](5)
     underway.put(0, "a")
     underway.put(3, "b")
     assert underway.due == 5

@@ -11,8 +11,8 @@ from simscen.core.records.events import Event
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
-from simscen.stack.plan_keeper import PlanKeeper
-from simscen.stack.prediction.moving import NOTHING, Moving
+from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
+from simscen.stack.plan_manager import PlanManager
 from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot
 
@@ -56,7 +56,7 @@ class Bench:
         self.costmap = Costmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE))
         self.journal: list[Event] = []
         self.now = 0.0
-        self.keeper = PlanKeeper(PlannerSpec(**options), self.script, self.costmap, lambda k: 100 + k, 0.22)
+        self.keeper = PlanManager(PlannerSpec(**options), self.script, self.costmap, lambda k: 100 + k, 0.22)
 
     def steps(self, count: int, goal: Goal = GOAL) -> list[object]:
         """Reasons of the plans made in so many steps of the navigator."""
@@ -215,10 +215,10 @@ def test_where_there_is_no_roomier_way_the_tight_one_is_tried_again() -> None:
     assert room == [False, False, True]
 
 
-def across(y: float, vy: float) -> Moving:
+def across(y: float, vy: float) -> MovingObstacles:
     """Someone at (2, y) who walks along y."""
     at, velocity = np.array([[2.0, y]]), np.array([[0.0, vy]])
-    return Moving(at, velocity, np.array([0.3]), np.diag((1e-4,) * 4)[None], 0.3)
+    return MovingObstacles(at, velocity, np.array([0.3]), np.diag((1e-4,) * 4)[None], 0.3)
 
 
 def test_a_plan_that_meets_what_moves_is_made_anew_twice_a_second_until_nothing_does() -> None:
@@ -226,7 +226,7 @@ def test_a_plan_that_meets_what_moves_is_made_anew_twice_a_second_until_nothing_
     assert bench.steps(20) == ["goal"]
     bench.costmap.moving = across(5.0, -1.0)  # at (2, 3) in 2 s, as the robot is
     assert bench.steps(20) == ["moving", "moving"]
-    bench.costmap.moving = NOTHING
+    bench.costmap.moving = NO_MOVING_OBSTACLES
     assert bench.steps(40) == ["moving"]  # straight again
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from simscen.advanced.localizers.spec import SlipEkf
+from simscen.advanced.turn_slip import MAX_CURVATURE_PER_M, TurnSlipObserver
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Goal
@@ -14,7 +15,6 @@ from simscen.core.messages.sensor_data import Imu, Odometry, Readings
 from simscen.core.records.trace import Decision
 from simscen.model.guards import VelocitySmoother
 from simscen.model.stack import StackSpec
-from simscen.stack.turn_slip import MOST, TurnSlip
 from simscen.testing.flatland import Drive, Flatland, drive
 
 BEND = 0.3
@@ -85,7 +85,7 @@ def test_scans_tell_an_ekf_how_far_a_robot_came_whose_wheels_turn_in_vain(matche
 
 
 def test_a_command_is_countered_by_as_much_as_was_seen_and_no_broken_sensor_makes_it_more() -> None:
-    slip, wheels, fused = TurnSlip(), Pose2(0.0, 0.0, 0.0), Pose2(5.0, 5.0, 2.0)
+    slip, wheels, fused = TurnSlipObserver(), Pose2(0.0, 0.0, 0.0), Pose2(5.0, 5.0, 2.0)
     assert slip.countered(Twist(1.0, 0.0, 0.2)) == Twist(1.0, 0.0, 0.2)
     for _ in range(200):
         wheels, fused = wheels.compose(Pose2(0.02, 0.0, 0.01)), fused.compose(Pose2(0.02, 0.0, 0.014))
@@ -96,4 +96,4 @@ def test_a_command_is_countered_by_as_much_as_was_seen_and_no_broken_sensor_make
     for _ in range(200):
         wheels, fused = wheels.compose(Pose2(0.02, 0.0, 0.0)), fused.compose(Pose2(0.02, 0.0, 1.0))
         slip.learn(wheels, fused)
-    assert slip.countered(Twist(1.0, 0.0, 0.0)).wz == -MOST
+    assert slip.countered(Twist(1.0, 0.0, 0.0)).wz == -MAX_CURVATURE_PER_M

@@ -7,7 +7,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.stack.controllers.dwb.trajectories import Trajectories
 from simscen.stack.controllers.free_way import NEARER, SIGMAS
 from simscen.stack.footprint import Footprint
-from simscen.stack.prediction.moving import Moving
+from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView
 
 ROOM = 0.05
@@ -48,7 +48,7 @@ class Room:
             free = no_nearer & (gaps[-1] > gaps[0] + 0.5 * costmap.resolution)
         return int(order[int(free.argmax())]) if free.any() else None
 
-    def _unmet(self, moving: Moving, tried: Trajectories, order: npt.NDArray[np.intp]) -> Array:
+    def _unmet(self, moving: MovingObstacles, tried: Trajectories, order: npt.NDArray[np.intp]) -> Array:
         """Seconds (k,) for which these trajectories meet nothing that moves, where both will be; inf for all of it."""
         times = tried.passed[:, tried.turn[order]]
         gaps = self._footprint.gap(moving, tried.poses(order), times, SIGMAS)

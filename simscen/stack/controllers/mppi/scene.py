@@ -12,7 +12,7 @@ from simscen.stack.controllers.limits import Limits
 from simscen.stack.controllers.local_plan import LocalPlan
 from simscen.stack.controllers.mppi.rollouts import Rollouts
 from simscen.stack.footprint import Discs, Footprint
-from simscen.stack.prediction.moving import WIDEST, Moving
+from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
 from simscen.stack.protocols import CostmapView
 
 Floats = npt.NDArray[np.float32]
@@ -79,13 +79,13 @@ class Scene:
         return np.asarray((costs < INSCRIBED) | (costs == UNKNOWN))
 
     @cached_property
-    def moving(self) -> Moving:
+    def moving(self) -> MovingObstacles:
         """What moves and may come near to a rollout, in the frame of the rollouts."""
         rolled, moving = self.rolled, self.costmap.moving
         if not len(moving):
             return moving
         gone, times = np.sqrt((rolled.x * rolled.x + rolled.y * rolled.y).max(axis=1)), self.times
-        reach, speed = self.footprint.circumscribed + WIDEST, float((gone / times).max())
+        reach, speed = self.footprint.circumscribed + MAX_UNCERTAINTY_M, float((gone / times).max())
         near = moving.near(self.pose.x, self.pose.y, reach, speed, float(times[-1]))
         return near.seen_from(Pose2(self.pose.x, self.pose.y, 0.0)) if len(near) else near
 

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from simscen.advanced.recovery.retrace import Retrace
+from simscen.advanced.recovery.trail import Trail
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
@@ -16,11 +18,9 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import BackUp, Spin
-from simscen.stack.behaviors.retrace import Retrace
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
-from simscen.stack.trail import Trail
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
 Allowed = Callable[[Twist, Pose2], Twist]

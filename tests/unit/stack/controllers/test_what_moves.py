@@ -22,7 +22,7 @@ from simscen.stack.controllers.mppi.rollouts import Rollouts
 from simscen.stack.controllers.mppi.scene import KEPT_OFF, SOON, Scene
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit as Rpp
 from simscen.stack.footprint import Footprint
-from simscen.stack.prediction.moving import Moving
+from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import Controller, CostmapView
 from simscen.testing.flatland import box_robot, round_robot, setting
 
@@ -40,7 +40,7 @@ def among(*discs: tuple[float, float, float, float], deviation: float = 0.0) -> 
     """A costmap with these on it and nothing else, all of whose places are known to so many metres."""
     known = np.array(discs)
     sure = np.tile(np.diag((deviation**2, deviation**2, 0.0, 0.0)), (len(discs), 1, 1))
-    return replace(OPEN, moving=Moving(known[:, :2], known[:, 2:], np.full(len(discs), 0.2), sure, 0.0))
+    return replace(OPEN, moving=MovingObstacles(known[:, :2], known[:, 2:], np.full(len(discs), 0.2), sure, 0.0))
 
 
 def met(disc: tuple[float, float, float, float], speed: float, seconds: float = 1.0) -> bool:

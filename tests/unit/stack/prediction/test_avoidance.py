@@ -6,6 +6,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from simscen.advanced.prediction import avoidance
+from simscen.advanced.prediction.avoidance import Avoidance
+from simscen.advanced.prediction.rollouts import Followed
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import Goal
@@ -18,10 +21,7 @@ from simscen.model.localizers import GroundTruth
 from simscen.model.mppi import Mppi
 from simscen.model.stack import StackSpec
 from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.prediction import avoidance
-from simscen.stack.prediction.avoidance import Avoidance
-from simscen.stack.prediction.moving import Moving
-from simscen.stack.prediction.rollouts import Followed
+from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView, RobotModel
 from simscen.testing.flatland import RATE, Drive, Flatland, box_robot, drive
 
@@ -138,7 +138,7 @@ def test_what_looks_at_the_cheapest_ways_only_finds_the_way_that_is_cheapest_of_
         monkeypatch.setattr(avoidance, "AT_ONCE", at_once)
         avoids, commands = Avoidance(Prediction(), robot, 1.0), list[Twist]()
         for places, speeds, (x, vx, wz) in drawn:
-            moving = Moving(places, speeds, np.full(3, 0.3), np.tile(0.01 * np.eye(4), (3, 1, 1)), 1.0)
+            moving = MovingObstacles(places, speeds, np.full(3, 0.3), np.tile(0.01 * np.eye(4), (3, 1, 1)), 1.0)
             wanted, twist = Twist(1.0, 0.0, 0.1), Twist(float(vx), 0.0, float(wz))
             commands.append(avoids.steer(wanted, Pose2(float(x), 0.1, 0.2), twist, moving, costmap, path))
         given.append(commands)
@@ -152,7 +152,7 @@ def test_the_collision_monitor_brakes_by_the_relative_velocity_and_only_where_br
     still = np.zeros((1, 4, 4))
 
     def told(x: float, y: float, vx: float, vy: float) -> float:
-        monitor.on_moving(Moving(np.array([[x, y]]), np.array([[vx, vy]]), np.array([0.5]), still, 1.0))
+        monitor.on_moving(MovingObstacles(np.array([[x, y]]), np.array([[vx, vy]]), np.array([0.5]), still, 1.0))
         return monitor.allow(Twist(1.0, 0.0, 0.0), Pose2(0.0, 0.0)).vx
 
     assert told(1.0, 0.0, 1.0, 0.0) == 1.0  # it goes as fast as the robot

@@ -8,7 +8,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Goal
 from simscen.model.stack import StackSpec
 from simscen.stack.frames import Frames
-from simscen.stack.prediction.moving import nothing
+from simscen.stack.moving_obstacles import no_moving_obstacles
 from simscen.testing.flatland import RATE, Flatland, drive, round_robot
 
 CONTROLLERS: dict[str, dict[str, Any]] = {
@@ -32,9 +32,9 @@ def least(heed: str, controller: str = "regulated_pure_pursuit") -> float:
     def foretell(tick: int, frames: Frames) -> None:
         told(tick, frames)
         if heed != "monitor":
-            stack._monitor.on_moving(nothing())
+            stack._monitor.on_moving(no_moving_obstacles())
         if heed != "controller":
-            stack._costmaps.near.moving = nothing()
+            stack._costmaps.near.moving = no_moving_obstacles()
 
     stack._foretell = foretell
     world.discs.append((4.5, 0.5, 0.3))

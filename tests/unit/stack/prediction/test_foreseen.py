@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from simscen.advanced.prediction.predicted_costs import add_predicted_costs, meets_moving_obstacle
 from simscen.core.geometry import Pose2
 from simscen.model.planners import OmplPlanner as Spec
+from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
 from simscen.stack.planners.ompl_planner import OmplPlanner
-from simscen.stack.prediction.foreseen import foreseen, meets
-from simscen.stack.prediction.moving import NOTHING, Moving
 from simscen.stack.protocols import CostmapView
 from simscen.testing.flatland import round_robot
 
@@ -14,11 +14,11 @@ SPEED, RADIUS = 1.0, 0.22
 SURE = np.diag((1e-4, 1e-4, 1e-4, 1e-4))[None]
 
 
-def crossing(x: float, y: float, vy: float) -> Moving:
-    return Moving(np.array([[x, y]]), np.array([[0.0, vy]]), np.array([0.3]), SURE, 0.3)
+def crossing(x: float, y: float, vy: float) -> MovingObstacles:
+    return MovingObstacles(np.array([[x, y]]), np.array([[0.0, vy]]), np.array([0.3]), SURE, 0.3)
 
 
-def ground(moving: Moving, resolution: float = 0.05) -> CostmapView:
+def ground(moving: MovingObstacles, resolution: float = 0.05) -> CostmapView:
     cells = round(12 / resolution), round(12 / resolution)
     costs, distance = np.zeros(cells, np.uint8), np.full(cells, 2.0, np.float32)
     return CostmapView(costs, distance, resolution, (-6.0, -6.0), moving=moving)
@@ -31,7 +31,7 @@ def cost_at(view: CostmapView, x: float, y: float) -> int:
 @pytest.mark.parametrize("resolution", [0.05, 0.03, 0.25])
 def test_what_crosses_is_marked_where_it_will_be_when_the_robot_gets_there(resolution: float) -> None:
     """It stands at (2, 2) and crosses the robot's way, 2 m ahead, in 2 s: the robot is there then."""
-    view = foreseen(ground(crossing(2.0, 2.0, -1.0), resolution), ROBOT, SPEED, RADIUS)
+    view = add_predicted_costs(ground(crossing(2.0, 2.0, -1.0), resolution), ROBOT, SPEED, RADIUS)
     assert cost_at(view, 2.0, 0.0) > 50
     assert cost_at(view, 2.0, 2.0) == 0  # where it is now
     assert cost_at(view, 2.0, 1.2) == 0  # behind it: it has gone by then
@@ -40,17 +40,17 @@ def test_what_crosses_is_marked_where_it_will_be_when_the_robot_gets_there(resol
 
 
 def test_nothing_is_marked_where_nothing_moves_or_too_far_off_to_tell() -> None:
-    still = ground(NOTHING)
-    assert foreseen(still, ROBOT, SPEED, RADIUS) is still
+    still = ground(NO_MOVING_OBSTACLES)
+    assert add_predicted_costs(still, ROBOT, SPEED, RADIUS) is still
     far = ground(crossing(5.0, 5.0, -1.0))
-    assert foreseen(far, ROBOT, SPEED, RADIUS) is far  # so that no plan is made anew for it
+    assert add_predicted_costs(far, ROBOT, SPEED, RADIUS) is far  # so that no plan is made anew for it
     beside = ground(crossing(2.0, 2.0, -1.0))
-    assert foreseen(beside, Pose2(40.0, 0.0), SPEED, RADIUS) is beside
+    assert add_predicted_costs(beside, Pose2(40.0, 0.0), SPEED, RADIUS) is beside
 
 
 def test_a_plan_passes_behind_who_would_be_there_first() -> None:
     for vy in (-1.0, 1.0):
-        view = foreseen(ground(crossing(2.0, -1.6 * vy, vy)), ROBOT, SPEED, RADIUS)
+        view = add_predicted_costs(ground(crossing(2.0, -1.6 * vy, vy)), ROBOT, SPEED, RADIUS)
         points = OmplPlanner(Spec(), round_robot(RADIUS)).plan(view, ROBOT, Pose2(4.5, 0.0), 1).points
         beside = points[np.abs(points[:, 0] - 2.0) < 0.1, 1]
         assert (np.sign(beside) == -np.sign(vy)).all()
@@ -59,7 +59,7 @@ def test_a_plan_passes_behind_who_would_be_there_first() -> None:
 
 def test_a_way_meets_what_will_be_there_then_and_nothing_else() -> None:
     way = [complex(x) for x in np.linspace(0.1, 4.5, 45)]
-    assert meets(crossing(2.0, 2.0, -1.0), ROBOT, way, SPEED, RADIUS)
-    assert not meets(crossing(2.0, 2.0, 1.0), ROBOT, way, SPEED, RADIUS)
-    assert not meets(crossing(2.0, 0.9, -2.0), ROBOT, way, SPEED, RADIUS)  # it will have gone
-    assert not meets(crossing(2.0, 2.0, -1.0), ROBOT, way[:0], SPEED, RADIUS)
+    assert meets_moving_obstacle(crossing(2.0, 2.0, -1.0), ROBOT, way, SPEED, RADIUS)
+    assert not meets_moving_obstacle(crossing(2.0, 2.0, 1.0), ROBOT, way, SPEED, RADIUS)
+    assert not meets_moving_obstacle(crossing(2.0, 0.9, -2.0), ROBOT, way, SPEED, RADIUS)  # it will have gone
+    assert not meets_moving_obstacle(crossing(2.0, 2.0, -1.0), ROBOT, way[:0], SPEED, RADIUS)

@@ -1,8 +1,8 @@
 """Which tracks are followed on, from updates written down by hand."""
 
+from simscen.advanced.prediction.track import Track
+from simscen.advanced.prediction.track_lifecycle import UNCOME, TrackLifecycle
 from simscen.model.guards import Prediction
-from simscen.stack.prediction.going import UNCOME, Going
-from simscen.stack.prediction.tracks import Track
 from simscen.testing.flatland import RATE
 
 
@@ -17,7 +17,7 @@ def track(*came: bool) -> Track:
 
 
 def ended(*tracks: Track) -> list[bool]:
-    going = Going(Prediction(), RATE)
+    going = TrackLifecycle(Prediction(), RATE)
     return [going.ended(each, each.hit_at, list(tracks), lambda _: True) for each in tracks]
 
 

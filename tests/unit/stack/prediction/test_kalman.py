@@ -5,14 +5,14 @@ import pytest
 from filterpy.common import Q_discrete_white_noise
 from filterpy.kalman import KalmanFilter
 
-from simscen.stack.prediction.kalman import Point
+from simscen.advanced.prediction.track import ConstantVelocityFilter
 
 
 def test_it_is_filterpys_filter_of_either_axis() -> None:
     chance = np.random.default_rng(3)
     seconds, acceleration = 0.1, 1.5
     state, covariance = chance.normal(size=4), np.kron([[0.1, 0.02], [0.02, 1.5]], np.eye(2))
-    point = Point(complex(*state[:2]), complex(*state[2:]), 0.1, 0.02, 1.5)
+    point = ConstantVelocityFilter(complex(*state[:2]), complex(*state[2:]), 0.1, 0.02, 1.5)
     oracle = KalmanFilter(dim_x=4, dim_z=2)
     oracle.x, oracle.P = state.copy(), covariance
     oracle.F = np.eye(4) + seconds * np.eye(4, k=2)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from simscen.advanced.prediction.rollouts import HORIZON, TIMES, Followed
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.stack.prediction.moving import Moving, Thing
-from simscen.stack.prediction.rollouts import HORIZON, TIMES, Followed
+from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
 from simscen.testing.flatland import round_robot
 
 
@@ -15,23 +15,27 @@ def test_what_is_told_to_come_no_nearer_comes_no_nearer_whichever_way_one_goes()
     for _ in range(200):
         x, y, vx, vy = chance.normal(0.0, 2.0, 4).tolist()
         here, speed = complex(*chance.normal(0.0, 2.0, 2)), float(chance.uniform(0.0, 3.0))
-        thing = Thing(complex(x, y), complex(vx, vy), 0.3, 0.0, 0.0, 0.0)
+        thing = MovingObstacle(complex(x, y), complex(vx, vy), 0.3, 0.0, 0.0, 0.0)
         off = np.abs(thing.place + thing.velocity * times - here) - speed * times - 0.3
         assert thing.missed_by(here, speed, 3.0) == pytest.approx(off.min(), abs=2e-3)
-    assert Thing(2 + 0j, 0j, 0.3, 0.0, 0.0, 0.0).missed_by(0j, 0.0, 3.0) == pytest.approx(1.7)
-    assert Thing(0j, -1 + 0j, 0.3, 0.0, 0.0, 0.0).missed_by(0j, 0.0, 3.0) == pytest.approx(-0.3)
+    assert MovingObstacle(2 + 0j, 0j, 0.3, 0.0, 0.0, 0.0).missed_by(0j, 0.0, 3.0) == pytest.approx(1.7)
+    assert MovingObstacle(0j, -1 + 0j, 0.3, 0.0, 0.0, 0.0).missed_by(0j, 0.0, 3.0) == pytest.approx(-0.3)
 
 
 def test_arrays_are_what_it_was_made_of_and_turn_with_the_frame() -> None:
     spread = np.kron([[[0.1, 0.02], [0.02, 0.4]]], np.eye(2))
-    one = Moving(np.array([[3.0, 1.0]]), np.array([[1.0, 0.0]]), np.array([0.3]), spread, 1.0)
+    one = MovingObstacles(np.array([[3.0, 1.0]]), np.array([[1.0, 0.0]]), np.array([0.3]), spread, 1.0)
     assert one.covariances == pytest.approx(spread)
     seen = one.seen_from(Pose2(1.0, 1.0, np.pi / 2)).after(2.0)
     assert seen.centres == pytest.approx(np.array([[0.0, -4.0]]))
     assert seen.velocities == pytest.approx(np.array([[0.0, -1.0]]))
     step = np.eye(4) + 2.0 * np.eye(4, k=2)
     assert seen.covariances == pytest.approx(step @ spread @ step.T)
-    assert Moving.of((), 1.0).centres.shape == (0, 2) and Moving.of((), 1.0).covariances.shape == (0, 4, 4)
+    assert MovingObstacles.of((), 1.0).centres.shape == (0, 2) and MovingObstacles.of((), 1.0).covariances.shape == (
+        0,
+        4,
+        4,
+    )
 
 
 def test_what_is_told_at_once_to_stay_off_a_way_stays_off_it_at_each_moment() -> None:
@@ -44,8 +48,10 @@ def test_what_is_told_at_once_to_stay_off_a_way_stays_off_it_at_each_moment() ->
             float(chance.uniform(-0.3, 3.0)), float(chance.uniform(-0.4, 0.4)), float(chance.uniform(-3.0, 3.0))
         )
         twist, wanted = (Twist(float(chance.uniform(-0.5, 0.5)), 0.0, 0.0) for _ in range(2))
-        thing = Thing(complex(*chance.uniform(-4, 4, 2)), complex(*chance.uniform(-1, 1, 2)), 0.3, 0.01, 0.0, 0.02)
-        moving = Moving.of((thing,), 1.5)
+        thing = MovingObstacle(
+            complex(*chance.uniform(-4, 4, 2)), complex(*chance.uniform(-1, 1, 2)), 0.3, 0.01, 0.0, 0.02
+        )
+        moving = MovingObstacles.of((thing,), 1.5)
         place, speed, apart = path.course(here, twist, wanted, robot)
         way = path.driven(here, twist, wanted, (1.0,), robot, turns=False)
         assert np.abs(way.x[0] + 1j * way.y[0] - [place(time) for time in TIMES]).max() <= apart + 1e-9

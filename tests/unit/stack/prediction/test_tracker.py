@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from simscen.advanced.prediction.clusters import ENOUGH, answers, clusters, fitted, runs
+from simscen.advanced.prediction.tracker import Tracker
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
-from simscen.stack.prediction.clusters import ENOUGH, answers, clusters, fitted, runs
-from simscen.stack.prediction.tracker import Tracker
 from simscen.testing.flatland import RATE, Flatland
 
 Disc = tuple[float, float, float]

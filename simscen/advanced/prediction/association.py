@@ -2,10 +2,10 @@
 
 import math
 
+from simscen.advanced.prediction.clusters import BOTH, Piece, Places, fitted
+from simscen.advanced.prediction.scan_outline import LidarPose
+from simscen.advanced.prediction.track import Track
 from simscen.core.decorators import fast_dataclass
-from simscen.stack.prediction.clusters import BOTH, Piece, Places, fitted
-from simscen.stack.prediction.stance import Stance
-from simscen.stack.prediction.tracks import Track
 
 NOISE, RELATIVE, HALF_SEEN = 0.02, 0.004, 0.10
 """Standard deviation in m of a measured centre: near by, for each metre of range, and more where a piece is hidden."""
@@ -31,7 +31,7 @@ class Seen:
     tick: int
     places: Places
     pieces: list[Piece]
-    lidar: Stance
+    lidar: LidarPose
     came: list[bool]
     stood: list[bool]
 
@@ -65,7 +65,7 @@ def associate(tracks: list[Track], seen: Seen) -> set[int]:
     return taken
 
 
-def _stood(track: Track, centre: complex, lidar: Stance, hidden: float) -> bool:
+def _stood(track: Track, centre: complex, lidar: LidarPose, hidden: float) -> bool:
     """Whether what stands there is what the track was hit at: nothing hops from one post to the next."""
     return abs(lidar.into(track.lately[-1].place) - centre) <= GATE + hidden
 

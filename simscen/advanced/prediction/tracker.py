@@ -7,16 +7,16 @@ nothing continues ends: soon where the lidar sees through the place, later where
 
 import numpy as np
 
+from simscen.advanced.prediction.association import Seen, associate, begin
+from simscen.advanced.prediction.clusters import Hits, Mask, Places, Runs, answers, clusters, runs, shares
+from simscen.advanced.prediction.scan_outline import Sight
+from simscen.advanced.prediction.track import Track
+from simscen.advanced.prediction.track_lifecycle import TrackLifecycle
+from simscen.advanced.prediction.visibility import FARTHEST, Earlier, FreeSpaceMemory
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
-from simscen.stack.prediction.association import Seen, associate, begin
-from simscen.stack.prediction.clusters import Hits, Mask, Places, Runs, answers, clusters, runs, shares
-from simscen.stack.prediction.going import Going
-from simscen.stack.prediction.moving import Moving, Thing, nothing
-from simscen.stack.prediction.seen_through import FARTHEST, Earlier, SeenThrough
-from simscen.stack.prediction.sight import Sight
-from simscen.stack.prediction.tracks import Track
+from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles, no_moving_obstacles
 
 CHECKED = 120
 """Beams of a scan that are looked at while nothing moves; all, when what one of these hits has appeared."""
@@ -34,17 +34,17 @@ class Tracker:
 
     def __init__(self, spec: Prediction, tick_rate: int) -> None:
         self._spec, self._rate = spec, tick_rate
-        self._memory = SeenThrough(tick_rate)
+        self._memory = FreeSpaceMemory(tick_rate)
         self._every, self._restless = 1, False
         self._towards = self._towards_some = np.zeros(0, dtype=np.complex128)
-        self._tracks, self._going = list[Track](), Going(spec, tick_rate)
+        self._tracks, self._going = list[Track](), TrackLifecycle(spec, tick_rate)
         self.tick = 0
         """When the newest scan was taken."""
         self.began: int | None = None
         """When the first scan was taken."""
         self.hits: Mask | None = None
         """Which beams of the newest scan hit something that moves; None when none does."""
-        self._nothing = nothing(spec.acceleration)
+        self._nothing = no_moving_obstacles(spec.acceleration)
         self.moving = self._nothing
         """What moves, at the tick of the newest scan."""
 
@@ -138,7 +138,7 @@ class Tracker:
         """Note what moves, and which beams hit it."""
         scan, ends, lidar = sight.scan, sight.ends, sight.lidar
         things = [
-            Thing(
+            MovingObstacle(
                 each.place,
                 each.velocity,
                 max(each.radius, BODY),
@@ -148,7 +148,7 @@ class Tracker:
             )
             for each in moving
         ]
-        self.moving = Moving.of(things, self._spec.acceleration)
+        self.moving = MovingObstacles.of(things, self._spec.acceleration)
         hits = np.zeros(len(ends), dtype=np.bool_)
         for thing in things:
             hits |= np.abs(ends - lidar.into(thing.place)) <= self._spec.margin + thing.radius

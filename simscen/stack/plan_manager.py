@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simscen.advanced.prediction.predicted_costs import add_predicted_costs, meets_moving_obstacle
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.model.planners import PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
-from simscen.stack.prediction.foreseen import foreseen, meets
+from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
-from simscen.stack.replanning import PlanInForce
 
 TIGHT_PERIOD = 0.5
 """Seconds between two looks for a roomier way where the followed one has become tight."""
@@ -41,7 +41,7 @@ GONE = 8
 """Cells of live obstacles that must have gone for that; single cells come and go with the lidar's noise."""
 
 
-class PlanKeeper:
+class PlanManager:
     """Keeps the plan in force for one goal after another, in the map frame; `now` is the navigator's clock."""
 
     def __init__(
@@ -73,7 +73,7 @@ class PlanKeeper:
 
     def drop(self, reason: str) -> None:
         """Make a new plan at the next step, for this reason; what is being worked out is of no use any more."""
-        self.plan: PlanInForce | None = None
+        self.plan: FollowedPlan | None = None
         self._asked: _Asked | None = None
         self._reason = reason
 
@@ -108,7 +108,7 @@ class PlanKeeper:
     def _rate(self) -> float:
         return self._spec.replanning_rate or (THROUGH_POSES_RATE if self._via else USUAL_RATE)
 
-    def _reconsider(self, tick: int, now: float, goal: Goal, pose: Pose2, plan: PlanInForce) -> None:
+    def _reconsider(self, tick: int, now: float, goal: Goal, pose: Pose2, plan: FollowedPlan) -> None:
         """Ask for another plan when this one is blocked, outdated, or may be clearly longer than need be."""
         reason = self._must_replan(now, pose, plan)
         if reason:
@@ -141,7 +141,7 @@ class PlanKeeper:
         self._partial, self._origin, self._bent = asked.partial, asked.origin, asked.bent
         return (self._adopt(tick, now, asked.answer, asked.reason),)
 
-    def _must_replan(self, now: float, pose: Pose2, plan: PlanInForce) -> str:
+    def _must_replan(self, now: float, pose: Pose2, plan: FollowedPlan) -> str:
         """Why the plan cannot be followed any more; "" if it can."""
         if self._steered and now - self._adopted >= MISSED_PERIOD and plan.missed(pose):
             return "missed"
@@ -159,21 +159,21 @@ class PlanKeeper:
             return "blocked"
         return "window" if self._partial and self._costmap.view.origin != self._origin else ""
 
-    def _blocked(self, plan: PlanInForce) -> bool:
+    def _blocked(self, plan: FollowedPlan) -> bool:
         plan.watch(self._costmap)
         return plan.blocked()
 
-    def _moved(self, now: float, pose: Pose2, plan: PlanInForce) -> str:
+    def _moved(self, now: float, pose: Pose2, plan: FollowedPlan) -> str:
         """Why what moves calls for another plan: this one meets it, or leads around where it was to be met."""
         moving = self._costmap.moving
         if not (self._bent or len(moving)) or now - self._minded < MOVING_PERIOD or self._spec.replanning == "rate":
             return ""
-        if not self._bent and not meets(moving, pose, plan.places(4), self._speed, self._radius):
+        if not self._bent and not meets_moving_obstacle(moving, pose, plan.places(4), self._speed, self._radius):
             return ""
         self._minded = now
         return "moving"
 
-    def _may_replan(self, now: float, goal: Goal, pose: Pose2, plan: PlanInForce) -> str:
+    def _may_replan(self, now: float, goal: Goal, pose: Pose2, plan: FollowedPlan) -> str:
         """Why there may be a better plan by now; "" if nothing speaks for it."""
         if self._spec.replanning == "rate":
             return ""
@@ -189,7 +189,7 @@ class PlanKeeper:
         self._most = cells if gone else max(self._most, cells)
         return "better" if gone and self._can_be_shorter(goal, pose, plan) else ""
 
-    def _can_be_shorter(self, goal: Goal, pose: Pose2, plan: PlanInForce) -> bool:
+    def _can_be_shorter(self, goal: Goal, pose: Pose2, plan: FollowedPlan) -> bool:
         """Whether a plan straight to where the goal may be reached would be taken: no other is shorter."""
         return self._partial or plan.worse_than(pose.distance(goal.pose) - goal.xy_tolerance)
 
@@ -197,7 +197,7 @@ class PlanKeeper:
         """One path through all that is to be passed; where it turns from one to the next, it heads for the next."""
         legs, start = list[Array](), pose
         seen = self._costmap.view
-        view = foreseen(seen, pose, self._speed, self._radius)
+        view = add_predicted_costs(seen, pose, self._speed, self._radius)
         self._bent = view is not seen
         for stop in (*self._via, goal):
             points = self._leg(view, stop, start)
@@ -234,7 +234,7 @@ class PlanKeeper:
 
     def _adopt(self, tick: int, now: float, path: Path, reason: str) -> Event:
         view = self._costmap.view
-        self.plan = PlanInForce(path, self._radius, view)
+        self.plan = FollowedPlan(path, self._radius, view)
         self._adopted = self._looked = self._minded = now
         self._checked, self._most = view.revision, self._costmap.obstacle_cells
         made: dict[str, Value] = {"reason": reason, "length": round(path.length(), 6)}

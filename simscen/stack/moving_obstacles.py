@@ -10,19 +10,19 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 
-WIDEST = 0.8
+MAX_UNCERTAINTY_M = 0.8
 """Metres by which what is not known of a place widens it at most."""
-AHEAD, LEAST = 0.5, 0.05
+MAX_STEP_S, MIN_STEP_S = 0.5, 0.05
 """Seconds that are passed over at once at most, unless all keep clear of each other by WIDEST as well, and at least, to
 be worth it."""
-TOUCH = 0.03
+CONTACT_DISTANCE_M = 0.03
 """Metres: whoever comes nearer is taken to touch."""
 
 Mask = npt.NDArray[np.bool_]
 Reals = npt.NDArray[np.floating]
 
 
-class Thing(NamedTuple):
+class MovingObstacle(NamedTuple):
     """An upright cylinder that moves: its middle (m) and its velocity (m/s) as x + iy, and its radius in m.
 
     How sure these are is alike along all axes: variance of the place, covariance of both, variance of the velocity.
@@ -54,7 +54,7 @@ class Thing(NamedTuple):
         return abs(off + velocity * when) - self.radius - speed * when
 
 
-class Moving:
+class MovingObstacles:
     """Things that move, as upright cylinders, in one frame and at one moment.
 
     `acceleration` in m/s² is how fast velocities may change: what is not known of them grows with it.
@@ -71,11 +71,13 @@ class Moving:
         """
         spreads = np.maximum(covariances[:, (0, 0, 2), (0, 2, 2)], covariances[:, (1, 1, 3), (1, 3, 3)])
         rows = zip(centres.tolist(), velocities.tolist(), radii.tolist(), spreads.tolist(), strict=True)
-        self.things = tuple(Thing(complex(*at), complex(*goes), radius, *spread) for at, goes, radius, spread in rows)
+        self.things = tuple(
+            MovingObstacle(complex(*at), complex(*goes), radius, *spread) for at, goes, radius, spread in rows
+        )
         self.acceleration = acceleration
 
     @classmethod
-    def of(cls, things: Iterable[Thing], acceleration: float) -> "Moving":
+    def of(cls, things: Iterable[MovingObstacle], acceleration: float) -> "MovingObstacles":
         """These things."""
         moving = object.__new__(cls)
         moving.things, moving.acceleration = tuple(things), acceleration
@@ -117,7 +119,7 @@ class Moving:
         """
         least = np.full(np.broadcast_shapes(x.shape, times.shape), np.inf, x.dtype)
         for thing, gap in self._gaps(x, y, times):
-            wider = np.minimum(sigmas * self._deviation(thing, times), WIDEST) if sigmas else 0.0
+            wider = np.minimum(sigmas * self._deviation(thing, times), MAX_UNCERTAINTY_M) if sigmas else 0.0
             np.minimum(least, gap - wider, out=least)
         return least
 
@@ -130,8 +132,8 @@ class Moving:
         shape = np.broadcast_shapes(x.shape, times.shape)
         nearest, touched = np.full(shape, -np.inf, x.dtype), np.zeros(shape, np.bool_)
         for thing, gap in self._gaps(x, y, times):
-            touched |= gap < radius + TOUCH
-            room = np.minimum(kept_off + self._deviation(thing, times), WIDEST)
+            touched |= gap < radius + CONTACT_DISTANCE_M
+            room = np.minimum(kept_off + self._deviation(thing, times), MAX_UNCERTAINTY_M)
             np.maximum(nearest, (radius - gap) / room, out=nearest)
         nearest += 1.0
         return nearest, touched
@@ -146,20 +148,22 @@ class Moving:
             closing, time = max(speed + abs(thing.velocity), 1e-3), 0.0
             while time < seconds:
                 off = abs(thing.place + thing.velocity * time - place(time))
-                room = min(kept_off + thing.deviation(min(time + AHEAD, seconds), self.acceleration), WIDEST)
+                room = min(
+                    kept_off + thing.deviation(min(time + MAX_STEP_S, seconds), self.acceleration), MAX_UNCERTAINTY_M
+                )
                 spare = (off - thing.radius - reach - room) / closing
-                if spare < LEAST:
+                if spare < MIN_STEP_S:
                     return False
-                time += max(min(spare, AHEAD), spare - (WIDEST - room) / closing)
+                time += max(min(spare, MAX_STEP_S), spare - (MAX_UNCERTAINTY_M - room) / closing)
         return True
 
-    def _deviation(self, thing: Thing, times: Reals) -> Reals:
+    def _deviation(self, thing: MovingObstacle, times: Reals) -> Reals:
         """Standard deviation (…,) in m of where one will be, along any axis."""
         turned = (0.5 * self.acceleration * times**2) ** 2
         *_, variance, covariance, wanders = thing
         return np.asarray(np.sqrt(variance + 2.0 * covariance * times + wanders * times**2 + turned))
 
-    def _gaps(self, x: Reals, y: Reals, times: Reals) -> Iterator[tuple[Thing, Reals]]:
+    def _gaps(self, x: Reals, y: Reals, times: Reals) -> Iterator[tuple[MovingObstacle, Reals]]:
         """Of each thing, the metres (…,) to its surface."""
         for thing in self.things:
             place, velocity, radius, *_ = thing
@@ -171,24 +175,24 @@ class Moving:
             dx -= radius
             yield thing, dx
 
-    def near(self, x: float, y: float, reach: float, speed: float, seconds: float) -> "Moving":
+    def near(self, x: float, y: float, reach: float, speed: float, seconds: float) -> "MovingObstacles":
         """Those whose surface may come within `reach` metres of who leaves a point at `speed`, in so many seconds."""
         here = complex(x, y)
         close = [each for each in self.things if each.missed_by(here, speed, seconds) < reach]
-        return self if len(close) == len(self.things) else Moving.of(close, self.acceleration)
+        return self if len(close) == len(self.things) else MovingObstacles.of(close, self.acceleration)
 
-    def seen_from(self, frame: Pose2) -> "Moving":
+    def seen_from(self, frame: Pose2) -> "MovingObstacles":
         """The same in another frame, which is at `frame` in this one."""
         origin, turn = complex(frame.x, frame.y), cmath.rect(1.0, -frame.yaw)
-        return Moving.of(
-            [Thing((place - origin) * turn, goes * turn, *rest) for place, goes, *rest in self.things],
+        return MovingObstacles.of(
+            [MovingObstacle((place - origin) * turn, goes * turn, *rest) for place, goes, *rest in self.things],
             self.acceleration,
         )
 
-    def after(self, seconds: float) -> "Moving":
+    def after(self, seconds: float) -> "MovingObstacles":
         """The same so many seconds later."""
         later = [
-            Thing(
+            MovingObstacle(
                 place + goes * seconds,
                 goes,
                 radius,
@@ -198,12 +202,12 @@ class Moving:
             )
             for place, goes, radius, variance, covariance, wanders in self.things
         ]
-        return Moving.of(later, self.acceleration)
+        return MovingObstacles.of(later, self.acceleration)
 
 
-def nothing(acceleration: float = 0.0) -> Moving:
+def no_moving_obstacles(acceleration: float = 0.0) -> MovingObstacles:
     """Nothing moves."""
-    return Moving.of((), acceleration)
+    return MovingObstacles.of((), acceleration)
 
 
-NOTHING = nothing()
+NO_MOVING_OBSTACLES = no_moving_obstacles()

@@ -13,10 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
+from simscen.advanced.prediction.clusters import Indices, Mask, Places
 from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
-from simscen.stack.prediction.clusters import Indices, Mask, Places
 
 MARGIN, RELATIVE = 0.25, 0.02
 """Metres, and share of the range, by which an earlier beam must have gone farther."""
@@ -176,7 +176,7 @@ class Looked:
         return np.asarray(near < SAME + SAME_RELATIVE * self.distance)
 
 
-class SeenThrough:
+class FreeSpaceMemory:
     """The newest scans of one lidar."""
 
     def __init__(self, tick_rate: int) -> None:

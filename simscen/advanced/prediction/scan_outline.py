@@ -1,20 +1,43 @@
-"""What a scan says of places: whether the lidar sees past one, and whether something still stands there."""
+"""Where a lidar is, for points as complex numbers."""
 
 import cmath
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from simscen.advanced.prediction.clusters import Places
+from simscen.advanced.prediction.track import Track
+from simscen.advanced.prediction.visibility import SAME, Earlier
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
-from simscen.stack.prediction.clusters import Places
-from simscen.stack.prediction.seen_through import SAME, Earlier
-from simscen.stack.prediction.stance import Stance
-from simscen.stack.prediction.tracks import Track
+
+Spot = TypeVar("Spot", complex, Places)
 
 
+class LidarPose(NamedTuple):
+    """A frame in another: `at` x + iy in m, and looking along the unit vector `towards`."""
+
+    at: complex
+    towards: complex
+
+    @classmethod
+    def of(cls, pose: Pose2) -> "LidarPose":
+        """That of a pose."""
+        return cls(complex(pose.x, pose.y), cmath.rect(1.0, pose.yaw))
+
+    def out(self, points: Spot) -> Spot:
+        """Points of this frame as the other has them."""
+        return points * self.towards + self.at
+
+    def into(self, points: Spot) -> Spot:
+        """Points of the other frame as this one has them."""
+        return (points - self.at) * self.towards.conjugate()
+
+
+# MERGED: What a scan says of places: whether the lidar sees past one, and whether something still stands there.
 @dataclass(frozen=True, eq=False)
 class Sight:
     """A scan whose beams end at `ends` (n,) as its lidar sees them, which is `at` a pose in the frame of the tracks.
@@ -28,9 +51,9 @@ class Sight:
     before: Earlier | None
 
     @cached_property
-    def lidar(self) -> Stance:
+    def lidar(self) -> LidarPose:
         """Where the lidar is."""
-        return Stance.of(self.at)
+        return LidarPose.of(self.at)
 
     def past(self, track: Track) -> bool:
         """Whether the lidar sees past the place where the middle of a track should be."""

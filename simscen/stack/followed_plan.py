@@ -33,7 +33,7 @@ STRAYED, AT_END = 0.2, 0.03
 """Metres beside its plan, or from its end, at which a car needs another: it cannot turn back on the spot."""
 
 
-class PlanInForce:
+class FollowedPlan:
     """The plan being followed, and how far the robot has come on it."""
 
     def __init__(self, path: Path, radius: float, costmap: CostmapView) -> None:

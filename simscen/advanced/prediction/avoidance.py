@@ -13,12 +13,12 @@ from functools import cached_property
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2
+from simscen.advanced.prediction.rollouts import HORIZON, TIMES, Followed, Repertoire, Rollouts, arc
+from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.guards import Prediction
 from simscen.stack.footprint import Discs
-from simscen.stack.prediction.moving import WIDEST, Moving, Reals
-from simscen.stack.prediction.rollouts import HORIZON, TIMES, Followed, Repertoire, Rollouts, arc
+from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles, Reals
 from simscen.stack.protocols import CostmapView, RobotModel
 
 ROOM = 0.25
@@ -69,7 +69,7 @@ class Avoidance:
         wanted: Twist,
         pose: Pose2,
         twist: Twist,
-        moving: Moving,
+        moving: MovingObstacles,
         costmap: CostmapView,
         path: Followed | None,
         home: Pose2 | None = None,
@@ -78,7 +78,7 @@ class Avoidance:
 
         All in one frame. `path` is what is followed; a robot that follows none belongs at `home`.
         """
-        near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + WIDEST, self._speed, HORIZON)
+        near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + MAX_UNCERTAINTY_M, self._speed, HORIZON)
         if not near.things:
             self._last = None
             return wanted
@@ -92,7 +92,7 @@ class Avoidance:
         self._last = self._best(self._own(wanted, pose, twist, path, SLOWER), pose, twist, near, costmap, path, home)
         return self._last
 
-    def _clear(self, wanted: Twist, pose: Pose2, twist: Twist, moving: Moving, path: Followed | None) -> bool:
+    def _clear(self, wanted: Twist, pose: Pose2, twist: Twist, moving: MovingObstacles, path: Followed | None) -> bool:
         """Whether the controller's own way is told at once to come near nothing: most that is in sight stays off."""
         if path is None or len(path) < 2 or wanted.vx == 0.0:
             return False
@@ -104,7 +104,7 @@ class Avoidance:
         own: Rollouts,
         pose: Pose2,
         twist: Twist,
-        moving: Moving,
+        moving: MovingObstacles,
         costmap: CostmapView,
         path: Followed | None,
         home: Pose2 | None,
@@ -140,7 +140,7 @@ class Avoidance:
         ways: Rollouts,
         pose: Pose2,
         goal: tuple[float, float],
-        moving: Moving,
+        moving: MovingObstacles,
         costmap: CostmapView,
         least: float,
         other: float,
@@ -162,7 +162,7 @@ class Avoidance:
             return arc(pose, wanted, parts if wanted != STOP else (1.0,))
         return path.driven(pose, twist, wanted, parts, self._robot, not self._discs.centred)
 
-    def _risk(self, ways: Rollouts, moving: Moving) -> Array:
+    def _risk(self, ways: Rollouts, moving: MovingObstacles) -> Array:
         """What each way (n,) costs for what it comes near to."""
         worst, hit = self._discs.nearness(moving, ways.x, ways.y, ways.yaw, TIMES, ROOM)
         near = np.minimum(np.maximum(worst, 0.0), 2.0) ** 2 * SOONER
@@ -201,3 +201,55 @@ class Avoidance:
             return np.zeros(len(commands))
         change = np.abs(commands[:, 0] - self._last.vx) / self._speed
         return np.asarray(CHANGE * (change + np.abs(commands[:, 1] - self._last.wz) / 3.0))
+
+
+# MERGED: Where a robot belongs that is to stand, and how it gets back there after it has stepped aside.
+THERE, TURNED = 0.08, 0.15
+"""Metres and rad within which the robot stands where it belongs."""
+LEFT = 0.15
+"""Metres from there at which it sets out to come back."""
+PART, GAIN = 0.3, 1.0
+"""Of full speed at most on the way back, and m/s for each metre that is left."""
+TURN = 1.0
+"""rad/s at most on the way back."""
+FACING = 0.4
+"""rad off its line beyond which it turns before it drives."""
+
+
+class StandPosition:
+    """Remembers the pose; the way back is straight, forward or backward, and last the heading is turned to."""
+
+    def __init__(self, robot: RobotModel, full_speed: float) -> None:
+        self._speed, self._turn = PART * full_speed, min(TURN, robot.max_angular)
+        self._reverses, self._turns = robot.max_reverse > 0.0, robot.turning_radius == 0.0
+        self._home: Pose2 | None = None
+        self._away = False
+
+    def leave(self) -> None:
+        """It drives again."""
+        self._home, self._away = None, False
+
+    def home(self, pose: Pose2, moving: bool) -> Pose2 | None:
+        """Where it belongs, once something moves around it; None while it need not care."""
+        if self._home is None and moving:
+            self._home = pose
+        return self._home
+
+    def back(self, pose: Pose2) -> Twist:
+        """The command on the way back; STOP where it belongs, or when it cannot turn to its line."""
+        home = self._home
+        if home is None or not self._turns:
+            return STOP
+        distance = home.distance(pose)
+        self._away = distance > (THERE if self._away else LEFT)
+        if not self._away:
+            turn = wrap(home.yaw - pose.yaw)
+            return Twist(0.0, 0.0, self._turned(turn)) if abs(turn) > TURNED else STOP
+        bearing = wrap(math.atan2(home.y - pose.y, home.x - pose.x) - pose.yaw)
+        sign = -1.0 if abs(bearing) > math.pi / 2 and self._reverses else 1.0
+        off = wrap(bearing + math.pi) if sign < 0 else bearing
+        speed = min(self._speed, GAIN * distance) if abs(off) < FACING else 0.0
+        return Twist(sign * speed, 0.0, self._turned(off))
+
+    def _turned(self, angle: float) -> float:
+        return math.copysign(min(self._turn, 2.0 * abs(angle)), angle)

@@ -12,7 +12,7 @@ from simscen.stack.footprint import Footprint, distance_at, distances, lethal_ne
 from simscen.stack.protocols import CostmapView
 
 
-def time_free(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> float:
+def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> float:
     """Seconds until the first collision at this velocity; `horizon` when there is none before.
 
     A robot that seems to be in collision already (its map or its belief is off by a few centimetres) may move as long

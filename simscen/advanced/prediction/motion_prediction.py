@@ -2,21 +2,20 @@
 
 import math
 
+from simscen.advanced.prediction.avoidance import Avoidance, StandPosition
+from simscen.advanced.prediction.dead_reckoning import DeadReckoning
+from simscen.advanced.prediction.rollouts import Followed
+from simscen.advanced.prediction.tracker import Tracker
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import Path
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
-from simscen.stack.prediction.avoidance import Avoidance
-from simscen.stack.prediction.moving import Moving, nothing
-from simscen.stack.prediction.rolled import Rolled
-from simscen.stack.prediction.rollouts import Followed
-from simscen.stack.prediction.standing import Standing
-from simscen.stack.prediction.tracker import Tracker
+from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
 from simscen.stack.protocols import CostmapView, RobotModel
 
-LOOKS, LOOKING = 0.7, 0.5
+WARM_UP_S, WARM_UP_SPEED_M_S = 0.7, 0.5
 """Seconds after its first scan in which a robot does not yet know what moves, and m/s that it drives at most till then:
 Nav2's usual speed, at which it can still stop for what it has not made out."""
 
@@ -30,15 +29,15 @@ class MotionPrediction:
         self._spec, self._rate = spec, tick_rate
         self._trackers = {name: Tracker(spec, tick_rate) for name in lidars} if spec.enabled else {}
         self._avoidance = Avoidance(spec, robot, full_speed)
-        self._standing = Standing(robot, full_speed)
-        self._enough, self._held = LOOKS * tick_rate, False
+        self._standing = StandPosition(robot, full_speed)
+        self._enough, self._held = WARM_UP_S * tick_rate, False
         self.stands = False
         """Whether it has been told to stand since it last drove."""
-        self._rolled = Rolled(tick_rate)
-        self._nothing = nothing(spec.acceleration)
+        self._rolled = DeadReckoning(tick_rate)
+        self._nothing = no_moving_obstacles(spec.acceleration)
         self._seeing: list[Tracker] = []
-        self._foretold: tuple[int, Moving] | None = None
-        self._told: tuple[Moving, Pose2, Pose2, Moving] | None = None
+        self._foretold: tuple[int, MovingObstacles] | None = None
+        self._told: tuple[MovingObstacles, Pose2, Pose2, MovingObstacles] | None = None
         self._plan: Path | None = None
         self._followed: Followed | None = None
         self.take = self._rolled.take
@@ -69,7 +68,7 @@ class MotionPrediction:
             return scan
         return ScanAmongMoving(**vars(scan), moving=tracker.hits)
 
-    def moving(self, tick: int) -> Moving:
+    def moving(self, tick: int) -> MovingObstacles:
         """What moves at a tick, in the frame of `Rolled`; with several lidars, as each of them sees it."""
         if not self._seeing:
             return self._nothing
@@ -77,11 +76,11 @@ class MotionPrediction:
             self._foretold = tick, self._after(tick)
         return self._foretold[1]
 
-    def _after(self, tick: int) -> Moving:
+    def _after(self, tick: int) -> MovingObstacles:
         seen = [tracker.moving.after((tick - tracker.tick) / self._rate) for tracker in self._seeing]
-        return Moving.of([thing for each in seen for thing in each.things], self._spec.acceleration)
+        return MovingObstacles.of([thing for each in seen for thing in each.things], self._spec.acceleration)
 
-    def seen_from(self, tick: int, pose: Pose2) -> Moving:
+    def seen_from(self, tick: int, pose: Pose2) -> MovingObstacles:
         """What moves at a tick, in a frame in which the robot is at `pose` now."""
         moving = self.moving(tick)
         if not moving.things:
@@ -96,7 +95,7 @@ class MotionPrediction:
     ) -> Twist:
         """The command to give for the one that is wanted; `pose`, `costmap` and `plan` are in one frame."""
         if not self._seeing:
-            return wanted if self.calm else _cautious(wanted)
+            return wanted if self.calm else _limit_speed(wanted)
         if plan is not self._plan:
             self._plan, self._followed = plan, None if plan is None else Followed(plan.points)
         return self._avoidance.steer(wanted, pose, twist, self.seen_from(tick, pose), costmap, self._followed)
@@ -124,10 +123,10 @@ class MotionPrediction:
         return self._avoidance.steer(wanted, pose, twist, self.seen_from(tick, pose), costmap, None, home)
 
 
-def _cautious(wanted: Twist) -> Twist:
+def _limit_speed(wanted: Twist) -> Twist:
     """The command, slowed down as long as nothing can be known yet of what moves."""
     speed = math.hypot(wanted.vx, wanted.vy)
-    if speed <= LOOKING:
+    if speed <= WARM_UP_SPEED_M_S:
         return wanted
-    scale = LOOKING / speed
+    scale = WARM_UP_SPEED_M_S / speed
     return Twist(scale * wanted.vx, scale * wanted.vy, scale * wanted.wz)

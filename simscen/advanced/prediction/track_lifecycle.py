@@ -3,9 +3,9 @@
 import math
 from collections.abc import Callable
 
+from simscen.advanced.prediction.clusters import BOTH
+from simscen.advanced.prediction.track import LATELY, Track
 from simscen.model.guards import Prediction
-from simscen.stack.prediction.clusters import BOTH
-from simscen.stack.prediction.tracks import LATELY, Track
 
 SURE, TRAVELLED, HITS = 3.0, 0.15, 3
 """A track moves when its speed is so many standard deviations, now or over its last updates, and it has come so far in
@@ -35,7 +35,7 @@ like any other, for who turns round stands a moment, too; and until nobody expec
 """
 
 
-class Going:
+class TrackLifecycle:
     """Looks at tracks after each scan."""
 
     def __init__(self, spec: Prediction, tick_rate: int) -> None:

@@ -11,27 +11,27 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from simscen.advanced.prediction.avoidance import ROOM
+from simscen.advanced.prediction.rollouts import HORIZON
 from simscen.core.geometry import Array, Pose2
+from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
 from simscen.stack.planners.rates import MAX_NON_OBSTACLE
-from simscen.stack.prediction.avoidance import ROOM
-from simscen.stack.prediction.moving import WIDEST, Moving
-from simscen.stack.prediction.rollouts import HORIZON
 from simscen.stack.protocols import CostmapView
 
-FORGETS = 2.0
+DECAY_TIME_S = 2.0
 """Seconds in which what will be counts e times less: at constant velocity, nobody goes on for ever."""
-BLOCK = 0.2
+BLOCK_SIZE_M = 0.2
 """Metres, about: the edge of what is marked alike."""
 
 
-def foreseen(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:
+def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:
     """The same with costs, at most MAX_NON_OBSTACLE, where a robot at `robot` that drives at `speed` would meet what
     moves: no way is shut. `radius` is the robot's. The same object where it would meet nothing.
     """
     if not len(costmap.moving):
         return costmap
     size, (height, width) = costmap.resolution, costmap.costs.shape
-    factor = max(1, round(BLOCK / size))
+    factor = max(1, round(BLOCK_SIZE_M / size))
     low, high, middles = [], [], []
     for at, corner, cells in ((robot.y, costmap.origin[1], height), (robot.x, costmap.origin[0], width)):
         first = max(0, math.floor((at - speed * HORIZON - corner) / size))
@@ -50,18 +50,20 @@ def foreseen(costmap: CostmapView, robot: Pose2, speed: float, radius: float) ->
     return replace(costmap, costs=costs)
 
 
-def _dear(moving: Moving, x: Array, y: Array, times: Array, radius: float) -> npt.NDArray[np.uint8]:
+def _dear(moving: MovingObstacles, x: Array, y: Array, times: Array, radius: float) -> npt.NDArray[np.uint8]:
     near, _ = moving.nearness(x, y, times, radius, ROOM)
-    cost = MAX_NON_OBSTACLE * np.clip(near, 0.0, 1.0) * np.exp(-times / FORGETS)
+    cost = MAX_NON_OBSTACLE * np.clip(near, 0.0, 1.0) * np.exp(-times / DECAY_TIME_S)
     return np.where(times > HORIZON, 0.0, cost).astype(np.uint8)
 
 
-def meets(moving: Moving, robot: Pose2, way: Iterable[complex], speed: float, radius: float) -> bool:
+def meets_moving_obstacle(
+    moving: MovingObstacles, robot: Pose2, way: Iterable[complex], speed: float, radius: float
+) -> bool:
     """Whether a robot at `robot` that drives along `way` (x + iy) at `speed` comes too near to what moves.
 
     As `Moving.nearness` has it, in floats: until what is foreseen ends it comes to a handful of places.
     """
-    moving = moving.near(robot.x, robot.y, radius + WIDEST, speed, HORIZON)
+    moving = moving.near(robot.x, robot.y, radius + MAX_UNCERTAINTY_M, speed, HORIZON)
     if not moving.things:
         return False
     here, come = complex(robot.x, robot.y), 0.0
@@ -71,7 +73,7 @@ def meets(moving: Moving, robot: Pose2, way: Iterable[complex], speed: float, ra
         if time >= HORIZON:
             return False
         for thing in moving.things:
-            room = min(ROOM + thing.deviation(time, moving.acceleration), WIDEST)
+            room = min(ROOM + thing.deviation(time, moving.acceleration), MAX_UNCERTAINTY_M)
             if abs(place - thing.place - time * thing.velocity) - thing.radius < radius + room:
                 return True
     return False

@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 
-class Underway(Generic[T]):
+class LatencyQueue(Generic[T]):
     """Results that are there `latency` ticks after their work began, in the order in which it did.
 
     `due` is the tick at which the oldest of them is there: `while tick >= underway.due: underway.take()`.

@@ -10,13 +10,13 @@ import math
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 
-FORGETS = 0.5
+DECAY_DISTANCE_M = 0.5
 """Metres driven in which what was learnt fades by a factor of e: turns and ground change."""
-MOST = 1.0
+MAX_CURVATURE_PER_M = 1.0
 """1/m: no more of a bend is believed, whatever a broken sensor says."""
 
 
-class TurnSlip:
+class TurnSlipObserver:
     """Compares the wheels' steps with those that wheels and gyroscope agree on."""
 
     def __init__(self) -> None:
@@ -36,10 +36,10 @@ class TurnSlip:
         c, s = math.cos(before[0].yaw), math.sin(before[0].yaw)
         ahead = c * (wheels.x - before[0].x) + s * (wheels.y - before[0].y)
         turned = math.remainder((fused.yaw - before[1].yaw) - (wheels.yaw - before[0].yaw), math.tau)
-        share = min(1.0, abs(ahead) / FORGETS)
+        share = min(1.0, abs(ahead) / DECAY_DISTANCE_M)
         if ahead != 0.0:
             bend = self._bend + share * (turned / ahead - self._bend)
-            self._bend = min(max(bend, -MOST), MOST)
+            self._bend = min(max(bend, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
 
     def countered(self, command: Twist) -> Twist:
         """The command to send so that the robot turns as this one says."""

@@ -19,7 +19,7 @@ WAITING = 10_000
 """Readings that may wait to be added up: of minutes, after which nobody compares scans."""
 
 
-class Rolled:
+class DeadReckoning:
     """Adds up the wheels' steps along the gyroscope's heading, when it is asked: a scan is rarer than a step."""
 
     def __init__(self, tick_rate: int) -> None:

@@ -1,0 +1,1 @@
+"""Motion prediction: tracking of moving obstacles in lidar scans, and avoidance of them."""

@@ -1,0 +1,1 @@
+"""Recovery behaviors beyond Nav2."""

@@ -1,1 +1,0 @@
-"""What moves around the robot: tracked from scans, told to who plans, drives or brakes, and kept out of the way of."""
