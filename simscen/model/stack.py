@@ -33,6 +33,10 @@ _LatencyOrRobots = Annotated[
 ]
 
 
+REFERENCE_BUILDER = "simscen.stack.build:StackBuilder"
+ADVANCED_BUILDER = "simscen.advanced.build:AdvancedStackBuilder"
+
+
 class InProcessStack(StackBase, Typed):
     """A whole stack that lives in the process of its run: simscen's own, or one that an installed package adds."""
 
@@ -40,7 +44,7 @@ class InProcessStack(StackBase, Typed):
 class StackSpec(InProcessStack):
     """The navigation stack under test: Nav2 in miniature."""
 
-    component: ClassVar[str] = "simscen.stack.build:reference_stack"
+    component: ClassVar[str] = "simscen.stack.build:configured_stack"
     type: Literal["reference"] = "reference"
     profile: Profile = "simscen"
     """Where parameters have their values from that nobody says: our own defaults, or exactly Nav2's."""
@@ -78,6 +82,18 @@ class StackSpec(InProcessStack):
     @classmethod
     def _by_profile(cls, said: Any) -> Any:
         return with_profile(said) if isinstance(said, Mapping) and said.get("profile") in PROFILES else said
+
+    @property
+    def builder(self) -> str:
+        """The builder of the stack as `module:class`: that of the advanced stack if any parameter asks for it."""
+        is_advanced = (
+            self.prediction.enabled
+            or self.planner.replanning == "on_invalid"
+            or self.planner.cautious
+            or not self.recovery.clear_entirely
+            or (self.velocity_smoother.counter_turn_slip and self.localizer.fuses_odometry)
+        )
+        return ADVANCED_BUILDER if is_advanced else REFERENCE_BUILDER
 
     @property
     def told_truth(self) -> bool:

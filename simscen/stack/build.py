@@ -1,13 +1,13 @@
-"""From a specification to a stack."""
+"""Construction of a stack from its specification."""
 
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
+from typing import Any
 
-from simscen.advanced.prediction.motion_prediction import MotionPrediction
-from simscen.advanced.recovery.costmap_clearing import ClearingBackoff
-from simscen.core.clock import Clock
-from simscen.core.messages.goal_names import Mode
-from simscen.core.random_streams import Streams
+from simscen.core.chance import Streams
+from simscen.core.goalnames import Mode
+from simscen.core.time import Clock
 from simscen.model.latency import Latency
 from simscen.model.recovery import Recovery
 from simscen.model.stack import InProcessStack, StackSpec
@@ -21,11 +21,11 @@ from simscen.stack.installed.localizer import InstalledLocalizer
 from simscen.stack.installed.planner import InstalledPlanner
 from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.installed.watched import made
-from simscen.stack.navigator import Navigator
+from simscen.stack.navigator import ClearEntirely, ClearingPolicy, Navigator
 from simscen.stack.odometry_history import WAY, OdometryHistory
 from simscen.stack.plan_manager import PlanManager
 from simscen.stack.progress_checker import ProgressChecker
-from simscen.stack.protocols import Behavior, Controller, Localizer, Surroundings
+from simscen.stack.protocols import Behavior, Controller, Localizer, Planner, Surroundings
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.reference import ReferenceStack
 from simscen.stack.setting import Setting
@@ -43,9 +43,9 @@ def build_stack(
     heard: Callable[[Localizer], Localizer] = lambda localizer: localizer,
     mode: Mode = "navigate_to_pose",
 ) -> InstalledStack:
-    """The stack of a specification, ready to `start`. Raises ValueError when a rate does not divide the clock.
+    """Build the stack of a specification, ready to `start`.
 
-    `heard` makes of its localizer the one that the rest of a reference stack asks.
+    `heard` wraps the localizer that the rest of the stack uses. Raises ValueError if a rate does not divide the clock.
     """
     period = clock.seconds(clock.period(spec.controller_frequency))
     setting = Setting(
@@ -54,83 +54,120 @@ def build_stack(
     return InstalledStack(spec, setting)
 
 
-def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
-    """Nav2 in miniature. It works on its map in cells no larger than the costmap's.
+def configured_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
+    """Build the stack with the builder that the specification names: that of the reference or of the advanced stack."""
+    module, _, name = spec.builder.partition(":")
+    stack: ReferenceStack = getattr(import_module(module), name)(spec, setting).build()
+    return stack
 
-    Its random streams are "localizer", "controller" and "planner#1", "planner#2", … for the plans of a run; components
-    of others have theirs besides, so that one more of them changes nobody's numbers.
+
+class StackBuilder:
+    """Builder of the reference stack. Subclasses replace components by overriding the methods that make them.
+
+    The map is refined to cells no larger than those of the costmap. Random streams: "localizer", "controller", and
+    "planner#1", "planner#2", … for successive plans. Components of packages have their own streams besides, so adding
+    one does not change the random numbers of the others.
     """
-    surroundings, clock, streams = setting.surroundings, setting.clock, setting.streams
-    if surroundings.map is not None:
-        surroundings = replace(surroundings, map=surroundings.map.refined(spec.costmap.resolution))
-    robot, period = surroundings.robot, clock.period(spec.controller_frequency)
-    latency = _ticks(spec, clock)
-    odometry = OdometryHistory(surroundings.tick_rate, way=WAY)
-    driving = replace(
-        setting,
-        surroundings=surroundings,
-        name="controller",
-        resolution=spec.local_costmap.completed(spec.costmap).resolution,
-        way=odometry.way,
-    )
-    controller: Controller = made(InstalledController, spec.controller, driving)
-    costmaps = Costmaps(spec, surroundings, controller.full_speed * spec.controller.looks_ahead, latency["costmap"])
-    monitor = CollisionMonitor(spec.collision_monitor, robot, surroundings.lidars, surroundings.tick_rate)
-    driving = replace(driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around, allowed=monitor.allow)
-    planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
-    plans = PlanManager(
-        spec.planner,
-        InstalledPlanner(spec.planner, planning),
-        costmaps.wide,
-        lambda number: streams.integer(f"planner#{number}"),
-        robot.inscribed_radius,
-        steered=robot.turning_radius > 0.0,
-        latency=latency["planner"],
-        speed=controller.full_speed,
-    )
-    navigator = Navigator(
-        plans,
-        controller,
-        RoundRobin(_behaviors(spec.recovery, driving), spec.recovery),
-        made(InstalledGoalChecker, spec.goal_checker, driving.named("goal_checker")),
-        ProgressChecker(spec.progress_checker),
-        costmaps,
-        setting.control_period,
-        spec.failure_tolerance,
-        ClearingBackoff(always=spec.recovery.clear_entirely),
-    )
-    commands = Commands(
-        VelocitySmoother(spec.velocity_smoother, robot, setting.control_period),
-        monitor,
-        period,
-        (latency["controller"], latency["collision_monitor"]),
-    )
-    return ReferenceStack(
-        surroundings,
-        setting.heard(made(InstalledLocalizer, spec.localizer, driving.named("localizer"))),
-        costmaps,
-        controller,
-        navigator,
-        Task(setting.stop_on_failure, clock=clock, mode=setting.mode),
-        commands,
-        monitor,
-        MotionPrediction(spec.prediction, robot, surroundings.lidars, surroundings.tick_rate, controller.full_speed),
-        odometry,
-        period,
-        latency["localizer"],
-        spec.localizer.fuses_odometry,
-        spec.velocity_smoother.counter_turn_slip,
-    )
+
+    def __init__(self, spec: StackSpec, setting: Setting) -> None:
+        """Take the specification and the setting of the stack."""
+        surroundings = setting.surroundings
+        if surroundings.map is not None:
+            surroundings = replace(surroundings, map=surroundings.map.refined(spec.costmap.resolution))
+        self.spec, self.setting, self.surroundings = spec, setting, surroundings
+        self.robot, self.streams = surroundings.robot, setting.streams
+        self.latency = _latency_ticks(spec, setting.clock)
+
+    def build(self) -> ReferenceStack:
+        """Build all components and the stack."""
+        spec, setting, robot = self.spec, self.setting, self.robot
+        period = setting.clock.period(spec.controller_frequency)
+        odometry = OdometryHistory(self.surroundings.tick_rate, way=WAY)
+        driving = replace(
+            setting,
+            surroundings=self.surroundings,
+            name="controller",
+            resolution=spec.local_costmap.completed(spec.costmap).resolution,
+            way=odometry.way,
+        )
+        controller: Controller = made(InstalledController, spec.controller, driving)
+        costmaps = Costmaps(
+            spec,
+            self.surroundings,
+            controller.full_speed * spec.controller.looks_ahead,
+            self.latency["costmap"],
+        )
+        monitor = CollisionMonitor(spec.collision_monitor, robot, self.surroundings.lidars, self.surroundings.tick_rate)
+        driving = replace(
+            driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around, allowed=monitor.allow
+        )
+        planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
+        plans = self.make_plan_manager(InstalledPlanner(spec.planner, planning), costmaps, controller)
+        navigator = Navigator(
+            plans,
+            controller,
+            RoundRobin(_behaviors(spec.recovery, driving), spec.recovery),
+            made(InstalledGoalChecker, spec.goal_checker, driving.named("goal_checker")),
+            ProgressChecker(spec.progress_checker),
+            costmaps,
+            setting.control_period,
+            spec.failure_tolerance,
+            self.make_clearing_policy(),
+        )
+        commands = Commands(
+            VelocitySmoother(spec.velocity_smoother, robot, setting.control_period),
+            monitor,
+            period,
+            (self.latency["controller"], self.latency["collision_monitor"]),
+        )
+        return self.make_stack(
+            self.surroundings,
+            setting.heard(made(InstalledLocalizer, spec.localizer, driving.named("localizer"))),
+            costmaps,
+            controller,
+            navigator,
+            Task(setting.stop_on_failure, clock=setting.clock, mode=setting.mode),
+            commands,
+            monitor,
+            odometry,
+            period,
+            self.latency["localizer"],
+            spec.localizer.fuses_odometry,
+        )
+
+    def make_plan_manager(self, planner: Planner, costmaps: Costmaps, controller: Controller) -> PlanManager:
+        """Make the plan manager."""
+        return PlanManager(
+            self.spec.planner,
+            planner,
+            costmaps.wide,
+            self.plan_seed,
+            self.robot.inscribed_radius,
+            steered=self.robot.turning_radius > 0.0,
+            latency=self.latency["planner"],
+        )
+
+    def plan_seed(self, number: int) -> int:
+        """Return the seed of a plan by its number in the run."""
+        return self.streams.integer(f"planner#{number}")
+
+    def make_clearing_policy(self) -> ClearingPolicy:
+        """Make the policy for clearing the global costmap."""
+        return ClearEntirely()
+
+    def make_stack(self, *parts: Any) -> ReferenceStack:
+        """Make the stack of its components."""
+        return ReferenceStack(*parts)
 
 
-def _ticks(spec: StackSpec, clock: Clock) -> dict[str, int]:
-    """What each part takes in whole ticks; the robot's own values have been put in by whoever knows its file."""
+def _latency_ticks(spec: StackSpec, clock: Clock) -> dict[str, int]:
+    """Return the latency of each component in ticks. `latency: robot` has been replaced by the robot's values."""
     latency = spec.latency if isinstance(spec.latency, Latency) else Latency()
     return {part: clock.ticks(getattr(latency, part)) for part in Latency.model_fields}
 
 
 def _behaviors(spec: Recovery, shared: Setting) -> list[Behavior]:
-    """The recovery behaviours that the robot can do, each with a random stream of its own."""
+    """Build the recovery behaviors that the robot can execute, each with its own random stream."""
     possible = [each for each in spec.chosen() if shared.robot.turning_radius == 0.0 or not each.turns_in_place]
     return [
         InstalledBehavior(each, shared.named(f"behavior#{number}")) for number, each in enumerate(possible, start=1)

@@ -1,19 +1,17 @@
 """Drives to a goal, past poses on the way: the replanning and recovery of Nav2's trees as a state machine.
 
-Without errors one step is: check the goal, check the plan, ask the controller. When planning fails, first the global
-costmap is cleared (how much of it: `Forgetting`), and when control fails the local one, and the same is tried again
-(the per-context recoveries of Nav2's tree); when it fails again, the next behaviour of the round robin is run. A plan
-that is found makes good a failure to plan; control has one retry until the next recovery, for its action goes on until
-the goal. After `number_of_retries` behaviours the goal has failed with the code of the last failure. A goal outside the
-map or inside a mapped wall fails after the first retry: no recovery changes that.
+Without errors, one step is: check the goal, check the plan, ask the controller. When planning fails, the global
+costmap is cleared and planning is tried again; when control fails, the local one is cleared (the contextual recoveries
+of Nav2's tree). When that fails again, the next behavior of the round robin runs. Finding a plan resets the retry of planning;
+control has one retry until the next recovery. After `number_of_retries` behaviors, the goal fails with the code of the
+last failure. A goal outside the map or inside a mapped wall fails after the first retry, because no recovery helps.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from simscen.advanced.recovery.costmap_clearing import ClearingBackoff
-from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import ErrorCode, Goal
-from simscen.core.records.events import Event, EventKind, Value
+from simscen.core.events import Event, EventKind, Value
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import ErrorCode, Goal
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
 from simscen.stack.local_path import LocalPath
@@ -23,8 +21,31 @@ from simscen.stack.protocols import Behavior, Controller, GoalChecker, Navigatio
 from simscen.stack.recovery import RoundRobin
 
 
+class ClearingPolicy(Protocol):
+    """Decision how much of the global costmap to clear when planning has failed."""
+
+    def reset(self) -> None:
+        """Prepare for a new goal."""
+        ...
+
+    def entirely(self, now: float, to_go: float) -> bool:
+        """Return whether to clear all of it `now` (s), with the goal `to_go` m away; otherwise around the robot."""
+        ...
+
+
+class ClearEntirely:
+    """Clear the entire costmap each time, as Nav2's default tree does."""
+
+    def reset(self) -> None:
+        """Prepare for a new goal."""
+
+    def entirely(self, now: float, to_go: float) -> bool:
+        """Return True."""
+        return True
+
+
 class Step(NamedTuple):
-    """What comes of a step: the velocity wanted, whether the goal is reached or has failed, and what happened."""
+    """Result of a step: the wanted velocity, whether the goal is reached or has failed, and the events."""
 
     command: Twist = STOP
     reached: bool = False
@@ -48,14 +69,14 @@ class Navigator:
         costmaps: Costmaps,
         period: float,
         failure_tolerance: float,
-        forgetting: ClearingBackoff,
+        clearing: ClearingPolicy,
     ) -> None:
-        """`period` between two steps and `failure_tolerance` in seconds; -1 bears a failing controller for ever."""
+        """Combine the components. `period` between two steps and `failure_tolerance` in s; -1 tolerates forever."""
         self.plans = plans
-        """Who sees to the plan that is being followed."""
+        """The manager of the plan that is being followed."""
         self._controller, self._recovery = controller, recovery
         self._goal_checker, self._progress, self._costmaps = goal_checker, progress, costmaps
-        self._path, self._forgetting = LocalPath(controller), forgetting
+        self._path, self._clearing = LocalPath(controller), clearing
         self._period, self._failure_tolerance = period, failure_tolerance
         self._clock = 0.0
         self.goal: Goal | None = None
@@ -75,7 +96,7 @@ class Navigator:
         self.goal = goal
         self._forget()
         self._recovery.reset()
-        self._forgetting.reset()
+        self._clearing.reset()
         self._goal_checker.reset()
         self._progress.reset()
 
@@ -136,13 +157,13 @@ class Navigator:
                 if self._tolerable():
                     return Step()
                 failure = self._impatient(failure)
-            self.plans.not_followed()
+            self.plans.report_control_failure()
             retry, self._controlled_again = not self._controlled_again, True
         if retry:
             self._trouble_since = None
             if planning:
                 to_go = frames.pose.distance(goal.pose)
-                self._costmaps.clear_global(entirely=self._forgetting.entirely(self._clock, to_go))
+                self._costmaps.clear_global(entirely=self._clearing.entirely(self._clock, to_go))
             else:
                 self._costmaps.clear_local()
             self.plans.drop("recovery")

@@ -1,33 +1,30 @@
-"""How much of the global costmap is forgotten when there is no way."""
+"""Clearing of the global costmap with back-off, so that the robot does not forget both ends of a dead end in turn."""
 
 INITIAL_WAIT_S = 10.0
-"""Seconds until all may be forgotten once more; each time that comes to nothing doubles them."""
+"""Time until the entire costmap may be cleared again; it doubles each time."""
 PROGRESS_M = 1.0
-"""Metres by which a robot must have come nearer to its goal for what it forgot to have come to something."""
+"""The robot must have come this much closer to its goal for the last clearing to count as successful."""
 
 
 class ClearingBackoff:
-    """Says whether a plan that failed clears all of the global costmap, or only what lies around the robot.
+    """Clear the entire global costmap at first and then ever more rarely, otherwise only the area around the robot.
 
-    What was seen elsewhere may have gone, so all of it is forgotten at first (Nav2's tree does so each time). But who
-    forgets again what was just seen finds a way round the end of the wall that is out of sight, drives there until it
-    sees it, and has forgotten the other end by then: to and fro, for ever.
+    Obstacles that were seen earlier may have disappeared. But a robot that clears the costmap each time it finds no
+    path plans around the end of a wall that is out of sight, drives there, sees it, and has forgotten the other end.
     """
 
-    def __init__(self, always: bool) -> None:
-        """`always`: as Nav2's tree."""
-        self._always = always
+    def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """A new goal."""
+        """Prepare for a new goal."""
         self._wait, self._due, self._nearest = INITIAL_WAIT_S, 0.0, float("inf")
 
     def entirely(self, now: float, to_go: float) -> bool:
-        """Whether to forget all of it `now`, in seconds, with the goal `to_go` metres away as the crow flies."""
+        """Return whether to clear all of it `now` (s), with the goal `to_go` m away in a straight line."""
         if to_go <= self._nearest - PROGRESS_M:
             self._wait, self._due = INITIAL_WAIT_S, now
-        if now < self._due and not self._always:
+        if now < self._due:
             return False
         self._due, self._wait = now + self._wait, 2 * self._wait
         self._nearest = min(self._nearest, to_go)

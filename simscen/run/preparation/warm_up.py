@@ -20,6 +20,8 @@ def import_components(prepared: PreparedScenario) -> None:
     for part in prepared.each.values():
         for module in shipped_modules(_components((part.stack, part.robot.sensors))):
             import_module(module)
+        if isinstance(part.stack, StackSpec):
+            import_module(part.stack.builder.partition(":")[0])
 
 
 def precompute(prepared: PreparedScenario) -> None:

@@ -1,0 +1,171 @@
+"""Replanning only when it pays: on changes of the costmap, around moving obstacles, and with more clearance."""
+
+import contextlib
+from collections.abc import Callable
+
+import numpy as np
+
+from simscen.advanced.prediction.predicted_costs import add_predicted_costs, meets_moving_obstacle
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal, Path
+from simscen.model.planners import PlannerSpec
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.followed_plan import WATCH_DISTANCE_M, FollowedPlan
+from simscen.stack.footprint import distances
+from simscen.stack.plan_manager import PlanManager, PlanResult
+from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
+
+CLEARANCE_PERIOD_S = 0.5
+"""Time between two checks for lost clearance."""
+SHORTCUT_PERIOD_S = 2.0
+"""Time between two checks for a shorter path after obstacles have disappeared."""
+MOVING_PERIOD_S = 0.5
+"""Time between two plans around moving obstacles."""
+CAUTIOUS_CLEARANCES_M = (0.10, 0.05)
+"""Additional clearances to try once the controller could not follow a plan."""
+PREFERRED_CLEARANCE_M, MAX_DETOUR_RATIO = 0.15, 1.15
+"""Larger additional clearance that is used if it makes the path longer by at most this ratio."""
+DISAPPEARED_CELLS = 8
+"""Obstacle cells that must have disappeared before a shorter path is sought; single cells vary with lidar noise."""
+MAX_LENGTH_RATIO, MIN_SAVING_M = 0.85, 0.5
+"""Hysteresis: a new path must be shorter than the rest of the current one by this ratio and this length."""
+LOST_CLEARANCE_M = 0.1
+"""Clearance that a plan may lose before it is replaced."""
+CLEARANCE_HORIZON_M = 4.0
+"""Length of the plan ahead of the robot on which clearance is checked."""
+
+
+class ClearancePlan(FollowedPlan):
+    """Followed plan that also remembers the clearance it had when it was made."""
+
+    def __init__(self, path: Path, radius: float, costmap: CostmapView) -> None:
+        self._initial_clearance = np.minimum(distances(costmap, path.points[:, :2]), np.float32(WATCH_DISTANCE_M))
+        super().__init__(path, radius, costmap)
+
+    def see(self, costmap: CostmapView) -> None:
+        """Compare the plan with a costmap."""
+        clearance = distances(costmap, self.path.points[:, :2])
+        self._occupied = clearance <= np.float32(self._radius)
+        least = self._initial_clearance - np.float32(LOST_CLEARANCE_M)
+        self._has_lost = np.minimum(clearance, np.float32(WATCH_DISTANCE_M)) < least
+
+    def has_lost_clearance(self) -> bool:
+        """Return whether the plan ahead has clearly less clearance than when it was made.
+
+        A plan that was made when an obstacle was only half visible passes it closely, although the robot still fits.
+        """
+        track = self._track
+        if not self._has_lost.any():
+            return False
+        along, index = track.along, track.index
+        end = int(np.searchsorted(along, along[index] + CLEARANCE_HORIZON_M, side="right"))
+        return bool(self._has_lost[index:end].any())
+
+    def is_longer_than(self, length: float) -> bool:
+        """Return whether a path of `length` m is clearly shorter than the rest of this plan."""
+        left = self.remaining()
+        return length < MAX_LENGTH_RATIO * left and length < left - MIN_SAVING_M
+
+
+class AdvancedPlanManager(PlanManager):
+    """Plan manager that plans around predicted obstacles and, with `replanning: on_invalid`, on changes only."""
+
+    plan: ClearancePlan | None
+
+    def __init__(
+        self,
+        spec: PlannerSpec,
+        planner: Planner,
+        costmap: Costmap,
+        plan_seed: Callable[[int], int],
+        radius: float,
+        steered: bool = False,
+        latency: int = 0,
+        speed: float = 0.5,
+    ) -> None:
+        """Take the arguments of PlanManager, and the `speed` in m/s at which plans will be driven."""
+        self._speed = speed
+        super().__init__(spec, planner, costmap, plan_seed, radius, steered, latency)
+
+    def reset(self, now: float) -> None:
+        """Prepare for a new goal."""
+        super().reset(now)
+        self._checked_revision, self._max_obstacle_cells = -1, 0
+        self._avoids_moving, self._moving_checked_at = False, now
+        self._is_cautious = False
+
+    def report_control_failure(self) -> None:
+        """Prefer paths with more clearance until the next goal, because the controller could not follow the plan."""
+        self._is_cautious = self._spec.cautious
+
+    def _scheduled_reason(self, now: float, plan: FollowedPlan) -> str:
+        if self._spec.replanning == "rate":
+            return super()._scheduled_reason(now, plan)
+        if self._costmap.revision == self._checked_revision:
+            return ""
+        if self._is_blocked(plan):
+            return "blocked"
+        return "window" if self._is_partial and self._costmap.view.origin != self._origin else ""
+
+    def _optional_reason(self, now: float, goal: Goal, pose: Pose2, plan: FollowedPlan) -> str:
+        if self._spec.replanning == "rate":
+            return ""
+        assert isinstance(plan, ClearancePlan)
+        if self._should_avoid_moving(now, pose, plan):
+            return "moving"
+        if self._costmap.revision != self._checked_revision:
+            self._checked_revision = self._costmap.revision
+            self._max_obstacle_cells = max(self._max_obstacle_cells, self._costmap.obstacle_cells)
+            if now - self._adopted_at >= CLEARANCE_PERIOD_S and plan.has_lost_clearance():
+                return "tight"
+        if now - self._scheduled_at < SHORTCUT_PERIOD_S:
+            return ""
+        self._scheduled_at, cells = now, self._costmap.obstacle_cells
+        disappeared = cells < self._max_obstacle_cells - DISAPPEARED_CELLS
+        self._max_obstacle_cells = cells if disappeared else max(self._max_obstacle_cells, cells)
+        can_be_shorter = self._is_partial or plan.is_longer_than(pose.distance(goal.pose) - goal.xy_tolerance)
+        return "better" if disappeared and can_be_shorter else ""
+
+    def _should_avoid_moving(self, now: float, pose: Pose2, plan: FollowedPlan) -> bool:
+        """Return whether the plan meets a moving obstacle, or avoids one that may have gone."""
+        moving = self._costmap.moving
+        if not (self._avoids_moving or len(moving)) or now - self._moving_checked_at < MOVING_PERIOD_S:
+            return False
+        if not self._avoids_moving and not meets_moving_obstacle(
+            moving, pose, plan.places(4), self._speed, self._radius
+        ):
+            return False
+        self._moving_checked_at = now
+        return True
+
+    def _accepts(self, reason: str, result: PlanResult) -> bool:
+        return reason != "better" or (self.plan is not None and self.plan.is_longer_than(result.path.length()))
+
+    def _planning_view(self, pose: Pose2) -> CostmapView:
+        return add_predicted_costs(self._costmap.view, pose, self._speed, self._radius)
+
+    def _call_planner(self, view: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        for clearance in CAUTIOUS_CLEARANCES_M if self._is_cautious else ():
+            with contextlib.suppress(NavigationFailure):
+                path = self.planner.plan(view.with_less_room(clearance), start, goal, seed)
+                return self._with_preferred_clearance(path, view, start, goal, seed)
+        return self.planner.plan(view, start, goal, seed)
+
+    def _with_preferred_clearance(self, path: Path, view: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        """Return a path with the preferred clearance if it is not much longer, otherwise `path`."""
+        with contextlib.suppress(NavigationFailure):
+            other = self.planner.plan(view.with_less_room(PREFERRED_CLEARANCE_M), start, goal, seed)
+            if other.length() <= MAX_DETOUR_RATIO * path.length():
+                return other
+        return path
+
+    def _followed(self, path: Path) -> ClearancePlan:
+        return ClearancePlan(path, self._radius, self._costmap.view)
+
+    def _adopt(self, tick: int, now: float, result: PlanResult, reason: str) -> Event:
+        event = super()._adopt(tick, now, result, reason)
+        self._avoids_moving, self._moving_checked_at = result.avoids_moving, now
+        self._checked_revision = self._costmap.view.revision
+        self._max_obstacle_cells = self._costmap.obstacle_cells
+        return event
