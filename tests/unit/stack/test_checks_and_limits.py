@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
-from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.advanced.replanning import ClearancePlan
+from simscen.core.filtermasks import FilterMasks, SpeedLimits
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
@@ -363,8 +363,8 @@ def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> 
 @pytest.mark.parametrize(("length", "better"), [(1.0, True), (2.4, True), (2.6, False)])
 def test_another_plan_must_be_clearly_shorter(length: float, better: bool) -> None:
     line = np.column_stack((np.linspace(0, 3, 61), np.zeros(61), np.zeros(61)))
-    plan = FollowedPlan(Path(line), 0.2, view_of(Flatland(), round_robot()))
-    assert plan.worse_than(length) == better
+    plan = ClearancePlan(Path(line), 0.2, view_of(Flatland(), round_robot()))
+    assert plan.is_longer_than(length) == better
 
 
 def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_any() -> None:
@@ -372,9 +372,9 @@ def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_
     line = Path(np.column_stack((np.arange(0.0, 4.0, 0.05), np.zeros(80), np.zeros(80))))
     roomy, narrow = (view_of(Flatland(discs=discs), robot) for discs in ((), [(2.0, 0.45, 0.1)]))
     for made, now, tighter in ((roomy, narrow, True), (narrow, narrow, False), (narrow, roomy, False)):
-        plan = FollowedPlan(line, robot.inscribed_radius, made)
+        plan = ClearancePlan(line, robot.inscribed_radius, made)
         plan.see(now)
-        assert plan.tightened() == tighter
+        assert plan.has_lost_clearance() == tighter
 
 
 def test_the_lowest_limit_of_the_zones_one_is_in_counts() -> None:

@@ -182,13 +182,11 @@ ELSEWHERE = {
     "StackSpec.speed_mask": "tests/scenarios/test_masks.py",
     "StackSpec.nav2_params": "tests/unit/loading/nav2/test_nav2_parameters.py",
     "StackSpec.latency": "tests/unit/run/test_latency.py",  # `robot` is what the robot's file says
-    "Recovery.clear_entirely": "tests/unit/stack/test_forgetting.py",
+    "Recovery.clear_entirely": "tests/unit/advanced/test_costmap_clearing.py",
     "ClearCostmap.clear_entirely": "tests/unit/stack/behaviors/test_motions.py",
     "Recovery.retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",
-    "VelocitySmoother.counter_turn_slip": "tests/unit/stack/test_slipping_wheels.py",
-    "Amcl.pf_err": "tests/unit/stack/localizers/test_kld.py",
-    "Amcl.pf_z": "tests/unit/stack/localizers/test_kld.py",
-    "ScanMatchingAmcl.sure_update_interval": "tests/unit/advanced/localizers/test_scan_matching_amcl.py",
+    "VelocitySmoother.counter_turn_slip": "tests/unit/advanced/test_turn_slip.py",
+    "Amcl.sure_update_interval": "tests/unit/stack/localizers/test_amcl.py",
     # Whoever makes goals reads these.
     "SimpleGoalChecker.xy_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",
     "SimpleGoalChecker.yaw_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",

@@ -315,7 +315,7 @@ def test_what_ships_is_looked_at_in_what_the_stack_decides(monkeypatch, command,
     with pytest.raises(RunError) as broken:
         driven().run(1)
     assert broken.value.kind == kind
-    assert str(broken.value).startswith("stack `reference` (simscen.stack.build:reference_stack)")
+    assert str(broken.value).startswith("stack `reference` (simscen.stack.build:configured_stack)")
     assert told in str(broken.value)
 
 

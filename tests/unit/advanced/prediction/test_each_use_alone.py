@@ -27,16 +27,16 @@ def least(heed: str, controller: str = "regulated_pure_pursuit") -> float:
     driven = drive(world, Pose2(1.0, 4.0), goal, robot=round_robot(), grid=grid, spec=spec)
     stack = driven.stack.inner
     stack._prediction.steer = lambda tick, command, *seen: command
-    told = stack._foretell
+    original = stack._on_costmaps_updated
 
-    def foretell(tick: int, frames: Frames) -> None:
-        told(tick, frames)
+    def update(tick: int, frames: Frames) -> None:
+        original(tick, frames)
         if heed != "monitor":
             stack._monitor.on_moving(no_moving_obstacles())
         if heed != "controller":
             stack._costmaps.near.moving = no_moving_obstacles()
 
-    stack._foretell = foretell
+    stack._on_costmaps_updated = update
     world.discs.append((4.5, 0.5, 0.3))
     nearest = 9.0
     while driven.tick < 10.5 * RATE:

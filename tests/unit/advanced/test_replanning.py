@@ -3,6 +3,8 @@ import math
 import numpy as np
 import pytest
 
+from simscen.advanced.replanning import AdvancedPlanManager
+from simscen.core.events import Event
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
@@ -12,7 +14,6 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
-from simscen.stack.plan_manager import PlanManager
 from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot
 
@@ -56,7 +57,7 @@ class Bench:
         self.costmap = Costmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE))
         self.journal: list[Event] = []
         self.now = 0.0
-        self.keeper = PlanManager(PlannerSpec(**options), self.script, self.costmap, lambda k: 100 + k, 0.22)
+        self.keeper = AdvancedPlanManager(PlannerSpec(**options), self.script, self.costmap, lambda k: 100 + k, 0.22)
 
     def steps(self, count: int, goal: Goal = GOAL) -> list[object]:
         """Reasons of the plans made in so many steps of the navigator."""
@@ -172,7 +173,7 @@ def test_after_a_plan_that_could_not_be_followed_plans_keep_more_room_until_the_
 
     bench.script.plan = plan
     bench.steps(2)
-    bench.keeper.not_followed()
+    bench.keeper.report_control_failure()
     bench.keeper.drop("recovery")
     bench.steps(2)
     bench.keeper.reset(bench.now)
@@ -184,7 +185,7 @@ def test_after_a_plan_that_could_not_be_followed_plans_keep_more_room_until_the_
 def test_still_more_room_is_kept_where_the_way_is_hardly_longer_for_it(bulge: float, kept: bool) -> None:
     bench = Bench()
     bench.steps(2)
-    bench.keeper.not_followed()
+    bench.keeper.report_control_failure()
     bench.keeper.drop("recovery")
     plan, bulges = bench.script.plan, iter([0.0, bulge])
 
@@ -200,7 +201,7 @@ def test_still_more_room_is_kept_where_the_way_is_hardly_longer_for_it(bulge: fl
 def test_where_there_is_no_roomier_way_the_tight_one_is_tried_again() -> None:
     bench = Bench()
     bench.steps(2)
-    bench.keeper.not_followed()
+    bench.keeper.report_control_failure()
     bench.keeper.drop("recovery")
     straight, room = bench.script.plan, list[bool]()
 

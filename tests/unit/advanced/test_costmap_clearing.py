@@ -49,7 +49,7 @@ def test_a_door_that_was_seen_shut_and_has_opened_out_of_sight_is_driven_to() ->
 
 
 def test_all_is_forgotten_at_first_and_then_ever_more_rarely() -> None:
-    forgetting = ClearingBackoff(always=False)
+    forgetting = ClearingBackoff()
     assert [t for t in range(100) if forgetting.entirely(float(t), 5.0)] == [0, 10, 30, 70]
     forgetting.reset()
     assert forgetting.entirely(100.0, 5.0)
@@ -57,7 +57,7 @@ def test_all_is_forgotten_at_first_and_then_ever_more_rarely() -> None:
 
 @pytest.mark.parametrize(("to_go", "again"), [(4.5, False), (3.9, True)])
 def test_who_has_come_a_metre_nearer_may_forget_at_once(to_go: float, again: bool) -> None:
-    forgetting = ClearingBackoff(always=False)
+    forgetting = ClearingBackoff()
     assert forgetting.entirely(0.0, 5.0)
     assert forgetting.entirely(1.0, to_go) == again
     assert not forgetting.entirely(2.0, to_go)
