@@ -6,9 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from simscen.advanced.prediction.predicted_costs import add_predicted_costs, meets_moving_obstacle
-from simscen.core.events import Event
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import Goal, Path
+from simscen.core.messages.navigation import Goal, Path
+from simscen.core.records.events import Event
 from simscen.model.planners import PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.followed_plan import WATCH_DISTANCE_M, FollowedPlan

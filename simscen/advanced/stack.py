@@ -5,8 +5,8 @@ from typing import Any
 from simscen.advanced.prediction.motion_prediction import MotionPrediction
 from simscen.advanced.turn_slip import TurnSlipObserver
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP, Twist
-from simscen.core.sensing import Imu, Odometry, Scan
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.stack.frames import Frames
 from simscen.stack.reference import ReferenceStack
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
-from simscen.core.chance import Streams
-from simscen.core.goalnames import Mode
-from simscen.core.time import Clock
+from simscen.core.clock import Clock
+from simscen.core.messages.goal_names import Mode
+from simscen.core.random_streams import Streams
 from simscen.model.latency import Latency
 from simscen.model.recovery import Recovery
 from simscen.model.stack import InProcessStack, StackSpec

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.events import Event, EventKind, Value
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.core.records.events import Event, EventKind, Value

@@ -3,8 +3,7 @@
 from functools import partial
 from typing import Any
 
-from simscen.core.belief import Estimate
-from simscen.core.events import Event
+from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.localization import Estimate

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from simscen.advanced.replanning import AdvancedPlanManager
-from simscen.core.events import Event
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path

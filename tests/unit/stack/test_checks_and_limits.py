@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from simscen.advanced.replanning import ClearancePlan
-from simscen.core.filtermasks import FilterMasks, SpeedLimits
+from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path

@@ -132,7 +132,8 @@ def sampled(case: dict[str, float], slip: float, seed: int) -> tuple[Belief, Arr
         share = share * math.exp(-dt) + chance.normal(0, slip * math.sqrt(1 - math.exp(-2 * dt)))
     bias = chance.normal(0, case["bias"])
     spec = SlipEkf(
-        type="slip_ekf", translation_noise=case["translation"], rotation_noise=case["rotation"], gyro_noise=case["gyro"],
+        type="slip_ekf", translation_noise=case["translation"], rotation_noise=case["rotation"],
+        gyro_noise=case["gyro"],
         gyro_bias=case["bias"], gyro_bias_walk=0.0, wheel_slip=slip,
     )  # fmt: skip
     return replayed(spec, truth, claimed, truth[:, 2] + bias + chance.normal(0, case["gyro"], n))
