@@ -4,7 +4,8 @@ Without errors, one step is: check the goal, check the plan, ask the controller.
 costmap is cleared and planning is tried again; when control fails, the local one is cleared (the contextual recoveries
 of Nav2's tree). When that fails again, the next behavior of the round robin runs. Finding a plan resets the retry of
 planning; control has one retry until the next recovery. After `number_of_retries` behaviors, the goal fails with the
-code of the last failure. A goal outside the map or inside a mapped wall fails after the first retry, because no recovery helps.
+code of the last failure. A goal outside the map or inside a mapped wall fails after the first retry, because no
+recovery helps.
 """
 
 from typing import NamedTuple, Protocol

@@ -8,6 +8,7 @@ import pytest
 
 from simscen.advanced.replanning import ClearancePlan
 from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
+from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
