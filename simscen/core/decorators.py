@@ -1,4 +1,4 @@
-"""Frozen dataclasses that are made at every beat."""
+"""Decorators: frozen dataclasses with a fast constructor, and results cached on an instance."""
 
 from collections.abc import Callable
 from dataclasses import MISSING, dataclass, fields

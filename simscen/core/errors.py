@@ -1,4 +1,4 @@
-"""Every way to fail, its exit code, and who can mend it. A verdict is not an error."""
+"""Problems in input files, exceptions, and the exit codes of the command line. A verdict is not an error."""
 
 from dataclasses import dataclass
 from enum import IntEnum

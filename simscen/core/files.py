@@ -1,4 +1,4 @@
-"""Files of the user's choice are written over plain files only, and never over what was read."""
+"""Checks of output paths, and a record of the input files that were read."""
 
 import errno
 import os

@@ -30,8 +30,8 @@ from simscen.sim.robot import Robot
 from simscen.sim.simulation import Placed, Simulation
 from simscen.stack.build import build_stack
 from simscen.stack.protocols import Stack, Surroundings
-from simscen.worlds.meshing import triangulate
-from simscen.worlds.rays import RayScene
+from simscen.worlds.geometry.triangulation import triangulate
+from simscen.worlds.raycasting.ray_scene import RayScene
 
 
 def assemble(prepared: PreparedScenario, seed: int, printed: Path | None = None) -> RunSetup:

@@ -1,9 +1,9 @@
 """A world made ready: once for each world and lidar height, shared by all its runs."""
 
 from simscen.core.environment.world_model import BuiltWorld, World
-from simscen.worlds.mapsize import RESOLUTION
-from simscen.worlds.meshing import fuse
-from simscen.worlds.slicing import map_of
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.maps.map_size import RESOLUTION
+from simscen.worlds.maps.occupancy_map import map_of
 
 
 def build(world: World, lidar_height: float, resolution: float = RESOLUTION) -> BuiltWorld:

@@ -11,7 +11,7 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.robot import Holonomic, RobotSpec
 from simscen.sim.alone import Alone
 from simscen.sim.embody import robot_body
-from simscen.worlds.meshing import fuse, triangulate
+from simscen.worlds.geometry.triangulation import fuse, triangulate
 
 ROBOTS = Path(__file__).parents[2] / "simscen/data/robots"
 NAMES = sorted(path.name.removesuffix(".robot.yaml") for path in ROBOTS.glob("*.robot.yaml"))

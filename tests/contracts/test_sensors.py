@@ -18,8 +18,8 @@ from simscen.model.robot import RobotSpec
 from simscen.sensors.build import build_sensors
 from simscen.sim.alone import Alone
 from simscen.sim.embody import robot_body
-from simscen.worlds.meshing import fuse, triangulate
-from simscen.worlds.rays import RayScene
+from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.raycasting.ray_scene import RayScene
 
 ROBOTS = Path(__file__).parents[2] / "simscen/data/robots"
 CAMERA = {"camera": {"rate": 5.0, "width": 32, "height": 24, "mount": {"z": 0.4}}}

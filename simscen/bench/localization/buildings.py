@@ -9,7 +9,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Box, Solid, TriangleMesh
 from simscen.core.random_streams import Streams
-from simscen.worlds.meshing import fuse
+from simscen.worlds.geometry.triangulation import fuse
 
 HEIGHT = 1.0
 """Of everything, in m: the lidar looks along the floor."""

@@ -8,7 +8,7 @@ from simscen.bench.localization.buildings import HEIGHT, Building
 from simscen.core.geometry import Array
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.model.robot import Lidar
-from simscen.worlds.rays import RayScene
+from simscen.worlds.raycasting.ray_scene import RayScene
 
 WANDERS = 2.5
 """m: how far from the middle of a room people who are in it walk, and from the corridor's middle never."""

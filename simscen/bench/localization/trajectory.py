@@ -9,7 +9,7 @@ import numpy as np
 from simscen.bench.localization.buildings import Building, mesh_of
 from simscen.core.geometry import Array, Pose2
 from simscen.model.robot import WheelOdometry
-from simscen.worlds.shortest import ShortestWays
+from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 STEP = 0.075
 """Seconds between two poses, and between two readings of the odometry."""
@@ -32,7 +32,9 @@ def drive(floor: Building, furniture: Array, seconds: float, chance: np.random.G
 
     Such a drive begins in the left half.
     """
-    ways = ShortestWays(mesh_of(floor.walls, floor.glass, furniture), (0.0, 0.0, *floor.size), CLEARANCE, finest=FINEST)
+    ways = ShortestPaths(
+        mesh_of(floor.walls, floor.glass, furniture), (0.0, 0.0, *floor.size), CLEARANCE, finest=FINEST
+    )
     corners = _corners(floor, ways, chance, alternate)
     before, goal = next(corners), next(corners)
     x, y = before.tolist()
@@ -50,7 +52,7 @@ def drive(floor: Building, furniture: Array, seconds: float, chance: np.random.G
     return np.array(truth)
 
 
-def _corners(floor: Building, ways: ShortestWays, chance: np.random.Generator, alternate: bool) -> Iterator[Array]:
+def _corners(floor: Building, ways: ShortestPaths, chance: np.random.Generator, alternate: bool) -> Iterator[Array]:
     """Places to turn at, without end, on the shortest ways between places in rooms."""
     here: Array | None = None
     right, failed = False, 0
@@ -70,7 +72,7 @@ def _corners(floor: Building, ways: ShortestWays, chance: np.random.Generator, a
 
 def tour(floor: Building) -> Array:
     """Poses (k, 3) half a metre apart on ways from room to room of an empty floor, none left out that has a door."""
-    ways = ShortestWays(mesh_of(floor.walls, floor.glass), (0.0, 0.0, *floor.size), CLEARANCE, finest=FINEST)
+    ways = ShortestPaths(mesh_of(floor.walls, floor.glass), (0.0, 0.0, *floor.size), CLEARANCE, finest=FINEST)
     order = floor.rooms[np.argsort(floor.rooms[:, 0], kind="stable")]
     places, here = [order[:1]], order[0]
     for room in order[1:]:

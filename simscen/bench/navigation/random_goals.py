@@ -11,7 +11,7 @@ from simscen.bench.navigation.experiment import Drive, Experiment, write_scenari
 from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Pose2
 from simscen.core.random_streams import Streams
-from simscen.worlds.shortest import ShortestWays
+from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 ROOM = 0.12
 """Metres between a robot's hull, as a disc, and the nearest wall, where it starts and where it is sent."""
@@ -36,7 +36,7 @@ def random_drives(
     """A drive of a disc of `radius` metres for each number, none shorter than `least` metres; always the same for a
     number; none for a number of which TRIES draws find none.
     """
-    ways = ShortestWays(built.mesh, built.world.bounds, radius + ROOM)
+    ways = ShortestPaths(built.mesh, built.world.bounds, radius + ROOM)
     free = np.argwhere(built.map.cells == 0)
     for number in numbers if len(free) else ():
         chance = Streams(number).generator("errand")

@@ -19,8 +19,8 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Solid
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation.scenario import prepare
-from simscen.worlds.meshing import fuse
-from simscen.worlds.rosmap import save_map
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.maps.ros_map import save_map
 
 HOUSE = Path(__file__).parents[2] / "data" / "bench" / "house.scenario.yaml"
 MOVABLE = 40

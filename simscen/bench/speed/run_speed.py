@@ -24,8 +24,8 @@ from simscen.run.simulate import simulate
 from simscen.sim.bare import BareWorld
 from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.reference import ReferenceStack
-from simscen.worlds.meshing import fuse, triangulate
-from simscen.worlds.rays import RayScene
+from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.raycasting.ray_scene import RayScene
 
 PATROL = Path(__file__).parents[2] / "data" / "bench" / "patrol.scenario.yaml"
 SEED = 1

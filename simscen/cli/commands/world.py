@@ -23,7 +23,7 @@ from simscen.run.sessions.output_folder import write_atomically
 from simscen.run.worldchecks.runner import world_reader_notes
 
 if TYPE_CHECKING:
-    from simscen.worlds.inspect import Inspection, Item
+    from simscen.worlds.inspection import Inspection, Item
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
 
@@ -56,7 +56,7 @@ def inspect(
     Exit code 0; 2: the file or something in it cannot be used.
     """
     from simscen.worlds.build import build
-    from simscen.worlds.inspect import inspect as inspected
+    from simscen.worlds.inspection import inspect as inspected
 
     home = root or default_root([path])
     source = load_world_file(path, home, world_path or ())
@@ -70,7 +70,7 @@ def inspect(
         if warnings:
             print_text(as_text(warnings))
     if png is not None:
-        from simscen.worlds.picture import picture
+        from simscen.worlds.maps.world_picture import picture
 
         save(png, lambda file: picture(built, height).save(file, format="PNG"), [path])
 
@@ -91,7 +91,7 @@ def export(
     not be written.
     """
     from simscen.worlds.build import build
-    from simscen.worlds.rosmap import save_map
+    from simscen.worlds.maps.ros_map import save_map
 
     home = root or default_root([path])
     source = load_world_file(path, home, world_path or ())
@@ -135,7 +135,7 @@ def _converted(
     spec = source.spec or WorldSpec(simscen=1, name=source.name)
     if source.sdf is None:
         return spec, []
-    from simscen.worlds.convert import convert as converted
+    from simscen.worlds.export.conversion import convert as converted
 
     world = _built(replace(source, spec=None, map=None), home, world_path, lenient)
     try:

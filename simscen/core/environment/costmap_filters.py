@@ -1,4 +1,4 @@
-"""Filter masks as nav2_costmap_2d's costmap filters read them: maps that say where not to go, and how fast."""
+"""Costmap filter masks and zones with the meaning of nav2_costmap_2d: keepout and speed limits."""
 
 from __future__ import annotations
 

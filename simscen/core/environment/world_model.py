@@ -1,4 +1,4 @@
-"""A world as everybody downstream gets it: solids, named places, and the map it came with, if any."""
+"""A world as plain data: solids, bodies, named places, its map, and patches of floor friction."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Velocities, and what a robot is told to do with them."""
+"""Planar velocities and the kinematics of four mecanum wheels."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Faces of a mesh: some of them as a mesh of their own, and whether they are their own convex hull."""
+"""Parts of triangle meshes: submeshes, convexity, and square tiles of faces for lookup by position."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Points and polygons in the plane."""
+"""Points, segments and polygons in the plane; decomposition into convex pieces."""
 
 import math
 from collections.abc import Sequence

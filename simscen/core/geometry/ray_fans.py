@@ -1,4 +1,4 @@
-"""Rays sixteen at a time, in the layout that Embree takes and fills in: its `RTCRayHit16`."""
+"""Rays in packets of sixteen as Embree takes them (`RTCRayHit16`), fans of lidar rays, and the ray-caster protocol."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where scripts have things at moments that are yet to come, worked out for many of them at once."""
+"""Poses of scripted bodies at many times, computed in one batch."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""Where a way leads between two fixed things."""
+"""The parts of a scenario that criteria may use besides the trace."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""What a scenario orders to happen, and what came of it."""
+"""Scheduled events and faults, their outcomes, and the kinds of messages that faults can affect."""
 
 from dataclasses import dataclass
 from typing import Literal

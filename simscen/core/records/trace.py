@@ -1,7 +1,7 @@
-"""What happened, on the lockstep clock: the only currency past the simulation.
+"""The recorded run on the lockstep clock: one Moment per control step, and sampled signals.
 
-A run hands on one Moment per beat. The MCAP recorder and the TraceBuilder eat the same moments, and a log replayed
-gives the same Trace, so that a run can be judged years later without a simulator.
+The MCAP recorder and the TraceBuilder take the same moments, and a replayed log gives the same Trace, so that a run can
+be judged later without a simulator.
 """
 
 from __future__ import annotations

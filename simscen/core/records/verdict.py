@@ -1,4 +1,4 @@
-"""The answer to one pass criterion, with the margin that was left."""
+"""The verdict of one pass criterion with its margin, and the declaration that a run is expected to fail."""
 
 from dataclasses import dataclass, field
 from enum import Enum

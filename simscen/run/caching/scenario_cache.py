@@ -26,10 +26,10 @@ from simscen.run.preparation.loaders import load_world
 from simscen.run.preparation.scenario import PreparedScenario, prepare
 from simscen.run.reproducibility.environment import arithmetic_fingerprints, software_versions, source_digest
 from simscen.worlds.build import build
-from simscen.worlds.mapsize import RESOLUTION
-from simscen.worlds.meshing import fuse
-from simscen.worlds.shortest import Leg, legs_between
-from simscen.worlds.slicing import map_of
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.maps.map_size import RESOLUTION
+from simscen.worlds.maps.occupancy_map import map_of
+from simscen.worlds.routes.shortest_paths import Leg, legs_between
 
 _LEGS = TypeAdapter(list[Leg])
 _MAP = struct.Struct("<II4d")

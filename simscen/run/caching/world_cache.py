@@ -12,10 +12,10 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Solid
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.run.preparation.loaders import load_world
-from simscen.worlds.plainways import PlainWays, plain_ways
+from simscen.worlds.routes.simple_paths import SimplePaths, simple_paths_between
 
 if TYPE_CHECKING:
-    from simscen.worlds.shortest import ShortestWays
+    from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 Bounds = tuple[float, float, float, float]
 
@@ -25,8 +25,8 @@ class WorldCache:
     """Caches worlds by the content of their files, and the shortest paths of discs in them."""
 
     _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
-    _plain: list[tuple[tuple[Solid, ...], float, tuple[float, float], PlainWays | None]] = field(default_factory=list)
-    _ways: list[tuple[tuple[Solid, ...], Bounds, float, tuple[float, float], ShortestWays]] = field(
+    _plain: list[tuple[tuple[Solid, ...], float, tuple[float, float], SimplePaths | None]] = field(default_factory=list)
+    _ways: list[tuple[tuple[Solid, ...], Bounds, float, tuple[float, float], ShortestPaths]] = field(
         default_factory=list
     )
 
@@ -42,26 +42,26 @@ class WorldCache:
             record_read_file(file)
         return known[1]
 
-    def plain_ways(self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]) -> PlainWays | None:
+    def plain_ways(self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]) -> SimplePaths | None:
         """Return the paths of a disc between simple solids without numpy; None if a solid is not simple."""
         for known in self._plain:
             if known[0] is solids and known[1:3] == (radius, z_range):
                 return known[3]
-        ways = plain_ways(solids, radius, z_range)
+        ways = simple_paths_between(solids, radius, z_range)
         self._plain = [*self._plain[-7:], (solids, radius, z_range, ways)]
         return ways
 
     def ways(
         self, solids: tuple[Solid, ...], bounds: Bounds, radius: float, z_range: tuple[float, float]
-    ) -> ShortestWays:
+    ) -> ShortestPaths:
         """Return the shortest paths of a disc between solids."""
         for known in self._ways:
             if known[0] is solids and known[1:4] == (bounds, radius, z_range):
                 return known[4]
-        from simscen.worlds.meshing import fuse
-        from simscen.worlds.shortest import ShortestWays
+        from simscen.worlds.geometry.triangulation import fuse
+        from simscen.worlds.routes.shortest_paths import ShortestPaths
 
-        ways = ShortestWays(fuse(solids), bounds, radius, z_range)
+        ways = ShortestPaths(fuse(solids), bounds, radius, z_range)
         self._ways = [
             *self._ways[-3:],
             (solids, bounds, radius, z_range, ways),

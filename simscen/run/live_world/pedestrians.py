@@ -18,8 +18,8 @@ from simscen.people.walls import Walls
 from simscen.sim.outline import footprint, parts
 from simscen.sim.robot import Robot
 from simscen.sim.simulation import Simulation
-from simscen.worlds.section import section
-from simscen.worlds.shortest import ShortestWays, ways_in
+from simscen.worlds.geometry.cross_section import section
+from simscen.worlds.routes.shortest_paths import ShortestPaths, ways_in
 
 MAX_STEP_S = 0.05
 """Longest step of the pedestrian model."""
@@ -48,7 +48,7 @@ class PedestrianSimulation:
         self._behaviors: dict[str, str] = {}
         self._hulls: dict[str, Array] = {}
         self._outlines: dict[str, tuple[tuple[Solid, ...], tuple[Array, ...]]] = {}
-        self._ways: dict[float, ShortestWays] = {}
+        self._ways: dict[float, ShortestPaths] = {}
         self.tell: list[Callable[[Event], None]] = []
 
     @cached_property

@@ -9,8 +9,8 @@ from simscen.core.geometry.ray_fans import RayCaster, RayFan, Singles
 from simscen.core.geometry.scripted_poses import PosesAtTick, PredictedPoses
 from simscen.core.geometry.shapes import Body, Shape, TriangleMesh
 from simscen.sim.robot import Robot
-from simscen.worlds.meshing import fuse
-from simscen.worlds.rays import RayScene
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.raycasting.ray_scene import RayScene
 
 REFRESH_DISTANCE_M = 4.0
 """Distance that the origin of the rays may move before the reachable objects are determined again."""

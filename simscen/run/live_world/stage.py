@@ -26,7 +26,7 @@ from simscen.sim.robot import Robot
 from simscen.sim.simulation import Simulation
 from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.protocols import Stack
-from simscen.worlds.shortest import Z_RANGE
+from simscen.worlds.routes.shortest_paths import Z_RANGE
 
 
 class LiveStage:

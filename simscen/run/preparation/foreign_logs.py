@@ -13,7 +13,7 @@ from simscen.run.preparation.filter_masks import load_criterion_masks
 from simscen.run.preparation.goals import expected_failures, scenario_goals
 from simscen.run.preparation.loaders import robot_from_file, world_from_file
 from simscen.run.preparation.robot_size import inscribed_radius
-from simscen.worlds.own import build_own
+from simscen.worlds.world_file import build_own
 
 
 def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:

@@ -15,7 +15,7 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.tree import key_position
 from simscen.model.robot import RobotSpec
 from simscen.model.world import WorldSpec
-from simscen.worlds.own import build_own
+from simscen.worlds.world_file import build_own
 
 if TYPE_CHECKING:
     from simscen.sim.robot_body import RobotBody
@@ -47,7 +47,7 @@ def load_map(source: LoadedMap) -> OccupancyGrid:
 
 
 def _map_and_notes(source: LoadedMap) -> tuple[OccupancyGrid, tuple[str, ...]]:
-    from simscen.worlds.rosmap import load_grid
+    from simscen.worlds.maps.ros_map import load_grid
 
     return load_grid(source.spec, source.image)
 

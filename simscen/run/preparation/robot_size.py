@@ -11,7 +11,7 @@ from simscen.model.robot import RobotSpec
 from simscen.run.preparation.loaders import load_robot
 from simscen.sim.ground import refuse_dragging
 from simscen.sim.robot_body import RobotBody
-from simscen.worlds.flat import is_flat
+from simscen.worlds.geometry.prisms import is_flat
 
 CIRCLE_CORNERS = 24
 """Corners of the polygon that approximates a round footprint."""
@@ -74,9 +74,9 @@ def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, 
     if is_flat(solids, reach):
         return solids
     from simscen.sim.climb import climb_of
-    from simscen.worlds.obstacles import obstacles_of
+    from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 
-    return obstacles_of(solids, reach, *climb_of(body))
+    return drive_obstacles(solids, reach, *climb_of(body))
 
 
 def blocking_world(loaded: LoadedScenario, world: World) -> World:

@@ -32,8 +32,8 @@ from simscen.sim.robot_body import RobotBody
 from simscen.spec.registry import Entry
 from simscen.triggers.clearance_below import ClearanceBelow
 from simscen.worlds.build import build
-from simscen.worlds.meshing import fuse
-from simscen.worlds.shortest import Leg, legs_between
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.routes.shortest_paths import Leg, legs_between
 
 DEFAULT_LIDAR_HEIGHT = 0.2
 

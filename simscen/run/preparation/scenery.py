@@ -18,7 +18,7 @@ from simscen.core.environment.world_model import World
 from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.run.preparation.scenario import PreparedScenario
 from simscen.sim.outline import convex_hull, footprint, parts
-from simscen.worlds.shortest import Z_RANGE
+from simscen.worlds.routes.shortest_paths import Z_RANGE
 
 MILLIMETRES = 3
 """Decimals of coordinates in m."""

@@ -12,7 +12,7 @@ from simscen.model.stack import StackSpec
 from simscen.run.preparation.scenario import PreparedScenario
 from simscen.sim import walls
 from simscen.spec.component import Component
-from simscen.worlds import rays
+from simscen.worlds.raycasting import ray_scene
 
 
 def import_components(prepared: PreparedScenario) -> None:
@@ -29,7 +29,7 @@ def precompute(prepared: PreparedScenario) -> None:
     from simscen.run.robot_interface import robot_model
     from simscen.stack.costmap import costmap
 
-    rays.ready(prepared.built.mesh)
+    ray_scene.ready(prepared.built.mesh)
     walls.ready(prepared.built.mesh)
     for part in prepared.each.values():
         walls.ready(part.obstacles)

@@ -13,7 +13,7 @@ from simscen.sensors.odometry import along_arc
 from simscen.sim.alone import Alone
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.simulation import FIRMWARE_RATE
-from simscen.worlds.meshing import fuse, triangulate
+from simscen.worlds.geometry.triangulation import fuse, triangulate
 
 TICK_RATE = 240
 PERIOD = TICK_RATE // FIRMWARE_RATE

@@ -20,9 +20,8 @@ from simscen.run.worldchecks.scene import SILL_M, START, TOUCH_M, WORLD, Scene
 from simscen.spec.motions import Motion
 from simscen.triggers.time import Time
 from simscen.triggers.trigger import Trigger
-from simscen.worlds.contain import first_blocking
-from simscen.worlds.overlap import placed, polygons_overlap
-from simscen.worlds.upright import upright
+from simscen.worlds.geometry.overlaps import first_blocking, placed, polygons_overlap
+from simscen.worlds.geometry.prisms import upright_prism
 
 START_HINT = "move it to free space"
 GOAL_HINT = "move it, or expect the failure with `result: {status: FAILED, error_code: GOAL_OCCUPIED}`"
@@ -111,7 +110,7 @@ def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
         return None
     corners = placed(_outline(spawn), spawn.pose.pose)
     for solid in scene.world.solids:
-        prism = upright(solid)
+        prism = upright_prism(solid)
         if prism is None or prism.bottom > spawn.z or prism.top < spawn.z + spawn.tall:
             continue
         if all(prism.distance(corner, (prism.bottom, prism.top)) == 0 for corner in corners):
@@ -135,7 +134,7 @@ def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
 def _outline(spawn: Spawn) -> Polygon:
     """Return the outline of a thing in its own frame."""
     solid = spawn.solid(spawn.name)
-    prism = upright(Solid(solid.shape, Pose3(z=solid.pose.z), spawn.name))
+    prism = upright_prism(Solid(solid.shape, Pose3(z=solid.pose.z), spawn.name))
     return prism.base if prism is not None else tuple((x, y) for x, y in spawn.polygon or ())
 
 

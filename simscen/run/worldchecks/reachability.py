@@ -10,7 +10,7 @@ from simscen.loading.checks.registry import Finding
 from simscen.run.worldchecks.placement import blocked_poses
 from simscen.run.worldchecks.regions import robot_routes
 from simscen.run.worldchecks.scene import START, WORLD, Scene
-from simscen.worlds.contain import first_blocking
+from simscen.worlds.geometry.overlaps import first_blocking
 
 HINT = "widen the gap, or expect the failure with `result: {status: FAILED, error_code: NO_VALID_PATH}`"
 GAP_EDGE_M = 0.03
@@ -69,11 +69,11 @@ def _ramp_hint(scene: Scene) -> str:
 
 
 def _widest_gap(scene: Scene, goal: Pose2, solids: tuple[Solid, ...]) -> Gap:
-    from simscen.worlds.meshing import fuse
-    from simscen.worlds.narrowest import narrowest
+    from simscen.worlds.geometry.triangulation import fuse
+    from simscen.worlds.routes.narrow_gaps import narrowest_gap
 
     routes = scene.once(robot_routes)
-    gap = narrowest(fuse(solids), routes.bounds, (scene.start, goal), scene.size.inscribed, routes.z_range)
+    gap = narrowest_gap(fuse(solids), routes.bounds, (scene.start, goal), scene.size.inscribed, routes.z_range)
     position = f"({gap.x:.2f}, {gap.y:.2f})"
     sides = gap.sides or ((gap.x, gap.y), (gap.x, gap.y))
     names = [first_blocking(solids, side, GAP_EDGE_M, routes.z_range) for side in sides]

@@ -18,7 +18,7 @@ from simscen.run.worldchecks.scene import START, WORLD, Scene
 from simscen.triggers.robot_in import RobotIn
 from simscen.triggers.robot_within import RobotWithin
 from simscen.triggers.trigger import Test
-from simscen.worlds.overlap import placed, polygons_overlap
+from simscen.worlds.geometry.overlaps import placed, polygons_overlap
 
 
 class TriggerArea(NamedTuple):

@@ -9,10 +9,10 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Solid
 from simscen.run.caching.world_cache import bounds_with
 from simscen.run.worldchecks.scene import Scene
-from simscen.worlds.plainways import PlainWays, plain_ways
+from simscen.worlds.routes.simple_paths import SimplePaths, simple_paths_between
 
 if TYPE_CHECKING:
-    from simscen.worlds.shortest import ShortestWays
+    from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 SILL_M = 0.03
 """Height of obstacles that a route may cross, although no robot could stop there."""
@@ -64,13 +64,13 @@ class RobotRoutes:
         return bounds_with(self.scene.world.bounds, list(self.stops))
 
     @cached_property
-    def _fixed(self) -> PlainWays | None:
+    def _fixed(self) -> SimplePaths | None:
         return self.scene.cache.plain_ways(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
 
-    def _plain(self, solids: tuple[Solid, ...]) -> PlainWays | None:
+    def _plain(self, solids: tuple[Solid, ...]) -> SimplePaths | None:
         if solids is self.scene.world.solids:
             return self._fixed
-        return plain_ways(solids, self.scene.size.inscribed, self.z_range)
+        return simple_paths_between(solids, self.scene.size.inscribed, self.z_range)
 
-    def _exact(self, solids: tuple[Solid, ...]) -> "ShortestWays":
+    def _exact(self, solids: tuple[Solid, ...]) -> "ShortestPaths":
         return self.scene.cache.ways(solids, self.bounds, self.scene.size.inscribed, self.z_range)

@@ -18,8 +18,8 @@ from simscen.run.preparation.robot_size import blocking_world, robot_size
 from simscen.run.worldchecks import masks, placement, reachability, regions, timing
 from simscen.run.worldchecks.scene import TIMING, WORLD, Scene
 from simscen.run.worldchecks.world_file import check_built_world
-from simscen.worlds.mapsize import too_large
-from simscen.worlds.overlap import placed
+from simscen.worlds.geometry.overlaps import placed
+from simscen.worlds.maps.map_size import too_large
 
 MODULES = (masks, placement, reachability, regions, timing)
 """Modules that register checks when they are imported."""
@@ -75,7 +75,7 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
     Raises UsageError if it cannot be written.
     """
     from simscen.worlds.build import build
-    from simscen.worlds.picture import picture
+    from simscen.worlds.maps.world_picture import picture
 
     low, high = scene.z_range
     height = (low + high) / 2

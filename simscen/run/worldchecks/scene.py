@@ -22,9 +22,8 @@ from simscen.run.preparation.goals import event_goals, scenario_goals
 from simscen.run.preparation.loaders import load_map
 from simscen.run.preparation.robot_size import RobotSize
 from simscen.run.worldchecks.expected_failures import expects_failure
-from simscen.worlds.contain import first_blocking
-from simscen.worlds.overlap import first_overlapping
-from simscen.worlds.upright import upright
+from simscen.worlds.geometry.overlaps import first_blocking, first_overlapping
+from simscen.worlds.geometry.prisms import upright_prism
 
 SILL_M = 0.02
 """Height below which an obstacle does not block a robot."""
@@ -143,7 +142,7 @@ class Scene:
         A mesh or a tilted box may be a ramp.
         """
         mapped = self.world.grid is not None
-        return tuple(s for s in self.world.solids if upright(s) is not None or (mapped and s.name == "map"))
+        return tuple(s for s in self.world.solids if upright_prism(s) is not None or (mapped and s.name == "map"))
 
     @cached_property
     def targets(self) -> list[tuple[Keys, Goal]]:

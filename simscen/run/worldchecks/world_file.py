@@ -12,7 +12,7 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.tree import MappingNode
 from simscen.run.worldchecks.placement import motion_stops
 from simscen.run.worldchecks.scene import TOUCH_M
-from simscen.worlds.contain import blocking_solid
+from simscen.worlds.geometry.overlaps import blocking_solid
 
 HEIGHTS_M = 0.02, 0.4
 """Heights between which an obstacle blocks most robots."""
@@ -77,7 +77,7 @@ def regions_outside_the_world(built: BuiltWorld) -> Iterator[Finding]:
 
 def _without_platforms(world: World) -> World:
     """Return the world as it blocks a robot that climbs ramps: places may be on top of platforms."""
-    from simscen.worlds.obstacles import obstacles_of
+    from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 
-    solids = obstacles_of(world.solids, RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M)
+    solids = drive_obstacles(world.solids, RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M)
     return replace(world, solids=solids)

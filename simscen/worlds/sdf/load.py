@@ -10,17 +10,17 @@ import numpy as np
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Array
 from simscen.core.geometry.shapes import Body, Solid
-from simscen.worlds.extents import plan_extents
-from simscen.worlds.mapsize import Bounds
+from simscen.worlds.geometry.prisms import plan_extents
+from simscen.worlds.maps.map_size import Bounds
 from simscen.worlds.sdf.actors import read_actor
 from simscen.worlds.sdf.bodies import distinct, split
 from simscen.worlds.sdf.files import Library
-from simscen.worlds.sdf.floor import floor_height
 from simscen.worlds.sdf.includes import Shelf
 from simscen.worlds.sdf.links import read_link
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.outliers import outliers
 from simscen.worlds.sdf.placing import place
+from simscen.worlds.sdf.planes import floor_height
 from simscen.worlds.sdf.report import Report, Unusable
 from simscen.worlds.sdf.shapes import ShapeReader
 from simscen.worlds.sdf.state import ModelState, WorldState, read_state

@@ -9,8 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections import OrderedDict
 
-from simscen.worlds.sdf.meshfile import read_parts
-from simscen.worlds.sdf.meshpart import Part
+from simscen.worlds.sdf.mesh_files import Part, read_parts
 
 MOST_BYTES = 256 << 20
 """Of triangles kept; the mesh that was asked for longest ago goes first."""

@@ -16,8 +16,8 @@ from simscen.core.geometry.shapes import Mesh
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.files import MESH_BYTES, Library
 from simscen.worlds.sdf.markup import Element
+from simscen.worlds.sdf.mesh_files import Part, UnusableMesh
 from simscen.worlds.sdf.meshcache import READ
-from simscen.worlds.sdf.meshpart import Part, UnusableMesh
 from simscen.worlds.sdf.report import CODE, Report
 
 

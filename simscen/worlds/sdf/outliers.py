@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.worlds.mapsize import too_large
+from simscen.worlds.maps.map_size import too_large
 
 FEW = 0.05
 """Share of the things in a world that may be outliers; where more are, it is the world that is large."""

@@ -6,10 +6,10 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Shape, Solid, Sphere
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.files import Library
-from simscen.worlds.sdf.ground import read_plane
 from simscen.worlds.sdf.heightmap import read_heightmap
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.meshes import MeshShelf
+from simscen.worlds.sdf.planes import read_plane
 from simscen.worlds.sdf.polyline import read_polylines
 from simscen.worlds.sdf.report import Report
 from simscen.worlds.sdf.vocabulary import SHAPES, judge_children

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from simscen.core.geometry.shapes import Shape, Solid
-from simscen.worlds.meshing import triangulate
+from simscen.worlds.geometry.triangulation import triangulate
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.markup import Element
 

@@ -9,7 +9,7 @@ from PIL import Image
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED
 from simscen.loading.files.worldfile import load_world_file
-from simscen.worlds.rosmap import load_grid
+from simscen.worlds.maps.ros_map import load_grid
 
 ROOM = """\
 simscen: 1

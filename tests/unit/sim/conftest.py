@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.sim.alone import Alone
 from simscen.sim.embody import robot_body
-from simscen.worlds.meshing import fuse, triangulate
+from simscen.worlds.geometry.triangulation import fuse, triangulate
 
 sys.path.insert(0, str(Path(__file__).parent))
 

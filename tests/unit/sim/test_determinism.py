@@ -15,7 +15,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.sim.embody import robot_body
 from simscen.sim.alone import Alone
-from simscen.worlds.meshing import fuse, triangulate
+from simscen.worlds.geometry.triangulation import fuse, triangulate
 
 solids = [box(f"box{{k}}", (k * 7 % 11) - 5, (k * 5 % 9) - 4, 0.3, 0.4) for k in range(60)]
 solids = [solid for solid in solids if abs(solid.pose.x) + abs(solid.pose.y) > 1.0]

@@ -11,9 +11,9 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, Box, Mesh, Solid
 from simscen.sim.climb import climb_of, grip_angle
 from simscen.sim.embody import robot_body
-from simscen.worlds.meshing import fuse
-from simscen.worlds.obstacles import obstacles_of
-from simscen.worlds.ramps import wedge
+from simscen.worlds.geometry.drive_obstacles import drive_obstacles
+from simscen.worlds.geometry.ramp_wedges import wedge
+from simscen.worlds.geometry.triangulation import fuse
 
 TICKS = 240
 FOOT = 0.5
@@ -32,7 +32,7 @@ def on_ground(simulate):
     def make(robot, solids, **where):
         body = robot_body(shipped(robot))
         reach = max((wheel.radius for wheel in body.wheels), default=0.0)
-        return simulate(body, solids, obstacles=fuse(obstacles_of(tuple(solids), reach, *climb_of(body))), **where)
+        return simulate(body, solids, obstacles=fuse(drive_obstacles(tuple(solids), reach, *climb_of(body))), **where)
 
     return make
 

@@ -7,7 +7,7 @@ import trimesh
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Solid, Sphere
 from simscen.sim.inertia import MassProperties, combined, of_shape, of_solids, volume
-from simscen.worlds.meshing import triangulate
+from simscen.worlds.geometry.triangulation import triangulate
 
 SHAPES = [
     Box((0.4, 0.3, 0.2)),

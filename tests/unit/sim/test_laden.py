@@ -10,7 +10,7 @@ from simscen.core.geometry.kinematics import STOP
 from simscen.sim.climb import climb_of
 from simscen.sim.embody import robot_body
 from simscen.sim.laden import centre, laden, stands, weakened
-from simscen.worlds.ramps import wedge
+from simscen.worlds.geometry.ramp_wedges import wedge
 
 TICKS, GRAVITY = 240, 9.81
 

@@ -17,7 +17,7 @@ from simscen.sim.actor import Actor
 from simscen.sim.embody import robot_body
 from simscen.sim.presence import STRIDE, Absent, Looker
 from simscen.sim.simulation import Placed, Simulation
-from simscen.worlds.meshing import fuse, triangulate
+from simscen.worlds.geometry.triangulation import fuse, triangulate
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
 NAMES = [f"thing {number}" for number in range(10)]

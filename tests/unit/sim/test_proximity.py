@@ -14,7 +14,7 @@ from simscen.sim.embody import robot_body
 from simscen.sim.enclosure import winds_along_a_line, winds_around
 from simscen.sim.engine import fixed, hull_shape, tiles
 from simscen.sim.proximity import Proximity, motion, point_to_triangles
-from simscen.worlds.meshing import fuse
+from simscen.worlds.geometry.triangulation import fuse
 
 
 def test_distances_to_triangles_are_trimeshs():

@@ -10,8 +10,8 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.ray_fans import RayFan
 from simscen.core.geometry.shapes import Body
 from simscen.run.live_world.ray_caster import LiveRayCaster
-from simscen.worlds.meshing import fuse
-from simscen.worlds.rays import RayScene
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.raycasting.ray_scene import RayScene
 
 WALL = box("wall", 4.0, 0.0, 0.2, 8.0)
 CRATE = (box("crate", 0, 0, 0.3, 0.3, 0.3),)

@@ -11,8 +11,8 @@ from simscen.core.geometry.scripted_poses import PosesAtTick
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.run.live_world import ray_caster
 from simscen.run.live_world.ray_caster import LiveRayCaster
-from simscen.worlds.meshing import fuse
-from simscen.worlds.rays import RayScene
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.raycasting.ray_scene import RayScene
 
 WALL = box("wall", 4.0, 0.0, 0.2, 8.0)
 PARTS = (box("cart", 0.2, 0, 0.5, 0.3, 0.4),)

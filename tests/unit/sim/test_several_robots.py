@@ -11,8 +11,8 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.run.live_world.ray_caster import LiveRayCaster
 from simscen.sim.embody import robot_body
 from simscen.sim.simulation import Placed, Simulation
-from simscen.worlds.meshing import fuse, triangulate
-from simscen.worlds.rays import RayScene
+from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.raycasting.ray_scene import RayScene
 
 FRONT = Twist(0.3, 0.0, 0.0)
 

@@ -12,11 +12,11 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Goal
 from simscen.model.rosmap import RosMapSpec
 from simscen.worlds.build import build
-from simscen.worlds.meshing import fuse
-from simscen.worlds.rays import RayScene
-from simscen.worlds.rosmap import load_grid
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.maps.ros_map import load_grid
+from simscen.worlds.raycasting.ray_scene import RayScene
+from simscen.worlds.routes.shortest_paths import legs_between
 from simscen.worlds.sdf import load_sdf
-from simscen.worlds.shortest import legs_between
 
 DATA = Path(__file__).parents[3].parent / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")

@@ -15,8 +15,8 @@ from simscen.core.geometry.shapes import Box, Mesh
 from simscen.model.robot import RobotSpec
 from simscen.sim.alone import Alone
 from simscen.sim.embody import robot_body
-from simscen.worlds.meshing import fuse, triangulate
-from simscen.worlds.sdf.meshfile import UnusableMesh, read_parts
+from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.sdf.mesh_files import UnusableMesh, read_parts
 
 JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf"
 DIFFERENTIAL = {"type": "differential", "wheel_radius": 0.05, "wheel_separation": 0.4}

@@ -24,10 +24,10 @@ from simscen.stack.protocols import Localizer, Surroundings
 from simscen.stack.setting import Setting
 from simscen.testing.room import ROBOT, TICK_RATE
 from simscen.worlds.build import build
-from simscen.worlds.meshing import fuse
-from simscen.worlds.own import build_own
-from simscen.worlds.rays import RayScene
-from simscen.worlds.shortest import ShortestWays
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.raycasting.ray_scene import RayScene
+from simscen.worlds.routes.shortest_paths import ShortestPaths
+from simscen.worlds.world_file import build_own
 
 PERIOD, BEAMS, HEIGHT, KIDNAPPED_AT = 24, 60, 0.2, 200
 ANGLES = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
@@ -93,9 +93,9 @@ BUILDINGS = ("house", "office", "warehouse", *GENERATED, "house coarse")
 
 
 @cache
-def ways(name: str) -> ShortestWays:
+def ways(name: str) -> ShortestPaths:
     """Ways that stay 0.4 m away from everything."""
-    return ShortestWays(building(name).mesh, building(name).world.bounds, 0.4)
+    return ShortestPaths(building(name).mesh, building(name).world.bounds, 0.4)
 
 
 @cache

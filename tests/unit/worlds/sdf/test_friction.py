@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from simscen.worlds.meshing import fuse
-from simscen.worlds.obstacles import obstacles_of
+from simscen.worlds.geometry.drive_obstacles import drive_obstacles
+from simscen.worlds.geometry.triangulation import fuse
 
 
 def ramp(surface):
@@ -34,7 +34,7 @@ def test_what_is_no_coefficient_is_told_and_taken_for_1(load, text):
 
 def test_a_tilted_box_is_a_ramp_to_a_robot_that_climbs_it_and_a_wall_to_one_that_does_not(load):
     solids = load(ramp("")).solids
-    climbed = obstacles_of(solids, 0.033, math.radians(7.9), 0.0097)
+    climbed = drive_obstacles(solids, 0.033, math.radians(7.9), 0.0097)
     assert climbed is not solids
     assert all(solid.shape.size[1] == 0.01 for solid in climbed)  # only its sides are left
-    assert obstacles_of(solids, 0.033, 0.0, 0.0) is solids
+    assert drive_obstacles(solids, 0.033, 0.0, 0.0) is solids

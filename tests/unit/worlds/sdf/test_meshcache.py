@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from simscen.worlds.sdf.mesh_files import UnusableMesh
 from simscen.worlds.sdf.meshcache import MeshCache
-from simscen.worlds.sdf.meshpart import UnusableMesh
 
 TRIANGLE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 OTHER = b"v 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\n"

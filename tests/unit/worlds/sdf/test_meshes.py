@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from simscen.core.errors import InvalidInput
+from simscen.worlds.sdf.mesh_files import UnusableMesh, read_parts
 from simscen.worlds.sdf.meshes import read_mesh
-from simscen.worlds.sdf.meshfile import read_parts
-from simscen.worlds.sdf.meshpart import UnusableMesh
 
 DAE = """<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">

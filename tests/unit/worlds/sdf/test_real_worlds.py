@@ -12,10 +12,10 @@ from scipy.ndimage import distance_transform_edt
 
 from simscen.core.environment.world_model import World
 from simscen.core.geometry.shapes import Cylinder, Mesh
-from simscen.worlds.meshing import fuse
-from simscen.worlds.rays import RayScene
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.maps.occupancy_map import map_of
+from simscen.worlds.raycasting.ray_scene import RayScene
 from simscen.worlds.sdf import load_sdf
-from simscen.worlds.slicing import map_of
 
 BARN = ("world_1", "world_40", "world_55", "world_111", "world_217", "world_289")
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Sphere
-from simscen.worlds.meshing import triangulate
+from simscen.worlds.geometry.triangulation import triangulate
 from simscen.worlds.sdf.polyline import trapezoids
 
 OFF_GRID = 8.28713

@@ -1,0 +1,1 @@
+"""Conversion of imported worlds to simscen's own world files."""

@@ -1,0 +1,1 @@
+"""Geometry of solids: triangle meshes, upright prisms, cross sections, overlap tests."""

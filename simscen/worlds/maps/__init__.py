@@ -1,0 +1,1 @@
+"""Occupancy maps: drawn from solids, read from and written to ROS map files."""

@@ -1,0 +1,1 @@
+"""Shortest paths, clearance and passages of a disc in the static world."""

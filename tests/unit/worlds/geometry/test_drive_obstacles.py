@@ -1,0 +1,67 @@
+"""What of a world is in the way of a robot that climbs ramps."""
+
+import math
+
+import pytest
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry.shapes import Box, Mesh, Solid
+from simscen.worlds.geometry.drive_obstacles import drive_obstacles
+from simscen.worlds.geometry.ramp_wedges import wedge
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.routes.shortest_paths import ShortestPaths
+
+TURTLEBOT = 0.033, math.radians(7.9), 0.0097
+BOUNDS = (-1.0, -4.0, 8.0, 4.0)
+
+
+def box(name, x, y, length, width, height):
+    return Solid(Box((length, width, height)), Pose3(x, y, height / 2), name)
+
+
+def hall(degrees):
+    """Two halves of a hall, with a platform between them that a ramp leads up to on either side."""
+    high = math.tan(math.radians(degrees))
+    return (
+        wedge((2, 0), (3, 0), 1.5, high, "up"),
+        box("platform", 3.5, 0, 1.0, 7.8, high),
+        wedge((5, 0), (4, 0), 1.5, high, "down"),
+        box("north", 3.5, 4, 9.2, 0.2, 1.0),
+        box("south", 3.5, -4, 9.2, 0.2, 1.0),
+        box("west", -1, 0, 0.2, 8, 1.0),
+        box("east", 8, 0, 0.2, 8, 1.0),
+    )
+
+
+def way(degrees, robot=TURTLEBOT):
+    mesh = fuse(drive_obstacles(hall(degrees), *robot))
+    return ShortestPaths(mesh, BOUNDS, 0.22).length(Pose2(1, 3, 0), Pose2(6, 3, 0))
+
+
+def test_a_world_without_ground_but_the_floor_stays_the_same_object():
+    solids = (box("wall", 1, 0, 0.1, 4, 1.0),)
+    assert drive_obstacles(solids, *TURTLEBOT) is solids
+
+
+def test_the_shortest_way_leads_over_a_ramp_that_the_robot_climbs_and_not_over_its_sides():
+    # Round the corners of the ramps' sides, which are higher than a step but for their first 30 cm.
+    assert 7.0 < way(5) < 8.5
+
+
+def test_no_way_leads_over_a_ramp_that_is_too_steep_or_for_a_robot_that_stays_on_the_floor():
+    assert way(30) == math.inf
+    assert way(5, (0.1, 0.0, 0.0)) == math.inf
+
+
+def test_ramp_and_platform_join_without_a_wall_between_them():
+    names = [s.name for s in drive_obstacles(hall(5), *TURTLEBOT) if s.name in ("up", "down", "platform")]
+    assert names.count("platform") == 4 + 2  # ends of the platform are at the walls' faces; four beside the ramps
+    assert names.count("up") == names.count("down") == pytest.approx(18, abs=2)
+
+
+def test_a_concave_solid_with_a_low_part_stays_in_the_way_as_a_whole():
+    """Forks 3 cm high before a mast: wheels may roll on them, but nobody plans to."""
+    forks, mast = (box("jack", x, 0, length, 0.5, height) for x, length, height in ((0.5, 1.0, 0.03), (1.1, 0.2, 1.2)))
+    jack = fuse([forks, mast])
+    solids = (Solid(Mesh(jack.vertices, jack.faces), Pose3(), "jack"),)
+    assert drive_obstacles(solids, *TURTLEBOT) is solids

@@ -1,0 +1,76 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry.shapes import Box, Cone, Cylinder, Extrusion, Solid, Sphere
+from simscen.worlds.geometry.cross_section import distance_in_plan
+from simscen.worlds.geometry.prisms import plan_extents, plan_rectangle, upright_prism
+from simscen.worlds.geometry.triangulation import fuse
+
+L_SHAPE = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
+STAR = tuple((math.cos(4 * math.pi * k / 5), math.sin(4 * math.pi * k / 5)) for k in range(5))
+
+sizes = st.floats(0.01, 3.0)
+places = st.floats(-3.0, 3.0)
+heights = st.floats(-1.0, 1.0)
+headings = st.floats(-math.pi, math.pi)
+poses = st.builds(
+    lambda x, y, z, yaw: Pose3.planar(Pose2(x, y, yaw), z), places, places, st.floats(-1.0, 1.0), headings
+)
+quadrangles = st.builds(
+    lambda a, b, c, d, h: Extrusion(((a, 0.0), (0.0, b), (-c, 0.0), (0.0, -d)), h), sizes, sizes, sizes, sizes, sizes
+)
+shapes = st.one_of(
+    st.builds(lambda x, y, z: Box((x, y, z)), sizes, sizes, sizes),
+    st.builds(Cylinder, sizes, sizes),
+    quadrangles,
+    quadrangles.map(lambda it: Extrusion(it.polygon[::-1], it.height)),
+)
+
+
+@given(shape=shapes, pose=poses, point=st.tuples(places, places))
+def test_distances_are_those_of_the_triangle_mesh(shape, pose, point):
+    solid, slab = Solid(shape, pose), (0.02, 0.4)
+    prism = upright_prism(solid)
+    assert prism is not None
+    assert prism.distance(point, slab) == pytest.approx(distance_in_plan(fuse([solid]), point, slab), abs=1e-9)
+
+
+@given(shape=shapes, pose=poses, frame=poses)
+def test_extents_are_those_of_the_triangle_mesh(shape, pose, frame):
+    solid = Solid(shape, pose)
+    for owner in (None, frame):
+        assert upright_prism(solid, owner) is not None
+        assert plan_rectangle(solid, owner) == pytest.approx(plan_extents(solid, owner).ravel().tolist(), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        Solid(Box((1, 1, 1)), Pose3.from_rpy(0, 0, 0, 0.1, 0, 0)),
+        Solid(Sphere(1.0)),
+        Solid(Cone(1.0, 1.0)),
+        Solid(Extrusion(L_SHAPE, 1.0)),
+        Solid(Extrusion(STAR, 1.0)),
+        Solid(Extrusion(((0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (0.0, 1.0)), 1.0)),
+    ],
+    ids=["tilted", "ball", "cone", "hollow corner", "star", "corner given twice"],
+)
+def test_what_is_no_convex_prism_is_left_to_the_mesh(solid):
+    assert upright_prism(solid) is None
+    assert plan_rectangle(solid) == pytest.approx(plan_extents(solid).ravel().tolist())
+
+
+def test_a_solid_in_a_tilted_frame_is_left_to_the_mesh():
+    assert upright_prism(Solid(Box((1, 1, 1))), Pose3.from_rpy(0, 0, 0, 0, 0.2, 0)) is None
+
+
+def test_what_only_touches_the_heights_in_question_is_not_there():
+    box = upright_prism(Solid(Box((1, 1, 1)), Pose3(z=0.5)))
+    assert box is not None
+    assert box.distance((0, 0), (1.0, 2.0)) == box.distance((0, 0), (-1.0, 0.0)) == math.inf
+    assert box.distance((0, 0), (np.nextafter(1.0, 0.0), 2.0)) == 0.0

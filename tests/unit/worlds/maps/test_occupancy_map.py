@@ -1,0 +1,132 @@
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.environment.world_model import World
+from simscen.core.errors import InvalidInput
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Mesh, Solid
+from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.geometry.wall_prisms import wall_solids
+from simscen.worlds.maps.occupancy_map import map_of
+
+ROOM = (
+    Solid(Box((4.2, 0.1, 1.0)), Pose3(2, -0.05, 0.5), "south"),
+    Solid(Box((4.2, 0.1, 1.0)), Pose3(2, 3.05, 0.5), "north"),
+    Solid(Box((0.1, 3.0, 1.0)), Pose3(-0.05, 1.5, 0.5), "west"),
+    Solid(Box((0.1, 3.0, 1.0)), Pose3(4.05, 1.5, 0.5), "east"),
+)
+
+
+def grid_of(*solids, height=0.3, resolution=0.05, **world):
+    return map_of(World("w", solids, **world), fuse(solids), height, resolution)
+
+
+def by_shapely(grid, polygon):
+    """The cells whose open square meets the open polygon."""
+    x = grid.origin.x + np.arange(grid.shape[1]) * grid.resolution
+    y = grid.origin.y + np.arange(grid.shape[0]) * grid.resolution
+    xs, ys = np.meshgrid(x, y)
+    small = 1e-6
+    squares = shapely.box(xs + small, ys + small, xs + grid.resolution - small, ys + grid.resolution - small)
+    return shapely.intersects(squares, polygon)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_cell_is_occupied_exactly_if_a_solid_is_in_it(seed):
+    rng = np.random.default_rng(seed)
+    solids, polygons = [], []
+    for _ in range(8):
+        x, y, yaw = rng.uniform(-3, 3), rng.uniform(-3, 3), rng.uniform(-3, 3)
+        angles = np.sort(rng.uniform(0, 2 * math.pi, 7))
+        radii = rng.uniform(0.02, 1.0, 7)
+        corners = np.column_stack((radii * np.cos(angles), radii * np.sin(angles)))
+        polygon = shapely.Polygon(corners)
+        if not polygon.is_valid or not polygon.exterior.is_ccw:
+            continue
+        solids.append(Solid(Extrusion(tuple(map(tuple, corners.tolist())), 1.0), Pose3.planar(Pose2(x, y, yaw))))
+        polygons.append(shapely.Polygon(Pose2(x, y, yaw).apply(corners)))
+    grid = grid_of(*solids)
+    expected = by_shapely(grid, shapely.union_all(polygons))
+    assert ((grid.cells == OCCUPIED) != expected).sum() == 0
+
+
+def test_walls_on_cell_edges_fill_just_their_own_cells():
+    grid = grid_of(Solid(Box((0.2, 0.1, 1.0)), Pose3(1.1, 2.05, 0.5)))
+    rows, columns = np.nonzero(grid.cells == OCCUPIED)
+    centres = grid.centre_of(np.column_stack((rows, columns)))
+    assert len(centres) == 8
+    assert centres.min(axis=0) == pytest.approx([1.025, 2.025])
+    assert centres.max(axis=0) == pytest.approx([1.175, 2.075])
+
+
+def test_a_wall_thinner_than_a_cell_is_not_lost():
+    grid = grid_of(Solid(Box((0.01, 2.0, 1.0)), Pose3(0.02, 0, 0.5)))
+    assert (grid.cells == OCCUPIED).sum() == 40
+
+
+def test_things_above_or_below_the_lidar_are_not_on_the_map():
+    solids = Solid(Box((1, 1, 0.1)), Pose3(0, 0, 0.05)), Solid(Box((1, 1, 0.1)), Pose3(3, 0, 2.0))
+    assert not (grid_of(*solids).cells == OCCUPIED).any()
+
+
+def test_outside_of_a_closed_building_nothing_is_known():
+    grid = grid_of(*ROOM)
+    inside, beyond = grid.values_at(np.array([[2.0, 1.5], [-0.5, -0.5]])).tolist()
+    assert (inside, beyond) == (FREE, UNKNOWN)
+
+
+def test_outside_stays_free_when_a_named_place_is_there_or_a_door_stands_open():
+    yard = grid_of(*ROOM, places={"yard": Pose2(4.5, 1.0, 0.0)}, bounds=(0, 0, 5, 3))
+    open_door = grid_of(*ROOM[:3])
+    for grid in (yard, open_door):
+        assert not (grid.cells == UNKNOWN).any()
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4, math.pi / 4])
+def test_neither_a_turn_nor_a_wing_makes_a_building_an_open_field(yaw):
+    plan = [(0, 0), (6, 0), (6, 2), (2, 2), (2, 6), (0, 6), (0, 0)]
+    turned = Pose2(0, 0, yaw).apply(np.array(plan, dtype=float)).tolist()
+    grid = grid_of(*wall_solids([(x, y) for x, y in turned], 0.1, 1.0, "w"))
+    inside, beyond, corner = grid.values_at(Pose2(0, 0, yaw).apply(np.array([[1, 1], [-0.5, 3], [4, 4]]))).tolist()
+    assert (inside, beyond, corner) == (FREE, UNKNOWN, UNKNOWN)
+
+
+def test_a_field_of_posts_is_free_all_over():
+    posts = [Solid(Cylinder(0.2, 1.0), Pose3(x, y, 0.5)) for x in range(5) for y in range(5)]
+    assert not (grid_of(*posts).cells == UNKNOWN).any()
+
+
+def test_an_open_mesh_leaves_only_its_outline():
+    box = triangulate(Box((2.0, 2.0, 1.0)))
+    open_box = Mesh(box.vertices, box.faces[box.faces.min(axis=1) != 1])  # some sides are missing
+    grid = grid_of(Solid(open_box, Pose3(z=0.3)))
+    assert 40 < (grid.cells == OCCUPIED).sum() < 200
+
+
+def test_a_room_modelled_from_within_keeps_its_floor_free():
+    box = triangulate(Box((3.0, 3.0, 2.0)))
+    grid = grid_of(Solid(Mesh(box.vertices, box.faces[:, ::-1]), Pose3(z=1.0)))
+    assert grid.values_at(np.array([[0.0, 0.0], [1.5, 0.0]])).tolist() == [FREE, OCCUPIED]
+
+
+def test_what_is_added_to_a_ros_map_is_drawn_into_it_under_its_yaw():
+    own = OccupancyGrid(np.full((40, 40), UNKNOWN, np.int8), 0.1, Pose2(1.0, 2.0, math.pi / 6))
+    own.cells[5:30, 5:30] = FREE
+    place = own.centre_of(np.array([[20, 10]]))[0]
+    grid = grid_of(Solid(Box((0.05, 0.05, 1.0)), Pose3(place[0], place[1], 0.5)), grid=own)
+    assert np.argwhere(grid.cells == OCCUPIED).tolist() == [[20, 10]]
+    assert (grid.cells == UNKNOWN).sum() == (own.cells == UNKNOWN).sum()
+
+
+def test_a_map_that_would_be_too_large_is_refused_with_its_size():
+    with pytest.raises(InvalidInput, match="map too large: 400040 x 400040 cells"):
+        grid_of(bounds=(-1e4, -1e4, 1e4, 1e4))
+
+
+def test_a_world_of_places_alone_has_a_map_that_holds_them():
+    built = grid_of(places={"a": Pose2(3, 2), "b": Pose2(8, 2)}, bounds=(3, 2, 8, 2))
+    assert built.values_at(np.array([[3.0, 2.0], [8.0, 2.0]])).tolist() == [FREE, FREE]

@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+import shapely
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry.shapes import Box, Cylinder, Solid, Sphere
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.maps.occupancy_map import empty_grid
+from simscen.worlds.routes.clearance import MOST_LEVELS, clearance_field, standing_outlines
+
+BOUNDS, BODY = (-3.0, -3.0, 3.0, 3.0), (0.03, 0.4)
+
+
+def scattered(seed):
+    rng = np.random.default_rng(seed)
+    solids, polygons = [], []
+    for x, y, yaw in rng.uniform(-2.5, 2.5, (6, 3)):
+        width, depth = rng.uniform(0.1, 1.5, 2)
+        solids.append(Solid(Box((width, depth, 1.0)), Pose3.planar(Pose2(x, y, yaw), 0.5)))
+        corners = np.array([(-width, -depth), (width, -depth), (width, depth), (-width, depth)]) / 2
+        polygons.append(shapely.Polygon(Pose2(x, y, yaw).apply(corners)))
+    return fuse(solids), shapely.union_all(polygons)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_clearance_agrees_with_shapely_outside_and_is_negative_inside(seed):
+    mesh, truth = scattered(seed)
+    field = clearance_field(mesh, empty_grid(BOUNDS, 0.05, "w"), BODY)
+    points = np.random.default_rng(seed).uniform(-2.9, 2.9, (3000, 2))
+    exact = truth.distance(shapely.points(points))
+    deep = truth.buffer(-0.04).distance(shapely.points(points)) == 0
+    outside = exact > 0.04
+    assert np.abs(field.exact(points) - exact)[outside].max() < 0.0015
+    assert (field.exact(points)[deep] < 0).all()
+    for distance in (0.1, 0.25, 0.6):
+        assert np.array_equal(field.keeps(points, distance), field.exact(points) >= distance)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("distance", [0.04, 0.25, 0.6])
+def test_free_cells_are_those_whose_middle_keeps_the_distance(seed, distance):
+    mesh, _ = scattered(seed)
+    field = clearance_field(mesh, empty_grid(BOUNDS, 0.05, "w"), BODY)
+    middles = field.grid.centre_of(np.argwhere(np.ones(field.grid.shape, dtype=bool)))
+    expected = (field.exact(middles) >= distance).reshape(field.grid.shape)
+    assert np.array_equal(field.free_cells(distance), expected)
+
+
+def test_points_are_pushed_off_the_nearest_solid():
+    wall = fuse([Solid(Box((0.2, 8.0, 1.0)), Pose3(0, 0, 0.5))])
+    field = clearance_field(wall, empty_grid(BOUNDS, 0.05, "w"), BODY)
+    points = np.array([[0.3, 0.0], [-0.2, 1.0], [0.05, 0.0], [0.5, 0.0], [2.0, 0.0]])
+    expected = np.array([[0.1, 0], [-0.2, 0], [0.35, 0], [0, 0], [0, 0]])
+    assert field.push(points, 0.3) == pytest.approx(expected, abs=0.001)
+
+
+def test_where_nothing_stands_everything_is_far_away():
+    field = clearance_field(fuse([]), empty_grid(BOUNDS, 0.05, "w"), BODY)
+    assert field.keeps(np.zeros((3, 2)), 100.0).all()
+    assert field.free_cells(100.0).all()
+
+
+def test_upright_things_need_one_cut_and_round_ones_a_dozen():
+    upright = fuse([Solid(Box((1, 1, 1)), Pose3(z=0.5)), Solid(Cylinder(0.3, 2.0), Pose3(3, 0, 1.0))])
+    assert len(standing_outlines(upright, BODY)) == 1
+    assert len(standing_outlines(fuse([Solid(Sphere(0.5), Pose3(z=0.5))]), BODY)) == MOST_LEVELS
+
+
+def test_a_low_shelf_is_seen_between_the_heights_of_the_robot():
+    shelf = fuse([Solid(Box((1, 1, 0.02)), Pose3(0, 0, 0.25)), Solid(Box((5, 0.1, 1.0)), Pose3(0, 2, 0.5))])
+    field = clearance_field(shelf, empty_grid(BOUNDS, 0.05, "w"), BODY)
+    assert field.exact(np.array([[0.0, 0.0]]))[0] < 0

@@ -1,0 +1,74 @@
+import math
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry.shapes import Box, Solid
+from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.routes.shortest_paths import ShortestPaths
+
+RADIUS = 0.2
+
+
+def wall(name, x, y, length, width, yaw=0.0):
+    return Solid(Box((length, width, 1.0)), Pose3.planar(Pose2(x, y, yaw), 0.5), name)
+
+
+def leg(start, goal, *solids):
+    ways = ShortestPaths(fuse(solids), (-6, -6, 6, 6), RADIUS)
+    return ways.leg(Pose2(*start), Pose2(*goal), "goal")
+
+
+DOOR = wall("left", 0, 10.5, 0.1, 20), wall("right", 0, -10.5, 0.1, 20)
+"""A wall along y with a door of 1 m at the origin."""
+
+
+@pytest.mark.parametrize("start", [(-4, 0), (-4, 4), (-0.6, -3)])
+@pytest.mark.parametrize("goal", [(4, 0), (4, 4), (0.6, 4)])
+def test_a_door_is_found_at_its_true_width_however_the_way_crosses_it(start, goal):
+    found = leg(start, goal, *DOOR).passages
+    narrowest = min(found, key=lambda passage: passage.width)
+    assert narrowest.width == pytest.approx(1.0, abs=0.03)
+    assert set(narrowest.between) == {"left", "right"}
+    assert narrowest.middle == pytest.approx((0.0, 0.0), abs=0.1)
+
+
+def test_passages_come_in_the_direction_of_the_way_and_each_crosses_it():
+    corridor = wall("north", 0, 1, 8, 0.2), wall("south", 0, -1, 8, 0.2)
+    forth = leg((-3.5, 0), (3.5, 0.3), *corridor).passages
+    assert len(forth) > 10
+    assert all(passage.width == pytest.approx(1.8, abs=0.1) for passage in forth)
+    middles = [passage.middle[0] for passage in forth]
+    assert middles == sorted(middles)
+    assert all(min(passage.ends)[1] * max(passage.ends)[1] < 0 for passage in forth)
+
+
+def test_in_the_open_and_along_a_single_wall_there_is_none():
+    assert leg((-4, 0), (4, 0)).passages == ()
+    assert leg((-4, 0), (4, 0), wall("lonely", 0, 1, 8, 0.2)).passages == ()
+
+
+def test_where_there_is_no_way_there_are_no_passages():
+    closed = leg((-4, 0), (4, 0), wall("across", 0, 0, 0.1, 40.0))
+    assert (closed.length, closed.passages) == (math.inf, ())
+
+
+def test_an_oblique_door_is_as_wide_as_it_is():
+    yaw = math.radians(50)
+    posts = [
+        wall(name, *(k * 1.9 * np.array([math.cos(yaw), math.sin(yaw)])), 3.0, 0.1, yaw)
+        for name, k in (("a", 1), ("b", -1))
+    ]
+    found = leg((-4, 0), (4, 0), *posts).passages
+    assert min(passage.width for passage in found) == pytest.approx(0.8, abs=0.03)
+
+
+def test_a_gap_too_narrow_for_the_robot_is_the_passage_of_a_way_that_is_none():
+    narrow = wall("left", 0, 10.15, 0.1, 20), wall("right", 0, -10.15, 0.1, 20)
+    closed = leg((-4, 0), (4, 0), *narrow)
+    assert closed.length == math.inf
+    (gap,) = closed.passages
+    assert gap.width == pytest.approx(0.3, abs=0.03)
+    assert set(gap.between) == {"left", "right"}
+    assert leg((-4, 0), (0, 10), *narrow).passages == ()
