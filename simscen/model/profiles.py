@@ -1,4 +1,4 @@
-"""Parameters of the reference stack by the name of a profile: `nav2` is nav2_bringup's own file, and Nav2's meanings.
+"""Default parameters of the stack by profile: `nav2` takes those of nav2_bringup, with Nav2's meanings.
 
 Read from navigation2 of August 2026: nav2_bringup/params/nav2_params.yaml, the default behaviour trees, and for plugins
 that the file does not use the defaults of their code. What is said in a scenario wins.
@@ -7,7 +7,7 @@ that the file does not use the defaults of their code. What is said in a scenari
 from collections.abc import Mapping
 from typing import Any, Literal
 
-Profile = Literal["simscen", "nav2"]
+Profile = Literal["simscen", "advanced", "nav2"]
 Values = Mapping[str, Any]
 
 BY_TYPE = ("localizer", "planner", "controller", "goal_checker")
@@ -61,7 +61,7 @@ NAV2: Values = {
         "source_timeout": 1.0, "time_before_collision": 1.2, "stop_margin": 0.0, "min_points": 6, "hold_timeout": 0.0,
     },
 }  # fmt: skip
-PROFILES: Mapping[str, Values] = {"simscen": {}, "nav2": NAV2}
+PROFILES: Mapping[str, Values] = {"simscen": {}, "advanced": {}, "nav2": NAV2}
 
 
 def with_profile(said: Mapping[str, Any]) -> Mapping[str, Any]:

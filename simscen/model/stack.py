@@ -47,7 +47,8 @@ class StackSpec(InProcessStack):
     component: ClassVar[str] = "simscen.stack.build:configured_stack"
     type: Literal["reference"] = "reference"
     profile: Profile = "simscen"
-    """Where parameters have their values from that nobody says: our own defaults, or exactly Nav2's."""
+    """Default values of the other parameters. `nav2`: those of nav2_bringup, which build the reference stack alone.
+    `advanced`, the same as `simscen`: those that include components that Nav2 does not have."""
     nav2_params: ParameterFile | None = None
     """A parameter file of Nav2, such as nav2_params.yaml: what it says of parameters that are here, too."""
     localizer: Localizer = by_default()

@@ -4,7 +4,7 @@ import pytest
 
 from simscen.model.localizers import GroundTruth
 from simscen.model.profiles import NAV2, over, with_profile
-from simscen.model.stack import StackSpec
+from simscen.model.stack import ADVANCED_BUILDER, REFERENCE_BUILDER, StackSpec
 
 NAV2_PARAMS = {
     # nav2_bringup/params/nav2_params.yaml, August 2026, by our names
@@ -69,6 +69,13 @@ def test_a_specification_that_is_made_already_stays_as_it_is() -> None:
 def test_without_a_profile_nothing_changes() -> None:
     assert with_profile({"controller": {"type": "dwb"}}) == {"controller": {"type": "dwb"}}
     assert StackSpec(profile="simscen") == StackSpec()
+
+
+def test_nav2_values_build_the_reference_stack_and_any_advanced_parameter_the_advanced_one() -> None:
+    assert StackSpec(profile="nav2").builder == REFERENCE_BUILDER
+    assert StackSpec(profile="nav2", prediction={"enabled": True}).builder == ADVANCED_BUILDER
+    assert StackSpec(profile="nav2", recovery={"clear_entirely": False}).builder == ADVANCED_BUILDER
+    assert StackSpec(profile="advanced").builder == StackSpec().builder == ADVANCED_BUILDER
 
 
 def test_mappings_are_merged_to_their_ends() -> None:
