@@ -87,7 +87,7 @@ def test_93_a_working_folder_that_was_deleted_is_told(folder: Path, words: str) 
     (folder / "gone").mkdir()
     command = words.format(a=shlex.quote(str(folder / "a.scenario.yaml")))
     done = shell(f'cd gone && rmdir ../gone && "$simscen" {command}', folder)
-    assert (done.returncode, done.stderr) == (2, "simscen: the working folder no longer exists\n")
+    assert (done.returncode, done.stderr) == (2, "simscen: the working directory no longer exists\n")
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_71_a_killed_log_is_made_whole_by_hand(simscen, folder: Path) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
     (log,) = folder.rglob("run.mcap")
     (folder / "run.partial.mcap").write_bytes(log.read_bytes()[:-20_000])
-    assert simscen("log", "recover", "run.partial.mcap").out == "run.partial.mcap: made whole\n"
+    assert simscen("log", "recover", "run.partial.mcap").out == "run.partial.mcap: recovered\n"
     assert simscen("log", "recover", "run.partial.mcap").out == "run.partial.mcap: nothing to mend, it is whole\n"
     shutil.copy(log, folder / "other.mcap")
     assert simscen("log", "recover", "a.scenario.yaml").code == 2

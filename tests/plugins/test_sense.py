@@ -52,4 +52,4 @@ def test_with_an_action_of_a_package_only_what_is_sure_is_an_error(told) -> None
     code, text = told("{turn_robot: {by: 1}}")
     assert code == 0, text
     assert "error[" not in text
-    assert "unless an action of an installed package opens a way" in text
+    assert "unless an action of an installed package opens a route" in text

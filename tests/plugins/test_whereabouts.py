@@ -14,7 +14,7 @@ from simscen.spec.registry import Entry, installed
 ROOT = Path(__file__).parents[2]
 ISOLATED = (
     f"import sys; sys.path.insert(0, {str(ROOT)!r});"
-    "from simscen.run.process.plugin_path import settle_in; settle_in(sys.argv[1]);"
+    "from simscen.run.process.plugin_path import apply_plugin_path; apply_plugin_path(sys.argv[1]);"
     "from simscen.spec.registry import installed;"
     "print([(entry.version, entry.load().__module__) for entry in installed('criterion')], sys.path.index({0!r}))"
 )

@@ -84,9 +84,7 @@ def command(
     durations: Annotated[
         int | None, typer.Option(min=0, metavar="N", help="List the N slowest runs at the end; 0 = all.")
     ] = None,
-    watch: Annotated[
-        bool, typer.Option("--watch", help="Watch for changes and rerun affected scenarios (press h for keys).")
-    ] = False,
+    watch: Annotated[bool, typer.Option("--watch", help="Watch for changes and rerun affected scenarios.")] = False,
     open_: Annotated[
         bool, typer.Option("--open", help="Open the report in a browser and update it as runs finish.")
     ] = False,

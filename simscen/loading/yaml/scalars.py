@@ -51,7 +51,7 @@ _UNSPEAKABLE = re.compile("[\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufef
 class Dumper(yaml.SafeDumper):
     """Quotes a text that our reader would take for something else, such as 1e3; does not quote `on` or 1:30."""
 
-    def parse_scalar(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
+    def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
         """The tag that our reader gives to a plain scalar."""
         if kind is yaml.ScalarNode and implicit[0]:
             return f"tag:yaml.org,2002:{_plain_type(value)}"

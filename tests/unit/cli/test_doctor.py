@@ -49,7 +49,7 @@ def test_the_cache_of_worlds_is_told_and_one_of_others_is_ill(tmp_path: Path, mo
     folder = cache_folder(os.environ)
     assert doctor.cache() == f"{folder}: empty"
     DiskCache(folder).put("a" * 64, bytes(99_968))
-    assert doctor.cache() == f"{folder}: 1 files, 0.1 MB of at most 256; to be deleted at any time"
+    assert doctor.cache() == f"{folder}: 1 files, 0.1 MB of at most 256; safe to delete"
     folder.chmod(0o777)
     with pytest.raises(installation.CheckFailed, match="others may write to it"):
         doctor.cache()

@@ -26,7 +26,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Trace, Trace]:
 
 @pytest.mark.parametrize("name", SIGNALS)
 def test_a_signal_is_the_same_from_the_run_and_from_its_log(name: str, both: tuple[Trace, Trace]) -> None:
-    of = {key: OF[key] for key in SIGNALS[name].about[:1]}
+    of = {key: OF[key] for key in SIGNALS[name].required_arguments[:1]}
     live, replayed = (_bits(name, trace, of) for trace in both)
     assert live == replayed
 
@@ -39,5 +39,5 @@ def _bits(name: str, trace: Trace, of: dict[str, str]) -> bytes | str:
 
 
 def test_most_signals_are_in_the_log(both: tuple[Trace, Trace]) -> None:
-    answers = [_bits(name, both[1], {key: OF[key] for key in s.about[:1]}) for name, s in SIGNALS.items()]
+    answers = [_bits(name, both[1], {key: OF[key] for key in s.required_arguments[:1]}) for name, s in SIGNALS.items()]
     assert sum(isinstance(answer, bytes) for answer in answers) >= len(SIGNALS) - 1

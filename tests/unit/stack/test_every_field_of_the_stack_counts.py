@@ -186,7 +186,7 @@ ELSEWHERE = {
     "ClearCostmap.clear_entirely": "tests/unit/stack/behaviors/test_motions.py",
     "Recovery.retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",
     "VelocitySmoother.counter_turn_slip": "tests/unit/advanced/test_turn_slip.py",
-    "Amcl.sure_update_interval": "tests/unit/stack/localizers/test_amcl.py",
+    "Amcl.sure_update_interval": "tests/unit/advanced/localizers/test_scan_matching_amcl.py",
     # Whoever makes goals reads these.
     "SimpleGoalChecker.xy_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",
     "SimpleGoalChecker.yaw_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",
