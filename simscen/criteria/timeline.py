@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.records.events import EventKind
-from simscen.core.records.trace import Samples
 
 if TYPE_CHECKING:
     from simscen.core.environment.costmap_filters import Filter
-    from simscen.core.records.trace import Trace
+    from simscen.core.records.trace import Samples, Trace
 
 _STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
 _ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
@@ -98,4 +97,4 @@ def clip_samples(samples: Samples, first: int, last: int) -> Samples:
     inner = samples.ticks[(samples.ticks > first) & (samples.ticks < last)]
     ticks = np.unique(np.concatenate(([first], inner, [last])))
     ticks = ticks[(ticks >= samples.ticks[0]) & (ticks <= samples.ticks[-1])]
-    return Samples(ticks, samples.at(ticks))
+    return type(samples)(ticks, samples.at(ticks))

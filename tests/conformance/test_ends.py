@@ -152,6 +152,6 @@ def test_71_a_killed_log_is_made_whole_by_hand(simscen, folder: Path) -> None:
     (log,) = folder.rglob("run.mcap")
     (folder / "run.partial.mcap").write_bytes(log.read_bytes()[:-20_000])
     assert simscen("log", "recover", "run.partial.mcap").out == "run.partial.mcap: recovered\n"
-    assert simscen("log", "recover", "run.partial.mcap").out == "run.partial.mcap: nothing to mend, it is whole\n"
+    assert simscen("log", "recover", "run.partial.mcap").out == "run.partial.mcap: complete, nothing to recover\n"
     shutil.copy(log, folder / "other.mcap")
     assert simscen("log", "recover", "a.scenario.yaml").code == 2

@@ -10,13 +10,12 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.records.events import EventKind
-from simscen.core.records.trace import Samples, Ticks
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from simscen.core.records.trace import Trace
+    from simscen.core.records.trace import Samples, Ticks, Trace
 
     Flags = npt.NDArray[np.bool_]
 else:
@@ -75,13 +74,13 @@ def check_finite(trace: Trace) -> None:
 def speed(trace: Trace) -> Samples:
     """True speed over ground (m/s), (n, 1)."""
     velocity = check_samples(trace.velocity, "the true velocity", trace)
-    return Samples(velocity.ticks, np.hypot(velocity.values[:, 0], velocity.values[:, 1])[:, np.newaxis])
+    return type(velocity)(velocity.ticks, np.hypot(velocity.values[:, 0], velocity.values[:, 1])[:, np.newaxis])
 
 
 def turn_rate(trace: Trace) -> Samples:
     """True turn rate without its sign (rad/s), (n, 1)."""
     velocity = check_samples(trace.velocity, "the true velocity", trace)
-    return Samples(velocity.ticks, np.abs(velocity.values[:, 2])[:, np.newaxis])
+    return type(velocity)(velocity.ticks, np.abs(velocity.values[:, 2])[:, np.newaxis])
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +141,8 @@ def pose_error(trace: Trace) -> Samples:
     newest belief is older than STALE_AFTER, when the robot has nothing better than the old one. No alignment: a map
     localizer answers in the map's frame, and an offset there is an error (evo would call it APE without --align).
     """
+    from simscen.core.records.trace import Samples
+
     belief, poses = check_samples(trace.belief, "the belief", trace), truth(trace)
     if not len(belief) or not len(poses):
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 2)))

@@ -17,22 +17,7 @@ from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.polygons import distance_to_segment
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid
-
-MAX_SAGITTA_M = 0.0005
-"""How far in metres a facet may cut into a circle; half of the millimetre that lidars resolve."""
-FACETS = (12, 192)
-"""Fewest and most facets of a circle: a peg stays round, a gasometer affordable."""
-
-
-def facet_count(radius: float, sagitta: float = MAX_SAGITTA_M) -> int:
-    """How many facets a circle needs so that none cuts deeper than `sagitta`; a multiple of 4, within FACETS.
-
-    A chord over the angle 2π/n cuts r (1 - cos(π/n)) into a circle. With a multiple of 4 the extents along
-    x and y are exact.
-    """
-    fewest, most = FACETS
-    needed = math.pi / math.acos(1 - sagitta / radius) if radius > sagitta else fewest
-    return int(min(most, max(fewest, 4 * math.ceil(needed / 4))))
+from simscen.worlds.geometry.circle_facets import facet_count
 
 
 class UprightPrism(NamedTuple):

@@ -51,7 +51,7 @@ def test_the_cache_of_worlds_is_told_and_one_of_others_is_ill(tmp_path: Path, mo
     DiskCache(folder).put("a" * 64, bytes(99_968))
     assert doctor.cache() == f"{folder}: 1 files, 0.1 MB of at most 256; safe to delete"
     folder.chmod(0o777)
-    with pytest.raises(installation.CheckFailed, match="others may write to it"):
+    with pytest.raises(installation.CheckFailed, match="other users may write to it"):
         doctor.cache()
 
 

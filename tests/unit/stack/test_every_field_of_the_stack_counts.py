@@ -164,7 +164,7 @@ PARTS = [
         "max_range": [1.0], "max_radius": [0.1], "min_speed": [1.0]}),
     Part(("latency",), Latency, ((TRUTH, scenes.seen_by_one), (amcl(), scenes.moved))),
     Part((), StackSpec, ((TRUTH, scenes.through),), {"failure_tolerance": (
-        ({**BLIND, "local_costmap": {"obstacle_max_range": 2.5}}, scenes.seen_by_one),)}),
+        ({**BLIND, "local_costmap": {"obstacle_max_range": 2.5}}, scenes.seen_by_one),)}, {"profile": ["nav2"]}),
     Part(("planner",), planners.OmplPlanner, (
         (planner(), scenes.planned), (planner(sampler="uniform"), scenes.planned)), {
         **of_planner("bit_star"),
