@@ -13,7 +13,6 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
 from simscen.criteria.timeline import NEVER_SWITCHED, enabled_spans
 from simscen.criteria.trace_signals import ground_truth
-from simscen.criteria.trace_signals.readers import points_in_polygon as within
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, NonNegativeSpeed, PositiveAngularSpeed, PositiveSpeed
 from simscen.spec.references import RegionName
@@ -140,12 +139,14 @@ class Speed(Spec, Criterion):
 
     def _inside(self, trace: Trace, case: Case, signal: Samples) -> ground_truth.Flags | None:
         """When the robot's centre was in the region, everywhere being one, too; None for one that does not exist."""
+        from simscen.criteria.trace_signals.readers import points_in_polygon
+
         if self.in_ is None:
             return np.ones(len(signal), dtype=bool)
         if self.in_ not in case.regions:
             return None
         where = ground_truth.truth(trace).at(signal.ticks)[:, :2]
-        return within(where, np.array(case.regions[self.in_], dtype=np.float64))
+        return points_in_polygon(where, np.array(case.regions[self.in_], dtype=np.float64))
 
 
 def _highest_around(values: Array, ticks: Ticks, reach: int) -> Array:
