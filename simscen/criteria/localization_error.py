@@ -9,7 +9,6 @@ from pydantic import model_validator
 
 from simscen.core.geometry import Array
 from simscen.core.records.evidence import POSITION, Evidence
-from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
@@ -20,7 +19,7 @@ from simscen.spec.quantities import Duration, PositiveAngle, PositiveLength
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
-    from simscen.core.records.trace import Trace
+    from simscen.core.records.trace import Samples, Trace
 
 
 class LocalizationError(Spec, Criterion):
@@ -72,7 +71,7 @@ class LocalizationError(Spec, Criterion):
             last = trace.seconds(int(error.ticks[-1]))
             because = f"the last belief is from t = {last:.2f} s, but judging begins at {self.after:.2f} s"
             return [undecided("localization_error", because)]
-        return self._bounds(trace, Samples(error.ticks[counts], error.values[counts]))
+        return self._bounds(trace, type(error)(error.ticks[counts], error.values[counts]))
 
     def _bounds(self, trace: Trace, error: Samples) -> list[Finding]:
         off, turned = error.values.T
