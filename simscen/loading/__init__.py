@@ -1,1 +1,1 @@
-"""From text to a validated scenario, or to a list of problems that say where and how to mend."""
+"""Load YAML files as validated scenarios, or report every problem with its position and a hint."""

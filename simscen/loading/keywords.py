@@ -9,22 +9,22 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.model.scenario import ScenarioSpec
 
 _TOKEN = re.compile(r"[()]|[^\s()]+")
-DEEPEST = 50
+MAX_DEPTH = 50
 
 Matcher = Callable[[str], bool]
 
 
 class Selectable(Protocol):
-    """What has a title and tags: a loaded scenario."""
+    """Anything with a title and tags, such as a loaded scenario."""
 
     @property
     def title(self) -> str:
-        """Its id, the path without suffix, with the name of its variation: `aisle[speed=0.5]`."""
+        """The id (path without suffix) with the name of the variation: `aisle[speed=0.5]`."""
         ...
 
     @property
     def spec(self) -> ScenarioSpec:
-        """The scenario itself, with its tags."""
+        """The scenario, with its tags."""
         ...
 
 
@@ -32,10 +32,10 @@ Item = TypeVar("Item", bound=Selectable)
 
 
 def select(scenarios: Iterable[Item], keyword: str = "", tags: Sequence[str] = ()) -> list[Item]:
-    """Those whose title matches `keyword` and that have at least one of `tags`, in order.
+    """Return the scenarios whose title matches `keyword` and that have at least one of `tags`, in order.
 
-    `keyword` is an expression like pytest's -k: parts of titles, case ignored, with `and`, `or`, `not` and brackets.
-    Raises UsageError for a broken expression, NothingSelected where nothing is left.
+    `keyword` is an expression like pytest's -k: parts of titles, ignoring case, and `and`, `or`, `not`, parentheses.
+    Raises UsageError for an invalid expression, and NothingSelected if nothing matches.
     """
     everything = list(scenarios)
     matches = keyword_matcher(keyword) if keyword.strip() else lambda _: True
@@ -46,22 +46,22 @@ def select(scenarios: Iterable[Item], keyword: str = "", tags: Sequence[str] = (
 
 
 def keyword_matcher(expression: str) -> Matcher:
-    """The test for ids that an expression stands for. Raises UsageError where it cannot be read."""
+    """Return the test for titles that an expression describes. Raises UsageError for an invalid expression."""
     reader = _Reader(_TOKEN.findall(expression), expression)
     matcher = reader.either(0)
     if reader.tokens:
-        raise reader.error(f"{quoted(reader.tokens[0])} is not expected there")
+        raise reader.error(f"unexpected {quoted(reader.tokens[0])}")
     return matcher
 
 
 class _Reader:
-    """A recursive descent over or < and < not < brackets."""
+    """Recursive descent parser; precedence: or < and < not < parentheses."""
 
     def __init__(self, tokens: list[str], expression: str) -> None:
         self.tokens, self._expression = tokens, expression
 
     def either(self, depth: int) -> Matcher:
-        """Parts joined by `or`."""
+        """Parse terms joined by `or`."""
         options = [self._both(depth)]
         while self._next_is("or"):
             options.append(self._both(depth))
@@ -74,15 +74,15 @@ class _Reader:
         return lambda text: all(part(text) for part in parts)
 
     def _one(self, depth: int) -> Matcher:
-        if depth > DEEPEST:
-            raise self.error(f"it is nested deeper than {DEEPEST}")
+        if depth > MAX_DEPTH:
+            raise self.error(f"it is nested deeper than {MAX_DEPTH}")
         if self._next_is("not"):
             inner = self._one(depth + 1)
             return lambda text: not inner(text)
         if self._next_is("("):
             inner = self.either(depth + 1)
             if not self._next_is(")"):
-                raise self.error("a bracket is not closed")
+                raise self.error("a parenthesis is not closed")
             return inner
         if not self.tokens or self.tokens[0] in ("and", "or", ")"):
             raise self.error("a part of an id is missing")
@@ -96,7 +96,7 @@ class _Reader:
         return False
 
     def error(self, why: str) -> UsageError:
-        """The mistake, with the expression."""
+        """Return the error with the whole expression."""
         return UsageError(f"cannot read -k {quoted(self._expression)}: {why}")
 
 

@@ -1,4 +1,4 @@
-"""What a scenario can refer to by name."""
+"""Names that a scenario can refer to."""
 
 from collections.abc import Mapping
 
@@ -22,11 +22,11 @@ NOUNS = {
 }
 
 Names = Mapping[str, list[str] | None]
-"""Kind of reference → the names there are, in the order of the files; None = only the importer of the world knows."""
+"""Known names by kind of reference; None: they are known only when an imported world has been built."""
 
 
 def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
-    """What there is to refer to. What an imported world holds is known once it has become a `world`."""
+    """Return all names that a scenario can refer to; those of an imported world need the built `world`."""
     there = _of_files(loaded) if world is None else _of_world(loaded, world)
     movable = there["movable"]
     happening = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])
@@ -41,24 +41,24 @@ def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
 
 
 def goal_names(loaded: LoadedScenario) -> list[str]:
-    """The goals of the scenario, then those that its events send."""
-    return own_goal_names(loaded) + _made(loaded, "new_goal")
+    """Return the goals of the scenario, then those that its events send."""
+    return own_goal_names(loaded) + _defined(loaded, "new_goal")
 
 
 def own_goal_names(loaded: LoadedScenario) -> list[str]:
-    """The goals of the scenario, in every loop: as written, or after their place, or goal-1, goal-2, …"""
+    """Return the names of the goals in every loop: as written, or after their place, or goal-1, goal-2, …"""
     loops = range(1, loaded.spec.navigation.loops + 1)
     return [loop_goal_name(name, loop) for loop in loops for name in loaded.spec.goal_names]
 
 
 def event_names(loaded: LoadedScenario) -> list[str]:
-    """Names as written, or event-1, event-2, …; steps of stories after their event."""
+    """Return the names of events, each followed by the steps of its story."""
     return [step.name for step in loaded.spec.steps]
 
 
 def mark_names(loaded: LoadedScenario) -> list[str]:
-    """The marks that events set, in order."""
-    return _distinct(_made(loaded, "mark"))
+    """Return the marks that events set, in order."""
+    return _distinct(_defined(loaded, "mark"))
 
 
 def _of_files(loaded: LoadedScenario) -> Names:
@@ -88,30 +88,30 @@ def _of_world(loaded: LoadedScenario, world: World) -> Names:
 
 
 def world_object_names(loaded: LoadedScenario, world: World | None = None) -> list[str]:
-    """What the world holds under a name, as far as that is known."""
+    """Return the names of objects in the world, as far as they are known."""
     if world is not None:
         return [*(body.name for body in world.bodies), *(solid.name for solid in world.solids)]
     return _standing(loaded.world.spec) if loaded.world.spec is not None else []
 
 
 def spawned_names(loaded: LoadedScenario) -> list[str]:
-    """What events put into the world: things, and people, also those of crowds."""
-    return _made(loaded, "spawn") + pedestrian_names(loaded)
+    """Return the names of what events add to the world: objects and pedestrians, also those of crowds."""
+    return _defined(loaded, "spawn") + pedestrian_names(loaded)
 
 
 def pedestrian_names(loaded: LoadedScenario) -> list[str]:
-    """Who events bring to walk by themselves, also those of crowds."""
+    """Return the names of pedestrians, also those of crowds."""
     crowds = [
         action.chosen.names
         for step in loaded.spec.steps
         for action in step.actions
         if action.kind == "crowd" and hasattr(action.chosen, "names")
     ]
-    return _made(loaded, "pedestrian") + [name for crowd in crowds for name in crowd]
+    return _defined(loaded, "pedestrian") + [name for crowd in crowds for name in crowd]
 
 
-def _made(loaded: LoadedScenario, kind: str) -> list[str]:
-    """The names that actions of one kind give to what they bring; a goal is that of the robot it is sent to."""
+def _defined(loaded: LoadedScenario, kind: str) -> list[str]:
+    """Return the names that actions of one kind define; goals of other robots are skipped."""
     actions = [action for step in loaded.spec.steps for action in step.actions]
     mine = [action for action in actions if kind != "new_goal" or loaded.concerns(action.robot)]
     return [str(getattr(action.chosen, "name", "")) for action in mine if action.kind == kind]

@@ -1,4 +1,4 @@
-"""What loading yields: validated specifications, and the files they came from."""
+"""Results of loading: validated specifications and the files they came from."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -19,7 +19,7 @@ from simscen.model.world import WorldSpec
 
 @dataclass(frozen=True)
 class LoadedMap:
-    """A ROS map: `path` of its yaml, `image` of its pixels; `notes` are warnings about keys that mean nothing."""
+    """ROS map: `path` of its YAML file, `image` file, and `notes` (warnings about keys without a meaning)."""
 
     path: Path
     spec: RosMapSpec
@@ -28,7 +28,7 @@ class LoadedMap:
 
 
 class JudgedMask(NamedTuple):
-    """A filter mask that a criterion judges by: where its file is named first, and the map in it."""
+    """Filter mask of a criterion: keys where it is named first, and the map."""
 
     keys: tuple[Key, ...]
     map: LoadedMap
@@ -36,9 +36,9 @@ class JudgedMask(NamedTuple):
 
 @dataclass(frozen=True)
 class LoadedWorld:
-    """A world: own (`spec`, perhaps on top of a `map` or an `sdf`), a ROS map alone, or an SDF file alone.
+    """World: a world file (`spec`, perhaps with a `map` or an `sdf`), a ROS map, or an SDF file.
 
-    `path` is the file that says so; the scenario's own for an inline world.
+    `path` is its file; for an inline world, the file of the scenario.
     """
 
     name: str
@@ -51,9 +51,9 @@ class LoadedWorld:
 
 @dataclass(frozen=True)
 class LoadedRobot:
-    """A robot: `spec` from a `*.robot.yaml`, `urdf` where it is built on one. A bare `.urdf` has no `spec`.
+    """Robot: `spec` of its `*.robot.yaml`, and `urdf` if it has one. A robot from a bare `.urdf` has no `spec`.
 
-    `path` is the file the scenario named; `bundled` tells that simscen ships it; `packages` are the folders of ROS
+    `path` is the file that the scenario names; `bundled` robots ship with simscen; `packages` are the folders of ROS
     packages that its file names.
     """
 
@@ -68,21 +68,22 @@ class LoadedRobot:
 
 @dataclass(frozen=True)
 class LoadedScenario:
-    """A scenario that is right as far as can be told without building its world.
+    """Valid scenario, checked as far as possible without building its world.
 
-    `id` is its path without suffix relative to the root; `file` is absolute, `path` is `file` relative to the root as
-    problems show it. `text` is the file as it was read. `map` is the map the robot gets: a ROS map, "none" for mapless
-    driving, or None = what the world gives; `keepout_mask` and `speed_mask` are those of its stack, `judged_masks` what
-    criteria judge by, by their files as written. `sources` holds the texts of all files
-    read, by shown path, and `files` their absolute paths. `read` are the files that the world and the robot were made
-    of besides, once they were built.
-    `notes` are warnings. With `lenient`, what of an SDF world cannot be used is left out and noted.
-    `choice` is the stack that was chosen in place of its own; it is part of the runs' keys where the session has
-    `several_stacks`. `runs` is what an external stack runs, as far as anybody has said so.
-    `variation` is the name of the variation that it is, "" for a file without: `spec` and `tree` hold its values, and
-    `set_by` the path by which each of them came there, by its place.
-    `robots` are its robots by name where there are several: each is the same scenario as one of this robot alone, whose
-    name is `robot_name`, with `other_robots` about. What the whole says of a robot is then that of the first.
+    `id` is its path relative to the root, without suffix; `file` is absolute, and `path` relative to the root, as in
+    problems. `text` is the file as read; `sources` are the texts of all files, by the names that problems use, and
+    `files` their absolute paths. `read` are further files that world and robot were built from. `notes` are warnings.
+
+    `map` is the map of the robot: a ROS map, "none" for driving without a map, or None for the map of the world.
+    `keepout_mask` and `speed_mask` are those of the stack, `judged_masks` those of criteria, by file as written.
+    With `lenient`, unusable parts of an SDF world are skipped with a note.
+
+    `choice` is the stack selected on the command line; it is part of the run keys if the session has `several_stacks`.
+    `runs` is the command of an external stack, if defined. `variation` is the name of the variation ("" without
+    variations), and `set_by` the path that set a value, by the position of the value.
+
+    `robots` are the views of a scenario of several robots: each is a scenario of that robot alone, with its name as
+    `robot_name` and the others as `other_robots`. The scenario itself then describes the first robot.
     """
 
     id: str
@@ -115,36 +116,36 @@ class LoadedScenario:
 
     @property
     def each(self) -> Mapping[str, "LoadedScenario"]:
-        """It as each of its robots sees it, by name; the only one has none."""
+        """The views of all robots by name; a single robot has no name."""
         return self.robots or {self.robot_name: self}
 
     def having(self, **changes: Any) -> "LoadedScenario":
-        """The same with other values of fields, as each of its robots sees it, too."""
+        """Return the scenario, and the views of its robots, with other values of fields."""
         robots = {name: view.having(**changes) for name, view in self.robots.items()}
         return replace(self, **changes, robots=robots)
 
     def concerns(self, robot: str | None) -> bool:
-        """Whether what is said of a robot (None: of the only one, or of the world) may be about this one."""
+        """Return whether something about a robot (None: about the only robot or the world) applies to this robot."""
         return robot is None or not self.robot_name or robot == self.robot_name
 
     @property
     def title(self) -> str:
-        """What it is called: its id, with its variation."""
+        """The id with the name of the variation."""
         return scenario_title(self.id, self.variation)
 
     @property
     def stack_name(self) -> str:
-        """What tells its runs from those of the same scenario with other stacks."""
+        """Name of the stack in run keys, if the session has several stacks."""
         return self.choice.name if self.choice is not None and self.several_stacks else ""
 
     @property
     def stack(self) -> str:
-        """NAME=VALUE of the chosen stack, a file as seen from the root; "" = its own."""
+        """NAME=VALUE of the selected stack, with the file relative to the root; "" for its own stack."""
         return "" if self.choice is None else self.choice.seen_from(self.root)
 
     @property
     def expectation(self) -> ExpectedFailure | None:
-        """That it is known to fail, with the line that says so, where that is in its own file."""
+        """Its expected failure, with the line if that is in its own file."""
         said = self.spec.expected
         if said is None:
             return None
@@ -152,26 +153,26 @@ class LoadedScenario:
         return ExpectedFailure(said.fail, tuple(said.criteria), place.line if place.path == self.path else 0)
 
     def key(self, seed: int) -> RunKey:
-        """The key of its run with this seed."""
+        """Return the key of its run with this seed."""
         return RunKey(self.id, seed, self.variation, self.stack_name)
 
     def place_of(self, *keys: Key) -> Position:
-        """Where the value at `keys` stands in its file, e.g. `place_of("goals", 0, "pose")`."""
+        """Return the position of the value at `keys`, e.g. `place_of("goals", 0, "pose")`."""
         return value_position(self.tree, keys)
 
     def key_place_of(self, *keys: Key) -> Position:
-        """Where the last of `keys` stands."""
+        """Return the position of the last of `keys`."""
         return key_position(self.tree, keys)
 
     def problem(self, keys: tuple[Key, ...], code: str, message: str, hint: str = "") -> Problem:
-        """A problem at the value of `keys`, with the text of its line."""
+        """Return a problem at the value of `keys`, with the text of its line."""
         return self.problem_at(self.place_of(*keys), code, message, hint)
 
     def problem_at(self, place: Position, code: str, message: str, hint: str = "") -> Problem:
-        """A problem at a place in any of the files read, with the text of its line."""
+        """Return a problem at a position in any of the files, with the text of its line."""
         return self.sourced(Problem(*place, code=code, message=message, hint=hint))
 
     def sourced(self, problem: Problem) -> Problem:
-        """A problem in any of the files read with the text of its line."""
+        """Return a problem in any of the files with the text of its line."""
         lines = self.sources.get(problem.path, "").split("\n")
         return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem

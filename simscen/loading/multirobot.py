@@ -1,4 +1,4 @@
-"""A scenario of several robots, as each of them sees it: a scenario of one robot."""
+"""Split a scenario of several robots into one scenario per robot."""
 
 from collections.abc import Iterator
 
@@ -9,14 +9,14 @@ from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, Sequ
 from simscen.model.scenario import RobotEntry
 
 ROBOT, ROBOTS, PASS, EXPECTED, STACK = "robot", "robots", "pass", "expected", "stack"
-OF_ONE = ("goals", "faults")
-"""What a scenario of one robot says at top level, and one of several says of each."""
+ROBOT_KEYS = ("goals", "faults")
+"""Keys at top level of a scenario of one robot, and under each robot if there are several."""
 
 
 def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
-    """The scenario as each of its robots sees it, by name in order; empty where it has one robot.
+    """Return the scenario of each robot by name, sorted; empty for a scenario of one robot.
 
-    Each part is where it is written, so that problems are told there. That the run is expected to fail is said of all.
+    All parts keep their positions. `expected` stays with the scenario as a whole.
     """
     robots = child(tree, ROBOTS)
     entries = robots.entries if isinstance(robots, MappingNode) else {}
@@ -24,7 +24,7 @@ def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
 
 
 def has_multiple_robots(tree: MappingNode) -> bool:
-    """Whether there are several robots, as far as they can be looked at."""
+    """Return whether `robots` is a valid mapping of robots."""
     robots = child(tree, ROBOTS)
     return isinstance(robots, MappingNode) and all(
         isinstance(said.value, MappingNode) for said in robots.entries.values()
@@ -45,15 +45,15 @@ def _of_one(tree: MappingNode, entry: Entry) -> MappingNode:
 
 
 def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
-    """A scenario with the chosen stack in place of its own; of several robots, in place of each one's.
+    """Return a scenario with the selected stack instead of its own, or of those of all its robots.
 
-    A command whose name is that of the external stack of one of them says what that runs: the others keep theirs.
+    A command for the external stack of one robot defines only what that stack runs.
     """
     robots = child(tree, ROBOTS)
     if robots is None:
         return replace_stack(tree, choice)
     if not isinstance(robots, MappingNode) or not has_multiple_robots(tree):
-        return tree  # which is a mistake that is told as such
+        return tree  # validation reports the wrong type
     each = split_by_robot(tree)
     if choice.runs is not None and choice.name in map(external_stack_name, each.values()):
         return tree
@@ -68,13 +68,13 @@ def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
 
 
 def _with(said: Node, part: MappingNode) -> MappingNode:
-    """What is said of a robot, with the whole of its stack, as there is none of all any more."""
+    """Return the entry of a robot with its complete stack, since the common `stack` is removed."""
     assert isinstance(said, MappingNode)
     return MappingNode(said.place, said.entries | {key: entry for key, entry in part.entries.items() if key == STACK})
 
 
 def external_stack_name(tree: MappingNode) -> str | None:
-    """The name of the external stack of a scenario of one robot."""
+    """Return the name of the external stack of a scenario of one robot."""
     stack = child(tree, STACK)
     name = None if stack is None else child(stack, EXTERNAL)
     return str(name.value) if isinstance(name, ScalarNode) else None
@@ -89,12 +89,12 @@ def _without(tree: MappingNode, *keys: str) -> MappingNode:
 
 
 def missing_in_scenario(tree: MappingNode) -> list[Problem]:
-    """What a scenario lacks or says twice: one robot or several, and what must hold."""
+    """Return problems with missing or contradicting `robot`, `robots` and `pass` in a scenario."""
     return [*(_of_several(tree) if ROBOTS in tree.entries else _of_the_only(tree))]
 
 
 def missing_in_criteria(tree: MappingNode) -> list[Problem]:
-    """What a file lacks that need say no more than what must hold."""
+    """Return problems with missing or contradicting `robots` and `pass` in a file of criteria."""
     return [*(_of_several(tree) if ROBOTS in tree.entries else _nothing_holds(tree))]
 
 
@@ -114,12 +114,12 @@ def _nothing_holds(tree: MappingNode) -> Iterator[Problem]:
 
 def _of_several(tree: MappingNode) -> Iterator[Problem]:
     if ROBOT in tree.entries:
-        hint = "one robot is `robot`, several are each under a name in `robots`"
+        hint = "use `robot` for one robot; for several, list each under its name in `robots`"
         yield Problem(*tree.entries[ROBOT].key, "SC016", "`robot` and `robots` exclude each other", hint)
-    for key in OF_ONE:
+    for key in ROBOT_KEYS:
         if key in tree.entries:
-            what = f"`{key}` are those of one robot, and here are several"
-            yield Problem(*tree.entries[key].key, "SC016", what, f"write them under the robot's name in `{ROBOTS}`")
+            message = f"`{key}` belong to one robot, but the scenario has several"
+            yield Problem(*tree.entries[key].key, "SC016", message, f"move them to each robot in `{ROBOTS}`")
     yield from _nothing_holds(tree)
     robots = child(tree, ROBOTS)
     for name, entry in robots.entries.items() if isinstance(robots, MappingNode) else ():
@@ -128,5 +128,5 @@ def _of_several(tree: MappingNode) -> Iterator[Problem]:
             and not _items(child(tree, PASS))
             and not _items(child(entry.value, PASS))
         ):
-            hint = "say what must hold for it, or at top level for each robot"
+            hint = "add criteria for this robot, or for all robots at top level"
             yield Problem(*entry.key, "SC010", f"missing key `{PASS}` in `{ROBOTS}.{name}`", hint)

@@ -1,4 +1,4 @@
-"""Put poses in place of the names of places."""
+"""Replace names of places by their poses."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
@@ -16,42 +16,42 @@ from simscen.spec.places import PoseSpec
 Spec = TypeVar("Spec", bound=BaseModel)
 Places = Mapping[str, PoseSpec]
 NOWHERE = PoseSpec(x=0.0, y=0.0)
-"""Where a place is that there is not: what names it is wrong, and goes nowhere."""
-NO_WORLD = "name the world that has it with `world:`"
-NO_PLACES = "there is none at all"
+"""Pose that replaces an unknown place, which is reported as a problem."""
+NO_WORLD = "name its world with `world:`"
+NO_PLACES = "the world has no places"
 
 
 def places_of(world: LoadedWorld | None) -> Places:
-    """The places of a world; those that can be named are all in its own file."""
+    """Return the places of a world, which are all defined in its own file."""
     return world.spec.places if world is not None and world.spec is not None else {}
 
 
 def resolve_places(spec: Spec, places: Places) -> Spec:
-    """The specification with poses and points in place of the names of places; unknown ones are nowhere."""
+    """Return the specification with poses and points instead of names of places."""
     for reference, pose in _named(spec, places):
         spec = _put(spec, reference.keys, pose)
     return spec
 
 
 def resolve_criteria_places(plain: dict[str, Any], spec: BaseModel, places: Places) -> dict[str, Any]:
-    """What `spec` was read from, with poses and points in place of the names of places that its criteria use.
+    """Return the data of `spec` with poses and points instead of the names of places in its criteria.
 
-    Whoever judges a log by it has no world to look them up in.
+    Logs are judged with it, without a world that knows the places.
     """
     for reference, pose in _named(spec, places):
-        if "pass" in reference.keys[:3:2]:  # of the whole, or of one of several robots
+        if "pass" in reference.keys[:3:2]:  # of the scenario, or of one of its robots
             written = pose.model_dump() if isinstance(pose, BaseModel) else pose
             plain = _put(plain, reference.keys, written)
     return plain
 
 
 def place_references(spec: BaseModel) -> Iterator[Reference]:
-    """Where the name of a place stands instead of its pose."""
+    """Yield the references to places."""
     return (reference for reference in references(spec) if isinstance(reference.mark, OrPlace))
 
 
 def unknown_places(spec: BaseModel, tree: Node, known: Iterable[str], nothing: str = NO_PLACES) -> Iterator[Problem]:
-    """What in `tree`, from which `spec` was read, names none of the `known` places; `nothing` hints where none is."""
+    """Yield a problem for each unknown place; `nothing` is the hint if there are no places at all."""
     names = tuple(known)
     for reference in place_references(spec):
         if reference.name not in names:
@@ -67,7 +67,7 @@ def _named(spec: BaseModel, places: Places) -> Iterator[tuple[Reference, Any]]:
 
 
 def _put(holder: Any, keys: tuple[Key, ...], value: Any) -> Any:
-    """The same with another value at `keys`."""
+    """Return the holder with another value at `keys`."""
     if isinstance(holder, RootModel):
         return holder.model_copy(update={"root": _put(holder.root, keys, value)})
     if not keys:

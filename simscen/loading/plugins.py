@@ -1,4 +1,4 @@
-"""Which installed packages a scenario uses, and what of them."""
+"""Find the plugins of installed packages that a scenario uses."""
 
 from collections.abc import Container, Iterable, Iterator, Mapping
 from typing import Any
@@ -13,34 +13,37 @@ _FACT = "plugin."
 
 
 def plugins_of(loaded: LoadedScenario) -> tuple[Entry, ...]:
-    """What the scenario and its robots take from installed packages, sorted."""
+    """Return the plugins that a scenario and its robots use, sorted."""
     return used_by(loaded.spec, *(view.robot.spec for view in loaded.each.values()))
 
 
 def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[Entry, ...]:
-    """What any of the scenarios takes from installed packages, sorted; each scenario is looked at once."""
+    """Return the plugins that any of the scenarios uses, sorted."""
     different = {id(scenario): scenario for scenario in scenarios}.values()
     return _sorted({entry for scenario in different for entry in plugins_of(scenario)})
 
 
 def used_by(*specs: Any) -> tuple[Entry, ...]:
-    """What validated specifications take from installed packages, sorted."""
+    """Return the plugins that validated specifications use, sorted."""
     found = {entry for spec in specs for keys, part in walk(spec) for entry in _used(keys, part)}
     return _sorted(found)
 
 
 def fact_of(entry: Entry) -> str:
-    """What the log's header calls it."""
+    """Return the name of a plugin in the header of a log."""
     return f"{_FACT}{entry.group}.{entry.name}"
 
 
 def requirement_of(entry: Entry) -> str:
-    """Its package and version as pip writes them."""
+    """Return package and version of a plugin, as pip writes them."""
     return f"{entry.distribution}=={entry.version}"
 
 
 def missing_plugins(facts: Mapping[str, str], kinds: Container[str]) -> list[Problem]:
-    """What of these kinds a log was made with, by its header's `facts`, and is not installed as it was then."""
+    """Return problems with plugins of these kinds that a log was made with and that are not installed in that version.
+
+    `facts` are those of the header of the log.
+    """
     missing = []
     for fact, then in sorted(facts.items()):
         kind, _, name = fact.removeprefix(_FACT).partition(".")
@@ -49,9 +52,9 @@ def missing_plugins(facts: Mapping[str, str], kinds: Container[str]) -> list[Pro
         entry = find(kind, name)
         now = requirement_of(entry) if entry is not None else ""
         if now != then:
-            instead = f"installed is {now}" if now else "it is not installed"
-            message = f"the run was judged with {kind} `{name}` of {then}, and {instead}"
-            missing.append((message, f"`pip install {then}`, or judge by another file with --scenario"))
+            instead = f"{now} is installed" if now else "it is not installed"
+            message = f"the run was judged with {kind} `{name}` of {then}, but {instead}"
+            missing.append((message, f"`pip install {then}`, or judge with another file: --scenario"))
     return [Problem("", 0, 0, "SC805", message, hint) for message, hint in missing]
 
 

@@ -1,4 +1,4 @@
-"""A scenario as one self-contained text: what a log and an output folder keep of it."""
+"""A scenario as one self-contained text, for logs and output folders, and its events and faults in a log."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -21,14 +21,14 @@ from simscen.model.criteria_file import CriteriaSpec
 from simscen.model.scenario import ScenarioSpec
 
 JUDGING = frozenset({"criterion", "metric"})
-"""The kinds of types that a judgement needs."""
+"""Kinds of plugins that are needed to judge a log."""
 _JUDGED = frozenset({"simscen", "pass", "metrics", "expected"})
 
 
 def resolved_text(loaded: LoadedScenario) -> str:
-    """The file as it was written; where it `extends` others or takes `defaults.yaml`, all of them merged.
+    """Return the file as written, or merged with what it `extends` and `defaults.yaml`.
 
-    Where criteria name places, their poses stand there instead: it is judged by without its world.
+    Names of places in criteria are replaced by poses, because logs are judged without the world.
     """
     own, _ = parse_yaml(loaded.text, loaded.path)
     plain = resolve_criteria_places(loaded.tree.plain, _checked(ScenarioSpec, loaded.tree), places_of(loaded.world))
@@ -38,7 +38,7 @@ def resolved_text(loaded: LoadedScenario) -> str:
 
 
 def unexpanded_text(loaded: LoadedScenario) -> str:
-    """Likewise, with all the variations that the file has instead of the values of one."""
+    """Return the same text, but with `variations` instead of the values of one variation."""
     if not loaded.variation:
         return resolved_text(loaded)
     own, _ = parse_yaml(loaded.text, loaded.path)
@@ -47,14 +47,14 @@ def unexpanded_text(loaded: LoadedScenario) -> str:
 
 
 def spec_of_text(text: str, name: str) -> ScenarioSpec:
-    """The specification in a resolved text; `name` is what problems call it. Raises InvalidInput."""
+    """Return the specification in a resolved text; `name` is its name in problems. Raises InvalidInput."""
     return _checked(ScenarioSpec, _read(text, name))
 
 
 def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, MappingNode]:
-    """The specification in a resolved text, of one of several robots if named, and the tree that says where it stands.
+    """Return the criteria in a resolved text, of one of several robots if given, and the tree with their positions.
 
-    A file of criteria will do. Raises InvalidInput.
+    The text may be a file with criteria only. Raises InvalidInput.
     """
     tree = _read(text, name)
     if isinstance(tree, MappingNode) and robot:
@@ -65,11 +65,11 @@ def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, 
 
 
 def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str = "") -> CriteriaSpec:
-    """What a resolved text says must hold; `name` is what problems call it, `facts` are those of the log it is from,
-    `robot` the one of several that is meant.
+    """Return the criteria in the resolved text of a log, for `robot` if there are several.
 
-    Only that is looked at: what else of installed packages the run was made with need not be there to judge it. Raises
-    InvalidInput, also where a criterion is not installed that judged the run then.
+    `name` is the name of the text in problems, `facts` are those of the header of the log. Other parts of the scenario
+    are ignored, so plugins other than criteria and metrics need not be installed. Raises InvalidInput, also if a
+    criterion is not installed in the version of the log.
     """
     if missing := missing_plugins(facts, JUDGING):
         raise InvalidInput([replace(problem, path=name) for problem in missing])
@@ -95,7 +95,7 @@ def _checked(model: type[Model], tree: Node) -> Model:
 
 
 def disturbances_of(loaded: LoadedScenario) -> tuple[Disturbance, ...]:
-    """Events, each with the steps of its story after it, then faults, in the order of the scenario."""
+    """Return the events, each followed by the steps of its story, then the faults, in the order of the scenario."""
     return (*_events(loaded), *_faults(loaded))
 
 
@@ -113,7 +113,7 @@ def _faults(loaded: LoadedScenario) -> Iterator[Disturbance]:
 
 
 def _written(loaded: LoadedScenario, *keys: Key) -> str:
-    """A mapping on one line as an author would write it, without its braces."""
+    """Return a mapping on one line of YAML, without its braces."""
     text = yaml.safe_dump(
         node_at(loaded.tree, keys).plain, default_flow_style=True, sort_keys=False, allow_unicode=True, width=10**9
     )
@@ -121,6 +121,6 @@ def _written(loaded: LoadedScenario, *keys: Key) -> str:
 
 
 def _line(loaded: LoadedScenario, *keys: Key) -> int:
-    """0 for what a base file holds: the line would be taken for one of the scenario's own."""
+    """Return the line in the scenario file; 0 for what is written in a file that it extends."""
     place = loaded.place_of(*keys)
     return place.line if place.path == loaded.path else 0

@@ -1,4 +1,4 @@
-"""Load a scenario with everything it names, or say all that is wrong with it."""
+"""Load a scenario with everything it names, or report all its problems."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -34,11 +34,10 @@ def load_scenario(
     choice: StackChoice | None = None,
     variation: str = "",
 ) -> LoadedScenario:
-    """The scenario in the file `path`; paths in it stay inside `root` and the folders of `world_path`.
+    """Load the scenario in the file `path`; paths in it must be inside `root` or a folder of `world_path`.
 
-    The chosen stack takes the place of its own; of a scenario with variations it is the one of that name. Raises
-    InvalidInput with every problem of the scenario and of the files it names, UsageError where there is no such
-    variation, or none is named.
+    `choice` replaces its stack. `variation` selects one of its variations. Raises InvalidInput with all problems of the
+    scenario and of the files it names, and UsageError if the variation is unknown or missing.
     """
     loaded = try_variations(path, root, world_path, choice)
     if isinstance(loaded, list):
@@ -47,17 +46,15 @@ def load_scenario(
         return found
     names = [one.variation for one in loaded if one.variation]
     if not names:
-        raise UsageError(f"{path} has no variations, so none is called {quoted(variation)}")
-    merge_problems = (
-        f"has no variation {quoted(variation)}" if variation else f"has {len(names)} variations: say which one"
-    )
-    raise UsageError(f"{path} {merge_problems}; {suggestion(variation, names)}")
+        raise UsageError(f"{path} has no variations, so not {quoted(variation)} either")
+    reason = f"has no variation {quoted(variation)}" if variation else f"has {len(names)} variations: choose one"
+    raise UsageError(f"{path} {reason}; {suggestion(variation, names)}")
 
 
 def try_scenario(
     path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None
 ) -> LoadedScenario | list[Problem]:
-    """The scenario in a file, the first of its variations where it has some; or all that is wrong with the file."""
+    """Return the scenario in a file, or its first variation; or all problems of the file."""
     loaded = try_variations(path, root, world_path, choice)
     return loaded if isinstance(loaded, list) else loaded[0]
 
@@ -65,9 +62,9 @@ def try_scenario(
 def try_variations(
     path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None
 ) -> tuple[LoadedScenario, ...] | list[Problem]:
-    """All variations of the scenario in a file, in order, or all that is wrong with any of them.
+    """Return all variations of the scenario in a file in order, or all problems of any of them.
 
-    A file without variations is its only one, without a name.
+    A file without variations yields one scenario whose variation has no name.
     """
     fence = PathSandbox.around(root, world_path)
     library = Library(fence)
@@ -75,7 +72,7 @@ def try_variations(
     if isinstance(file, Problem):
         return [file]
     if is_unusable_name(name := scenario_id(file, fence.root).rpartition("/")[2]):
-        message, hint = f"its id would end in {name!r}, which is no folder", "give the file a name before its suffix"
+        message, hint = f"its id would end in {name!r}: not a folder name", "give the file a name before the suffix"
         return [Problem(fence.shown(file), 0, 0, "SC041", message, hint)]
     tree, problems = library.read(file, defaults=True)
     if kind := recognize_stack_file(tree, library.texts.get(shown := fence.shown(file), ""), shown):
@@ -99,7 +96,7 @@ def try_variations(
 def _with_choice(
     one: Variation, library: Library, file: Path, choice: StackChoice | None
 ) -> LoadedScenario | list[Problem]:
-    """One variation with the chosen stack in place of its own, or all that is wrong with it."""
+    """Load one variation, with the selected stack instead of its own; or return all its problems."""
     tree = one.tree if choice is None else multirobot.apply_stack_choice(one.tree, choice)
     if choice is not None and (lost := list(_without_effect(one, tree, choice))):
         return library.with_source(lost)
@@ -120,17 +117,17 @@ def _with_choice(
 
 
 def _without_effect(one: Variation, tree: MappingNode, choice: StackChoice) -> Iterator[Problem]:
-    """Values for a stack that another takes the place of: the run would be called by what it is not run with."""
+    """Yield problems with varied values of a stack that `--stack` replaces."""
     each = [tree, *multirobot.split_by_robot(tree).values()] if multirobot.has_multiple_robots(tree) else [tree]
     for change in one.changes:
         if all(node_at(part, change.target.keys) is not change.value for part in each):
             message = f"{quoted(change.target.path)} changes nothing with --stack {choice.written}"
-            hint = "choose variations without it with -k or --variation, or another stack"
+            hint = "select variations that do not set it with -k or --variation, or choose another stack"
             yield Problem(*change.target.place, "SC055", message, hint)
 
 
 def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
-    """What is wrong with the world file of a scenario that is wrong itself: better told at once than next time."""
+    """Return the problems of the world file of an invalid scenario, to report all problems at once."""
     assets, node = Assets(library), child(tree, "world")
     if isinstance(node, ScalarNode) and isinstance(node.value, str):
         assets.world(node)
@@ -138,7 +135,7 @@ def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
 
 
 def _several(spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path) -> LoadedScenario | list[Problem]:
-    """A scenario of several robots; what is wrong is told once, whomever of them it concerns."""
+    """Load a scenario of several robots; problems that several robots share are returned once."""
     views: dict[str, LoadedScenario] = {}
     problems: list[Problem] = []
     for name, own in multirobot.split_by_robot(tree).items():
@@ -166,7 +163,7 @@ def _several(spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path
 def _one(
     spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path, name: str = "", others: tuple[str, ...] = ()
 ) -> LoadedScenario | list[Problem]:
-    """A scenario of one robot, or as one of several sees it."""
+    """Load a scenario of one robot, or as one of several robots sees it."""
     assets = Assets(library)
     world = _world(spec, tree, assets, file)
     robot_map = _map(spec, tree, assets)
@@ -227,22 +224,22 @@ def _map(spec: ScenarioSpec, tree: MappingNode, assets: Assets) -> LoadedMap | L
 
 
 def _mask(written: str | None, tree: MappingNode, keys: tuple[Key, ...], assets: Assets) -> LoadedMap | None:
-    """The filter mask that the stack names there."""
+    """Load the filter mask that the stack names at `keys`."""
     node = node_at(tree, keys)
     return assets.map(node) if written is not None and isinstance(node, ScalarNode) else None
 
 
 def _notes(*maps: LoadedMap | None) -> tuple[Problem, ...]:
-    """What was noted about the maps used, each once."""
+    """Return the notes about the maps, without duplicates."""
     return tuple(dict.fromkeys(note for used in maps if used for note in used.notes))
 
 
 def is_unusable_name(name: str) -> bool:
-    """Whether a scenario of that name could have no folder of its own in the output."""
+    """Return whether a name cannot be a folder in the output."""
     return name in ("", ".", "..")
 
 
 def scenario_id(file: Path, root: Path) -> str:
-    """The path of a scenario relative to the root, without its suffix."""
+    """Return the id of a scenario: its path relative to the root, without suffix."""
     shown = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
     return next((shown.removesuffix(suffix) for suffix in SUFFIXES if shown.endswith(suffix)), shown)

@@ -1,4 +1,4 @@
-"""Find the names in a specification that refer to something else."""
+"""Walk through a specification: its parts with their keys, references by name, quantities."""
 
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -13,7 +13,7 @@ from simscen.spec.references import Refers
 
 
 class Reference(NamedTuple):
-    """A name at `keys` of a scenario that must name something, as its `mark` says."""
+    """Name at `keys` of a scenario that refers to something; `mark` says to what kind of thing."""
 
     keys: tuple[Key, ...]
     mark: Refers
@@ -21,15 +21,16 @@ class Reference(NamedTuple):
 
     @property
     def to(self) -> str:
-        """The kind of what it names."""
+        """The kind of thing that it refers to."""
         return self.mark.to
 
 
 Concerns = Callable[[str | None], bool]
+"""Whether something that names this robot (None: no robot) is about the robot in question."""
 
 
 def references(spec: BaseModel, keys: tuple[Key, ...] = (), concerns: Concerns | None = None) -> Iterator[Reference]:
-    """Every reference below `spec`, in the order of its fields; not in what is about a robot that does not concern."""
+    """Yield every reference below `spec`, in the order of its fields; parts about other robots are skipped."""
     about = getattr(spec, "robot", None)
     if concerns is not None and isinstance(about, str) and not concerns(about):
         return
@@ -40,7 +41,7 @@ def references(spec: BaseModel, keys: tuple[Key, ...] = (), concerns: Concerns |
 
 @cache
 def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, Refers | None]]:
-    """Each field with its key, and what a text in it refers to."""
+    """Return name and key of each field, and what text in it refers to."""
     found = []
     for name, field in model.model_fields.items():
         marks = [mark for mark in field.metadata if isinstance(mark, Refers)]
@@ -62,7 +63,7 @@ def _in_value(value: Any, mark: Refers | None, keys: tuple[Key, ...], concerns: 
 
 
 def _mark(kind: Any) -> Refers | None:
-    """What a text of this type refers to; unions and lists are searched."""
+    """Return what text of this type refers to; unions and lists are searched."""
     if get_origin(kind) is Annotated:
         marks = [mark for mark in get_args(kind)[1:] if isinstance(mark, Refers)]
         if marks:
@@ -75,10 +76,7 @@ Keys = tuple[Key, ...]
 
 
 def walk(spec: Any, keys: Keys = (), concerns: Callable[[str], bool] | None = None) -> Iterator[tuple[Keys, BaseModel]]:
-    """Every mapping of a specification, itself included, in the order of its fields.
-
-    What says `robot:` and is about one that does not concern is passed over.
-    """
+    """Yield every mapping of a specification, itself included, with its keys; parts about other robots are skipped."""
     about = getattr(spec, "robot", None)
     if concerns is not None and isinstance(about, str) and not concerns(about):
         return
@@ -97,7 +95,7 @@ def walk(spec: Any, keys: Keys = (), concerns: Callable[[str], bool] | None = No
 
 
 def quantities_of(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float]]:
-    """The numbers of one dimension in a specification."""
+    """Yield the numbers of one dimension in a specification, with their keys."""
     for keys, part in walk(spec):
         for name, key in _measured(type(part), dimension):
             if isinstance(value := getattr(part, name), int | float):
@@ -106,7 +104,7 @@ def quantities_of(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float
 
 @cache
 def _measured(model: type[BaseModel], dimension: str) -> list[tuple[str, str]]:
-    """The fields that hold quantities of the dimension, with their keys."""
+    """Return name and key of the fields with quantities of the dimension."""
     return [
         (name, field.alias or name)
         for name, field in model.model_fields.items()
@@ -115,7 +113,7 @@ def _measured(model: type[BaseModel], dimension: str) -> list[tuple[str, str]]:
 
 
 def _measures(kind: Any, dimension: str) -> bool:
-    """Whether a type, or a member of a union, is a quantity of the dimension."""
+    """Return whether a type, or a member of a union, is a quantity of the dimension."""
     if get_origin(kind) is Annotated:
         inner, *marks = get_args(kind)
         return any(_has(mark, dimension) for mark in marks) or _measures(inner, dimension)

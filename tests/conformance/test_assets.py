@@ -148,7 +148,7 @@ def test_35_files_that_extend_each_other(refused, folder: Path) -> None:
     for name, base in (("one", "two"), ("two", "three"), ("three", "one")):
         (folder / f"{name}.scenario.yaml").write_text(f"simscen: 1\nextends: {base}.scenario.yaml\n")
     chain = "one.scenario.yaml → two.scenario.yaml → three.scenario.yaml → one.scenario.yaml"
-    assert f"three.scenario.yaml:2:10: error[SC024] files extend each other in a circle: {chain}" in refused(
+    assert f"three.scenario.yaml:2:10: error[SC024] circular `extends`: {chain}" in refused(
         "one.scenario.yaml"
     )
 
@@ -465,4 +465,4 @@ def test_50_things_of_no_size(with_world, world: str, place: str, told: str) -> 
 
 def test_51_ids_that_differ_in_case_alone(refused, folder: Path) -> None:
     (folder / "A.scenario.yaml").write_text((folder / "a.scenario.yaml").read_text())
-    assert "has the same id as `A.scenario.yaml`, but for upper and lower case or suffix" in refused(".")
+    assert "has the same id as `A.scenario.yaml`, except for case or suffix" in refused(".")

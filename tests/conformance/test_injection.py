@@ -165,10 +165,10 @@ def test_81_names_of_files_are_shown(simscen, folder: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "told"),
     [
-        ("a b\u202ec", "control character U+202E in its name"),
-        ("a\nb", "control character U+000A in its name"),
-        ("\x1b[31m", "control character U+001B in its name"),
-        ("caf\udce9", "its name is not valid UTF-8"),
+        ("a b\u202ec", "control character U+202E in the file name"),
+        ("a\nb", "control character U+000A in the file name"),
+        ("\x1b[31m", "control character U+001B in the file name"),
+        ("caf\udce9", "the file name is not valid UTF-8"),
     ],
 )
 def test_81_names_that_no_report_could_show_are_refused(refused, simscen, folder: Path, name: str, told: str) -> None:

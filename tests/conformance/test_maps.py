@@ -4,11 +4,11 @@ import pytest
 
 MAP = "image: map.pgm\nresolution: 0.1\norigin: [0, 0, 0]\ntype: indoor\nmoed: scale\n"
 NOTES = """\
-map.yaml:4:1: warning[SC311] `type` means nothing in a ROS map
+map.yaml:4:1: warning[SC311] `type` has no meaning in a ROS map
     4 | type: indoor
       | ^^^^
-      = it is ignored, as map_server ignores it
-map.yaml:5:1: warning[SC311] `moed` means nothing in a ROS map
+      = it is ignored, as by map_server
+map.yaml:5:1: warning[SC311] `moed` has no meaning in a ROS map
     5 | moed: scale
       | ^^^^
       = did you mean `mode`?

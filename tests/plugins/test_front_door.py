@@ -200,7 +200,7 @@ def test_without_the_package_a_file_that_uses_it_says_what_is_missing(ran, yardw
     assert "`simscen plugins` lists what installed packages add" in done.stdout + done.stderr
     judged = simscen("judge", "out/runs/door/seed-1/run.mcap")
     assert judged.returncode == 2
-    told = "the run was judged with criterion `dwell` of yardwork==1.2, and it is not installed"
+    told = "the run was judged with criterion `dwell` of yardwork==1.2, but it is not installed"
     assert told in judged.stdout + judged.stderr
     (ran / "mine.yaml").write_text("pass: [{goals_reached: {}}]\n")
     assert simscen("judge", "out/runs/door/seed-1/run.mcap", "--scenario", "mine.yaml").returncode == 0

@@ -1,4 +1,4 @@
-"""The files a scenario names: worlds, maps, robots."""
+"""Load the files that a scenario names: worlds, maps, robots, filter masks."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -33,18 +33,18 @@ ROBOT = ".robot.yaml"
 
 @dataclass
 class Assets:
-    """Loads what a scenario names and collects what is wrong with it."""
+    """Loader of the files that a scenario names; collects their problems."""
 
     library: Library
     problems: list[Problem] = field(default_factory=list)
 
     def world(self, written: ScalarNode) -> LoadedWorld | None:
-        """The world in the file that a scenario names."""
+        """Load the world in the file that a scenario names."""
         path = self._find(str(written.value), written.place)
         return None if path is None else self._once(self.world_file, path)
 
     def world_file(self, path: Path) -> LoadedWorld | None:
-        """The world in a file: SDF by suffix, a ROS map by its keys, else our own language."""
+        """Load the world in a file: SDF by suffix, a ROS map by its keys, else a world file of simscen."""
         if path.name.endswith(GAZEBO):
             return LoadedWorld(path.name.split(".")[0], path, sdf=path)
         tree = self._tree(path)
@@ -55,7 +55,7 @@ class Assets:
         return self.own_world(spec, tree, path) if spec and tree else None
 
     def own_world(self, spec: WorldSpec, tree: Node, path: Path) -> LoadedWorld | None:
-        """A world in our own language, with the map or SDF that it builds on."""
+        """Load the map or SDF that a world of simscen builds on, and replace names of places by poses."""
         before = len(self.problems)
         loaded_map = sdf = None
         if spec.map is not None:
@@ -71,16 +71,16 @@ class Assets:
         return LoadedWorld(name, path, spec, loaded_map, sdf, whole) if len(self.problems) == before else None
 
     def map(self, written: ScalarNode) -> LoadedMap | None:
-        """The ROS map in the file that a scenario names."""
+        """Load the ROS map in the file that a scenario names."""
         path = self._find(str(written.value), written.place)
         return None if path is None else self._once(self.map_file, path)
 
     def map_file(self, path: Path) -> LoadedMap | None:
-        """The ROS map in a file."""
+        """Load the ROS map in a file."""
         return self._ros_map(self._tree(path), path)
 
     def robot(self, written: str, place: Position) -> LoadedRobot | None:
-        """A robot that ships with simscen, by its bare name, or that of a file."""
+        """Load a robot by the path of its file, or by the name of a robot that ships with simscen."""
         if "/" in written or written.endswith((*URDF, ".yaml", ".yml")):
             path = self._find(written, place)
             return None if path is None else self._once(self.robot_file, path)
@@ -92,7 +92,7 @@ class Assets:
         return None
 
     def robot_file(self, path: Path, bundled: bool = False) -> LoadedRobot | None:
-        """The robot in a `*.robot.yaml` or `.urdf` file."""
+        """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file."""
         name = path.name.split(".")[0]
         if path.suffix in URDF:
             text = read_text(path, self.library.fence.shown(path))
@@ -114,7 +114,7 @@ class Assets:
         return LoadedRobot(name, path, spec, urdf, bundled, body, found)
 
     def _once(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
-        """What is in a file without a flaw is read once for all variations of a scenario."""
+        """Load a file; one without problems is loaded once for all variations of a scenario."""
         name = getattr(load, "func", load).__name__, path
         if name in self.library.loaded:
             known: Loaded = self.library.loaded[name]
@@ -172,18 +172,18 @@ class Assets:
 
 
 def is_ros_map(tree: Node | None) -> bool:
-    """Whether a YAML file is a map of map_server rather than a world of ours."""
+    """Return whether a YAML file is a map of map_server and not a world file of simscen."""
     return isinstance(tree, MappingNode) and "image" in tree.entries and "resolution" in tree.entries
 
 
 def _unread(tree: Node) -> list[Problem]:
-    """The keys that map_server does not read: its files are published with all sorts of them."""
+    """Return warnings about keys that map_server ignores."""
     if not isinstance(tree, MappingNode):
         return []
     unread = [key for key in tree.entries if key not in RosMapSpec.model_fields]
     return [
         Problem(
-            *key_position(tree, (key,)), "SC311", f"{quoted(key)} means nothing in a ROS map", _meant(key), "warning"
+            *key_position(tree, (key,)), "SC311", f"{quoted(key)} has no meaning in a ROS map", _meant(key), "warning"
         )
         for key in unread
     ]
@@ -191,19 +191,19 @@ def _unread(tree: Node) -> list[Problem]:
 
 def _meant(key: str) -> str:
     near = suggestion(key, RosMapSpec.model_fields)
-    return near if near.startswith("did you mean") else "it is ignored, as map_server ignores it"
+    return near if near.startswith("did you mean") else "it is ignored, as by map_server"
 
 
 def shipped_robots() -> dict[str, Path]:
-    """The robots that ship with simscen, by name."""
+    """Return the files of the robots that ship with simscen, by name."""
     folder = PACKAGE / "data" / "robots"
     return {path.name.removesuffix(ROBOT): path for path in sorted(folder.glob(f"*{ROBOT}"))}
 
 
 def load_judged_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, JudgedMask]:
-    """The masks that the criteria below `pass` name, by their files as written; what is wrong goes to `assets`.
+    """Return the filter masks of the criteria under `pass`, by file as written; problems are added to `assets`.
 
-    A list is never merged with another, so all of them are written in one file, and one name is one mask.
+    Lists are never merged, so all masks are named in one file, and a path always means the same mask.
     """
     found: dict[str, JudgedMask] = {}
     for reference in references(spec):

@@ -1,4 +1,4 @@
-"""Copy a scenario with the files that it needs, so that the copy stands alone."""
+"""Copy a scenario with the files that it needs."""
 
 import shutil
 from collections.abc import Iterator
@@ -13,16 +13,16 @@ from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNod
 
 _MODELINE = "# yaml-language-server:"
 _READABLE = (".yaml", ".yml")
-_SCATTERED = (".sdf", ".world", ".urdf", ".xacro")
-"""Files that name others in ways of their own: models, packages, meshes."""
+_WITH_OTHER_REFERENCES = (".sdf", ".world", ".urdf", ".xacro")
+"""Files that refer to models, packages and meshes in formats that are not searched."""
 
 
 def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path]:
-    """Write a copy of a scenario to `target`, and what it needs into the folder of its name beside it.
+    """Copy a scenario to `target`, and the files it needs to a folder with its name next to it; return the new files.
 
-    Where `target` is in the scenario's own root, what it needs stays where it is, and only the paths are others. The
-    text is that of the file, comments and all; of one that extends others it is all of them merged. Returns the files
-    written. Raises UsageError where it needs what cannot be copied.
+    If `target` is in the root of the scenario, the other files stay and only their paths are adapted. The text is that
+    of the file with its comments; a scenario that extends others is merged with them. Raises UsageError if a file
+    cannot be copied.
     """
     text, tree = _text_of(loaded)
     named = {leaf: _file_of(leaf, loaded) for leaf in _leaves(tree)}
@@ -33,7 +33,7 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
     folder = target.parent / target.name.partition(".")[0]
     copies = {} if stays else {file: folder / file.relative_to(home) for file in needed}
     if taken := next((copy for copy in copies.values() if copy.exists()), None):
-        raise UsageError(f"{taken} is there already; choose another name")
+        raise UsageError(f"{taken} already exists; choose another name")
     for file, copy in copies.items():
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(file, copy)
@@ -44,7 +44,7 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
 
 
 def _text_of(loaded: LoadedScenario) -> tuple[str, Node]:
-    """The text to copy, without the line that tells editors where the schema is, and its tree."""
+    """Return the text to copy, without the schema line for editors, and its tree."""
     lines = unexpanded_text(loaded).split("\n")
     text = "\n".join(line for line in lines if not line.startswith(_MODELINE))
     tree, _ = parse_yaml(text, loaded.path)
@@ -64,7 +64,7 @@ def _leaves(node: Node | None) -> Iterator[ScalarNode]:
 
 
 def _file_of(leaf: ScalarNode, loaded: LoadedScenario) -> Path | None:
-    """The file that a text names, as seen from one of the files that the scenario is made of."""
+    """Return the file that a text names, relative to one of the files of the scenario."""
     return _named(leaf, {file.parent for file in loaded.files.values()})
 
 
@@ -75,11 +75,11 @@ def _named(leaf: ScalarNode, folders: set[Path]) -> Path | None:
 
 
 def _needed(file: Path, known: frozenset[Path] = frozenset()) -> Iterator[Path]:
-    """A file, and what it names in turn."""
+    """Yield a file and the files that it names, recursively."""
     if file in known:
         return
-    if file.name.endswith(_SCATTERED):
-        raise UsageError(f"{file.name} needs models and meshes that cannot be told: copy its folder yourself")
+    if file.name.endswith(_WITH_OTHER_REFERENCES):
+        raise UsageError(f"{file.name} may refer to models and meshes: copy its folder yourself")
     yield file
     if file.name.endswith(_READABLE):
         tree, _ = parse_yaml(file.read_text(encoding="utf-8"), file.name)
@@ -90,7 +90,7 @@ def _needed(file: Path, known: frozenset[Path] = frozenset()) -> Iterator[Path]:
 
 
 def _with_path(text: str, leaf: ScalarNode, path: str) -> str:
-    """The text with another path where the leaf stands."""
+    """Return the text with another path at the position of the leaf."""
     lines = text.split("\n")
     line, start = lines[leaf.place.line - 1], leaf.place.col - 1
     quote = line[start] if line[start] in "'\"" else ""

@@ -1,4 +1,4 @@
-"""Read what must hold from a scenario, or from a file that says nothing else."""
+"""Load criteria from a scenario, or from a file with nothing else, to judge logs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,9 +20,9 @@ from simscen.model.world import WorldSpec
 
 @dataclass(frozen=True)
 class LoadedCriteria:
-    """Criteria with where they are written: `lines` in `file`, 0 for one that comes from a file it extends.
+    """Criteria of a file; `lines` are their lines in `file`, 0 for criteria of a file that it extends.
 
-    `masks` are what they judge by, by their files as written.
+    `masks` are their filter masks, by file as written.
     """
 
     file: Path
@@ -33,22 +33,22 @@ class LoadedCriteria:
     masks: Mapping[str, JudgedMask] = field(default_factory=dict)
 
     def of(self, robot: str) -> "LoadedCriteria":
-        """What must hold for one of several robots, "" for the only one of a log. Raises InvalidInput.
+        """Return the criteria for one of several robots, or "" for the only robot of a log. Raises InvalidInput.
 
-        A file that says nothing of single robots holds for each.
+        A file without `robots` applies to every robot.
         """
         views = multirobot.split_by_robot(self.tree)
         if robot in views:
             return _loaded(self.file, views[robot], self.library)
         if not views:
             return self
-        what = f"the log has a robot {quoted(robot)}, of which nothing is said here"
-        message = what if robot else "the log is of one robot, and here are several"
+        unknown = f"the log has a robot {quoted(robot)}, which is not listed here"
+        message = unknown if robot else "the log has one robot, but several are listed here"
         problem = Problem(*key_position(self.tree, (multirobot.ROBOTS,)), code="SC030", message=message)
         raise InvalidInput(self.library.with_source([problem]))
 
     def surroundings(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
-        """The world and the robot that the file names, if any. Raises InvalidInput."""
+        """Load the world and the robot that the file names, if any. Raises InvalidInput."""
         assets, robot = Assets(self.library), None
         world = _world(self.spec, self.tree, self.file, assets)
         if self.spec.robot is not None:
@@ -59,9 +59,9 @@ class LoadedCriteria:
 
 
 def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedCriteria:
-    """The criteria in `path`, with what it `extends` and the `defaults.yaml` beside it, as for any scenario.
+    """Load the criteria in `path`, with what it `extends` and the `defaults.yaml` next to it, as for a scenario.
 
-    Raises InvalidInput with every problem, at the line and in the file where it is written.
+    Raises InvalidInput with all problems.
     """
     library = Library(PathSandbox.around(root, world_path))
     file = library.fence.entered(path)
@@ -78,7 +78,7 @@ def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Lo
 
 
 def _loaded(file: Path, tree: MappingNode, library: Library) -> LoadedCriteria:
-    """What a sound tree says must hold; what it names that there is not is told."""
+    """Return the criteria in a valid tree. Raises InvalidInput for unknown places and unusable masks."""
     spec = check(CriteriaSpec, tree)
     if isinstance(spec, list):
         raise InvalidInput(library.with_source(spec))
@@ -96,7 +96,7 @@ def _loaded(file: Path, tree: MappingNode, library: Library) -> LoadedCriteria:
 
 
 def _world(spec: CriteriaSpec, tree: MappingNode, file: Path, assets: Assets) -> LoadedWorld | None:
-    """The world that the file names, if any."""
+    """Load the world that the file names, if any."""
     node = node_at(tree, ("world",))
     if isinstance(spec.world, WorldSpec):
         return assets.own_world(spec.world, node, file)

@@ -1,4 +1,4 @@
-"""Which files the arguments of a command mean."""
+"""Find the files that the path arguments of a command select, and the default root."""
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
@@ -18,36 +18,36 @@ BASE = (".base.yaml", ".base.yml")
 
 REPOSITORY = (".git", ".hg", ".jj", ".svn")
 PROJECT = ("pyproject.toml", "package.xml", "setup.py")
-"""What lies at the top of a Python project or a ROS package; an archive or a container image has no repository."""
+"""Files at the top of a Python project or a ROS package, for copies without a repository."""
 SCENARIOS = "scenarios"
 
 
 def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCENARIO) -> list[Path]:
-    """The scenario files that `paths` mean: a file as it is, a folder searched for `*.scenario.yaml`, sorted.
+    """Return the scenario files that `paths` select, sorted: files as given, and `*.scenario.yaml` in folders.
 
-    Raises InvalidInput where a path is missing or two scenarios would have the same id but for case, NothingSelected
-    where there is nothing.
+    Raises InvalidInput if a path is missing or two scenarios have the same id up to case, and NothingSelected if there
+    are no scenarios.
     """
-    problems = [problem for path in paths if (problem := _absent(path))]
+    problems = [problem for path in paths if (problem := _missing(path))]
     found = dict.fromkeys(file.absolute() for path in paths for file in _files(path, suffixes, problems))
     if problems:
         raise InvalidInput(problems)
     if not found:
         where = ", ".join(quoted(str(path)) for path in paths)
-        raise NothingSelected(f"no scenarios found in {where}; a folder is searched for *{suffixes[0]}")
+        raise NothingSelected(f"no scenarios found in {where}; folders are searched for *{suffixes[0]}")
     files = sorted(found, key=lambda file: file.parts)
     home = Path(os.path.realpath(root))
-    if problems := [*_no_folders(files, home), *_same_ids(files, home)]:
+    if problems := [*_folder_conflicts(files, home), *_same_ids(files, home)]:
         raise InvalidInput(sorted(problems))
     return files
 
 
 def default_root(paths: Iterable[Path]) -> Path:
-    """The project that holds all of `paths`, found by what lies around them, never by what is in the files.
+    """Return the folder of the project that contains all `paths`, without reading the files.
 
-    The nearest folder above with a repository; else with a project's file; else the one that holds the nearest folder
-    called `scenarios`; else the working folder, where it holds them; else their common folder. The file system's root
-    and the user's home are nobody's project unless they hold a repository or a project's file.
+    This is the nearest parent with a repository; else with a project file; else the parent of the nearest folder called
+    `scenarios`; else the working folder if it contains the paths; else their common folder. The root of the file system
+    and the home folder are only projects if they have a repository or a project file.
     """
     folders = [Path(os.path.realpath(path if is_folder(path) else path.parent)) for path in paths]
     common = Path(os.path.commonpath(folders)) if folders else Path.cwd()
@@ -55,8 +55,8 @@ def default_root(paths: Iterable[Path]) -> Path:
     candidates = (
         *(folder for folder in above if _holds(folder, REPOSITORY)),
         *(folder for folder in above if _holds(folder, PROJECT)),
-        *(folder.parent for folder in above if folder.name == SCENARIOS and not _nobodys(folder.parent)),
-        *(folder for folder in (Path.cwd(),) if common.is_relative_to(folder) and not _nobodys(folder)),
+        *(folder.parent for folder in above if folder.name == SCENARIOS and not _is_too_wide(folder.parent)),
+        *(folder for folder in (Path.cwd(),) if common.is_relative_to(folder) and not _is_too_wide(folder)),
     )
     return next(iter(candidates), common)
 
@@ -65,22 +65,22 @@ def _holds(folder: Path, names: tuple[str, ...]) -> bool:
     return any(exists(folder / name) for name in names)
 
 
-def _nobodys(folder: Path) -> bool:
-    """Whether a folder is too wide to be somebody's project: `/`, the home folder and what holds that."""
+def _is_too_wide(folder: Path) -> bool:
+    """Return whether a folder is too wide to be a project: `/`, the home folder or one of its parents."""
     return folder == folder.parent or Path(os.path.realpath(Path("~").expanduser())).is_relative_to(folder)
 
 
-def _absent(path: Path) -> Problem | None:
+def _missing(path: Path) -> Problem | None:
     try:
         path.lstat()
     except (OSError, ValueError) as error:
-        told = os_error_reason(error) if isinstance(error, OSError) else "no such file or directory"
-        return Problem(str(path), 0, 0, "SC001", told)
+        message = os_error_reason(error) if isinstance(error, OSError) else "no such file or directory"
+        return Problem(str(path), 0, 0, "SC001", message)
     return None
 
 
 def _files(path: Path, suffixes: tuple[str, ...], problems: list[Problem]) -> Iterator[Path]:
-    """The files that `path` means; folders that cannot be searched become problems."""
+    """Yield the files that `path` selects; add a problem for each folder that cannot be searched."""
     if not is_folder(path):
         yield path
         return
@@ -93,15 +93,15 @@ def _files(path: Path, suffixes: tuple[str, ...], problems: list[Problem]) -> It
         yield from (Path(folder) / name for name in sorted(names) if name.endswith(suffixes))
 
 
-def _no_folders(files: list[Path], root: Path) -> Iterator[Problem]:
-    """Ids become folders of the output, in which those of runs are called seed-…"""
+def _folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]:
+    """Yield problems with ids whose output folder would be the folder of a run (seed-…) of another scenario."""
     ids = {scenario_id(file, root).casefold() for file in files}
     for file in files:
         name = scenario_id(file, root).casefold()
         above = name.split("/")[:-1]
         for depth, part in enumerate(above[1:], start=1):
             if part.startswith("seed-") and (other := "/".join(above[:depth])) in ids:
-                message = f"its folder in the output would be that of a run of {quoted(other)}"
+                message = f"its output folder would be the folder of a run of {quoted(other)}"
                 yield Problem(_shown(file, root), 0, 0, "SC041", message, "rename one of them")
 
 
@@ -110,10 +110,10 @@ def _shown(file: Path, root: Path) -> str:
 
 
 def _same_ids(files: list[Path], root: Path) -> Iterator[Problem]:
-    """Ids become folders of the output, and some file systems do not tell case apart."""
+    """Yield problems with ids that are equal up to case: some file systems cannot distinguish their output folders."""
     seen: dict[str, Path] = {}
     for file in files:
         other = seen.setdefault(scenario_id(file, root).casefold(), file)
         if other != file:
-            message = f"has the same id as {quoted(_shown(other, root))}, but for upper and lower case or suffix"
+            message = f"has the same id as {quoted(_shown(other, root))}, except for case or suffix"
             yield Problem(_shown(file, root), 0, 0, "SC040", message, "rename one of them")

@@ -1,4 +1,4 @@
-"""Check a file of any kind that simscen reads."""
+"""Recognize the kind of a file, and check files of any kind."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, node
 from simscen.model.scenario import ScenarioSpec
 
 STACKS = ("stack", NAV2_FILE_KIND)
-"""Kinds that hold the parameters of a stack."""
+"""Kinds of files with the parameters of a stack."""
 _ONLY_ROBOTS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
 _ONLY_WORLDS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
 _ONLY_SCENARIOS = frozenset({"world", "robot", "goals", "pass", "events", "faults", "stack"})
@@ -31,9 +31,9 @@ _SUFFIXES = (
 
 
 def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:
-    """All that is wrong with a file of a kind that kind_of knows, and with the files it names.
+    """Return the problems of a file, and of the files it names; `kind` is what file_kind returns.
 
-    Some are warnings.
+    Some problems are warnings.
     """
     if kind == "scenario":
         loaded = try_variations(file, root, world_path)
@@ -44,7 +44,7 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
     if isinstance(path := library.fence.entered(file), Problem):
         return [path]
     if kind in STACKS:
-        from simscen.loading.stacks.stackfile import read_stack_file  # a model of its own, which few commands need
+        from simscen.loading.stacks.stackfile import read_stack_file
 
         return found if isinstance(found := read_stack_file(path, library), list) else found[1]
     if kind == "base":
@@ -62,9 +62,9 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
 
 
 def file_kind(file: Path, root: Path) -> str:
-    """By its name where that tells, else by what only one kind has.
+    """Return the kind of a file by its suffix, else by keys that only one kind has.
 
-    "scenario", "world", "robot", "stack", "base", "map" or PARAMETER_FILE.
+    The kinds are "scenario", "world", "robot", "stack", "base", "map" and NAV2_FILE_KIND.
     """
     if file.name == DEFAULTS_FILE:
         return "base"
@@ -84,9 +84,9 @@ def file_kind(file: Path, root: Path) -> str:
 
 
 def check_base_file(file: Path, library: Library) -> list[Problem]:
-    """What is wrong with what a partial scenario says, and with the files that it names.
+    """Return the problems of a base file (`*.base.yaml`, `defaults.yaml`) and of the files it names.
 
-    What it leaves out is for the scenarios to say that extend it.
+    Missing keys are not problems: the scenarios that extend it may have them.
     """
     tree, problems = library.read(file)
     if problems or tree is None:
@@ -98,7 +98,7 @@ def check_base_file(file: Path, library: Library) -> list[Problem]:
 
 
 def _with_lists(tree: Node) -> Node:
-    """The same with `pass+` as `pass`: what is to be added must be what may stand there."""
+    """Return the tree with `pass+` as `pass`, so that the items to be added are checked."""
     if not isinstance(tree, MappingNode):
         return tree
     entries = {

@@ -1,4 +1,4 @@
-"""Paths inside files: relative, and inside the root or the folders that the command line allows."""
+"""Resolve paths inside files: they must be relative, and inside the root or a folder allowed on the command line."""
 
 import errno
 import os
@@ -13,32 +13,33 @@ from simscen.loading.yaml.textfile import os_error_reason
 
 MODEL = "model://"
 
-_UNSPEAKABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
-"""Control and bidirectional characters, and what stands for bytes that are not UTF-8 (PEP 383)."""
+_INVALID_IN_NAMES = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+"""Control and bidirectional characters, and surrogates for bytes that are not UTF-8 (PEP 383)."""
 
 
 @dataclass(frozen=True)
 class PathSandbox:
-    """Where a scenario may read from: `root`, and the folders of `--world-path`, searched in order."""
+    """Folders that a scenario may read from: `root`, and those of `--world-path`, which are searched in order."""
 
     root: Path
     world_path: tuple[Path, ...] = ()
 
     @classmethod
     def around(cls, root: Path, world_path: Sequence[Path] = ()) -> "PathSandbox":
-        """Folders as given, made absolute with symbolic links followed."""
+        """Return the sandbox of these folders, made absolute with symbolic links resolved."""
         return cls(_real(root), tuple(_real(folder) for folder in world_path))
 
     def find(self, written: str, folder: Path) -> "Path | PathProblem":
-        """The existing file or folder that `written` means in a file that lies in `folder`.
+        """Return the existing file or folder for a path written in a file in `folder`.
 
-        A path is taken relative to `folder` first and must stay inside the root; `model://name/…` and bare relative
-        paths are then looked up in the folders of `--world-path`. Whether something outside exists is not told.
+        The path is resolved relative to `folder` first, and must stay inside the root. `model://name/…` and relative
+        paths are then searched in the folders of `--world-path`. Problems do not reveal what exists outside.
         """
         if refusal := _refused_form(written):
             return refusal
         if written.startswith(MODEL):
-            missing = PathProblem("SC023", f"{quoted(written)} is in no folder of --world-path", _world_path_hint(self))
+            message = f"{quoted(written)} was not found in any folder of --world-path"
+            missing = PathProblem("SC023", message, _world_path_hint(self))
             return self._in_world_path(written.removeprefix(MODEL)) or missing
         inside = _real(folder / written)
         if self.holds(inside):
@@ -51,19 +52,19 @@ class PathSandbox:
         return self._in_world_path(written) or refusal or _outside(written)
 
     def entered(self, path: Path) -> Path | Problem:
-        """The absolute path of a file that the command line names, with links in its folder followed, if inside."""
+        """Return the absolute path of a file named on the command line if it is inside, else a problem."""
         file = _real(path.parent) / path.name
         if self.holds(file):
-            return _unspeakable(path, self.shown(file)) or file
-        return Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose one with --root")
+            return _name_problem(path, self.shown(file)) or file
+        return Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose the root with --root")
 
     def holds(self, path: Path) -> bool:
-        """Whether a file, with symbolic links followed, is inside the root or an allowed folder."""
+        """Return whether a file, with symbolic links resolved, is inside the root or an allowed folder."""
         real = _real(path)
         return any(real.is_relative_to(allowed) for allowed in (self.root, *self.world_path))
 
     def shown(self, path: Path) -> str:
-        """How messages name a file: relative to the root where it is inside."""
+        """Return the name of a file in messages: relative to the root if it is inside."""
         return path.relative_to(self.root).as_posix() if path.is_relative_to(self.root) else str(path)
 
     def _in_world_path(self, written: str) -> Path | None:
@@ -74,18 +75,18 @@ class PathSandbox:
 
 
 def exists(path: Path) -> bool:
-    """Whether there is something; False for names that cannot be, where Path.exists raises."""
+    """Return whether a path exists; False for invalid names, for which Path.exists raises."""
     return os.path.exists(path)  # noqa: PTH110
 
 
 def is_folder(path: Path) -> bool:
-    """Whether it is a folder; False for names that cannot be, where Path.is_dir raises."""
+    """Return whether a path is a folder; False for invalid names, for which Path.is_dir raises."""
     return os.path.isdir(path)  # noqa: PTH112
 
 
 @dataclass(frozen=True)
 class PathProblem:
-    """Why a path in a file cannot be used."""
+    """Reason why a path in a file cannot be used."""
 
     code: str
     message: str
@@ -98,22 +99,23 @@ def _refused_form(written: str) -> PathProblem | None:
     if written.startswith(("/", "~")) or (len(written) > 1 and written[1] == ":"):
         return PathProblem("SC021", f"{quoted(written)} is an absolute path", "write it relative to this file")
     if "://" in written and not written.startswith(MODEL):
-        return PathProblem("SC021", f"{quoted(written)} is a URL", "only relative paths and model://name are read")
+        return PathProblem("SC021", f"{quoted(written)} is a URL", "use a relative path or model://name")
     return None
 
 
-def _unspeakable(path: Path, name: str) -> Problem | None:
-    """The name becomes the scenario's id, which folders, XML and people must be able to take."""
-    character = _UNSPEAKABLE.search(name)
+def _name_problem(path: Path, name: str) -> Problem | None:
+    """Return a problem if the name of a file cannot be a scenario id, which appears in folder names and XML."""
+    character = _INVALID_IN_NAMES.search(name)
     if character is None:
         return None
     code = ord(character[0])
-    told = "its name is not valid UTF-8" if 0xD800 <= code < 0xE000 else f"control character U+{code:04X} in its name"
-    return Problem(str(path), 0, 0, "SC017", told, "rename it")
+    bad_bytes = 0xD800 <= code < 0xE000
+    message = "the file name is not valid UTF-8" if bad_bytes else f"control character U+{code:04X} in the file name"
+    return Problem(str(path), 0, 0, "SC017", message, "rename the file")
 
 
 def _real(path: Path) -> Path:
-    """With links followed, like Path.resolve, which however raises RuntimeError on a loop."""
+    """Return the path with symbolic links resolved; Path.resolve raises RuntimeError on a loop."""
     return Path(os.path.realpath(path))
 
 
@@ -128,7 +130,7 @@ def _unusable(error: OSError, written: str, path: Path) -> PathProblem:
 
 
 def _world_path_hint(fence: PathSandbox) -> str:
-    return "" if fence.world_path else "give the folder that holds it with --world-path"
+    return "" if fence.world_path else "allow its folder with --world-path"
 
 
 def _sibling(missing: Path) -> str:

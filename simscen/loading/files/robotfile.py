@@ -1,4 +1,4 @@
-"""A robot, read on its own."""
+"""Load a robot file by itself."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from simscen.loading.yaml.library import Library
 
 @dataclass(frozen=True)
 class RobotFile:
-    """A robot, and the folders that its files lie in: the root first."""
+    """Robot and the reader of its files."""
 
     robot: LoadedRobot
     library: Library
@@ -26,9 +26,9 @@ class RobotFile:
 
 
 def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -> RobotFile:
-    """The robot in a `*.robot.yaml`, `.urdf` or `.xacro` file, or one that ships, by its bare name.
+    """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file, or one that ships with simscen, by name.
 
-    Raises InvalidInput with all that is wrong with it.
+    Raises InvalidInput with all problems.
     """
     shipped = shipped_robots()
     library = Library(PathSandbox.around(root, world_path))
@@ -37,9 +37,7 @@ def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -
     if isinstance(path, Problem):
         raise InvalidInput([path])
     if not path.is_file():
-        message = (
-            "not a regular file" if path.exists() else f"no such file, and no robot called {quoted(written)} ships"
-        )
+        message = "not a regular file" if path.exists() else f"no such file or shipped robot: {quoted(written)}"
         raise InvalidInput([Problem(written, 0, 0, "SC001", message, suggestion(written, shipped))])
     assets = Assets(library)
     robot = assets.robot_file(path, bundled)

@@ -1,4 +1,4 @@
-"""World files of any kind, read on their own; and our own kind, written."""
+"""Load a world file of any format by itself, and write worlds as `*.world.yaml`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ from simscen.model.world import WorldSpec
 
 
 def load_world_file(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedWorld:
-    """The world in a `*.world.yaml`, a ROS map or an SDF file. Raises InvalidInput with all that is wrong with it."""
+    """Load the world in a `*.world.yaml`, a ROS map or an SDF file. Raises InvalidInput with all problems."""
     library = Library(PathSandbox.around(root, world_path))
     file = library.fence.entered(path)
     if isinstance(file, Problem):
@@ -33,13 +33,13 @@ def load_world_file(path: Path, root: Path, world_path: Sequence[Path] = ()) -> 
 
 
 def world_text(spec: WorldSpec) -> str:
-    """A world as the text of a `*.world.yaml`, without what is as it would be anyway."""
+    """Return a world as the text of a `*.world.yaml`, without default values."""
     data = spec.model_dump(mode="json", exclude_defaults=True)
     return to_yaml(_in_order(data), _Compact)
 
 
 def _in_order(value: Any) -> Any:
-    """The version and names first, as people write them."""
+    """Return data with the version and names first."""
     if isinstance(value, list):
         return [_in_order(item) for item in value]
     if not isinstance(value, dict):
@@ -49,7 +49,7 @@ def _in_order(value: Any) -> Any:
 
 
 class _Compact(Dumper):
-    """Writes a thing with its shape and pose on one line, but one line for each of a list of things."""
+    """YAML writer that puts each item of a list on one line."""
 
 
 def _list(dumper: yaml.SafeDumper, value: list[Any]) -> yaml.Node:

@@ -1,4 +1,4 @@
-"""What of Nav2 is called otherwise in the reference stack, and what is not there."""
+"""Tables and types of the translation from Nav2 parameters to parameters of the reference stack."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,15 +14,15 @@ MOTION_MODELS = {
     "DifferentialMotionModel": "differential", "OmniMotionModel": "omni",
     "differential": "differential", "omnidirectional": "omni",
 }  # fmt: skip
-"""AMCL's, the latter two as they were called before Humble."""
+"""Motion models of AMCL; the last two names are from before Humble."""
 DWB_CRITICS = {
     "BaseObstacle": "base_obstacle_scale", "PathAlign": "path_align_scale", "PathDist": "path_dist_scale",
     "GoalAlign": "goal_align_scale", "GoalDist": "goal_dist_scale", "RotateToGoal": "rotate_to_goal_scale",
     "Twirling": "twirling_scale",
 }  # fmt: skip
-"""DWB's critics by what weighs them here."""
+"""DWB critics, and the parameters for their weights."""
 DWB_CRITICS_WITHOUT_WEIGHT = ("Oscillation", "ObstacleFootprint")
-"""Those that forbid rather than weigh, and are always asked here."""
+"""DWB critics that reject trajectories instead of weighting them; they are always active."""
 MPPI_CRITICS = (
     "ConstraintCritic", "CostCritic", "ObstaclesCritic", "GoalCritic", "GoalAngleCritic", "PathAlignCritic",
     "PathFollowCritic", "PathAngleCritic", "PreferForwardCritic", "TwirlingCritic", "VelocityDeadbandCritic",
@@ -36,7 +36,7 @@ RENAMED_PARAMETERS: Mapping[tuple[str, str], str] = {
     ("dwb", "Oscillation.oscillation_reset_angle"): "oscillation_reset_angle",
     ("dwb", "Oscillation.x_only_threshold"): "x_only_threshold",
 }
-"""(Our type, Nav2's name) → our name, where that is another."""
+"""Parameters with different names: (type in simscen, name in Nav2) → name in simscen."""
 IGNORED_PARAMETERS = frozenset(
     {
         "tf_broadcast", "save_pose_rate", "random_seed", "map_subscribe_transient_local",
@@ -46,25 +46,25 @@ IGNORED_PARAMETERS = frozenset(
         "always_reset_initial_pose", "polygons", "controller_plugin_types",
     }
 )  # fmt: skip
-"""Parameters that mean nothing in a simulation: transport, what is shown, lists of what follows."""
+"""Parameters without a meaning in simulation: transport, visualization, lists of plugins that follow."""
 IGNORED_NAME_PARTS = (
     "frame", "topic", "plugin", "use_sim_time", "transform_t", "introspection_mode", "publish", "visualize", "bond",
     "qos", "realtime_priority", "stamp", "transport",
 )  # fmt: skip
-"""Those that have one of these in their names: frames and topics, transport, what is shown."""
+"""Parameters with one of these in their names have no meaning in simulation either."""
 EQUIVALENT_VALUES: Mapping[str, tuple[object, ...]] = {
     "enabled": (True,), "marking": (True,), "clearing": (True,), "use_astar": (False,), "scale_velocities": (False,),
     "feedback": ("OPEN_LOOP",), "base_shift_correction": (True,), "deadband_velocity": ([0.0, 0.0, 0.0],),
     "combination_method": (1,), "footprint_clearing_enabled": (True,),
 }  # fmt: skip
-"""Parameters that are not here, with the values that say what is done here anyway."""
+"""Parameters that simscen does not have, with the values that describe what it does anyway."""
 SCENARIO_PARAMETERS: Mapping[str, str] = {
-    **dict.fromkeys(("footprint", "robot_radius"), "the robot's file says how large it is"),
-    **dict.fromkeys(("initial_pose", "set_initial_pose"), "the scenario says where the robot begins"),
+    **dict.fromkeys(("footprint", "robot_radius"), "the robot file defines the size of the robot"),
+    **dict.fromkeys(("initial_pose", "set_initial_pose"), "the scenario defines the initial pose"),
 }
-"""Parameters that something other than the stack says here."""
+"""Parameters that the scenario or the robot file defines, and the reason given to users."""
 OLD_NODE_NAMES = {"recoveries_server": "behavior_server"}
-"""What nodes were called before Humble."""
+"""Names of nodes before Humble."""
 IGNORED_NODES = frozenset(
     {
         "map_server", "map_saver", "lifecycle_manager", "lifecycle_manager_navigation",
@@ -73,28 +73,28 @@ IGNORED_NODES = frozenset(
         "speed_costmap_filter_info_server", "loopback_simulator", "rviz2", "robot_state_publisher",
     }
 )  # fmt: skip
-"""Nodes whose part the scenario, its map and its zones have."""
+"""Nodes whose tasks the scenario, its map and its zones take over."""
 
 
 def class_of(plugin: object) -> str:
-    """`nav2_navfn_planner::NavfnPlanner` and `nav2_navfn_planner/NavfnPlanner` → NavfnPlanner."""
+    """Return the class in a plugin name such as `nav2_navfn_planner::NavfnPlanner` (or with `/`)."""
     return str(plugin).replace("/", "::").rpartition("::")[2]
 
 
 Path = tuple[str, ...]
 """Keys below `stack:`."""
 Parameters = Mapping[str, Any]
-"""`obstacle_layer.scan.topic` → value, of one node."""
+"""Parameters of one node by dotted name, e.g. `obstacle_layer.scan.topic`."""
 Known = Mapping[str, Sequence[str]]
-"""Our parameters by section, or by the type of what is in it; `a.b` is `b` in the mapping `a`."""
+"""Parameters of simscen by section, or by the type in a section; `a.b` is `b` in the mapping `a`."""
 
 
 @dataclass(frozen=True)
 class Translation:
-    """A parameter of Nav2, and where it belongs in a stack.
+    """Nav2 parameter, and the keys and value below `stack:` that it becomes.
 
-    `why` is what there is to tell of it; without a path and a reason it is as it is here, and no word is lost on it.
-    What begins with `covers` has the same fate.
+    `why` is a note for the user. A parameter with neither path nor note already matches what simscen does. Parameters
+    whose names begin with `covers` are treated the same way, without a note of their own.
     """
 
     node: str
@@ -108,19 +108,19 @@ class Translation:
 def translate_same_name(
     node: str, name: str, value: Any, section: Path, known: Sequence[str], own: str = ""
 ) -> Iterator[Translation]:
-    """A parameter that is called here as there, or `own`, if there is one; `a.b` is `b` in the mapping `a`."""
+    """Yield the translation of a parameter that exists in simscen under the same name, or under `own`."""
     here = own or name
     if here in known:
         yield Translation(node, name, (*section, *here.split(".")), value)
 
 
 def strings(value: Any) -> list[str]:
-    """The names in a list, of which there are none where it is no list."""
+    """Return the items of a list as text; an empty list for anything else."""
     return [str(one) for one in value] if isinstance(value, list) else []
 
 
 def parameters_below(parameters: Parameters, name: str) -> Iterator[tuple[str, Any]]:
-    """What stands below a name, called from there."""
+    """Yield the parameters below a name, with names relative to it."""
     for key, value in parameters.items():
         if name and key.startswith(f"{name}."):
             yield key.removeprefix(f"{name}."), value

@@ -1,4 +1,4 @@
-"""Nav2's costmaps: parameters of their own, and of the layers that they name."""
+"""Translate the parameters of Nav2's nodes: costmaps, velocity smoother, collision monitor, AMCL, behaviors."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -25,12 +25,12 @@ DEFAULT_LAYERS = {
     "obstacle_layer": "ObstacleLayer",
     "inflation_layer": "InflationLayer",
 }
-"""Those of a costmap whose file names none."""
+"""Layers of a costmap without `plugins`."""
 OBSERVATION_LAYERS = ("ObstacleLayer", "VoxelLayer")
 
 
 def costmap(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
-    """The global costmap, or the local one."""
+    """Translate the parameters of the global or the local costmap."""
     section = "local_costmap" if node == "local_costmap" else "costmap"
     layers = _layers(parameters)
     besides = {*layers, *strings(parameters.get("filters"))}
@@ -42,9 +42,9 @@ def costmap(node: str, parameters: Parameters, known: Known) -> Iterator[Transla
             yield from _of_layer(node, name, parameters, layers, section, known)
         elif layer not in besides:
             besides.add(layer)
-            yield Translation(node, name, (), value, f"`plugins` does not name {layer}", covers=f"{layer}.")
+            yield Translation(node, name, (), value, f"`plugins` does not list {layer}", covers=f"{layer}.")
     for zones in strings(parameters.get("filters")):
-        yield Translation(node, "filters", (), None, covers=f"{zones}.")  # zones are the scenario's
+        yield Translation(node, "filters", (), None, covers=f"{zones}.")  # zones are part of the scenario
 
 
 def _layers(parameters: Parameters) -> Mapping[str, str]:
@@ -74,7 +74,7 @@ def _of_layer(
 
 
 def velocity_smoother(node: str, parameters: Parameters, _: Known) -> Iterator[Translation]:
-    """Limits ahead, sideways and of the turn rate; here sideways is as ahead, and backward as forward."""
+    """Translate limits; the lateral limit is always the forward limit, and so is the limit backward."""
     for name, turning in (
         ("max_velocity", "max_angular_velocity"),
         ("max_accel", "max_angular_accel"),
@@ -85,19 +85,20 @@ def velocity_smoother(node: str, parameters: Parameters, _: Known) -> Iterator[T
             if ours and limit:
                 yield Translation(node, name, ("velocity_smoother", ours), abs(limit))
         if limits and limits[1] and abs(limits[1]) != abs(limits[0]):
-            yield Translation(node, name, (), limits, "sideways is limited as ahead here")
+            yield Translation(node, name, (), limits, "lateral motion has the same limit as forward motion")
     least, most = _axes(parameters.get("min_velocity")), _axes(parameters.get("max_velocity"))
     if least and most and all(low == -high or not low for low, high in zip(least, most, strict=True)):
         yield Translation(node, "min_velocity", (), least)
     elif least:
-        yield Translation(node, "min_velocity", (), least, "backward is limited as forward here")
+        yield Translation(node, "min_velocity", (), least, "backward motion has the same limit as forward motion")
     faster, slower = _axes(parameters.get("max_accel")), _axes(parameters.get("max_decel"))
     if faster and slower and abs(slower[2]) != abs(faster[2]):
-        yield Translation(node, "max_decel", (), slower, "turning slower is limited as turning faster here")
+        why = "angular deceleration has the same limit as angular acceleration"
+        yield Translation(node, "max_decel", (), slower, why)
 
 
 def collision_monitor(node: str, parameters: Parameters, _: Known) -> Iterator[Translation]:
-    """Polygons that approach are here; those that stop, slow down or limit are not."""
+    """Translate polygons with the action `approach`; other actions are not supported."""
     if "source_timeout" in parameters:
         yield Translation(node, "source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
     on = parameters.get("enabled", True)
@@ -105,7 +106,7 @@ def collision_monitor(node: str, parameters: Parameters, _: Known) -> Iterator[T
     for polygon in strings(parameters.get("polygons")):
         action = parameters.get(f"{polygon}.action_type")
         if action != "approach":
-            why = f"there is no polygon that does {action} here, as {polygon} does"
+            why = f"action_type {action} of {polygon} is not supported"
             yield Translation(node, "polygons", (), action, why, covers=f"{polygon}.")
             continue
         yield from (Translation(node, f"{polygon}.{said}", (), None) for said in ("action_type", "enabled"))
@@ -121,7 +122,7 @@ def collision_monitor(node: str, parameters: Parameters, _: Known) -> Iterator[T
 def _approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Translation]:
     for theirs, ours, more in (
         ("time_before_collision", "time_before_collision", 0),
-        ("max_points", "min_points", 1),  # Humble's: from one more on
+        ("max_points", "min_points", 1),  # Humble: the action starts at one point more
         ("min_points", "min_points", 0),
     ):
         value = parameters.get(f"{polygon}.{theirs}")
@@ -131,28 +132,28 @@ def _approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Trans
 
 
 def _axes(value: Any) -> list[float]:
-    """Ahead, sideways and turning; what is no list of three numbers is none, which is told as not understood."""
+    """Return the values for x, y and rotation; an empty list unless there are three numbers."""
     fits = isinstance(value, list) and len(value) == 3 and all(isinstance(one, int | float) for one in value)
     return value if fits else []
 
 
 def translate(nodes: Mapping[str, Parameters], known: Known) -> Iterator[Translation]:
-    """What becomes of each parameter. `known` are our parameters by section, or by type of what is in it."""
+    """Yield the translation of each parameter of all nodes. `known` are the parameters of simscen."""
     for node, parameters in nodes.items():
         reader = NODES.get(OLD_NODE_NAMES.get(node, node))
         if reader is None:
             continue
         taken = list(reader(node, parameters, known))
         yield from (one for one in taken if one.path or one.why)
-        told = {one.parameter for one in taken}
+        translated = {one.parameter for one in taken}
         covered = tuple(one.covers for one in taken if one.covers)
         for name, value in parameters.items():
-            if name not in told and not name.startswith(covered) and _matters(name, value):
+            if name not in translated and not name.startswith(covered) and _matters(name, value):
                 yield Translation(node, name, (), value, SCENARIO_PARAMETERS.get(name.partition(".")[0], ""))
 
 
 def unknown_nodes(nodes: Mapping[str, Parameters]) -> list[str]:
-    """The nodes that nothing here is like, and that say something that matters."""
+    """Return the nodes with relevant parameters that have no counterpart in simscen."""
     return [
         node
         for node, parameters in nodes.items()
@@ -174,7 +175,7 @@ def _amcl(node: str, parameters: Parameters, known: Known) -> Iterator[Translati
         if name == "robot_model_type":
             model = MOTION_MODELS.get(class_of(value))
             path = ("localizer", "robot_model") if model else ()
-            yield Translation(node, name, path, model, "" if model else f"there is no {value} here")
+            yield Translation(node, name, path, model, "" if model else f"{value} is not supported")
         else:
             yield from translate_same_name(node, name, value, ("localizer",), known["amcl"])
 

@@ -1,4 +1,4 @@
-"""A parameter file of Nav2, with the lines its parameters stand in."""
+"""Nav2 parameter files with the positions of their parameters."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -17,10 +17,9 @@ EVERY_NODE = "**"
 
 @dataclass(frozen=True)
 class Nav2Parameters:
-    """Node → parameter with dots → value, and where each stands; `shown` is the file for people.
+    """Parameters by node and dotted name, and their positions; `shown` is the name of the file in messages.
 
-    What `/**` says is said to every node of the file. `notes` are keys that stand there twice: the last counts, as in
-    ROS 2.
+    Parameters of `/**` apply to every node of the file. `notes` are warnings about duplicate keys.
     """
 
     shown: str
@@ -30,7 +29,7 @@ class Nav2Parameters:
     notes: tuple[Problem, ...] = ()
 
     def problems(self, offer: Offer) -> list[Problem]:
-        """What does not fit, in the order of the file."""
+        """Return the parameters that do not fit what simscen publishes, in the order of the file."""
         found = [
             Problem(
                 *self.places[finding.node, finding.parameter],
@@ -45,7 +44,7 @@ class Nav2Parameters:
 
 
 def read_nav2_parameters(path: Path, shown: str = "") -> Nav2Parameters | list[Problem]:
-    """The parameters in `path`, or what is wrong with the file; `shown` is how problems name it, default: as it is."""
+    """Return the parameters in a file, or its problems; `shown` is its name in problems (default: its path)."""
     shown = shown or str(path)
     text = read_text(path, shown)
     if isinstance(text, Problem):
@@ -56,21 +55,21 @@ def read_nav2_parameters(path: Path, shown: str = "") -> Nav2Parameters | list[P
         return [problem for problem in problems if problem not in notes]
     found = dict(_nodes(tree, ""))
     if not found:
-        return [Problem(shown, 0, 0, "SC340", f"no parameters of nodes: there is no key {PARAMETERS} in it")]
+        return [Problem(shown, 0, 0, "SC340", f"not a Nav2 parameter file: it has no key {PARAMETERS}")]
     nodes: dict[str, dict[str, Any]] = {}
     places: dict[tuple[str, str], Position] = {}
-    everybodys = found.pop(EVERY_NODE, None)
+    for_all_nodes = found.pop(EVERY_NODE, None)
     for name, parameters in found.items() if found else ((EVERY_NODE, MappingNode(Position(shown, 0, 0), {})),):
         nodes[name] = {}
-        for said in (everybodys, parameters):
-            for key, value in _flat(said, "") if said else ():
+        for source in (for_all_nodes, parameters):
+            for key, value in _flat(source, "") if source else ():
                 nodes[name][key] = value.plain
                 places[name, key] = value.place
     return Nav2Parameters(shown, nodes, places, text, notes)
 
 
 def is_nav2_parameter_file(text: str, shown: str) -> bool:
-    """Whether it is a parameter file of Nav2, rather than one of ours."""
+    """Return whether a text is a Nav2 parameter file and not a file of simscen."""
     if PARAMETERS not in text:
         return False
     tree, _ = parse_yaml(text, shown, last_wins=True)
@@ -78,7 +77,7 @@ def is_nav2_parameter_file(text: str, shown: str) -> bool:
 
 
 def _nodes(node: Node, name: str) -> Iterator[tuple[str, MappingNode]]:
-    """Every node of the file and its parameters; namespaces around it do not count."""
+    """Yield every node of the file and its parameters, without namespaces."""
     for key, entry in node.entries.items() if isinstance(node, MappingNode) else ():
         if key == PARAMETERS and isinstance(entry.value, MappingNode):
             yield name, entry.value

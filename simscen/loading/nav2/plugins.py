@@ -1,4 +1,4 @@
-"""The controller server and the planner server of Nav2: the first plug-in of each kind is the one that is here."""
+"""Translate the parameters of Nav2's controller and planner servers; the first plugin of each kind is used."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -21,7 +21,7 @@ from simscen.loading.nav2.mapping import (
 
 
 def controller_server(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
-    """Its checkers, and what drives."""
+    """Translate the parameters of checkers and of the controller."""
     for name in ("controller_frequency", "failure_tolerance"):
         if name in parameters:
             yield Translation(node, name, (name,), parameters[name])
@@ -36,14 +36,14 @@ def controller_server(node: str, parameters: Parameters, known: Known) -> Iterat
 
 
 def planner_server(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
-    """What plans."""
+    """Translate the parameters of the planner."""
     planner = _first(parameters, "planner", "GridBased")
     yield from _others(node, parameters, "planner", planner)
     yield from _plugin(node, parameters, planner, "planner", PLANNERS, known)
 
 
 def _first(parameters: Parameters, kind: str, usual: str) -> str:
-    """The first plug-in of a kind; Humble and before have one progress checker, named without a list."""
+    """Return the name of the first plugin of a kind; before Iron the progress checker is not a list."""
     named = parameters.get(f"{kind}_plugins", parameters.get(f"{kind}_plugin", usual))
     return next(iter(strings(named)), "") if isinstance(named, list) else str(named)
 
@@ -51,15 +51,13 @@ def _first(parameters: Parameters, kind: str, usual: str) -> str:
 def _others(node: str, parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
     listed = f"{kind}_plugins"
     for other in strings(parameters.get(listed))[1:]:
-        yield Translation(
-            node, listed, (), None, f"there is one {kind} here, which is {chosen}, and no {other}", f"{other}."
-        )
+        yield Translation(node, listed, (), None, f"only the first {kind} is used: {chosen}, not {other}", f"{other}.")
 
 
 def _plugin(
     node: str, parameters: Parameters, name: str, section: str, types: Mapping[str, str], known: Known
 ) -> Iterator[Translation]:
-    """The plug-in of a server: what it is, then its parameters. A rotation shim's controller drives alone."""
+    """Translate type and parameters of a plugin; the primary controller of a rotation shim is used without the shim."""
     inner = f"{name}.primary_controller"
     shimmed = f"{inner}.plugin" in parameters
     at = f"{inner}.plugin" if shimmed else inner if inner in parameters else f"{name}.plugin"
@@ -67,12 +65,12 @@ def _plugin(
     kind = types.get(class_of(plugin))
     if kind is None:
         if plugin:
-            why = f"there is no {plugin} here: the usual one is used"
+            why = f"{plugin} is not supported; the default {section} is used"
             yield Translation(node, at, (), plugin, why, covers=f"{name}.")
         return
     if at != f"{name}.plugin":
         shim = parameters.get(f"{name}.plugin")
-        yield Translation(node, at, (section, "type"), kind, f"there is no {shim} here; {plugin} drives alone")
+        yield Translation(node, at, (section, "type"), kind, f"{shim} is not supported; {plugin} is used without it")
     else:
         yield Translation(node, at, (section, "type"), kind)
     prefix = inner if shimmed else name
@@ -90,13 +88,13 @@ def _plugin(
 
 
 def _motion_model(parameters: Parameters, prefix: str) -> str:
-    """MPPI's, which newer files call by the name under which its plug-in stands."""
+    """Return the motion model of MPPI; newer files refer to a plugin by name."""
     written = parameters.get(f"{prefix}.motion_model", "DiffDrive")
     return class_of(parameters.get(f"{prefix}.{written}.plugin", written)).removesuffix("MotionModel")
 
 
 def _critics(node: str, name: str, written: Any, kind: str) -> Iterator[Translation]:
-    """The critics that are asked: MPPI's by their list; DWB's that it does not name weigh nothing."""
+    """Translate the list of critics: a list for MPPI, and a weight of 0 for each DWB critic that is not listed."""
     said = strings(written)
     here = MPPI_CRITICS if kind == "mppi" else (*DWB_CRITICS, *DWB_CRITICS_WITHOUT_WEIGHT)
     called = {critic: class_of(critic).removesuffix("Critic") + ("Critic" if kind == "mppi" else "") for critic in said}
@@ -108,4 +106,4 @@ def _critics(node: str, name: str, written: Any, kind: str) -> Iterator[Translat
         if critic not in kept:
             yield Translation(node, name, ("controller", weight), 0.0)
     if unknown:
-        yield Translation(node, name, (), written, f"there is no {', '.join(unknown)} here")
+        yield Translation(node, name, (), written, f"not supported: {', '.join(unknown)}")

@@ -1,4 +1,4 @@
-"""`stack: {nav2_params: FILE}`: what a parameter file of Nav2 says, as if it stood in the scenario."""
+"""Replace `stack: {nav2_params: FILE}` with the parameters of that file."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -28,7 +28,7 @@ KEY, STACK, ROBOTS = "nav2_params", "stack", "robots"
 
 @dataclass
 class ExpandedTree:
-    """A tree with what its parameter files say, what is wrong with them, and what of them means nothing here."""
+    """Tree with the parameters of its Nav2 files, the problems of these files, and notes on unused parameters."""
 
     tree: MappingNode
     problems: list[Problem] = field(default_factory=list)
@@ -36,7 +36,7 @@ class ExpandedTree:
 
 
 def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
-    """A scenario, or one of several robots, with the parameters that its stacks take from files of Nav2."""
+    """Return a scenario with the parameters that its stacks, or those of its robots, take from Nav2 files."""
     taken = ExpandedTree(tree)
     robots = child(tree, ROBOTS)
     if isinstance(robots, MappingNode):
@@ -57,10 +57,10 @@ def _filled(said: Node, library: Library, taken: ExpandedTree) -> Any:
 
 
 def with_parameters(stack: MappingNode, library: Library, taken: ExpandedTree) -> MappingNode:
-    """A `stack:` section over what its parameter file says, and that over Nav2's own defaults."""
+    """Return a `stack:` section merged onto its parameter file, which is merged onto Nav2's defaults."""
     written, place = stack.entries[KEY].value, value_position(stack, (KEY,))
     if not isinstance(written, ScalarNode) or not isinstance(written.value, str):
-        return stack  # which the model tells
+        return stack  # validation reports the wrong type
     file = library.fence.find(written.value, library.folder_of(place))
     if isinstance(file, PathProblem):
         taken.problems.append(Problem(*place, file.code, file.message, file.hint))
@@ -97,7 +97,7 @@ def _node(value: Any, place: Position) -> Node:
 
 
 def _notes(found_here: Sequence[Translation], parameters: Nav2Parameters) -> Iterator[Problem]:
-    """What of the file means nothing here: each with its reason, or all of a node at its first."""
+    """Yield notes on unused parameters: one for each with a reason, one per node for all others."""
     for one in found_here:
         if one.why:
             yield _note(parameters.places[one.node, one.parameter], f"{one.node}: `{one.parameter}`: {one.why}")
@@ -109,22 +109,22 @@ def _notes(found_here: Sequence[Translation], parameters: Nav2Parameters) -> Ite
             if one.node == node
             and not one.path
             and not one.why
-            and parameters.places[node, one.parameter] not in used  # what every node is told concerns some
+            and parameters.places[node, one.parameter] not in used  # parameters of `/**` may be used by another node
         ]
         if places:
-            told = ", ".join(f"{name} ({place.line})" for place, name in sorted(places))
-            yield _note(min(places)[0], f"{node}: nothing here is like {told}")
+            names = ", ".join(f"{name} ({place.line})" for place, name in sorted(places))
+            yield _note(min(places)[0], f"{node}: simscen has no {names}")
     for node in unknown_nodes(parameters.nodes):
         places_of = [place for (name, _), place in parameters.places.items() if name == node]
-        yield _note(min(places_of), f"nothing here is like the node {node}")
+        yield _note(min(places_of), f"simscen has no node like {node}")
 
 
 def _note(place: Position, message: str) -> Problem:
-    return Problem(*place, code="SC341", message=message, hint="it is left out", severity="warning")
+    return Problem(*place, code="SC341", message=message, hint="it is ignored", severity="warning")
 
 
 def _known() -> Known:
-    """Our parameters, by the section that they are in, or by the type of what is in it; `a.b` is `b` in `a`."""
+    """Return the parameters of the reference stack, by section or by type; `a.b` is `b` in the mapping `a`."""
     from simscen.model import checkers, controllers, costmaps, localizers, mppi, planners, recovery
 
     models: dict[str, type[BaseModel]] = {

@@ -1,4 +1,4 @@
-"""Slips of the pen that many make: what was meant instead."""
+"""Hints for common YAML mistakes."""
 
 from collections.abc import Iterable, Sequence
 
@@ -10,12 +10,12 @@ from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, Sequen
 from simscen.spec.choice import Choice
 from simscen.spec.places import PoseSpec
 
-DEEPEST = 3
-"""How many levels below a mapping a key is looked for that stands too high."""
+MAX_SEARCH_DEPTH = 3
+"""Levels below a mapping in which a misplaced key is searched."""
 
 
 def hint_for_wrong_type(kind: str, model: type[BaseModel], loc: Sequence[Key], node: Node) -> str:
-    """How to write what was meant where a mapping or a list is expected at `loc` below `model`."""
+    """Return how to write a value where a mapping or a list is expected at `loc` below `model`."""
     models = models_at(model, loc)
     in_list = isinstance(next((part for part in reversed(loc) if not _is_tag(part)), ""), int)
     if kind == "list_type":
@@ -24,47 +24,47 @@ def hint_for_wrong_type(kind: str, model: type[BaseModel], loc: Sequence[Key], n
         return _as_mapping(models, node)
     if isinstance(node, ScalarNode):
         word = _as_word(models, node.value, in_list) if isinstance(node.value, str) else ""
-        return word or _as_value(models, node) or _as_told(model, loc)
+        return word or _as_value(models, node) or _explain_hint(model, loc)
     return ""
 
 
 def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key], key: str) -> str:
-    """Where a key belongs that stands a level too deep or too high; "" where it is unknown on every level.
+    """Return where a key belongs that is on the wrong level; "" if no level knows it.
 
-    What an item of a list says is said of that item: it is looked for no higher.
+    Keys in an item of a list are not searched outside of this item.
     """
     item = next((index + 1 for index, part in enumerate(loc) if isinstance(part, int)), 0)
     for length in range(len(loc) - 1, item - 1, -1):
         if key in keys_of(models_at(model, loc[:length])):
             above = dotted_path(existing_keys(tree, loc[:length]))
-            return f"it belongs into `{above}`, a level up" if above else "it belongs to the top level of the file"
+            return f"move it one level up, to `{above}`" if above else "move it to the top level of the file"
     starts = ((loc, models_at(model, loc)), ((), [model]))
     for start, models in starts[:1] if item else starts:
         if (below := _deeper(models, key)) is not None:
-            return f"it belongs into `{dotted_path([*existing_keys(tree, start), *below])}`"
+            return f"move it to `{dotted_path([*existing_keys(tree, start), *below])}`"
     return ""
 
 
 def hint_for_reserved_key(loc: Sequence[Key], key: str) -> str:
-    """What a key means that stands where only others may: whose a fault or criterion is, and steps of steps."""
+    """Return a hint for `robot` in faults and criteria, and for `then` in a step."""
     if key == "robot" and loc and loc[0] in ("faults", "pass", "robots"):
-        return "what is of one of several robots stands under its name: `robots: {NAME: {faults: …, pass: …}}`"
+        return "write it under the name of the robot: `robots: {NAME: {faults: …, pass: …}}`"
     if key == "then" and "then" in loc:
-        return "a step has no steps of its own: write them behind it, in the same list"
+        return "a step has no steps of its own; add them to the same list, after this step"
     return ""
 
 
 def _as_list(node: Node, in_list: bool) -> str:
     if in_list and isinstance(node, ScalarNode) and isinstance(node.value, int | float):
-        return "each point is a list of its own: `[[1, 2], [3, 4]]`"
+        return "write each point as a list: `[[1, 2], [3, 4]]`"
     if isinstance(node, MappingNode):
-        return "begin each entry of the list with `- `"
+        return "start each item of the list with `- `"
     return f"write `[{node.value}]`" if isinstance(node, ScalarNode) and isinstance(node.value, str) else ""
 
 
 def _as_mapping(models: Iterable[type[BaseModel]], node: SequenceNode) -> str:
     if all(isinstance(item, MappingNode) for item in node.items):
-        return "remove the `-`: it is no list"
+        return "remove the `-`: a mapping is expected, not a list"
     values = [str(item.value) for item in node.items if isinstance(item, ScalarNode)]
     if len(values) != len(node.items) or len(values) not in (2, 3):
         return ""
@@ -78,7 +78,7 @@ def _as_mapping(models: Iterable[type[BaseModel]], node: SequenceNode) -> str:
 
 
 def _as_value(models: Iterable[type[BaseModel]], node: ScalarNode) -> str:
-    """A mapping that needs one key, or none, of which only the value is written."""
+    """Return a hint if a value was written instead of a mapping with one key, or with none."""
     plain = [model for model in models if not issubclass(model, Choice)]
     fitting = {key for model in plain for key in keys_of([model]) if _holds(model, {key: node.value})}
     if len(fitting) == 1 and not isinstance(node.value, bool):
@@ -94,34 +94,34 @@ def _holds(model: type[BaseModel], value: dict[str, object]) -> bool:
     return True
 
 
-def _as_told(model: type[BaseModel], loc: Sequence[Key]) -> str:
-    """Where to read what a word takes."""
+def _explain_hint(model: type[BaseModel], loc: Sequence[Key]) -> str:
+    """Return a hint to `simscen explain` for a choice."""
     chosen = any(issubclass(one, Choice) and loc[-1] in one.choices() for one in models_at(model, loc[:-1]) if loc)
-    return f"`simscen explain {loc[-1]}` tells what it takes" if chosen else ""
+    return f"`simscen explain {loc[-1]}` shows its keys" if chosen else ""
 
 
 def _as_word(models: Iterable[type[BaseModel]], word: str, in_list: bool) -> str:
-    """A word of a choice without its colon."""
+    """Return a hint if the key of a choice was written without a colon."""
     for choice in (model for model in models if issubclass(model, Choice)):
         keys = [*choice.choices()]
         if word not in keys:
             near = suggestion(word, keys)
             return near.replace("`?", ": …`?") if near.startswith("did") else ""
-        told = models_at(choice, [word])
-        body = "{}" if told and all(needs_nothing(model) for model in told) else "…"
+        chosen = models_at(choice, [word])
+        body = "{}" if chosen and all(needs_nothing(model) for model in chosen) else "…"
         written = f"`{word}: {body}`" if in_list else f"`{{{word}: {body}}}`"
-        return f"write {written}" + ("" if body == "{}" else f"; `simscen explain {word}` tells what it takes")
+        return f"write {written}" + ("" if body == "{}" else f"; `simscen explain {word}` shows its keys")
     return ""
 
 
 def _deeper(models: Iterable[type[BaseModel]], key: str, depth: int = 1) -> list[Key] | None:
-    """The keys of mappings that lead to the nearest one that knows `key`."""
+    """Return the keys of the nearest mapping below that knows `key`."""
     holders = [(name, models_at(model, [name])) for model in models if not issubclass(model, Choice)
                for name in keys_of([model])]  # fmt: skip
     for name, below in holders:
         if any(not issubclass(model, Choice) and key in keys_of([model]) for model in below):
             return [name]
-    if depth < DEEPEST:
+    if depth < MAX_SEARCH_DEPTH:
         for name, below in holders:
             if (found := _deeper(below, key, depth + 1)) is not None:
                 return [name, *found]

@@ -1,7 +1,7 @@
-"""What the models allow at a place, with what installed packages add: the keys that would have been right there.
+"""Find the models and keys that are valid at a position, including those of installed packages.
 
-A pydantic `loc` mixes keys of the file with tags of unions. Both are followed here along the types, keeping every
-model that could be meant.
+A pydantic `loc` mixes keys of the file with tags of unions. Both are followed along the types, and every model that
+may be meant is kept.
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,7 +18,7 @@ from simscen.spec.lazy import LazySpec, annotation_of
 
 
 def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel]]:
-    """The models that a mapping at `loc` below `model` may be written for."""
+    """Return the models that a mapping at `loc` below `model` may be an instance of."""
     candidates: list[Any] = [model]
     for part in loc:
         options = [option for candidate in candidates for option in _options(candidate)]
@@ -30,7 +30,7 @@ def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel
 
 
 def types_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
-    """The values that `type` may have in a mapping at `loc`."""
+    """Return the valid values of `type` in a mapping at `loc`."""
     return [str(value) for kind in models_at(model, loc) for value in _types(kind)]
 
 
@@ -44,18 +44,18 @@ def types_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -> list
 
 
 def keys_of(models: Iterable[type[BaseModel]]) -> list[str]:
-    """The keys that these models know, as they are written in YAML."""
+    """Return the keys of these models as written in YAML."""
     keys = [field.alias or name for model in models for name, field in model.model_fields.items()]
     return list(dict.fromkeys(keys))
 
 
 def needs_nothing(model: type[BaseModel]) -> bool:
-    """Whether `{}` is a complete specification."""
+    """Return whether `{}` is a complete specification."""
     return not issubclass(model, RootModel | Choice) and not any(f.is_required() for f in model.model_fields.values())
 
 
 def field_type(model: type[BaseModel], key: str) -> Any:
-    """The declared type of the field that is written as `key`; None where there is none, or its package is broken."""
+    """Return the declared type of the field with this key; None if there is none, or its package is broken."""
     for name, field in model.model_fields.items():
         if key in (field.alias, name):
             return _type_of(field)
@@ -74,7 +74,7 @@ def _type_of(field: FieldInfo) -> Any:
 
 
 def _options(kind: Any) -> list[Any]:
-    """The members of a union, tagged or not; any other type is its own only option."""
+    """Return the members of a union; for any other type, the type itself."""
     if mark := _by_type(kind):
         return [*_options(mark.own), *(Annotated[model, Tag(name)] for name, model in added(mark.group))]
     bare = _bare(kind)
@@ -104,7 +104,7 @@ def _below(kind: Any, part: Key) -> list[Any]:
 
 
 def _tags(option: Any) -> set[str]:
-    """What pydantic may call this member of a union in a `loc`."""
+    """Return the names that pydantic may use for this member of a union in a `loc`."""
     tags = {meta.tag for meta in _metadata(option) if isinstance(meta, Tag)}
     bare = _bare(option)
     if _is_model(bare):
@@ -132,7 +132,7 @@ def _bare(kind: Any) -> Any:
 
 
 def _widened(choice: type[Choice]) -> type[Choice]:
-    from simscen.spec.choice import widened  # only where something is wrong: nothing else looks for packages
+    from simscen.spec.choice import widened  # searches installed packages, so only used to explain problems
 
     return widened(choice)
 

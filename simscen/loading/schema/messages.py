@@ -1,4 +1,4 @@
-"""What pydantic found wrong, in the words of somebody who writes YAML."""
+"""Translate errors of pydantic to messages for authors of YAML files."""
 
 import difflib
 import re
@@ -39,7 +39,7 @@ _TEXTS = {
 
 
 class Message(NamedTuple):
-    """A stable code, what is wrong, and how to mend it."""
+    """Stable error code, message and hint."""
 
     code: str
     text: str
@@ -47,7 +47,7 @@ class Message(NamedTuple):
 
 
 def describe_node(node: Node) -> str:
-    """What stands there, as a message calls it."""
+    """Return a node as messages describe it, e.g. "the text `abc`"."""
     if isinstance(node, MappingNode):
         return "a mapping"
     if isinstance(node, SequenceNode):
@@ -56,20 +56,20 @@ def describe_node(node: Node) -> str:
     if value is None:
         return "nothing"
     if isinstance(value, bool):
-        return f"the truth value {str(value).lower()}"
+        return f"the boolean {str(value).lower()}"
     if isinstance(value, str):
         return f"the text {quoted(value)}"
     return f"the {'integer' if isinstance(value, int) else 'number'} {value}"
 
 
 def quoted(text: str, most: int = 60) -> str:
-    """User text inside a message: on one line, printable, not too long."""
-    short_value = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-    return f"`{short_value if len(short_value) <= most else short_value[: most - 1] + '…'}`"
+    """Return user text for a message: in backquotes, on one line, printable, shortened to `most` characters."""
+    printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    return f"`{printable if len(printable) <= most else printable[: most - 1] + '…'}`"
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """ "did you mean …" when something known is near; else a list of what is known."""
+    """Return "did you mean …?" if a known word is similar, else a list of the known words."""
     choices = list(known)
     lowered = {choice.lower(): choice for choice in reversed(choices)}
     near = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
@@ -79,13 +79,13 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 def _listed(choices: list[str]) -> str:
-    """The first ones, where there are too many to read: an imported world has hundreds of names."""
+    """Return the first choices; an imported world may have hundreds of names."""
     more = len(choices) - MAX_LISTED_CHOICES
     return f"{', '.join(choices[:MAX_LISTED_CHOICES])}, and {more} more" if more > 1 else ", ".join(choices)
 
 
 def translate_error(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Message:
-    """What pydantic's error type `kind` on the value `node` means; `text` is pydantic's own message."""
+    """Return the message for pydantic's error type `kind` at `node`; `text` is pydantic's own message."""
     if kind in _KINDS:
         return Message("SC011", f"expected {_KINDS[kind]}, got {describe_node(node)}", _type_hint(kind, node))
     if kind in _BOUNDS:
@@ -102,16 +102,13 @@ def translate_error(kind: str, context: Mapping[str, Any], node: Node, text: str
             suggestion(word, _choices(str(context["expected"]))),
         )
     if kind == "value_error":
-        told = str(context["error"])
-        return (
-            Message("SC016", "nothing is chosen here", told)
-            if told.startswith("expected one of")
-            else Message("SC016", told)
-        )
+        reason = str(context["error"])
+        is_empty_choice = reason.startswith("expected one of")
+        return Message("SC016", "a key is missing here", reason) if is_empty_choice else Message("SC016", reason)
     if kind == "plugin":
         return Message("SC019", str(context["problem"]), str(context["hint"]))
     if kind == "quantity":
-        units = f"units: {context['units']}; a bare number is SI"
+        units = f"units: {context['units']}; a number without a unit is in SI units"
         written = str(node.value) if isinstance(node, ScalarNode) else ""
         return Message("SC015", str(context["problem"]), lookalike_hint(written) or _bare_number(node) or units)
     if "names" in context:
@@ -138,14 +135,14 @@ def _type_hint(kind: str, node: Node) -> str:
 
 
 def _bare_number(node: Node) -> str:
-    """How to make a number of a text that is one but for its quotes or its zeros."""
+    """Return how to correct text that is a number with quotes or leading zeros."""
     if not isinstance(node, ScalarNode) or not isinstance(node.value, str) or not _NUMBER.fullmatch(node.value):
         return ""
     return "remove the leading zero" if _LEADING_ZERO.match(node.value) else "remove the quotes"
 
 
 def short_value(node: Node) -> str:
-    """The value that stands there, short."""
+    """Return the value of a node, shortened."""
     if isinstance(node, ScalarNode) and node.value is not None:
         return quoted(str(node.value).lower() if isinstance(node.value, bool) else str(node.value))
     return describe_node(node)
@@ -156,7 +153,7 @@ def _number(value: Any) -> str:
 
 
 def _choices(expected: str) -> list[str]:
-    """Pydantic lists choices as "'a', 'b' or 'c'"."""
+    """Return the choices in pydantic's text "'a', 'b' or 'c'"."""
     return [part.strip().strip("'") for part in expected.replace(" or ", ", ").split(",")]
 
 
@@ -165,7 +162,7 @@ def _bad_name(node: Node, pattern: str) -> Message:
     control = next((c for c in value if not c.isprintable()), None)
     if control is not None:
         return Message("SC017", f"control character U+{ord(control):04X} in {quoted(value)}", "remove it")
-    hint = "begin with a letter or `_`, then letters, digits, spaces, `_`, `.` and `-`"
+    hint = "start with a letter or `_`, then use letters, digits, spaces, `_`, `.` and `-`"
     if pattern == NAMESPACE:
-        hint = "it is a namespace in ROS, too: begin with a letter, then letters, digits, and single `_` between them"
-    return Message("SC017", f"{quoted(value)} cannot be a name here", hint)
+        hint = "it is also a ROS namespace: start with a letter, then use letters, digits, and single `_` between them"
+    return Message("SC017", f"{quoted(value)} is not a valid name", hint)

@@ -1,4 +1,4 @@
-"""Validate a tree against a model: the model, or every problem at the line and column to mend."""
+"""Validate a tree against a pydantic model."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
@@ -30,11 +30,12 @@ Model = TypeVar("Model", bound=BaseModel)
 LANGUAGE_VERSION = 1
 
 
-Lacking = Callable[[MappingNode], list[Problem]]
+MissingKeys = Callable[[MappingNode], list[Problem]]
+"""Finds problems that depend on several keys, which no model can express."""
 
 
-def check(model: type[Model], tree: Node, also: Lacking | None = None) -> Model | list[Problem]:
-    """The specification that `tree` holds, or all that is wrong with it; `also` looks for what no model tells."""
+def check(model: type[Model], tree: Node, also: MissingKeys | None = None) -> Model | list[Problem]:
+    """Return the specification in `tree`, or all its problems; `also` finds problems that the model does not."""
     if not isinstance(tree, MappingNode):
         return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")]
     if problem := _other_version(tree):
@@ -44,17 +45,14 @@ def check(model: type[Model], tree: Node, also: Lacking | None = None) -> Model 
     try:
         spec = model.model_validate(tree.plain, by_alias=True, by_name=False)
     except ValidationError as error:
-        told = error.errors(include_input=False, include_url=False)
-        found = [_translate(model, tree, dict(e)) for e in told if not _follows_from_empty(tree, dict(e))]
-        return _distinct([*empty, *more, *found])
+        errors = error.errors(include_input=False, include_url=False)
+        found = [_translate(model, tree, dict(e)) for e in errors if not _follows_from_empty(tree, dict(e))]
+        return _without_duplicates([*empty, *more, *found])
     return [*empty, *more] or spec
 
 
 def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
-    """All that is wrong with what `tree` says, whatever it leaves to the files that extend it.
-
-    These can add keys to its mappings, but nothing to what stands in its lists.
-    """
+    """Return the problems of a file that other files extend; they may add missing keys, except inside of lists."""
     if not isinstance(tree, MappingNode):
         return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")]
     if problem := _other_version(tree):
@@ -63,14 +61,14 @@ def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
     try:
         model.model_validate(tree.plain, by_alias=True, by_name=False)
     except ValidationError as error:
-        told = [dict(found) for found in error.errors(include_input=False, include_url=False)]
-        said = [found for found in told if not _may_be_added(found) and not _follows_from_empty(tree, found)]
-        return _distinct([*empty, *(_translate(model, tree, found) for found in said)])
+        errors = [dict(found) for found in error.errors(include_input=False, include_url=False)]
+        relevant = [found for found in errors if not _may_be_added(found) and not _follows_from_empty(tree, found)]
+        return _without_duplicates([*empty, *(_translate(model, tree, found) for found in relevant)])
     return empty
 
 
 def _may_be_added(error: dict[str, Any]) -> bool:
-    """Whether only a key is missing, in a mapping that is in no list."""
+    """Return whether an error is a missing key outside of lists."""
     in_a_list = any(isinstance(part, int) for part in error["loc"])
     return error["type"] in ("missing", "union_tag_not_found") and not in_a_list
 
@@ -115,7 +113,7 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
     if mended := textfile.lookalike_hint(key):
         hint = mended
     elif key in Trigger.modifiers and models == [Test]:
-        hint = f"`{key}` is of the whole trigger: it stands beside the `all`, `any` or `not` of `when`"
+        hint = f"`{key}` applies to the whole trigger: write it next to `all`, `any` or `not` under `when`"
     elif others := types_with_key(model, loc[:-1], key):
         hint = f"`{key}` is a parameter of type {' and '.join(f'`{name}`' for name in others)}"
     elif elsewhere := common_mistakes.hint_for_reserved_key(loc[:-1], key):
@@ -130,13 +128,13 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
 def _missing_key(tree: Node, loc: tuple[Key, ...]) -> Problem:
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     if isinstance(loc[-1], int):
-        return _problem(key_position(tree, loc[:-1]), "SC017", f"`{holder}` has too few values: none at [{loc[-1]}]")
+        return _problem(key_position(tree, loc[:-1]), "SC017", f"`{holder}` has too few values: [{loc[-1]}] is missing")
     where = f" in `{holder}`" if holder else ""
     return _problem(key_position(tree, loc[:-1]), "SC010", f"missing key `{loc[-1]}`{where}")
 
 
 def _wrong_type(model: type[BaseModel], tree: Node, loc: tuple[Key, ...], error: dict[str, Any]) -> Problem:
-    """A union told apart by `type:` whose type is missing or unknown."""
+    """Return the problem of a mapping whose `type` is missing or unknown."""
     node, types = node_at(tree, loc), types_at(model, loc)
     if not isinstance(node, MappingNode):
         return _problem(value_position(tree, loc), "SC011", f"expected a mapping, got {messages.describe_node(node)}")
@@ -149,7 +147,7 @@ def _wrong_type(model: type[BaseModel], tree: Node, loc: tuple[Key, ...], error:
 
 
 def _empty(node: Node, loc: tuple[Key, ...] = ()) -> Iterator[tuple[Key, ...]]:
-    """Where nothing is written: `off:` where `off: {}` was meant, or a value that was forgotten."""
+    """Yield the keys of empty values: `off:` instead of `off: {}`, or a forgotten value."""
     if isinstance(node, MappingNode):
         for key, entry in node.entries.items():
             yield from _empty(entry.value, (*loc, key))
@@ -173,7 +171,7 @@ def _no_value(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Probl
 
 
 def _follows_from_empty(tree: Node, error: dict[str, Any]) -> bool:
-    """Whether pydantic only says in its way that something is empty."""
+    """Return whether an error of pydantic only repeats that a value is empty."""
     node = node_at(tree, error["loc"])
     if isinstance(node, ScalarNode):
         return node.value is None
@@ -181,14 +179,14 @@ def _follows_from_empty(tree: Node, error: dict[str, Any]) -> bool:
     return holds_nothing and error["type"] == "value_error"
 
 
-def _distinct(problems: list[Problem]) -> list[Problem]:
-    """One problem for one mistake: members of a union complain at one place, and a misspelt key is also missing."""
+def _without_duplicates(problems: list[Problem]) -> list[Problem]:
+    """Return one problem per mistake: members of a union repeat problems, and a misspelled key is also missing."""
     places: dict[tuple[str, int, int, str], Problem] = {}
     for problem in problems:
         key = problem.code if problem.code == "SC010" else ""
         places.setdefault((problem.path, problem.line, problem.col, key and problem.message), problem)
-    misspelt = {problem.hint for problem in problems if problem.code == "SC012"}
-    return [p for p in places.values() if not (p.code == "SC010" and p.hint == "" and _meant(p) in misspelt)]
+    misspelled = {problem.hint for problem in problems if problem.code == "SC012"}
+    return [p for p in places.values() if not (p.code == "SC010" and p.hint == "" and _meant(p) in misspelled)]
 
 
 def _meant(missing: Problem) -> str:

@@ -1,4 +1,4 @@
-"""A stack that the command line chooses for every scenario, in place of the scenario's own."""
+"""Stack that the command line selects for all scenarios with `--stack`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,20 +9,19 @@ from simscen.core.external_command import ExternalCommand
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, child
 
 SCENARIO_KEYS = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
-"""What of a `stack:` section is about the world rather than the stack: it stays, whichever stack drives there."""
+"""Keys of a `stack:` section that describe the world: they stay for every stack."""
 COMMON_STACK_KEYS = ("controller_frequency",)
-"""What a scenario may ask of a stack of any kind."""
+"""Keys that all types of stacks have."""
 CHECKER, TOLERANCES = "goal_checker", ("xy_goal_tolerance", "yaw_goal_tolerance")
 REFERENCE, EXTERNAL = "reference", "external"
 
 
 @dataclass(frozen=True)
 class StackChoice:
-    """What `--stack NAME=VALUE` means; `value` is as it was given.
+    """Stack given as `--stack NAME=VALUE`: a stack file, a type of stack, or the command of an external stack.
 
-    `file` is the stack file that it names, `section` the `stack:` of that; `type` is the type of stack that it names;
-    `runs` is the command that it is. `texts` and `files` are those of the stack file and what it extends (Library),
-    `notes` what of them means nothing.
+    `section` is the `stack:` section of the stack file `file`. `texts` and `files` are those of the stack file and the
+    files it extends (see Library); `notes` are warnings about them. `runs` is the command.
     """
 
     name: str
@@ -41,7 +40,7 @@ class StackChoice:
         return f"{self.name}={self.value}"
 
     def seen_from(self, folder: Path) -> str:
-        """NAME=VALUE, for a command that is called in another folder; what is not below it is absolute."""
+        """Return NAME=VALUE for a command called in `folder`; a file outside of it is absolute."""
         if self.file is None:
             return self.written
         file = self.file.relative_to(folder).as_posix() if self.file.is_relative_to(folder) else str(self.file)
@@ -49,15 +48,14 @@ class StackChoice:
 
 
 def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
-    """A scenario with the chosen stack in place of its own.
+    """Return a scenario with the selected stack instead of its own.
 
-    Its zones and masks stay, and how near to a goal is near enough. A command or a type of stack says nothing of
-    parameters: those of the scenario's own stack stay where it is of the same kind, else those that any stack has. A
-    file says all of them.
+    Zones, masks and goal tolerances of the scenario stay. A command or a type of stack has no parameters: those of the
+    scenario stay if its own stack is of the same kind, else only those that all stacks have. A file replaces them all.
     """
     own = child(tree, "stack")
     if own is not None and not isinstance(own, MappingNode):
-        return tree  # which is a mistake that is told as such
+        return tree  # validation reports the wrong type
     own = own or MappingNode(tree.place, {})
     if choice.section is None and stack_type(own) == choice.type:
         return tree
@@ -81,7 +79,7 @@ def _section(own: MappingNode, choice: StackChoice) -> MappingNode:
 
 
 def _asked(section: MappingNode, own: MappingNode) -> MappingNode:
-    """The section with the tolerances of goals that the scenario asks for: every stack is judged by them."""
+    """Return the section with the goal tolerances of the scenario, by which every stack is judged."""
     checker, below = child(own, CHECKER), child(section, CHECKER)
     if not isinstance(checker, MappingNode) or not isinstance(below, MappingNode | None):
         return section
@@ -93,7 +91,7 @@ def _asked(section: MappingNode, own: MappingNode) -> MappingNode:
 
 
 def stack_type(section: Node) -> str | None:
-    """The type of stack of a `stack:` section, as far as it has a plain one; an external one has none."""
+    """Return the type of a `stack:` section; None for an external stack or an invalid type."""
     if child(section, EXTERNAL) is not None:
         return None
     written = child(section, "type")

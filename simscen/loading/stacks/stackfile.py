@@ -1,4 +1,4 @@
-"""Read a `*.stack.yaml`: the parameters of a stack, for every scenario that is run with it."""
+"""Read stack files (`*.stack.yaml`), and recognize them where a scenario is expected."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,9 +17,9 @@ from simscen.model.stackfile import StackFileSpec
 
 
 def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: Sequence[Path] = ()) -> StackChoice:
-    """The stack in `path`, which may lie outside `root`: whoever calls the command chooses it.
+    """Return the stack in `path`, which may be outside `root` because the command line names it.
 
-    Raises InvalidInput with all that is wrong with it.
+    Raises InvalidInput with all problems of the file.
     """
     library = Library(PathSandbox.around(root, [*world_path, path.parent]))
     found = read_stack_file(path, library)
@@ -32,12 +32,10 @@ def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: S
 
 
 def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Problem]] | list[Problem]:
-    """The `stack:` section of a stack file and what of it means nothing, or all that is wrong with the file.
+    """Return the `stack:` section of a stack file and warnings about it, or all problems of the file.
 
-    A parameter file of Nav2 is taken for a stack file that names it.
-
-    What a parameter file of Nav2 says is part of the section, which names that file no more: it may lie where no
-    scenario can reach it.
+    A Nav2 parameter file counts as a stack file with `nav2_params`. The section contains the Nav2 parameters, but no
+    longer the path of their file, which may be outside the root of the scenarios.
     """
     file = library.fence.entered(path)
     if isinstance(file, Problem):
@@ -62,7 +60,7 @@ def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Pro
 
 
 def _read(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:
-    """The tree of a stack file; of a parameter file of Nav2 that of one which names it."""
+    """Return the tree of a stack file; for a Nav2 parameter file, of a stack file with `nav2_params`."""
     shown = library.fence.shown(file)
     text = read_text(file, shown)
     if isinstance(text, Problem) or not is_nav2_parameter_file(text, shown):
@@ -78,10 +76,10 @@ def _read(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:
 
 
 def _misplaced(section: MappingNode) -> list[Problem]:
-    """What belongs into a scenario: regions and masks are of a world, and a stack is to drive in many."""
-    hint = "write it under `stack:` of the scenario, where it holds for every stack"
+    """Return problems with zones and masks, which belong to a world and so to a scenario."""
+    hint = "write it under `stack:` of the scenario, where it applies to every stack"
     return [
-        Problem(*key_position(section, (name,)), "SC016", f"`{name}` is the scenario's, not the stack's", hint)
+        Problem(*key_position(section, (name,)), "SC016", f"`{name}` belongs to a scenario, not to a stack file", hint)
         for name in SCENARIO_KEYS
         if name in section.entries
     ]
@@ -92,7 +90,7 @@ _OF_A_STACK_FILE = frozenset({"simscen", "name", "description", "stack"})
 
 
 def recognize_stack_file(tree: Node | None, text: str, shown: str) -> str:
-    """STACK_FILE or PARAMETER_FILE, if it is one of them; "" = anything else."""
+    """Return STACK_FILE_KIND or NAV2_FILE_KIND if the file is one of them, else ""."""
     if is_nav2_parameter_file(text, shown):
         return NAV2_FILE_KIND
     keys = set(tree.entries) if isinstance(tree, MappingNode) else set()
@@ -100,7 +98,7 @@ def recognize_stack_file(tree: Node | None, text: str, shown: str) -> str:
 
 
 def not_a_scenario(kind: str, shown: str) -> Problem:
-    """That a file of this kind is no scenario, and how scenarios are run with it."""
+    """Return the problem that a file of this kind is not a scenario, with a hint how to use it."""
     written = f", or name it in a scenario: `stack: {{nav2_params: {shown.rpartition('/')[2]}}}`"
     hint = f"run scenarios with `--stack NAME={shown}`{written if kind == NAV2_FILE_KIND else ''}"
-    return Problem(shown, 0, 0, "SC025", f"a {kind}, and no scenario", hint)
+    return Problem(shown, 0, 0, "SC025", f"this is a {kind}, not a scenario", hint)

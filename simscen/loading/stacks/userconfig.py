@@ -1,4 +1,4 @@
-"""Read the user's own configuration."""
+"""Read the user configuration, which defines the commands of external stacks."""
 
 import os
 from collections.abc import Iterable, Mapping
@@ -22,7 +22,7 @@ from simscen.model.userconfig import UserConfigSpec
 
 @dataclass(frozen=True)
 class UserConfig:
-    """A configuration with where it is written."""
+    """User configuration and the file that it was read from."""
 
     file: Path
     spec: UserConfigSpec
@@ -30,16 +30,16 @@ class UserConfig:
     library: Library | None = field(repr=False, default=None)
 
     def command(self, name: str, environment: Mapping[str, str], folder: Path) -> ExternalCommand | None:
-        """What a stack's name runs, called from `folder` with this environment; None for a name that is not there.
+        """Return the command of an external stack, called from `folder`; None if the configuration has none.
 
-        Raises InvalidInput where it cannot be run.
+        Raises InvalidInput if it cannot be run.
         """
         if name not in self.spec.stacks:
             return None
         said = self.spec.stacks[name]
         home = folder if said.cwd is None else Path(said.cwd).expanduser()
         if not home.is_dir():
-            raise self._wrong((name, "cwd"), "there is no such folder", "")
+            raise self._wrong((name, "cwd"), "no such folder", "")
         try:
             return parse_command(said.command, environment, home, said.env, (said.start_limit, said.answer_limit))
         except ValueError as error:
@@ -54,10 +54,10 @@ class UserConfig:
 
 
 def load_config(file: Path) -> UserConfig:
-    """The configuration in `file`; an empty one where there is none. Raises InvalidInput with all that is wrong."""
+    """Return the configuration in `file`; an empty one if it does not exist. Raises InvalidInput with all problems."""
     if not exists(file):
         return UserConfig(file, UserConfigSpec())
-    # Its root holds nothing, so that problems show where the file is: it is no part of a project.
+    # With this root, problems show the absolute path of the file, which is not part of a project.
     library = Library(PathSandbox.around(Path(os.devnull), [file.parent]))
     tree, problems = library.read(file)
     spec = check(UserConfigSpec, tree) if tree is not None else []
@@ -67,9 +67,9 @@ def load_config(file: Path) -> UserConfig:
 
 
 def undefined_stack(loaded: LoadedScenario, known: Iterable[str] = (), config: Path | None = None) -> Problem | None:
-    """The problem of a scenario whose external stack has a name of which nobody says what it runs.
+    """Return the problem that the external stack of a scenario has no command; None if it has one.
 
-    `known` are the names of which somebody does; `config` is the file that could say so.
+    `known` are the names of stacks with a command; `config` is the user configuration.
     """
     stack = loaded.spec.stack
     if not isinstance(stack, ExternalStackSpec) or loaded.runs is not None:
@@ -77,18 +77,19 @@ def undefined_stack(loaded: LoadedScenario, known: Iterable[str] = (), config: P
     name = stack.external
     near = suggestion(name, known)
     there = f", or under `stacks:` in {config}" if config is not None else ""
-    hint = near if near.startswith("did") else f"say so with --stack {name}='COMMAND'{there}"
-    message = f"nobody says what the stack {quoted(name)} runs"
+    hint = near if near.startswith("did") else f"give it with --stack {name}='COMMAND'{there}"
+    message = f"the external stack {quoted(name)} has no command"
     return loaded.problem(("stack", EXTERNAL), "SC060", message, hint)
 
 
 def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config: Path) -> list[Problem]:
-    """The problem that several --stack, of which each is for a run of its own, say what robots of one run have.
+    """Return the problem that several --stack name external stacks of one run; each --stack makes its own runs.
 
-    `given` are the names of which the command line says what they run.
+    `given` are the names with a command on the command line.
     """
     own = {name: view for view in loaded.robots.values() if (name := external_stack_name(view.tree)) is not None}
     said = [name for name in given if name in own]
-    message = f"robots here have the stacks {' and '.join(map(quoted, said))}, but a run has one --stack"
-    hint = f"say what all but one of them run under `stacks:` in {config}"
+    stacks = " and ".join(map(quoted, said))
+    message = f"robots of this scenario have the stacks {stacks}, but a run can have only one --stack"
+    hint = f"define the commands of all but one under `stacks:` in {config}"
     return [own[said[1]].problem(("stack", EXTERNAL), "SC042", message, hint)] if len(said) > 1 else []

@@ -1,4 +1,4 @@
-"""A scenario with `variations:` becomes as many scenarios, each a tree of its own with the values put in."""
+"""Expand a scenario with `variations:` to one tree per variation."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,19 +13,19 @@ from simscen.loading.variations.naming import NAME_HINT, derive_name, make_uniqu
 from simscen.loading.variations.paths import PathError, Target, resolve_path, set_value
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, child, node_at
 
-if TYPE_CHECKING:  # what most scenarios do not need is imported where it is
+if TYPE_CHECKING:  # most scenarios have no variations
     from simscen.model.variations import Sampled, VariationBlock
 
 VARIATIONS = "variations"
 MAX_TOTAL_VALUES = 5_000_000
-"""Of all variations of a scenario together: each is looked at as a whole."""
-_SAID_OF_IT = frozenset({"description", "tags", "expected", "skip"})
-"""What a variation may say that is no value it is run with: its name need not tell."""
+"""Limit on the number of values of all variations of a scenario together."""
+_DESCRIPTIVE_KEYS = frozenset({"description", "tags", "expected", "skip"})
+"""Keys that do not change the run, and so do not appear in names of variations."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """A value for a path; `number` is its place in its list, from 1 on."""
+    """Value for a path; `number` counts the values of the path from 1."""
 
     target: Target
     value: Node
@@ -34,7 +34,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Option:
-    """Changes that go together, with the name that was given to them."""
+    """Changes that belong together, and their name if the author gave one."""
 
     changes: tuple[Change, ...]
     name: str = ""
@@ -42,7 +42,7 @@ class Option:
 
 @dataclass(frozen=True)
 class Variation:
-    """A scenario with the values of `changes` put in; a file without variations is its only one, without a name."""
+    """Scenario with the values of `changes`; a file without variations is a single variation without a name."""
 
     name: str
     tree: MappingNode = field(repr=False)
@@ -50,7 +50,7 @@ class Variation:
 
     @property
     def set_by(self) -> Mapping[Position, str]:
-        """The path that put a value there, by the place of the value and of each part of it."""
+        """The path of each changed value, by the position of the value and of each of its parts."""
         return {
             place: change.target.path
             for change in self.changes
@@ -59,7 +59,7 @@ class Variation:
 
 
 def expand_variations(tree: MappingNode) -> list[Variation] | list[Problem]:
-    """All variations of a scenario, in order, or what is wrong with how they are said."""
+    """Return all variations of a scenario in order, or the problems of its `variations`."""
     entry = tree.entries.get(VARIATIONS)
     if entry is None:
         return [Variation("", tree)]
@@ -76,11 +76,11 @@ def expand_variations(tree: MappingNode) -> list[Variation] | list[Problem]:
     if expansion.problems:
         return expansion.problems
     if (number := sum(math.prod(map(len, block)) for block in axes)) > MOST:
-        message = f"these are {number} variations; a scenario may have {MOST}"
-        return [Problem(*entry.value.place, "SC017", message, "`sampled` draws some of many")]
+        message = f"the scenario has {number} variations; the limit is {MOST}"
+        return [Problem(*entry.value.place, "SC017", message, "use `sampled` to draw some of them")]
     values = _size(own) + max((sum(max(map(_weight, axis)) for axis in block) for block in axes), default=0)
     if number * values > MAX_TOTAL_VALUES:
-        message = f"{number} variations of up to {values} values are more than {MAX_TOTAL_VALUES} values in all"
+        message = f"{number} variations of up to {values} values exceed the limit of {MAX_TOTAL_VALUES} values in total"
         return [Problem(*entry.value.place, "SC006", message)]
     options = [list(chosen) for block in axes for chosen in product(*block)]
     return expansion.named(options) if options else [Variation("", own)]
@@ -88,7 +88,7 @@ def expand_variations(tree: MappingNode) -> list[Variation] | list[Problem]:
 
 @dataclass
 class _Expansion:
-    """Makes variations of `tree` and collects what is wrong."""
+    """Builder of the variations of `tree`; collects problems."""
 
     tree: MappingNode
     problems: list[Problem] = field(default_factory=list)
@@ -96,7 +96,7 @@ class _Expansion:
     _names: dict[str, Position] = field(default_factory=dict)
 
     def axes(self, block: "VariationBlock", node: Node) -> list[list[Option]]:
-        """What is combined with each other: each path of a grid, and each of the other kinds as a whole."""
+        """Return the axes whose options are combined: each path of a grid, and each other kind as a whole."""
         found = [[Option((change,)) for change in changes] for changes in self._columns(child(node, "grid"), True)]
         if block.pairs is not None:
             found.append(self._pairs(child(node, "pairs")))
@@ -108,14 +108,14 @@ class _Expansion:
         return found
 
     def named(self, chosen: Sequence[Sequence[Option]]) -> list[Variation] | list[Problem]:
-        """The variations, each with its name."""
+        """Return the variations with their names."""
         values = [
             {change.target.path: change.value.plain for o in options for change in o.changes} for options in chosen
         ]
         differ = {path for path in self._targets if any(one.get(path) != values[0].get(path) for one in values)}
         everything = list(self._targets.values())
-        told = [target for target in everything if target.keys[0] not in _SAID_OF_IT] or everything
-        keys = short_names([target for target in told if target.path in differ] or told)
+        named = [target for target in everything if target.keys[0] not in _DESCRIPTIVE_KEYS] or everything
+        keys = short_names([target for target in named if target.path in differ] or named)
         names = [self._name(options, keys, number) for number, options in enumerate(chosen, start=1)]
         given = [len(options) == 1 and bool(options[0].name) for options in chosen]
         variations = []
@@ -138,7 +138,7 @@ class _Expansion:
         return name if name and name_error(name) is None else f"variation-{number}"
 
     def _columns(self, node: Node | None, distinct: bool) -> list[list[Change]]:
-        """The changes of each path."""
+        """Return the changes of each path."""
         if not isinstance(node, MappingNode):
             return []
         found = []
@@ -161,7 +161,8 @@ class _Expansion:
         for path in others:
             if lengths[path] != lengths[first]:
                 message = f"{quoted(path)} has {lengths[path]} values, {quoted(first)} has {lengths[first]}"
-                self._add(node.entries[path].value.place, "SC016", message, "pairs are lists of the same length")
+                hint = "the lists of `pairs` must have the same length"
+                self._add(node.entries[path].value.place, "SC016", message, hint)
                 return []
         return [Option(changes) for changes in zip(*self._columns(node, False), strict=True)]
 
@@ -173,7 +174,7 @@ class _Expansion:
             name = self._given_name(item)
             entries = [(path, entry) for path, entry in item.entries.items() if path != "name"]
             if not entries:
-                self._add(item.place, "SC010", "this variation changes nothing", "give it a path and its value")
+                self._add(item.place, "SC010", "this variation changes nothing", "add a path and its value")
             targets = [(self._target(path, entry), entry) for path, entry in entries]
             changes = [Change(target, entry.value, number) for target, entry in targets if target is not None]
             self._require_apart([[Option((change,))] for change in changes])
@@ -190,7 +191,7 @@ class _Expansion:
             self._add(place, "SC017", flaw, NAME_HINT)
         first = self._names.setdefault(name.casefold(), place)
         if first != place:
-            self._add(place, "SC033", f"two variations are called {quoted(name)} (the first at line {first.line})")
+            self._add(place, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")
         return name
 
     def _sampled(self, sampled: "Sampled", node: Node) -> list[Option]:
@@ -227,11 +228,11 @@ class _Expansion:
         seen: list[object] = []
         for item in items.items:
             if item.plain in seen:
-                self._add(item.place, "SC054", "this value is there twice", "remove one of the two")
+                self._add(item.place, "SC054", "this value is listed twice", "remove one of them")
             seen.append(item.plain)
 
     def _require_apart(self, axes: Sequence[Sequence[Option]]) -> None:
-        """No two of what is combined may change the same value, or one what is part of the other."""
+        """Report axes that change the same value, or a part of each other's values."""
         targets = [{change.target.path: change.target for o in axis for change in o.changes} for axis in axes]
         for above, below in combinations(targets, 2):
             for one, other in product(above.values(), below.values()):
@@ -252,7 +253,7 @@ def _weight(option: Option) -> int:
 
 
 def _size(node: Node) -> int:
-    """How many values there are."""
+    """Return the number of values below a node."""
     return sum(1 for _ in _places(node))
 
 

@@ -1,4 +1,4 @@
-"""What variations are called: by the values that differ, short, unique, and safe as the name of a folder."""
+"""Names of variations: short, unique, valid as folder names, derived from the values that differ."""
 
 import re
 from collections import Counter
@@ -14,19 +14,19 @@ _UNSAFE = re.compile(r"[^\w.+%-]+")
 
 
 def name_error(name: str) -> str | None:
-    """Why a name that was given to a variation cannot be one; None for a good one."""
+    """Return why a name of a variation is invalid; None if it is valid."""
     if len(name) <= MAX_NAME_CHARS and _GIVEN.fullmatch(name):
         return None
-    return f"{quoted(name)} cannot be the name of a variation"
+    return f"{quoted(name)} is not a valid name of a variation"
 
 
 NAME_HINT = (
-    f"up to {MAX_NAME_CHARS} letters, digits, `_`, `.`, `,`, `=`, `+`, `-` and `%`, with a letter or digit first"
+    f"up to {MAX_NAME_CHARS} letters, digits, `_`, `.`, `,`, `=`, `+`, `-` and `%`, starting with a letter or digit"
 )
 
 
 def short_names(targets: Sequence[Target]) -> dict[str, str]:
-    """A short name for each path as written: its last part, and as many more before it as tell it from the others."""
+    """Return a short unique name for each path: its last part, and as many parts before it as needed."""
     parts = {target.path: split_path(target.path) for target in targets}
     named = dict.fromkeys(parts, 1)
     while True:
@@ -39,9 +39,9 @@ def short_names(targets: Sequence[Target]) -> dict[str, str]:
 
 
 def derive_name(keys: dict[str, str], values: dict[str, Node], numbers: dict[str, int], number: int) -> str:
-    """The name of a variation that was given none: `speed=0.5,mass=10`.
+    """Return the derived name of a variation: `speed=0.5,mass=10`.
 
-    `numbers` are those of the values in their lists, for what cannot be told in short; `number` is the variation's.
+    `numbers` count the values of each path; they stand for values that are too long. `number` counts the variations.
     """
     name = ",".join(f"{keys[path]}={_value(value) or f'no{numbers[path]}'}" for path, value in values.items())
     name = name if name[:1].isalnum() else f"x{name}"
@@ -49,7 +49,7 @@ def derive_name(keys: dict[str, str], values: dict[str, Node], numbers: dict[str
 
 
 def make_unique(names: Sequence[str], given: Sequence[bool]) -> list[str]:
-    """The names, those that were derived with a number behind them where another differs by case at most."""
+    """Return the names; derived ones get a number if another name is the same up to case."""
     taken = {name.casefold() for name, fixed in zip(names, given, strict=True) if fixed}
     found = []
     for name, fixed in zip(names, given, strict=True):
@@ -62,7 +62,7 @@ def make_unique(names: Sequence[str], given: Sequence[bool]) -> list[str]:
 
 
 def _value(node: Node) -> str:
-    """A value in short; "" where that cannot be."""
+    """Return a value as part of a name; "" if it is too long."""
     match node:
         case ScalarNode(value=value):
             text = (

@@ -1,7 +1,7 @@
-"""How a variation says which value it means: `robot.pose.x`, `goals[0].pose`, `faults.lidar.noise.std`.
+"""Paths to the values that a variation changes: `robot.pose.x`, `goals[0].pose`, `faults.lidar.noise.std`.
 
-Parts are joined by dots. An item of a list is said by its number from 0 on, `[0]` or `.0`, or by what it is called:
-its `name` or `id`, the place of a goal, the sensor of a fault, the kind of a criterion.
+Parts are joined by dots. An item of a list is given by its index from 0, `[0]` or `.0`, or by its name: its `name` or
+`id`, the place of a goal, the sensor of a fault, the kind of a criterion.
 """
 
 import re
@@ -11,22 +11,22 @@ from simscen.loading.schema.messages import quoted, short_value, suggestion
 from simscen.loading.yaml.tree import Entry, Key, MappingNode, Node, Position, ScalarNode, SequenceNode, dotted_path
 
 LIST_KEYS = frozenset({"goals", "events", "faults", "pass", "metrics", "tags"})
-"""The keys of a scenario that hold lists."""
+"""Top-level keys of a scenario that contain lists."""
 KEYS_BY_KIND = frozenset({"pass", "metrics"})
-"""Those of them whose items may be called by the one key that they are about."""
+"""Top-level keys whose items may be given by their kind."""
 FIXED_KEYS = {
-    "simscen": "all variations are of one language",
-    "extends": "all variations are of one file; vary the values that differ",
-    "variations": "variations have no variations",
-    "name": "each variation has a name of its own",
+    "simscen": "all variations use one version of the language",
+    "extends": "all variations extend the same file; vary the values that differ",
+    "variations": "variations cannot be nested",
+    "name": "each variation has its own name",
 }
-"""What a variation cannot change, and why."""
+"""Keys that a variation cannot change, and the reason."""
 _PART = re.compile(r"""\.?(?:([^.\[\]]+)|\["([^"]*)"\]|\['([^']*)'\]|\[([^\]]*)\])""")
 _NAMES = ("name", "id", "sensor", "pose")
 
 
 class PathError(ValueError):
-    """It names nothing; `hint` helps."""
+    """Path that leads to no value, with a hint."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
@@ -35,7 +35,7 @@ class PathError(ValueError):
 
 @dataclass(frozen=True)
 class Target:
-    """A value of a scenario: the path as it is written, where that stands, and the keys that lead there."""
+    """Path to a value as written, the position of the path, and the keys of the value."""
 
     path: str
     place: Position
@@ -43,7 +43,7 @@ class Target:
 
 
 def resolve_path(path: str, place: Position, tree: MappingNode) -> Target:
-    """What a path means in a scenario, also where nothing is written there yet. Raises NoPath."""
+    """Return the value that a path leads to, which need not be written yet. Raises PathError."""
     parts = split_path(path)
     if parts[0] in FIXED_KEYS:
         raise PathError(f"a variation cannot change `{parts[0]}`", FIXED_KEYS[parts[0]])
@@ -51,24 +51,24 @@ def resolve_path(path: str, place: Position, tree: MappingNode) -> Target:
 
 
 def set_value(tree: MappingNode, target: Target, value: Node) -> MappingNode:
-    """The scenario with the value there. What was not there stands where the path does, for messages about it."""
+    """Return the scenario with the value set. New nodes have the position of the path."""
     changed = _put(tree, target.keys, value, target.place)
     assert isinstance(changed, MappingNode)
     return changed
 
 
 def split_path(path: str) -> list[str]:
-    """What stands between the dots and in the brackets of a path. Raises NoPath."""
+    """Return the parts of a path. Raises PathError."""
     parts, position = [], 0
     while position < len(path):
         match = _PART.match(path, position)
         part = match and next((group for group in match.groups() if group is not None), "").strip()
         if not match or not part or (position == 0 and path.startswith(".")):
-            raise PathError(f"{quoted(path)} is no path", "write keys with dots between them, e.g. `goals[0].pose.x`")
+            raise PathError(f"{quoted(path)} is not a valid path", "join keys with dots, e.g. `goals[0].pose.x`")
         parts.append(part)
         position = match.end()
     if not parts:
-        raise PathError(f"{quoted(path)} is no path", "write keys with dots between them, e.g. `goals[0].pose.x`")
+        raise PathError(f"{quoted(path)} is not a valid path", "join keys with dots, e.g. `goals[0].pose.x`")
     return parts
 
 
@@ -91,23 +91,23 @@ def _keys(path: str, parts: list[str], tree: MappingNode) -> tuple[Key, ...]:
                     )
             case ScalarNode():
                 raise PathError(
-                    f"{quoted(path)} names nothing: `{dotted_path(keys)}` is {_told(node)}, without a `{part}`",
+                    f"{quoted(path)} leads to nothing: `{dotted_path(keys)}` is {_describe(node)}, without a `{part}`",
                     _file_hint(keys),
                 )
             case None:
                 if keys[-1] in LIST_KEYS and len(keys) == 1:
-                    raise PathError(f"{quoted(path)} names nothing: the scenario has no `{keys[-1]}`")
+                    raise PathError(f"{quoted(path)} leads to nothing: the scenario has no `{keys[-1]}`")
                 keys.append(part)
     return tuple(keys)
 
 
 def _item(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list[str]) -> list[Key]:
-    """The keys of an item of a list; of one that is called by its kind, also that kind."""
+    """Return the keys of an item of a list; for an item given by its kind, also that kind."""
     holder = dotted_path(keys)
     if part.isdecimal():
         if int(part) >= len(items.items):
             count = f"{len(items.items)} item{'' if len(items.items) == 1 else 's'}"
-            raise PathError(f"{quoted(path)} names nothing: `{holder}` has {count}", "the first one is [0]")
+            raise PathError(f"{quoted(path)} leads to nothing: `{holder}` has {count}", "the first item is [0]")
         return [int(part)]
     called = [index for index, item in enumerate(items.items) if part in _names(item)]
     if len(called) > 1 and rest:
@@ -119,9 +119,9 @@ def _item(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list
     ]
     found = called or kinds
     if len(found) > 1:
-        hint = f"say which one by its number: {', '.join(f'{holder}[{index}]' for index in found[:5])}"
+        hint = f"use the index: {', '.join(f'{holder}[{index}]' for index in found[:5])}"
         raise PathError(
-            f"{quoted(path)} names several: {len(found)} items of `{holder}` are called {quoted(part)}", hint
+            f"{quoted(path)} is ambiguous: {len(found)} items of `{holder}` are called {quoted(part)}", hint
         )
     if not found:
         known = [name for item in items.items for name in _names(item)]
@@ -129,8 +129,8 @@ def _item(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list
             known += [
                 key for item in items.items if isinstance(item, MappingNode) for key in item.entries if key != "id"
             ]
-        hint = suggestion(part, known) if known else "say it by its number, [0] is the first"
-        raise PathError(f"{quoted(path)} names nothing: no item of `{holder}` is called {quoted(part)}", hint)
+        hint = suggestion(part, known) if known else "use the index; the first item is [0]"
+        raise PathError(f"{quoted(path)} leads to nothing: no item of `{holder}` is called {quoted(part)}", hint)
     if kinds and not (rest and rest[0] in ("id", "severity", "then", part)):
         return [kinds[0], part]
     return [found[0]]
@@ -150,7 +150,7 @@ def _child(node: Node | None, key: Key) -> Node | None:
     return entry.value if entry else None
 
 
-def _told(leaf: ScalarNode) -> str:
+def _describe(leaf: ScalarNode) -> str:
     return short_value(leaf) if leaf.value is not None else "empty"
 
 

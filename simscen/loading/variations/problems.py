@@ -1,4 +1,4 @@
-"""What is wrong with the variations of a scenario, each problem once, with the variations that have it."""
+"""Merge the problems of all variations of a scenario: each once, with the variations that have it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -10,7 +10,7 @@ from simscen.loading.yaml.tree import Position
 
 
 class VariationProblems(NamedTuple):
-    """The problems of one variation; `set_by` is the path that put a value there, by the value's place."""
+    """Problems of one variation; `set_by` is the path that set a value, by the position of the value."""
 
     name: str
     set_by: Mapping[Position, str]
@@ -18,7 +18,7 @@ class VariationProblems(NamedTuple):
 
 
 def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
-    """The problems of all; what all of them have and none has put there is said as of any scenario."""
+    """Return the problems of all variations; those shared by all and not caused by a varied value are not annotated."""
     if len(variations) == 1 and not variations[0].name:
         return list(dict.fromkeys(variations[0].problems))
     having: dict[Problem, list[VariationProblems]] = {}

@@ -1,4 +1,4 @@
-"""Values drawn from ranges: a function of the seed, the path and the number of the draw, and of nothing else."""
+"""Draw values from ranges; a value depends only on the seed, the path and the number of the draw."""
 
 import hashlib
 import math
@@ -11,18 +11,18 @@ _DIGITS = 6
 
 
 class Pick(NamedTuple):
-    """The value of this number, from 0 on, of those to choose from."""
+    """Index of the chosen value in the list of choices."""
 
     number: int
 
 
 def draw_values(sampled: Sampled, path: str) -> list[Any]:
-    """The values of one path, in the order of the variations. Raises ValueError for a range that is none."""
+    """Return the values of one path, in the order of the variations. Raises ValueError for an invalid range."""
     return [_value(sampled.values[path], u) for u in _chances(sampled, path)]
 
 
 def _chances(sampled: Sampled, path: str) -> list[float]:
-    """Numbers between 0 and 1, both excluded."""
+    """Return numbers between 0 and 1, both excluded."""
     count = sampled.count
     chances = [_hash(sampled.seed, path, "value", number) for number in range(count)]
     if sampled.method == "random":
@@ -48,7 +48,7 @@ def _value(draw: Draw, u: float) -> Any:
             return _with_unit(low * (high / low) ** u, unit)
         case Integer(root=(first, last)):
             if first > last:
-                raise ValueError(f"the range ends before it begins: {first} is greater than {last}")
+                raise ValueError(f"the range is empty: {first} is greater than {last}")
             return first + math.floor(u * (last - first + 1))
         case OneOf(root=values):
             return Pick(math.floor(u * len(values)))
@@ -60,12 +60,12 @@ def _value(draw: Draw, u: float) -> Any:
 def _ordered(ends: tuple[Amount, Amount]) -> tuple[tuple[float, float], str]:
     (low, high), unit = to_common_unit(ends)
     if low > high:
-        raise ValueError(f"the range ends before it begins: {low:g} is greater than {high:g}")
+        raise ValueError(f"the range is empty: {low:g} is greater than {high:g}")
     return (low, high), unit
 
 
 def _normal(normal: Normal, u: float) -> Any:
-    from statistics import NormalDist  # slow to import, and seldom needed
+    from statistics import NormalDist  # slow to import, rarely needed
 
     ends = [end for end in (normal.min, normal.max) if end is not None]
     (mean, std, *bounds), unit = to_common_unit((normal.mean, normal.std, *ends))
@@ -78,7 +78,7 @@ def _normal(normal: Normal, u: float) -> Any:
         raise ValueError(f"`min` {low:g} is not less than `max` {high:g}")
     least, most = spread.cdf(low) if ends else 0.0, spread.cdf(high) if ends else 1.0
     if most - least < 1e-12:
-        raise ValueError("between `min` and `max` there is next to nothing of it: they are many `std` from the `mean`")
+        raise ValueError("the range from `min` to `max` is too many `std` away from `mean`")
     return _with_unit(min(max(spread.inv_cdf(least + u * (most - least)), low), high), unit)
 
 

@@ -1,4 +1,4 @@
-"""One YAML document out of several files: `extends:` and the `defaults.yaml` beside it."""
+"""Read a YAML file with the files that it extends and the `defaults.yaml` next to it."""
 
 import os
 from collections.abc import Mapping
@@ -16,14 +16,14 @@ DEFAULTS_FILE = "defaults.yaml"
 EXTENDS = "extends"
 MAX_FILES = 32
 APPEND_SUFFIX = "+"
-"""Behind the key of a list at top level: what stands there is added to that of the file that is extended."""
+"""Suffix of a top-level key such as `pass+`: its items are added to the list of the extended file."""
 
 
 @dataclass
 class Library:
-    """Reads the files of one scenario and keeps their texts, so that problems can show their lines.
+    """Reader of the files of one scenario; keeps their texts so that problems can show their lines.
 
-    `texts` and `files` are by the name that problems use; `loaded` is what was made of files, for whoever asks again.
+    `texts` and `files` are by the names that problems use. `loaded` caches what was loaded from files.
     """
 
     fence: PathSandbox
@@ -32,10 +32,10 @@ class Library:
     loaded: dict[tuple[str, Path], Any] = field(default_factory=dict)
 
     def read(self, path: Path, defaults: bool = False) -> tuple[Node | None, list[Problem]]:
-        """The tree of `path` with what it extends, and with `defaults`, the `defaults.yaml` beside it, merged in."""
+        """Return the tree of `path` merged with what it extends and, with `defaults`, the `defaults.yaml` beside it."""
         tree, problems = self._with_base(path, ())
         beside = path.parent / DEFAULTS_FILE
-        # Whatever is called so is meant to be read: one that cannot be is told rather than passed over.
+        # A defaults.yaml that cannot be read is a problem; ignoring it would change the scenario silently.
         if defaults and isinstance(tree, MappingNode) and os.path.lexists(beside) and path.name != DEFAULTS_FILE:
             below, more = self._defaults(beside)
             problems += more
@@ -46,20 +46,20 @@ class Library:
         return tree, problems
 
     def add(self, texts: Mapping[str, str], files: Mapping[str, Path]) -> None:
-        """Know files that were read elsewhere, by the names that problems use for them here."""
+        """Add files that were read elsewhere, by the names that problems use."""
         self.texts |= texts
         self.files |= files
 
     def folder_of(self, place: Position) -> Path:
-        """The folder of the file in which something stands: what paths there are relative to."""
+        """Return the folder of the file of a position; paths in that file are relative to it."""
         return self.files[place.path].parent
 
     def with_source(self, problems: list[Problem]) -> list[Problem]:
-        """The problems with the text of their lines."""
+        """Return the problems with the text of their lines."""
         return [self._sourced(problem) for problem in problems]
 
     def with_source_where_missing(self, problems: list[Problem]) -> list[Problem]:
-        """Likewise, of problems some of which are in files that were read elsewhere and have it."""
+        """Return the problems with the text of their lines; those that have a text keep it."""
         return [problem if problem.source else self._sourced(problem) for problem in problems]
 
     def _sourced(self, problem: Problem) -> Problem:
@@ -96,22 +96,22 @@ class Library:
     def _base(self, entry: Entry, path: Path, chain: tuple[Path, ...]) -> Path | Problem:
         place = entry.value.place
         if not isinstance(entry.value, ScalarNode) or not isinstance(entry.value.value, str):
-            return Problem(*place, "SC011", f"`{EXTENDS}` expects the path of one file")
+            return Problem(*place, "SC011", f"`{EXTENDS}` must be the path of one file")
         base = self.fence.find(entry.value.value, path.parent)
         if isinstance(base, PathProblem):
             return Problem(*place, base.code, base.message, base.hint)
         if base in chain:
             names = " → ".join(self.fence.shown(file) for file in (*chain[chain.index(base) :], base))
-            return Problem(*place, "SC024", f"files extend each other in a circle: {names}")
+            return Problem(*place, "SC024", f"circular `extends`: {names}")
         if len(self.files) >= MAX_FILES:
-            return Problem(*place, "SC024", f"more than {MAX_FILES} files extend each other")
+            return Problem(*place, "SC024", f"a scenario can extend at most {MAX_FILES} files")
         return base
 
 
 def extend_mapping(over: MappingNode, under: MappingNode) -> MappingNode:
-    """The file `over` with what `under` says besides; `pass+` and the like add to the list that is there.
+    """Return the mapping `over` merged onto the mapping `under` that it extends.
 
-    Where there is none yet, the key stays: a file further below may have it.
+    Keys such as `pass+` add to the list in `under`. If it has none, the key stays for files that `under` extends.
     """
     entries = dict(over.entries)
     for key, more in over.entries.items():
@@ -129,10 +129,9 @@ def extend_mapping(over: MappingNode, under: MappingNode) -> MappingNode:
 
 
 def merge_mappings(over: MappingNode, under: MappingNode) -> MappingNode:
-    """Keys of `over` win; mappings on both sides are merged, everything else is replaced as a whole.
+    """Return `under` with the keys of `over`; mappings are merged recursively, everything else is replaced.
 
-    Mappings whose `type` differs are different things and are replaced, too, as is a stack by an `external` one, and
-    that by one with a `type`.
+    Mappings with different `type` are replaced as well, and so are external stacks by others and vice versa.
     """
     entries = dict(over.entries)
     for key, below in under.entries.items():

@@ -1,8 +1,7 @@
-"""Compose a tree with positions from YAML events, within budgets.
+"""Parse YAML to a tree with positions, within limits on depth and size.
 
-PyYAML's own constructors are not used: duplicate keys overwrite silently there, `!!int abc` and huge integers raise
-bare ValueErrors, alias bombs expand when they are walked, and libyaml's composer overflows the C stack at 30 000
-brackets. Its event parser has none of these: it is a state machine, and we stop reading at the first excess.
+The tree is built from PyYAML's events. Its constructors are not used: they overwrite duplicate keys silently, raise
+bare ValueErrors, expand alias bombs, and overflow the C stack at 30 000 brackets.
 """
 
 from collections.abc import Iterator
@@ -19,21 +18,21 @@ from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, Scalar
 MAX_DEPTH = 40
 MAX_VALUES = 100_000
 
-# libyaml where PyYAML was built with it: ten times faster, the same events.
+# libyaml, if PyYAML was built with it, yields the same events ten times faster.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class _Refused(Exception):
-    """Reading cannot go on; the problem says why."""
+    """Parsing cannot continue because of `problem`."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
 
 
 def parse_yaml(text: str, path: str, *, last_wins: bool = False) -> tuple[Node | None, list[Problem]]:
-    """The only document of `text` as a tree, and every problem found; the tree is None where there is none.
+    """Return the only document of `text` as a tree (None if it cannot be parsed), and all problems.
 
-    With `last_wins` the last of two equal keys counts, which is worth a warning: so ROS 2 reads its files.
+    With `last_wins`, duplicate keys are warnings and the last one counts, as in parameter files of ROS 2.
     """
     composer = _Composer(path, text, last_wins)
     try:
@@ -45,7 +44,7 @@ def parse_yaml(text: str, path: str, *, last_wins: bool = False) -> tuple[Node |
 
 @dataclass(frozen=True)
 class _Anchor:
-    """An anchored node with what it costs to repeat it."""
+    """Anchored node, the number of its values, and its depth: an alias adds as much."""
 
     node: Node
     values: int
@@ -65,7 +64,7 @@ class _Composer:
         self._values = 0
 
     def document(self) -> Node | None:
-        """The first document; a second one is refused."""
+        """Return the root of the first document. Raises _Refused if there is none, or a second one."""
         next(self._events)  # the start of the stream
         if isinstance(next(self._events), ev.StreamEndEvent):
             raise _Refused(self._problem(None, "SC004", "the file is empty"))
@@ -75,7 +74,7 @@ class _Composer:
         after = next(self._events)
         if not isinstance(after, ev.StreamEndEvent):
             message = f"more than one YAML document (line {self._place(after).line})"
-            raise _Refused(self._problem(after, "SC004", message, "put each scenario into a file of its own"))
+            raise _Refused(self._problem(after, "SC004", message, "put each scenario into its own file"))
         return root
 
     def _parse(self) -> Iterator[ev.Event]:
@@ -87,7 +86,7 @@ class _Composer:
             raise _Refused(self._problem(None, "SC003", str(error).splitlines()[0])) from None
 
     def _node(self, event: ev.Event, depth: int) -> tuple[Node, int]:
-        """The node that begins with `event`, and how deep it is."""
+        """Return the node that begins with `event`, and its depth."""
         if isinstance(event, ev.AliasEvent):
             return self._alias(event, depth)
         if depth > MAX_DEPTH:
@@ -145,7 +144,7 @@ class _Composer:
         return MappingNode(self._place(start), self._merge(start, entries, merged)), height + 1
 
     def _merge(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
-        """Add what `<<:` brings; keys of the mapping itself win, then those of earlier aliases."""
+        """Add the merge keys (`<<`): keys of the mapping itself win, then those of earlier aliases."""
         for other in merged:
             if not isinstance(other, MappingNode):
                 self.problems.append(self._problem(start, "SC003", "`<<` expects a mapping or a list of mappings"))
@@ -155,7 +154,7 @@ class _Composer:
 
     def _key(self, event: ev.Event) -> str:
         if not isinstance(event, ev.ScalarEvent):
-            raise _Refused(self._problem(event, "SC003", "a key must be text, not a list, a mapping or an alias"))
+            raise _Refused(self._problem(event, "SC003", "a key must be text; it is a list, a mapping or an alias"))
         self._refuse_tag(event)
         self._count(event, 1)
         return str(event.value)
@@ -174,7 +173,7 @@ class _Composer:
     def _count(self, event: ev.Event, values: int) -> None:
         self._values += values
         if self._values > MAX_VALUES:
-            what = "aliases expand to" if isinstance(event, ev.AliasEvent) else "the file holds"
+            what = "aliases expand to" if isinstance(event, ev.AliasEvent) else "the file has"
             raise _Refused(self._problem(event, "SC006", f"{what} more than {MAX_VALUES} values"))
 
     def _refuse_tag(self, event: ev.Event) -> None:
@@ -191,7 +190,7 @@ class _Composer:
             twice = self._problem(event, "SC007", message, "this one counts, as in ROS 2")
             self.problems.append(replace(twice, severity="warning"))
         else:
-            self.problems.append(self._problem(event, "SC007", message, "remove one of the two"))
+            self.problems.append(self._problem(event, "SC007", message, "remove one of them"))
 
     def _place(self, event: ev.Event) -> Position:
         mark = event.start_mark
@@ -212,20 +211,20 @@ class _Composer:
             col = line.find("\t") + 1
             return Problem(self.path, mark.line + 1, col, "SC003", "tab character", "indent with spaces")
         start = error.context_mark
-        if (odd := self._odd(lines, start.line if start else mark.line, mark.line)) is not None:
-            return odd
+        if (lookalike := self._lookalike(lines, start.line if start else mark.line, mark.line)) is not None:
+            return lookalike
         if start is not None and mark.index >= len(self.text.rstrip()) and start.index < mark.index:
             what = (error.context or "this").removeprefix("while parsing a ").removeprefix("while scanning a ")
-            return Problem(self.path, start.line + 1, start.column + 1, "SC003", f"this {what} never ends")
+            return Problem(self.path, start.line + 1, start.column + 1, "SC003", f"this {what} is not closed")
         message = error.problem or "cannot be read as YAML"
         if start is not None and error.context and start.index != mark.index:
-            message += f" ({error.context} that begins at {start.line + 1}:{start.column + 1})"
+            message += f" ({error.context} that starts at {start.line + 1}:{start.column + 1})"
         if mark.line < len(lines):
             return Problem(self.path, mark.line + 1, mark.column + 1, "SC003", message)
         return Problem(self.path, len(lines), len(lines[-1]) + 1, "SC003", message)
 
-    def _odd(self, lines: list[str], first: int, last: int) -> Problem | None:
-        """A character in these lines that only looks like one of YAML's."""
+    def _lookalike(self, lines: list[str], first: int, last: int) -> Problem | None:
+        """Return a problem if these lines have a character that only looks like YAML syntax."""
         for number in range(first, min(last + 1, len(lines))):
             index = find_lookalike(lines[number].partition(" #")[0])
             if index is not None:

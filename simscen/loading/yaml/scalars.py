@@ -1,6 +1,6 @@
-"""Plain scalars of YAML 1.2's core schema (spec 1.2.2, section 10.3.2).
+"""Read and write plain scalars of YAML 1.2's core schema (spec 1.2.2, section 10.3.2).
 
-One thing is stricter: a number with a leading zero is text, because YAML 1.1 read it as octal and 1.2 as decimal.
+A number with a leading zero is text, because YAML 1.1 reads it as octal and YAML 1.2 as decimal.
 """
 
 import math
@@ -30,7 +30,7 @@ _FLOAT = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+
 
 
 def parse_scalar(text: str) -> Scalar:
-    """The value that a plain scalar stands for. Raises ValueError for an integer of more than 19 digits."""
+    """Return the value of a plain scalar. Raises ValueError for an integer of more than 19 digits."""
     if text in _WORDS:
         return _WORDS[text]
     if text[0] not in "+-.0123456789":
@@ -44,28 +44,28 @@ def parse_scalar(text: str) -> Scalar:
 
 
 _TAGS = {str: "str", bool: "bool", int: "int", float: "float", type(None): "null"}
-# What source.py refuses in a file, and line breaks of YAML 1.1; a string with one of them is written with escapes.
-_UNSPEAKABLE = re.compile("[\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")
+# Characters that `read_text` rejects, and line breaks of YAML 1.1; strings with one of them are written with escapes.
+_NEEDS_ESCAPES = re.compile("[\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")
 
 
 class Dumper(yaml.SafeDumper):
-    """Quotes a text that our reader would take for something else, such as 1e3; does not quote `on` or 1:30."""
+    """YAML writer for YAML 1.2: quotes text such as 1e3 that is a number in 1.2, but not `on` or 1:30."""
 
     def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
-        """The tag that our reader gives to a plain scalar."""
+        """Return the tag of a node; plain scalars have the type that `parse_scalar` gives them."""
         if kind is yaml.ScalarNode and implicit[0]:
             return f"tag:yaml.org,2002:{_plain_type(value)}"
         return super().resolve(kind, value, implicit)  # type: ignore[no-untyped-call]
 
     def ignore_aliases(self, data: Any) -> bool:
-        """Whatever stands twice is written twice."""
+        """Return True: repeated data is written out again."""
         return True
 
 
 def to_yaml(data: Any, dumper: type[Dumper] = Dumper) -> str:
-    """Lists, mappings and scalars as text that `compose` reads back equal; keys are strings, in the order given."""
+    """Return data as YAML that `parse_yaml` reads back equal; keys must be strings and keep their order."""
     text: str = yaml.dump(data, Dumper=dumper, sort_keys=False, allow_unicode=True, width=1000)
-    if _UNSPEAKABLE.search(text):
+    if _NEEDS_ESCAPES.search(text):
         text = yaml.dump(data, Dumper=dumper, sort_keys=False, allow_unicode=False, width=1000)
     return text
 
@@ -73,5 +73,5 @@ def to_yaml(data: Any, dumper: type[Dumper] = Dumper) -> str:
 def _plain_type(text: str) -> str:
     try:
         return _TAGS[type(parse_scalar(text))]
-    except ValueError:  # an integer too large for our reader
+    except ValueError:  # an integer that parse_scalar rejects
         return "int"

@@ -1,4 +1,4 @@
-"""Read a text file that somebody else wrote, without trusting it."""
+"""Read text files from untrusted sources: size, encoding, control characters, lookalike characters."""
 
 import errno
 import os
@@ -10,15 +10,15 @@ from simscen.core.errors import Problem
 
 MAX_FILE_BYTES = 1 << 20
 
-# C0 and C1 controls, lone surrogates, bidirectional overrides (they make text read other than it is, CVE-2021-42574)
-# and the line breaks that only YAML 1.1 knows, so that a line here is a line in every editor.
+# C0 and C1 controls, lone surrogates, bidirectional overrides (CVE-2021-42574), and the line breaks of YAML 1.1 that
+# editors do not treat as line breaks.
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufffe\uffff]")
 
 
 def read_text(path: Path, shown: str) -> str | Problem:
-    """The text of a regular file of at most 1 MiB in UTF-8, line breaks as \\n; or what is wrong with it.
+    """Return the text of a regular UTF-8 file of at most 1 MiB with line breaks as \\n, or a problem.
 
-    `shown` is how problems name the file. A FIFO, device, socket or folder is refused without being read.
+    `shown` is the name of the file in problems. A FIFO, device, socket or folder is rejected without being read.
     """
     try:
         raw = _read_bytes(path)
@@ -30,13 +30,13 @@ def read_text(path: Path, shown: str) -> str | Problem:
 
 
 def os_error_reason(error: OSError) -> str:
-    """Why a file could not be opened, in plain words."""
+    """Return why a file could not be opened."""
     known = {
         errno.ENOENT: "no such file or directory",
         errno.EACCES: "permission denied",
         errno.ELOOP: "symbolic link loop",
         errno.ENAMETOOLONG: "the name is too long",
-        errno.ENOTDIR: "a part of the path is not a folder",
+        errno.ENOTDIR: "part of the path is not a folder",
         errno.EISDIR: "not a regular file",
     }
     return known.get(error.errno or 0, os.strerror(error.errno) if error.errno else "cannot be read")
@@ -66,7 +66,7 @@ def _decode(raw: bytes, shown: str) -> str | Problem:
     if control := _CONTROL.search(text):
         line, column = _position(text, control.start())
         message = f"control character U+{ord(control[0]):04X}"
-        return Problem(shown, line, column, "SC002", message, "remove it; in text, write an escape such as \\n")
+        return Problem(shown, line, column, "SC002", message, "remove it, or write an escape such as \\n")
     return text
 
 
@@ -96,23 +96,23 @@ LOOKALIKES = {
     "\u2014": ("dash", "`-`"),
     "\u2212": ("minus sign", "`-`"),
 }
-"""Character → what it is called, and what is meant."""
+"""Characters that look like YAML syntax and come with text copied from web pages: their name, and what to write."""
 
 
 def find_lookalike(text: str) -> int | None:
-    """Where the first of them is in a text; None for none."""
+    """Return the index of the first lookalike character in a text; None if there is none."""
     return next((index for index, character in enumerate(text) if character in LOOKALIKES), None)
 
 
 def describe_lookalike(character: str) -> str:
-    """What it is: "no-break space (U+00A0)"."""
+    """Return the name of a lookalike character: "no-break space (U+00A0)"."""
     return f"{LOOKALIKES[character][0]} (U+{ord(character):04X})"
 
 
 def lookalike_hint(text: str) -> str:
-    """What to write instead of the first one of a text; "" where there is none."""
+    """Return what to write instead of the first lookalike character; "" if there is none."""
     index = find_lookalike(text)
     if index is None:
         return ""
     article = "an" if LOOKALIKES[text[index]][0][0] in "aeiou" else "a"
-    return f"there is {article} {describe_lookalike(text[index])} in it: write {LOOKALIKES[text[index]][1]}"
+    return f"it contains {article} {describe_lookalike(text[index])}; write {LOOKALIKES[text[index]][1]} instead"

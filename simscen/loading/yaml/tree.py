@@ -1,4 +1,4 @@
-"""YAML as a tree that knows where each key and value stands."""
+"""Tree of a YAML file whose keys and values know their position."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ Scalar = str | int | float | bool | None
 
 
 class Position(NamedTuple):
-    """Where something stands: `line` and `col` count from 1."""
+    """Position in a file; `line` and `col` count from 1."""
 
     path: str
     line: int
@@ -17,7 +17,7 @@ class Position(NamedTuple):
 
 @dataclass(frozen=True)
 class ScalarNode:
-    """A scalar."""
+    """Scalar value."""
 
     place: Position
     value: Scalar
@@ -30,7 +30,7 @@ class ScalarNode:
 
 @dataclass(frozen=True)
 class SequenceNode:
-    """A sequence."""
+    """Sequence of nodes."""
 
     place: Position
     items: tuple["Node", ...]
@@ -43,7 +43,7 @@ class SequenceNode:
 
 @dataclass(frozen=True)
 class Entry:
-    """A key of a mapping and what it holds."""
+    """Position of a key in a mapping, and its value."""
 
     key: Position
     value: "Node"
@@ -51,7 +51,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class MappingNode:
-    """A mapping, in the order of the file."""
+    """Mapping, in the order of the file."""
 
     place: Position
     entries: dict[str, Entry]
@@ -67,7 +67,7 @@ Key = str | int
 
 
 def child(node: Node, key: Key) -> Node | None:
-    """What stands under a key or index; None when nothing does."""
+    """Return the node under a key or index; None if there is none."""
     if isinstance(node, MappingNode):
         entry = node.entries.get(str(key))
         return entry.value if entry else None
@@ -77,17 +77,17 @@ def child(node: Node, key: Key) -> Node | None:
 
 
 def existing_keys(node: Node, loc: Sequence[Key]) -> tuple[Key, ...]:
-    """The parts of a pydantic `loc` that are in the tree; tags of unions and the like are not."""
+    """Return the parts of a pydantic `loc` that exist in the tree; tags of unions do not."""
     return tuple(key for key, _ in _walk(node, loc))
 
 
 def key_position(node: Node, loc: Sequence[Key]) -> Position:
-    """Where the last key of `loc` stands: the key of a mapping, the item of a sequence, else the node itself."""
+    """Return the position of the last key of `loc`: a key of a mapping, an item of a sequence, or the node itself."""
     return [node.place, *(place for _, place in _walk(node, loc))][-1]
 
 
 def value_position(node: Node, loc: Sequence[Key]) -> Position:
-    """Where the value at `loc` stands; the key where the value is empty."""
+    """Return the position of the value at `loc`; of its key if the value is empty."""
     found = node_at(node, loc)
     if isinstance(found, ScalarNode) and found.value is None:
         return key_position(node, loc)
@@ -95,7 +95,7 @@ def value_position(node: Node, loc: Sequence[Key]) -> Position:
 
 
 def node_at(node: Node, loc: Sequence[Key]) -> Node:
-    """The deepest node on the way along `loc`."""
+    """Return the deepest existing node along `loc`."""
     for part in loc:
         node = child(node, part) or node
     return node
@@ -111,6 +111,6 @@ def _walk(node: Node, loc: Sequence[Key]) -> Iterator[tuple[Key, Position]]:
 
 
 def dotted_path(keys: Sequence[Key]) -> str:
-    """How a message names a place in the file: `pass[0].goals_reached`."""
+    """Return keys as messages show them: `pass[0].goals_reached`."""
     text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
     return text.lstrip(".")

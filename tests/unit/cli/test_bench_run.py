@@ -44,7 +44,7 @@ def test_a_parameter_file_of_nav2_is_a_stack_file_and_what_means_nothing_of_it_i
     assert stack.controller.type == "regulated_pure_pursuit"
     assert stack.controller.lookahead_dist == 0.77
     assert "mine.yaml:5:" in (told := capsys.readouterr().err)
-    assert "warning[SC341] controller_server: nothing here is like unheard_of (5)" in told
+    assert "warning[SC341] controller_server: simscen has no unheard_of (5)" in told
 
 
 def test_experiments_whose_runs_have_one_name_are_not_driven(tmp_path: Path) -> None:

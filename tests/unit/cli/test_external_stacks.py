@@ -50,7 +50,7 @@ def loaded(name: str, *stacks: str):
 def test_a_name_that_nobody_defines_is_exit_2_at_its_place_when_it_is_run(simscen, project: Path) -> None:
     ended = simscen("run", ".")
     assert ended.code == 2
-    assert "mine.scenario.yaml:7:19: error[SC060] nobody says what the stack `mine` runs" in ended.err
+    assert "mine.scenario.yaml:7:19: error[SC060] the external stack `mine` has no command" in ended.err
     assert "--stack mine='COMMAND'" in ended.err
     assert not (project / "simscen-out").exists()
 
@@ -69,8 +69,8 @@ def test_a_file_that_names_a_stack_of_others_is_valid_with_a_warning(simscen, pr
         ("mine=./nowhere", "--stack mine=./nowhere: no such file or directory: `./nowhere`"),
         ("mine=./notes.txt", "permission denied: `./notes.txt` is not executable"),
         ("mine=./plain.scenario.yaml", "plain.scenario.yaml:1:1: error[SC010] missing key `stack`"),
-        ("mine=./home", "`./home` is not a program but a folder"),
-        ("mine=no-such-program-anywhere -x", "there is no program `no-such-program-anywhere` in the PATH"),
+        ("mine=./home", "`./home` is a folder, not a program"),
+        ("mine=no-such-program-anywhere -x", "no program `no-such-program-anywhere` in the PATH"),
         ("mine='unclosed", "cannot be read as a command: no closing quotation"),
         ("mine=", "names no program"),
         ("mine=''", "names no program"),

@@ -247,4 +247,4 @@ def test_the_same_robot_gives_the_same_figures_and_picture(check, tmp_path):
 def test_a_robot_that_is_not_there_is_told(check, robot):
     code, _, told = check(robot)
     assert code == 2
-    assert f"{robot}: error[SC001] no such file, and no robot called `{robot}` ships" in told
+    assert f"{robot}: error[SC001] no such file or shipped robot: `{robot}`" in told

@@ -70,6 +70,6 @@ def test_a_stack_that_nobody_defines_runs_nothing(simscen, tmp_path: Path) -> No
     )
     ended = simscen("run", "good.scenario.yaml", "--out", "out")
     assert ended.code == 2
-    assert "good.scenario.yaml:11:19: error[SC060] nobody says what the stack `mine` runs" in ended.err
+    assert "good.scenario.yaml:11:19: error[SC060] the external stack `mine` has no command" in ended.err
     assert "--stack mine='COMMAND'" in ended.err
     assert not (tmp_path / "out").exists()

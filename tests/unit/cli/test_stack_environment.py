@@ -102,8 +102,8 @@ def test_nothing_of_the_environment_is_in_what_a_session_leaves(run, tmp_path: P
 @pytest.mark.parametrize(
     ("first", "told"),
     [
-        ("#!/no/such/python3", "`./nav` begins with `#!/no/such/python3`, which is not there"),
-        ("#!/bin/sh\r", "the first line of `./nav` ends as on Windows; save it with plain line ends"),
+        ("#!/no/such/python3", "`./nav` starts with `#!/no/such/python3`, which does not exist"),
+        ("#!/bin/sh\r", "the first line of `./nav` has a Windows line end; save the file with Unix line ends"),
         ("#! ", "the first line of `./nav` names no interpreter"),
     ],
 )

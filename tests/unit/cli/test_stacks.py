@@ -136,7 +136,7 @@ def test_from_python_a_stack_is_given_as_on_the_command_line(project: Path) -> N
     with pytest.raises(UsageError, match="expected NAME=VALUE"):
         simulate("a.scenario.yaml", stack="a b=reference")
     (project / "a.scenario.yaml").write_text(SHORT + "stack: {external: mine}\n")
-    with pytest.raises(InvalidInput, match="nobody says what the stack `mine` runs"):
+    with pytest.raises(InvalidInput, match="the external stack `mine` has no command"):
         simulate("a.scenario.yaml")
     assert simulate("a.scenario.yaml", stack="dwb=dwb.stack.yaml").passed
 

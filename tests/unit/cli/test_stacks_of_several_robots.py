@@ -102,7 +102,7 @@ def test_what_a_run_keeps_of_the_scenario_has_the_stacks_that_drove(project: Pat
 def test_a_name_that_nobody_defines_is_told_at_each_robot_that_has_it(simscen, project: Path) -> None:
     ended = simscen("run", "mixed.scenario.yaml")
     assert ended.code == 2
-    assert "mixed.scenario.yaml:6:45: error[SC060] nobody says what the stack `mine` runs" in ended.err
+    assert "mixed.scenario.yaml:6:45: error[SC060] the external stack `mine` has no command" in ended.err
     assert ended.err.count("SC060") == 1
     assert simscen("run", "all.scenario.yaml").err.count("SC060") == 1
     assert simscen("validate", ".").out.count("warning[SC060]") == 2
@@ -111,7 +111,7 @@ def test_a_name_that_nobody_defines_is_told_at_each_robot_that_has_it(simscen, p
 def test_two_names_of_one_scenario_on_one_command_line_would_each_be_a_run_and_are_refused(simscen, project) -> None:
     ended = simscen("run", "mixed.scenario.yaml", "--stack", "mine=./nav", "--stack", "other=./nav")
     assert ended.code == 2
-    assert "error[SC042] robots here have the stacks `mine` and `other`, but a run has one --stack" in ended.err
+    assert "error[SC042] robots of this scenario have the stacks `mine` and `other`, but a run can have only one --stack" in ended.err
     assert "home/simscen/config.yaml" in ended.err
 
 

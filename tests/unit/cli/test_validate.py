@@ -29,7 +29,7 @@ def test_every_problem_is_shown_with_its_line(simscen, tmp_path: Path) -> None:
         "sub/bad.scenario.yaml:3:25: error[SC015] `s` is a unit of duration, but this is a length\n"
         "    3 | robot: {pose: {x: 1, y: 2 s}}\n"
         "      |                         ^^^\n"
-        "      = units: m, cm, mm, km; a bare number is SI\n"
+        "      = units: m, cm, mm, km; a number without a unit is in SI units\n"
         "2 problems in 1 of 2 files\n"
     )
 

@@ -126,7 +126,7 @@ def test_from_python_variations_are_listed_and_run_by_name(project: Path) -> Non
     run = package.simulate("a.scenario.yaml", variation="x=2")
     assert run.result.key.variation == "x=2"
     assert run.trace.truth.values[0][0] == pytest.approx(2, abs=0.01)
-    with pytest.raises(UsageError, match="has 3 variations: say which one; expected one of: x=1, x=2, x=50cm"):
+    with pytest.raises(UsageError, match="has 3 variations: choose one; expected one of: x=1, x=2, x=50cm"):
         package.simulate("a.scenario.yaml")
     (project / "plain.scenario.yaml").write_text(SHORT[: SHORT.index("variations")])
     assert package.variations("plain.scenario.yaml") == [""]

@@ -41,11 +41,11 @@ def told(problems):
 WRONG = {
     "none": ("robots: {}\n" + PASS, (7, "SC017", "expected 2 or more values, got 0")),
     "one": (f"robots: {{{A}}}\n" + PASS, (7, "SC017", "expected 2 or more values, got 1")),
-    "a path": (f"robots: {{{A}, ../x: {{pose: there}}}}\n" + PASS, (7, "SC017", "`../x` cannot be a name here")),
-    "no namespace": (f"robots: {{{A}, a__b: {{pose: there}}}}\n" + PASS, (7, "SC017", "`a__b` cannot be a name here")),
+    "a path": (f"robots: {{{A}, ../x: {{pose: there}}}}\n" + PASS, (7, "SC017", "`../x` is not a valid name")),
+    "no namespace": (f"robots: {{{A}, a__b: {{pose: there}}}}\n" + PASS, (7, "SC017", "`a__b` is not a valid name")),
     "a blank": (
         f"robots: {{{A}, my robot: {{pose: there}}}}\n" + PASS,
-        (7, "SC017", "`my robot` cannot be a name here"),
+        (7, "SC017", "`my robot` is not a valid name"),
     ),
     "the same twice": (f"robots: {{{A}, {A}}}\n" + PASS, (7, "SC007", "duplicate key `a` (first at 7:10)")),
     "both": (
@@ -54,7 +54,7 @@ WRONG = {
     ),
     "goals of all": (
         f"robots: {{{A}, {B}}}\ngoals: [there]\n" + PASS,
-        (8, "SC016", "`goals` are those of one robot, and here are several"),
+        (8, "SC016", "`goals` belong to one robot, but the scenario has several"),
     ),
     "nothing must hold": (
         f"robots:\n  a: {{pose: here, {PASS.strip()}}}\n  {B}\n",

@@ -147,4 +147,4 @@ def test_runs_of_two_scenarios_have_no_folder_in_common(tmp_path: Path) -> None:
         discover([tmp_path], tmp_path)
     (problem,) = raised.value.problems
     assert (problem.path, problem.code) == ("a/seed-1/map.png.scenario.yaml", "SC041")
-    assert problem.message == "its folder in the output would be that of a run of `a`"
+    assert problem.message == "its output folder would be the folder of a run of `a`"

@@ -76,8 +76,8 @@ def test_of_a_parameter_file_of_nav2_is_told_what_means_nothing_and_what_is_wron
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (PARAMETERS, "a parameter file of Nav2, and no scenario"),
-        ("simscen: 1\nstack: {}", "a stack file, and no scenario"),
+        (PARAMETERS, "this is a parameter file of Nav2, not a scenario"),
+        ("simscen: 1\nstack: {}", "this is a stack file, not a scenario"),
     ],
 )
 def test_parameters_of_a_stack_are_no_scenario_and_what_they_are_for_is_told(

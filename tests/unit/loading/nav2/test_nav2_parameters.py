@@ -106,10 +106,10 @@ def test_what_has_no_counterpart_is_named_where_it_stands(tmp_path: Path) -> Non
     told = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").notes]
     assert all("SC341" in note for note in notes)
     assert told == [
-        (12, f"controller_server: nothing here is like {NOT_OURS}"),
-        (36, "collision_monitor: `polygons`: there is no polygon that does stop here, as Stop does"),
-        (40, "behavior_server: nothing here is like cycle_frequency (40)"),
-        (42, "nothing here is like the node docking_server"),
+        (12, f"controller_server: simscen has no {NOT_OURS}"),
+        (36, "collision_monitor: `polygons`: action_type stop of Stop is not supported"),
+        (40, "behavior_server: simscen has no cycle_frequency (40)"),
+        (42, "simscen has no node like docking_server"),
     ]
 
 
@@ -134,7 +134,7 @@ def test_a_controller_that_is_not_here_leaves_the_usual_one_and_says_so(tmp_path
     params = PARAMS.replace("nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController", "mine::Graceful")
     found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", params)
     assert found.spec.stack.controller.type == "mppi"
-    assert "there is no mine::Graceful here: the usual one is used" in "".join(note.message for note in found.notes)
+    assert "mine::Graceful is not supported; the default controller is used" in "".join(note.message for note in found.notes)
 
 
 def test_mppis_motion_model_is_found_by_the_name_of_its_plugin(tmp_path: Path) -> None:
@@ -245,16 +245,16 @@ def test_a_file_of_humble_is_read_as_humble_meant_it(tmp_path: Path) -> None:
 def test_every_parameter_that_changes_nothing_here_is_named_with_its_line(tmp_path: Path) -> None:
     told = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", HUMBLE).notes]
     assert told == [
-        (4, "amcl: `set_initial_pose`: the scenario says where the robot begins"),
+        (4, "amcl: `set_initial_pose`: the scenario defines the initial pose"),
         (4, "duplicate key `max_beams` (first at 4:79)"),
-        (8, "controller_server: `goal_checker_plugins`: there is one goal_checker here, which is general_goal_checker,"
-         " and no precise"),
-        (18, "controller_server: `FollowPath.critics`: there is no PreferForward here"),
-        (23, "global_costmap: `robot_radius`: the robot's file says how large it is"),
+        (8, "controller_server: `goal_checker_plugins`: only the first goal_checker is used: general_goal_checker,"
+         " not precise"),
+        (18, "controller_server: `FollowPath.critics`: not supported: PreferForward"),
+        (23, "global_costmap: `robot_radius`: the robot file defines the size of the robot"),
         (24, "global_costmap: `rolling_window`: the local costmap always rolls, the global one with `map: none`"),
-        (29, "global_costmap: nothing here is like obstacle_layer.scan.clearing (29),"
+        (29, "global_costmap: simscen has no obstacle_layer.scan.clearing (29),"
          " obstacle_layer.old.obstacle_max_range (30)"),
-        (31, "global_costmap: `static_layer.plugin`: `plugins` does not name static_layer"),
+        (31, "global_costmap: `static_layer.plugin`: `plugins` does not list static_layer"),
     ]  # fmt: skip
 
 

@@ -72,7 +72,7 @@ def test_a_mapping_may_be_expected_where_a_type_would_tell_which() -> None:
 
 def test_keys_of_names_are_checked_at_the_key() -> None:
     told = _told(WorldSpec, "simscen: 1\nplaces:\n  ok: {x: 1, y: 2}\n  no/t: {x: 1, y: 2}\n")
-    assert told == [(4, 3, "`no/t` cannot be a name here")]
+    assert told == [(4, 3, "`no/t` is not a valid name")]
 
 
 def test_a_member_of_a_plain_union_is_told_once() -> None:
@@ -101,7 +101,7 @@ def test_control_characters_by_escape_are_refused_in_names() -> None:
 
 def test_a_choice_without_a_key_lists_the_keys() -> None:
     problem = _problems(ScenarioSpec, SCENARIO.replace("[{goals_reached: {}}]", "[{severity: warn}]"))[0]
-    assert (problem.line, problem.col, problem.message) == (4, 8, "nothing is chosen here")
+    assert (problem.line, problem.col, problem.message) == (4, 8, "a key is missing here")
     assert problem.hint.startswith("expected one of: goals_reached, ")
 
 

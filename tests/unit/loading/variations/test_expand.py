@@ -115,17 +115,17 @@ def test_derived_names_are_readable_unique_and_safe_as_folders(variations: str, 
 @pytest.mark.parametrize(
     ("variations", "told"),
     [
-        ("  {}", "nothing is chosen here"),
-        ("  grid: {robot.pose.x: [1, 1.0]}", "this value is there twice"),
+        ("  {}", "a key is missing here"),
+        ("  grid: {robot.pose.x: [1, 1.0]}", "this value is listed twice"),
         ("  grid: {robot.pose.x: [1], robot.pose: [dock]}", "`robot.pose.x` and `robot.pose` overlap: one is part"),
         ("  grid: {goals.0.pose: [a]}\n  pairs: {goals.desk.pose: [b]}", "and `goals.desk.pose` change the same value"),
         ("  list: [{robot.pose.x: 1, robot.pose: dock}]", "`robot.pose.x` and `robot.pose` overlap"),
         ("  pairs: {robot.pose.x: [1, 2], robot.pose.y: [1]}", "`robot.pose.y` has 1 values, `robot.pose.x` has 2"),
-        ("  list: [{name: a b, tags: [x]}]", "`a b` cannot be the name of a variation"),
-        ("  list: [{name: ../x, tags: [x]}]", "`../x` cannot be the name of a variation"),
-        ("  list: [{name: a, tags: [x]}, {name: A, tags: [y]}]", "two variations are called `A` (the first at line 5)"),
+        ("  list: [{name: a b, tags: [x]}]", "`a b` is not a valid name of a variation"),
+        ("  list: [{name: ../x, tags: [x]}]", "`../x` is not a valid name of a variation"),
+        ("  list: [{name: a, tags: [x]}, {name: A, tags: [y]}]", "the variation at line 5 is also called `A`"),
         ("  list: [{name: a}]", "this variation changes nothing"),
-        ("  sampled: {count: 3, values: {seed: {uniform: [2, 1]}}}", "the range ends before it begins"),
+        ("  sampled: {count: 3, values: {seed: {uniform: [2, 1]}}}", "the range is empty"),
         ("  sampled: {count: 1001, values: {seed: {integer: [1, 2]}}}", "must be at most 1000"),
     ],
 )  # fmt: skip
@@ -135,7 +135,7 @@ def test_what_is_said_wrongly_is_told_where_it_is(variations: str, told: str) ->
 
 def test_a_thousand_million_combinations_are_refused_without_being_made() -> None:
     grid = ", ".join(f"robot.k{n}: [{', '.join(map(str, range(10)))}]" for n in range(9))
-    assert wrong(f"  grid: {{{grid}}}") == ["5:3 these are 1000000000 variations; a scenario may have 1000"]
+    assert wrong(f"  grid: {{{grid}}}") == ["5:3 the scenario has 1000000000 variations; the limit is 1000"]
 
 
 def test_many_variations_of_a_large_value_are_refused_without_being_made() -> None:
@@ -143,7 +143,7 @@ def test_many_variations_of_a_large_value_are_refused_without_being_made() -> No
     goals = ", ".join("{pose: desk}" for _ in range(3000))
     (told,) = wrong(f"  grid: {{seed: [{seeds}], goals: [[{goals}]]}}")
     assert "999 variations of up to 9" in told
-    assert told.endswith("values are more than 5000000 values in all")
+    assert told.endswith("values exceed the limit of 5000000 values in total")
 
 
 def test_each_variation_is_a_whole_scenario_with_its_values(write, scenario: str) -> None:

@@ -76,13 +76,13 @@ def test_a_value_has_the_unit_of_its_range_and_is_in_si_where_there_are_several(
 @pytest.mark.parametrize(
     ("draw", "told"),
     [
-        ({"uniform": [2, 1]}, "the range ends before it begins: 2 is greater than 1"),
+        ({"uniform": [2, 1]}, "the range is empty: 2 is greater than 1"),
         ({"uniform": ["1 m", "2 s"]}, "`m` and `s` are no units of one dimension"),
         ({"log_uniform": [0, 1]}, "must be greater than 0"),
-        ({"integer": [2, 1]}, "ends before it begins"),
+        ({"integer": [2, 1]}, "the range is empty"),
         ({"normal": {"mean": 0, "std": 0}}, "`std` must be greater than 0"),
         ({"normal": {"mean": 0, "std": 1, "min": 2, "max": 1}}, "`min` 2 is not less than `max` 1"),
-        ({"normal": {"mean": 0, "std": 1, "min": 20}}, "next to nothing"),
+        ({"normal": {"mean": 0, "std": 1, "min": 20}}, "too many `std` away"),
     ],
 )
 def test_a_range_that_is_none_is_refused(draw: dict[str, Any], told: str) -> None:

@@ -64,7 +64,7 @@ def test_duplicate_keys_are_told_with_both_places_and_reading_goes_on() -> None:
     ]
 
 
-TOO_DEEP, ODD_KEY = f"nested deeper than {MAX_DEPTH}", "a key must be text, not a list, a mapping or an alias"
+TOO_DEEP, ODD_KEY = f"nested deeper than {MAX_DEPTH}", "a key must be text; it is a list, a mapping or an alias"
 
 
 @pytest.mark.parametrize(("opening", "told"), [("[", TOO_DEEP), ("{a: ", TOO_DEEP), ("- ", TOO_DEEP), ("? ", ODD_KEY)])
@@ -97,7 +97,7 @@ def test_ordinary_aliases_do_not_cost_the_budget() -> None:
 
 
 def test_too_many_values_are_refused() -> None:
-    assert _problem("[" + "1, " * 100_001 + "]").message == "the file holds more than 100000 values"
+    assert _problem("[" + "1, " * 100_001 + "]").message == "the file has more than 100000 values"
 
 
 @pytest.mark.parametrize("text", ["&a [*a]", "a: &a {b: [*a]}"])
