@@ -148,9 +148,7 @@ def test_35_files_that_extend_each_other(refused, folder: Path) -> None:
     for name, base in (("one", "two"), ("two", "three"), ("three", "one")):
         (folder / f"{name}.scenario.yaml").write_text(f"simscen: 1\nextends: {base}.scenario.yaml\n")
     chain = "one.scenario.yaml → two.scenario.yaml → three.scenario.yaml → one.scenario.yaml"
-    assert f"three.scenario.yaml:2:10: error[SC024] circular `extends`: {chain}" in refused(
-        "one.scenario.yaml"
-    )
+    assert f"three.scenario.yaml:2:10: error[SC024] circular `extends`: {chain}" in refused("one.scenario.yaml")
 
 
 @pytest.mark.parametrize("name", ["x" * 300 + ".scenario.yaml", "x" * 5000])

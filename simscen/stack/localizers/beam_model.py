@@ -1,4 +1,4 @@
-"""How well a scan fits the map, judged by casting its beams through the map.
+"""Beam sensor model: likelihood of a scan by ray casting.
 
 The beam model of Thrun, Burgard & Fox, Probabilistic Robotics, section 6.3 and table 6.1, as in nav2_amcl's
 beam_model.cpp. Rays are marched through the distance field, as in Walsh & Karaman, CDDT: Fast Approximate 2D Ray

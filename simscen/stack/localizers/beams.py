@@ -1,4 +1,4 @@
-"""The beams of a scan that a particle filter looks at."""
+"""Beams of a scan that a particle filter compares with the map."""
 
 import cmath
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""One pose and one covariance out of many particles."""
+"""Pose estimate and covariance from weighted particles."""
 
 import math
 

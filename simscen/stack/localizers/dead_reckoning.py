@@ -1,4 +1,4 @@
-"""Where the wheels say the robot is, counted from where it was told it started."""
+"""Dead reckoning from odometry."""
 
 import numpy as np
 
@@ -9,32 +9,32 @@ from simscen.model.localizers import Ekf
 from simscen.stack.localizers.planar_motion import grown
 from simscen.stack.odometry_history import believable
 
-# A place that nobody has told: 100 m and any heading.
 _UNKNOWN_STD = (100.0, 100.0, np.pi / np.sqrt(3))
+"""Standard deviations of an unknown pose: 100 m, and any heading."""
 _NOISE = Ekf(type="ekf")
 
 
 def start_of(estimate: Estimate) -> tuple[Pose2, Array]:
-    """A pose and a covariance (3, 3) to start from; an unknown place starts at the origin of the map."""
+    """Return the initial pose and covariance (3, 3). An unknown pose starts at the origin of the map."""
     if estimate.pose is None:
         return Pose2(0.0, 0.0, 0.0), np.diag(np.square(_UNKNOWN_STD))
     return estimate.pose, np.diag(np.square(estimate.std))
 
 
 class DeadReckoning:
-    """Adds up odometry from the initial estimate; its covariance grows as the EKF's without a gyroscope does."""
+    """Integrates odometry from the initial estimate. The covariance grows with the default noise of `ekf`."""
 
     def __init__(self, estimate: Estimate) -> None:
         self.reset(estimate)
 
     def reset(self, estimate: Estimate) -> None:
-        """Start over at an estimate."""
+        """Restart at an estimate."""
         pose, covariance = start_of(estimate)
         self._belief = Belief(pose, covariance, pose)
         self._odometry: Pose2 | None = None
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Take a step."""
+        """Move the pose by the odometry since the last reading."""
         if not believable(odometry.pose):
             return
         last, self._odometry = self._odometry, odometry.pose
@@ -45,12 +45,12 @@ class DeadReckoning:
         self._belief = Belief(pose, covariance, map_from_odom, updated=odometry.tick)
 
     def on_scan(self, scan: Scan) -> None:
-        """Nothing."""
+        """Ignore the reading."""
 
     def on_imu(self, imu: Imu) -> None:
-        """Nothing."""
+        """Ignore the reading."""
 
     @property
     def belief(self) -> Belief:
-        """The sum of all steps."""
+        """The integrated pose and its covariance."""
         return self._belief

@@ -1,4 +1,4 @@
-"""How far each cell of a map is from the nearest obstacle: what likelihood fields and ray marching look up."""
+"""Table of each cell's distance to the nearest obstacle, for likelihood fields and ray marching."""
 
 import math
 from collections.abc import Callable

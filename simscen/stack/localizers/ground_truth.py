@@ -1,4 +1,4 @@
-"""Where the robot is, as whoever runs the test says."""
+"""Localizer that reports the true pose."""
 
 import numpy as np
 
@@ -11,28 +11,28 @@ from simscen.stack.odometry_history import believable
 TRUTH = "ground_truth"
 """The name of the sensor whose odometry readings are true poses in the map frame."""
 
-# As sure as a survey: 1 mm and 1 mrad, so that the covariance can be inverted.
 _COVARIANCE = np.diag([1e-6, 1e-6, 1e-6])
+"""1 mm and 1 mrad, so that the covariance can be inverted."""
 
 
 class GroundTruthLocalizer:
-    """Believes what it is told by the sensor `ground_truth`, to tell faults of localisation from others.
+    """Reports the pose of the sensor `ground_truth`, to separate faults of localization from others.
 
-    The truth arrives as odometry readings whose sensor is called "ground_truth" and whose pose is in the map frame;
-    other odometry carries the pose on in between. A stack that is not fed any is left with dead reckoning.
+    The true pose arrives as odometry readings of a sensor called "ground_truth", in the map frame. Other odometry moves
+    the pose in between. Without such readings the localizer is dead reckoning.
     """
 
     def __init__(self, estimate: Estimate) -> None:
         self.reset(estimate)
 
     def reset(self, estimate: Estimate) -> None:
-        """Start over at an estimate; the next truth replaces it."""
+        """Restart at an estimate; the next true pose replaces it."""
         self._started = False
         self._pose, self._covariance = start_of(estimate)
         self._map_from_odom, self._odometry, self._updated = self._pose, Pose2(0.0, 0.0, 0.0), -1
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Take the truth, or a step of dead reckoning from it."""
+        """Store the true pose, or move it by wheel odometry."""
         if not believable(odometry.pose):
             return
         if odometry.sensor == TRUTH:
@@ -45,12 +45,12 @@ class GroundTruthLocalizer:
         self._started = True
 
     def on_scan(self, scan: Scan) -> None:
-        """Nothing."""
+        """Ignore the reading."""
 
     def on_imu(self, imu: Imu) -> None:
-        """Nothing."""
+        """Ignore the reading."""
 
     @property
     def belief(self) -> Belief:
-        """The last truth, carried on by odometry."""
+        """The last true pose, moved by odometry since then."""
         return Belief(self._pose, self._covariance, self._map_from_odom, updated=max(self._updated, 0))

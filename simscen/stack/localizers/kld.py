@@ -1,4 +1,4 @@
-"""How many particles are enough: as many as their spread needs.
+"""KLD sampling: the number of particles adapts to their spread.
 
 KLD-sampling: Fox, Adapting the Sample Size in Particle Filters Through KLD-Sampling, IJRR 22 (2003), equation 7;
 Probabilistic Robotics, table 8.4. The histogram is nav2_amcl's (pf_kdtree.c): bins of 0.5 m x 0.5 m x 10°.
@@ -18,19 +18,19 @@ Keys = npt.NDArray[np.int64]
 
 
 def bins(poses: Array) -> Keys:
-    """Keys (n,) of the histogram bins that `poses` (n, 3) fall into; headings a full turn apart share one."""
+    """Return the keys (n,) of the histogram bins of `poses` (n, 3). Headings a full turn apart share one."""
     places = np.clip(np.floor(poses[:, :2] / BIN_METRES), -_HALF + 2, _HALF - 2).astype(np.int64)
     yaw = np.floor(poses[:, 2] * (BINS_OF_YAW / (2 * np.pi))).astype(np.int64) % BINS_OF_YAW
     return join(places[:, 0], places[:, 1], yaw)
 
 
 def join(x: Keys, y: Keys, yaw: Keys) -> Keys:
-    """Keys of bins with these whole coordinates."""
+    """Return the keys of bins with these integer coordinates."""
     return ((x + _HALF) * (2 * _HALF) + (y + _HALF)) * BINS_OF_YAW + yaw
 
 
 def split(keys: Keys) -> tuple[Keys, Keys, Keys]:
-    """The whole coordinates x, y, yaw of bins."""
+    """Return the integer coordinates x, y, yaw of bins."""
     places, yaw = np.divmod(keys, BINS_OF_YAW)
     x, y = np.divmod(places, 2 * _HALF)
     return x - _HALF, y - _HALF, yaw
@@ -38,7 +38,7 @@ def split(keys: Keys) -> tuple[Keys, Keys, Keys]:
 
 @dataclass(frozen=True)
 class KldBound:
-    """How many samples make the sampled distribution differ by at most `error` from the true one.
+    """Number of samples that keep the sampled distribution within `error` of the true one.
 
     `z` is an upper quantile of the standard normal distribution. nav2_amcl uses its parameter pf_z = 0.99 as this
     quantile itself, not as the probability 0.99 (whose quantile is 2.33), and so does this.
@@ -50,7 +50,7 @@ class KldBound:
     most: int
 
     def samples(self, occupied: npt.ArrayLike) -> Keys:
-        """Samples needed when that many bins are occupied, between `least` and `most`.
+        """Return the samples needed for a number of occupied bins, between `least` and `most`.
 
         Fox's bound is zero for a single bin. (nav2_amcl asks for `most` there: a quirk that makes the filter work
         hardest when it is surest.)

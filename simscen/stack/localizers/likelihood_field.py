@@ -1,4 +1,4 @@
-"""How well a scan fits the map, judged by how near its ends are to obstacles.
+"""Likelihood field sensor models: likelihood of a scan by the distance of its endpoints from obstacles.
 
 Likelihood fields: Thrun, Burgard & Fox, Probabilistic Robotics, section 6.4 and table 6.3; nav2_amcl's
 likelihood_field_model.cpp and likelihood_field_model_prob.cpp. Beams that hit nothing say nothing.

@@ -1,4 +1,4 @@
-"""What odometry says about where each particle went.
+"""Motion models: how odometry moves particles.
 
 The odometry motion model of Thrun, Burgard & Fox, Probabilistic Robotics, section 5.4 and table 5.6, with the
 variances of nav2_amcl: alphas multiply *squared* motions, backward motion is as noisy as forward motion, and a

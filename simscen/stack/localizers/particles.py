@@ -1,4 +1,4 @@
-"""A weighted set of poses, and the two ways to begin one: around a guess, or anywhere."""
+"""Weighted set of particles, initialized around a pose or over all free space."""
 
 import math
 from dataclasses import dataclass

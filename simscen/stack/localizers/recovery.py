@@ -1,4 +1,4 @@
-"""Noticing that the particles are all wrong.
+"""Recovery of a lost filter by random particles.
 
 Augmented MCL: Thrun, Burgard & Fox, Probabilistic Robotics, section 8.3.5 and table 8.3.
 """

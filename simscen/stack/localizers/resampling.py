@@ -1,4 +1,4 @@
-"""Drawing new particles from old ones."""
+"""Resampling of particles."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ Indices = npt.NDArray[np.int64]
 
 
 def systematic(weights: Array, count: int, chance: np.random.Generator) -> Indices:
-    """Indices (count,) drawn in proportion to `weights` (n,), ascending, with the least variance.
+    """Return indices (count,), ascending, drawn in proportion to `weights` (n,) with minimum variance.
 
     The low-variance sampler of Probabilistic Robotics, table 4.4: an index is drawn ⌊count·w⌋ or ⌈count·w⌉ times.
     """
@@ -25,9 +25,7 @@ def systematic(weights: Array, count: int, chance: np.random.Generator) -> Indic
 
 
 def adaptive(draw: Callable[[int], Array], bound: KldBound) -> Array:
-    """Poses (n, 3) from `draw`, which returns as many as it is asked for, until the KLD bound says enough.
-
-    Rows may tell more than x, y and yaw behind these.
+    """Draw poses (n, 3) with `draw(count)` until the KLD bound is satisfied. Rows may have more than three columns.
 
     Fox (2003), table 3, in blocks instead of one by one: the sequence of draws is cut where it first satisfies the
     bound. `draw` must return its poses in an order that does not matter.

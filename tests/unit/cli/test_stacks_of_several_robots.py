@@ -111,7 +111,10 @@ def test_a_name_that_nobody_defines_is_told_at_each_robot_that_has_it(simscen, p
 def test_two_names_of_one_scenario_on_one_command_line_would_each_be_a_run_and_are_refused(simscen, project) -> None:
     ended = simscen("run", "mixed.scenario.yaml", "--stack", "mine=./nav", "--stack", "other=./nav")
     assert ended.code == 2
-    assert "error[SC042] robots of this scenario have the stacks `mine` and `other`, but a run can have only one --stack" in ended.err
+    assert (
+        "error[SC042] robots of this scenario have the stacks `mine` and `other`, but a run can have only one --stack"
+        in ended.err
+    )
     assert "home/simscen/config.yaml" in ended.err
 
 

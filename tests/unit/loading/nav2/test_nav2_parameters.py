@@ -134,7 +134,9 @@ def test_a_controller_that_is_not_here_leaves_the_usual_one_and_says_so(tmp_path
     params = PARAMS.replace("nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController", "mine::Graceful")
     found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", params)
     assert found.spec.stack.controller.type == "mppi"
-    assert "mine::Graceful is not supported; the default controller is used" in "".join(note.message for note in found.notes)
+    assert "mine::Graceful is not supported; the default controller is used" in "".join(
+        note.message for note in found.notes
+    )
 
 
 def test_mppis_motion_model_is_found_by_the_name_of_its_plugin(tmp_path: Path) -> None:
