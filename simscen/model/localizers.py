@@ -113,6 +113,8 @@ class Amcl(AmclParameters):
     component: ClassVar[str] = "simscen.stack.localizers.build:amcl"
     precomputation: ClassVar[str] = "simscen.stack.localizers.build:precompute"
     type: Literal["amcl"] = "amcl"
+    parameters: Literal["nav2"] | None = None
+    """Deprecated: `amcl` always has the default values of nav2_amcl. Remove it."""
 
 
 class EkfParameters(LocalizerSpec):

@@ -10,6 +10,7 @@ from simscen.loading.checks.registry import MEANING, Finding, Keys
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.spec_walk import quantities_of
 from simscen.loading.yaml.tree import MappingNode, ScalarNode, node_at
+from simscen.model.localizers import Amcl
 
 FULL_TURN_RAD = 2 * math.pi
 SPEED_PARAMETERS = ("desired_linear_vel", "max_vel_x", "vx_max")
@@ -63,6 +64,15 @@ def duplicate_entries(loaded: LoadedScenario) -> Iterator[Finding]:
                 first = loaded.place_of(*keys, entries.index(entry))
                 message = f"the same entry is already in `{keys[-1]}` at {first.line}:{first.col}"
                 yield Finding((*keys, index), message)
+
+
+@MEANING.check("SC055", severity="warning")
+def deprecated_parameters(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find parameters that earlier versions had and that no longer have an effect."""
+    localizer = getattr(loaded.spec.stack, "localizer", None)
+    if isinstance(localizer, Amcl) and localizer.parameters is not None:
+        message = "`parameters` is deprecated: `amcl` always has the default values of nav2_amcl"
+        yield Finding(("stack", "localizer", "parameters"), message, "remove it")
 
 
 @MEANING.check("SC055", severity="warning")

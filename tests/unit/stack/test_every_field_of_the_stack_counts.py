@@ -176,6 +176,7 @@ PARTS = [
     Part(("planner",), planners.Smac2d, ((planner(type="smac_2d"), scenes.planned),), of_planner("smac_2d")),
 ]  # fmt: skip
 ELSEWHERE = {
+    "Amcl.parameters": "tests/diagnostics/meaningless/deprecated_amcl_parameters.scenario.yaml",
     "StackSpec.keepout": "tests/scenarios/test_masks.py",
     "StackSpec.speed_zones": "tests/unit/run/test_filters.py",
     "StackSpec.keepout_mask": "tests/scenarios/test_masks.py",
