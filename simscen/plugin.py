@@ -1,6 +1,6 @@
 """Everything that an author of plug-ins imports, from one place that stays: `from simscen.plugin import PlannerSpec`.
 
-SI units throughout: metres, seconds, radians, m/s, rad/s. The map frame is that of the robot's map; the base frame has
+SI units throughout: meters, seconds, radians, m/s, rad/s. The map frame is that of the robot's map; the base frame has
 x forward and y to the left, and yaw turns anticlockwise. Arrays are numpy's, float64 unless something else is said.
 
 Each name is imported when it is asked for: a specification imports no engine, and validating a scenario imports no more

@@ -1,4 +1,4 @@
-"""`friction`: something is spilt on the floor, or mopped up."""
+"""`friction`: something is spilled on the floor, or mopped up."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ REACTIONS: dict[str, tuple[float, float]] = {
     "scared": (3.0, 40.0),
     "threatening": (4.0, 40.0),
 }
-"""Metres within which each begins and seconds after which it ends, of HuNavSim's behavior trees."""
+"""Meters within which each begins and seconds after which it ends, of HuNavSim's behavior trees."""
 TRIES = 200
 """Places drawn for one of a crowd before there is no room."""
 TOGETHER = 1.0
@@ -204,7 +204,7 @@ class Crowd(_Walks, Action):
 
 
 class Box(NamedTuple):
-    """A rectangle: its middle, and half its sides in metres."""
+    """A rectangle: its middle, and half its sides in meters."""
 
     x: float
     y: float

@@ -15,7 +15,7 @@ from simscen.spec.references import MovableName
 
 
 class Push(Spec, Action):
-    """Push the robot, or an object that has a mass, at its centre: an impulse at once, or a force for a while.
+    """Push the robot, or an object that has a mass, at its center: an impulse at once, or a force for a while.
 
     Imitates somebody who bumps into the robot (`impulse`), and somebody who leans on it, a slope or a gust of wind
     (`force`). A force of F newtons for t seconds gives a mass that nothing holds an impulse of F t.

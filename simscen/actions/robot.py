@@ -7,7 +7,7 @@ from simscen.spec.base import Spec
 from simscen.spec.named_places import PlaceOrPose
 
 SAME = 1e-3
-"""Metres and radians within which the robot is where a kidnapper wants it."""
+"""Meters and radians within which the robot is where a kidnapper wants it."""
 
 
 class Kidnap(Spec, Action):

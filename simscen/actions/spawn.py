@@ -31,7 +31,7 @@ class Spawn(Shaped, Action):
     pose: PlaceOrPose | None = None
     """In the world frame: a pose, or a place by name."""
     ahead: Annotated[list[Length], Field(min_length=2, max_length=2)] | None = None
-    """In the robot's frame: [metres ahead, metres to the left]."""
+    """In the robot's frame: [meters ahead, meters to the left]."""
     on_plan: NonNegativeLength | None = None
     """On the robot's plan, so far ahead along it, turned across it; at its end where the plan is shorter. Where the
     robot has no plan, ahead of it by as much, which does not count as having happened."""
@@ -75,7 +75,7 @@ def _has_plan(stage: Stage) -> bool:
 
 
 def along(plan: Path, robot: Pose2, ahead: float) -> Pose2:
-    """The pose on `plan` that is `ahead` metres further along it than its point nearest to the robot."""
+    """The pose on `plan` that is `ahead` meters further along it than its point nearest to the robot."""
     points = plan.points[:, :2]
     steps = np.hypot(*np.diff(points, axis=0).T)
     travelled = np.concatenate(([0.0], np.cumsum(steps)))

@@ -8,7 +8,7 @@ from simscen.spec.named_places import PlaceOrPose
 from simscen.spec.references import MovableName
 
 SAME = 1e-3
-"""Metres and radians within which a thing is where it shall be."""
+"""Meters and radians within which a thing is where it shall be."""
 
 
 class Teleport(Spec, Action):

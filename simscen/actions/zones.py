@@ -15,7 +15,7 @@ from simscen.spec.references import RegionName
 class SwitchKeepout(Spec, Action):
     """Tell the stack to keep out of a region from now on, or that it may enter it again.
 
-    The stack is told, as by Nav2's `keepout_filter/toggle_filter`, and honours it at the next update of its costmap: a
+    The stack is told, as by Nav2's `keepout_filter/toggle_filter`, and honors it at the next update of its costmap: a
     plan that leads through is made anew, and one that was made around is looked over. A zone that begins switched off
     is simply not in `stack.keepout`. Imitates a fleet manager that closes an aisle, or an area scanner that opens one.
 

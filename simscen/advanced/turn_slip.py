@@ -11,7 +11,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 
 DECAY_DISTANCE_M = 0.5
-"""Metres driven in which what was learnt fades by a factor of e: turns and ground change."""
+"""Meters driven in which what was learned fades by a factor of e: turns and ground change."""
 MAX_CURVATURE_PER_M = 1.0
 """1/m: no more of a bend is believed, whatever a broken sensor says."""
 

@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 from typing_extensions import Self
 
 from simscen.assets.addresses import PACKAGES, SCHEMES, fuel, places
-from simscen.assets.neighbours import neighbour
+from simscen.assets.neighbors import neighbor
 from simscen.assets.packages import is_package_name, places_of
 from simscen.core.files import record_read_file
 
@@ -144,7 +144,7 @@ class Folders:
             raise Trouble("outside the scenario root and the world paths")
 
     def _hint(self, uri: str, tried: list[tuple[Path, Path]]) -> str:
-        near = next((found for folder, path in tried if (found := neighbour(folder, path))), None)
+        near = next((found for folder, path in tried if (found := neighbor(folder, path))), None)
         if near:
             return f"did you mean `{near}`?"
         if fuel(uri) and not self.search:

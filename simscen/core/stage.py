@@ -53,7 +53,7 @@ class Situation(Protocol):
 
     @property
     def clearance(self) -> float | None:
-        """Metres from the robot's hull to the nearest obstacle by the newest sample of the truth, None before that.
+        """Meters from the robot's hull to the nearest obstacle by the newest sample of the truth, None before that.
 
         What is further than was searched for is said to be that far.
         """
@@ -65,7 +65,7 @@ class Situation(Protocol):
 
     @property
     def travelled(self) -> float:
-        """Metres driven so far; being set down elsewhere is no drive."""
+        """Meters driven so far; being set down elsewhere is no drive."""
         ...
 
     @property
@@ -122,7 +122,7 @@ class Stage(Situation, Protocol):
         ...
 
     def room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Whether a person of a radius in metres can stand there: no wall is in the way, no thing, person or robot."""
+        """Whether a person of a radius in meters can stand there: no wall is in the way, no thing, person or robot."""
         ...
 
     def chance(self, name: str) -> np.random.Generator:
@@ -158,7 +158,7 @@ class Stage(Situation, Protocol):
         ...
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
-        """Push the robot, or an object with a mass: an impulse in N s in the world frame, at its centre.
+        """Push the robot, or an object with a mass: an impulse in N s in the world frame, at its center.
 
         It is spread evenly over so many `seconds`; over one tick of the physics for 0.
         """

@@ -93,7 +93,7 @@ def chi2_quantile(probability: float, freedom: int) -> float:
 
 
 def chi2_cdf(value: float, freedom: int) -> float:
-    """The probability of staying below a value > 0: the regularised incomplete gamma function P(freedom/2, value/2).
+    """The probability of staying below a value > 0: the regularized incomplete gamma function P(freedom/2, value/2).
 
     Its power series, whose terms are all positive (Abramowitz and Stegun 1964, 6.5.29).
     """

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 SEARCH_MARGIN_M = 0.5
-"""Metres beyond its bound."""
+"""Meters beyond its bound."""
 
 
 class Clearance(Spec, Criterion):
@@ -35,7 +35,7 @@ class Clearance(Spec, Criterion):
     """
 
     min: NonNegativeLength
-    """Metres."""
+    """Meters."""
 
     @property
     def clearance_range(self) -> float:

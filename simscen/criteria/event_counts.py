@@ -90,19 +90,19 @@ class Replans(CountBounds, Criterion):
 
 
 class Recoveries(CountBounds, Criterion):
-    """Recovery behaviours ran as often as they should.
+    """Recovery behaviors ran as often as they should.
 
-    What is measured: the number of recovery behaviours that started.
+    What is measured: the number of recovery behaviors that started.
     When it fails: fewer than `min` or more than `max`.
     Why this: a scenario about getting unstuck proves something only if the robot was stuck; in all others recoveries
         are the first sign of trouble.
-    Source: Nav2's recovery node and behaviour server (spin, wait, backup, clear costmap).
+    Source: Nav2's recovery node and behavior server (spin, wait, backup, clear costmap).
 
     Example: `recoveries: {min: 1, name: spin}`
     """
 
     name: BehaviorName | None = None
-    """Only this behaviour."""
+    """Only this behavior."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:

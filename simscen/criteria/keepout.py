@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     Away = Callable[[Array], Array]
 
 RESOLUTION_M = 0.005
-"""Metres to which the nearest moment between two samples is searched."""
+"""Meters to which the nearest moment between two samples is searched."""
 POINT = ((0.0, 0.0),)
 """The hull of a robot without a footprint; its inscribed radius is around it."""
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class LocalizationConsistency(Spec, Criterion):
     """The robot's doubt about its pose fitted its error.
 
-    What is measured: the normalised estimation error squared e' P⁻¹ e of the believed pose (x, y, wrapped heading) with
+    What is measured: the normalized estimation error squared e' P⁻¹ e of the believed pose (x, y, wrapped heading) with
         its covariance P, every so often, averaged over the run; 3 when the covariance tells the truth.
     When it fails: the average is above what a consistent belief keeps with this probability (the robot is
         overconfident), or with `both_sides` below it; or a covariance is singular, as that of a particle set that has

@@ -28,7 +28,7 @@ class LocalizationError(Spec, Criterion):
     What is measured: the distance between believed and true position (and the heading error) whenever the robot
         publishes its belief, and all the time while its newest belief is over 1 s old; without any alignment.
     When it fails: the largest, the root mean square or the last error exceeds its bound.
-    Why this: goals can be reached by luck with a belief half a metre off, until a shelf stands in that half metre.
+    Why this: goals can be reached by luck with a belief half a meter off, until a shelf stands in that half meter.
     Source: evo's APE (metrics.py) and Beluga's benchmarks; alignment would forgive the very error we look for.
 
     Example: `localization_error: {max: 0.3 m, rmse: 0.1 m, after: 5 s}`

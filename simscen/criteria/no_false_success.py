@@ -28,7 +28,7 @@ class NoFalseSuccess(Spec, Criterion):
     When it fails: a goal was reported reached from further away than `tolerance`, or SUCCEEDED with a goal missing.
     Why this: a failed delivery is retried; one that was reported done is not even noticed. Arena's result says
         GOAL_REACHED without ever checking the goal.
-    Source: BARN challenge, run.py, for the metre.
+    Source: BARN challenge, run.py, for the meter.
 
     Example: `no_false_success: {tolerance: 0.5 m}`
     """

@@ -38,7 +38,7 @@ class PathLength(Spec, Criterion):
     """
 
     max: PositiveLength | None = None
-    """Metres."""
+    """Meters."""
     max_ratio: Ratio | None = None
     """Times the shortest way; 1 is a perfect drive."""
 
@@ -54,7 +54,7 @@ class PathLength(Spec, Criterion):
         return frozenset({Evidence.TRUTH})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """The length, then the ratio; both in metres of margin."""
+        """The length, then the ratio; both in meters of margin."""
         way = drive(trace)
         findings = [] if self.max is None else [_bound(trace, way, "path_length", self.max)]
         if self.max_ratio is not None:
@@ -79,7 +79,7 @@ class PathLength(Spec, Criterion):
 
 
 def shortest_way(trace: Trace, case: Case) -> tuple[float, str]:
-    """The length in metres of the shortest way through all goals; or nan, and why there is none to compare with."""
+    """The length in meters of the shortest way through all goals; or nan, and why there is none to compare with."""
     names = [goal.name for goal in case.goals if goal.name not in case.expected]
     twice = sorted({name for name in names if names.count(name) > 1})
     without = [name for name in names if not math.isfinite(case.shortest.get(name, math.nan))]

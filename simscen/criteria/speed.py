@@ -28,8 +28,8 @@ class Speed(Spec, Criterion):
     """The robot never went too fast.
 
     What is measured: the largest true speed over ground, and the largest true turn rate, over the whole run, or while
-        the robot's centre was in a region. With a mask of speed limits, also the true speed against the limit of the
-        cell that the robot's centre truly was in, where it was furthest above it.
+        the robot's center was in a region. With a mask of speed limits, also the true speed against the limit of the
+        cell that the robot's center truly was in, where it was furthest above it.
     When it fails: one is above its bound; the speed is more than `tolerance` above a limit of the mask, for which the
         highest limit within `grace` before and after counts.
     Why this: limits in a controller's parameters are wishes; slopes, slip and overshoot decide.
@@ -46,7 +46,7 @@ class Speed(Spec, Criterion):
     max_turn_rate: PositiveAngularSpeed | None = None
     """rad/s, either way."""
     in_: RegionName | None = Field(default=None, alias="in")
-    """Only while the robot's centre is in this region, by name."""
+    """Only while the robot's center is in this region, by name."""
     while_on: bool = False
     """Only while events have the limit in that region switched on (`speed_zone` among the actions), and from `grace`
     after that; else over the whole run."""
@@ -138,7 +138,7 @@ class Speed(Spec, Criterion):
         return at_most("speed", value, limit, "m/s", at=(trace, int(signal.ticks[k])), context=context)
 
     def _inside(self, trace: Trace, case: Case, signal: Samples) -> ground_truth.Flags | None:
-        """When the robot's centre was in the region, everywhere being one, too; None for one that does not exist."""
+        """When the robot's center was in the region, everywhere being one, too; None for one that does not exist."""
         from simscen.criteria.trace_signals.readers import points_in_polygon
 
         if self.in_ is None:

@@ -36,7 +36,7 @@ class Stuck(Spec, Criterion):
     max: PositiveDuration = 10.0
     """Seconds."""
     radius: PositiveLength = 0.5
-    """Metres that count as getting on."""
+    """Meters that count as getting on."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:

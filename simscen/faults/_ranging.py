@@ -38,7 +38,7 @@ def _changed(distances: Array, change: Callable[[Array], Array]) -> Array:
 def seen_as(scan: Scan, distances: Array, nominal: Array) -> Array:
     """What the lidar of a scan would have said at other true distances: with the errors of the scan itself.
 
-    `nominal` are the true distances at which it said what it did. In whole millimetres: last bits do not spread.
+    `nominal` are the true distances at which it said what it did. In whole millimeters: last bits do not spread.
     """
     with np.errstate(invalid="ignore"):
         errors = scan.ranges - nominal

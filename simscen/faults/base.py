@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Wheels:
-    """What a fault may know of the drive: distance between left and right wheels in metres (0 = has none)."""
+    """What a fault may know of the drive: distance between left and right wheels in meters (0 = has none)."""
 
     separation: float = 0.0
 
@@ -32,7 +32,7 @@ class Sight(Protocol):
     """What a sensor would see now if it sat elsewhere, or if something were not there."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """True distances (n,) in metres along the beams of a scan of now; inf where nothing is within its range.
+        """True distances (n,) in meters along the beams of a scan of now; inf where nothing is within its range.
 
         `error` is where the lidar really is in the frame in which it is thought to be; beams that point down end at
         the floor. What is called as in `without` lets them through.
@@ -52,7 +52,7 @@ def _start() -> int:
 class FaultSetting(Wheels):
     """All that a fault may know besides its specification.
 
-    separation:  between left and right wheels in metres (0 = has none)
+    separation:  between left and right wheels in meters (0 = has none)
     clock:       what makes seconds of ticks
     now:         the tick of this beat
     kind:        what it affects: one of its `affects`

@@ -22,7 +22,7 @@ from simscen.spec.quantities import Acceleration, Angle, AngularSpeed, Length, Q
 class Bias(Spec, Fault):
     """A sensor is off by the same amount all the time: wrong wheel radii, a gyroscope not zeroed, a lidar too warm.
 
-    Odometry reports a scaled distance and turn, plus a steady turn for each metre driven; ranges are too long or too
+    Odometry reports a scaled distance and turn, plus a steady turn for each meter driven; ranges are too long or too
     short; a gyroscope turns while it stands; a picture is too bright or too dark.
 
     Example: `{sensor: odom, bias: {linear_scale: 1.1, turn_per_metre: 0.05}}`
@@ -44,7 +44,7 @@ class Bias(Spec, Fault):
     angular_scale: Ratio = 1.0
     """Reported turn per true turn."""
     turn_per_metre: Angle = 0.0
-    """Radians of turn reported for each metre driven forward: unequal wheel radii."""
+    """Radians of turn reported for each meter driven forward: unequal wheel radii."""
     range: Length = 0.0
     """Added to each range or depth."""
     gyro: AngularSpeed = 0.0

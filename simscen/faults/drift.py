@@ -41,7 +41,7 @@ class Drift(Spec, Fault):
     range: Speed = 0.0
     """By which each range or depth grows."""
     linear: Speed = 0.0
-    """Metres a second forward that odometry adds, or that the belief slides."""
+    """Meters a second forward that odometry adds, or that the belief slides."""
     angular: AngularSpeed = 0.0
     """Radians a second that odometry adds, or that the belief turns."""
     gyro: AngularAcceleration = 0.0

@@ -68,8 +68,8 @@ class _Nonsense(Disturbance):
             case Scan(ranges=ranges):
                 return replace(reading, ranges=_spoilt(ranges, what))
             case Image(rgb=rgb, depth=depth):
-                colours = rgb if what in NUMBERS else _spoilt(rgb, what)
-                return replace(reading, rgb=colours, depth=_spoilt(depth, what))
+                colors = rgb if what in NUMBERS else _spoilt(rgb, what)
+                return replace(reading, rgb=colors, depth=_spoilt(depth, what))
             case Odometry():
                 value = NUMBERS[what]
                 return replace(reading, pose=Pose2(value, value, value), twist=Twist(value, value, value))

@@ -52,7 +52,7 @@ class Noise(Spec, Fault):
     colour: Probability = 0.0
     """Standard deviation of a pixel's red, green and blue, of their full scale."""
     linear: NonNegativeLength = 0.0
-    """Standard deviation of odometry's distance after one metre; of a belief, in x and in y."""
+    """Standard deviation of odometry's distance after one meter; of a belief, in x and in y."""
     angular: NonNegativeAngle = 0.0
     """Standard deviation of odometry's heading after one radian turned; of a belief's heading."""
     gyro: NonNegativeAngularSpeed = 0.0
@@ -80,9 +80,9 @@ class _Noise(Disturbance):
                 within = np.clip(noisy, reading.range_min, reading.range_max)
                 return replace(reading, ranges=np.where(np.isfinite(noisy), within, noisy))
             case Image(rgb=rgb, depth=depth):
-                colours = rgb + self._chance.normal(0.0, 255 * self._noise.colour, rgb.shape)
+                colors = rgb + self._chance.normal(0.0, 255 * self._noise.colour, rgb.shape)
                 depths = depth + self._chance.normal(0.0, self._noise.std, depth.shape)
-                seen = np.clip(np.rint(colours), 0, 255).astype(np.uint8)
+                seen = np.clip(np.rint(colors), 0, 255).astype(np.uint8)
                 return replace(reading, rgb=seen, depth=np.maximum(depths, 0.0).astype(np.float32))
             case Imu(angular_velocity=turning, linear_acceleration=pushing):
                 draws = self._chance.standard_normal((2, 3))

@@ -45,11 +45,11 @@ class _Drawn(Disturbance):
 
     def map(self, grid: OccupancyGrid) -> OccupancyGrid:
         rows, columns = np.indices(grid.shape)
-        centres = grid.centre_of(np.column_stack((rows.ravel(), columns.ravel())))
+        centers = grid.center_of(np.column_stack((rows.ravel(), columns.ravel())))
         cells = grid.cells.copy()
         for rings, value in ((self._spec.missing, FREE), (self._spec.extra, OCCUPIED)):
             for ring in rings:
-                within = covered([(x, y) for x, y in ring], centres).reshape(grid.shape)
+                within = covered([(x, y) for x, y in ring], centers).reshape(grid.shape)
                 cells[within] = value
         return replace(grid, cells=cells)
 

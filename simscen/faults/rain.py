@@ -24,7 +24,7 @@ RainRate = Annotated[float, Field(gt=0, le=500 * MM_PER_HOUR), Quantity("speed")
 class Rain(Spec, Fault):
     """Rain weakens what comes back and makes ranges uncertain: what is far or dark is not seen any more (inf).
 
-    Of a rate R in mm/h the extinction is α = 0.01 R^0.6 per metre. From a range z comes back ρ exp(-2 α z) / z²;
+    Of a rate R in mm/h the extinction is α = 0.01 R^0.6 per meter. From a range z comes back ρ exp(-2 α z) / z²;
     nothing is seen where that is less than 90 % of the light would be from the lidar's largest range in clear air.
     Ranges get an error with the standard deviation 0.02 z (1 - exp(-R))². Goodin, Carruth, Doude and Hudson, Predicting
     the influence of rain on lidar in ADAS, Electronics 8 (2019), eq. 3 to 6. Drops that echo themselves are `dust`.
@@ -44,7 +44,7 @@ class Rain(Spec, Fault):
 
     @property
     def extinction(self) -> float:
-        """α, per metre."""
+        """α, per meter."""
         return float(0.01 * (self.rate / MM_PER_HOUR) ** 0.6)
 
 

@@ -23,7 +23,7 @@ Factor = Annotated[float, Field(gt=0, le=100), Quantity("ratio")]
 class Scale(Spec, Fault):
     """Everything that a sensor measures is too large or too small by a factor.
 
-    Ranges and depths: a clock that runs fast or slow. Odometry: tyres with too little air, a wrong gear ratio in the
+    Ranges and depths: a clock that runs fast or slow. Odometry: tires with too little air, a wrong gear ratio in the
     driver; both distances and turns. An inertial unit: a wrong full-scale setting; what it measures at rest, too.
 
     Example: `{sensor: odom, scale: {factor: 105 %}}`

@@ -18,7 +18,7 @@ SlipRatio = Annotated[float, Field(ge=0, lt=1), Quantity("ratio")]
 
 
 class Slip(Spec, Fault):
-    """Wheels slip: of each metre a wheel rolls, its slip ratio is lost; odometry counts it all the same.
+    """Wheels slip: of each meter a wheel rolls, its slip ratio is lost; odometry counts it all the same.
 
     The slip ratio is that of vehicle dynamics when driving, s = 1 - v / (ω r) (Wong, Theory of Ground Vehicles,
     ch. 2). Left and right may differ; then the robot also turns without noticing. On `wheels` all odometry that counts

@@ -100,7 +100,7 @@ def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCovera
 
 def _error(entry: AnyCriterion, what: str) -> Finding:
     """Return the finding of a criterion that failed to judge; a plug-in is named with its package."""
-    return Finding(Status.ERROR, entry.kind, f"{what}{entry.added_by}", "a judgement")
+    return Finding(Status.ERROR, entry.kind, f"{what}{entry.added_by}", "a judgment")
 
 
 def _without_pass(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:

@@ -26,7 +26,7 @@ class ExternalStackSpec(StackBase):
     external: StackName
     """What the command line and the user's configuration call it: letters, digits, `_`, `.` and `-`."""
     ground_truth: bool = False
-    """Also tell it where it truly is, to tell faults of localisation from faults of navigation."""
+    """Also tell it where it truly is, to tell faults of localization from faults of navigation."""
 
     @property
     def told_truth(self) -> bool:

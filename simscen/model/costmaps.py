@@ -32,7 +32,7 @@ class Costmap(Ranged):
     inflation_radius: NonNegativeLength = 0.70
     """How far around obstacles cells cost something."""
     cost_scaling_factor: Annotated[float, Field(gt=0, le=100)] = 3.0
-    """How fast cost falls with the distance to an obstacle, for each metre."""
+    """How fast cost falls with the distance to an obstacle, for each meter."""
     update_frequency: Frequency = 5.0
     """How often what the lidars see is taken in."""
     obstacle_max_range: PositiveLength = 2.5
@@ -61,7 +61,7 @@ class Costmap(Ranged):
 
 
 class LocalCostmap(Spec):
-    """The local costmap, which rolls with the robot in the odom frame, for controllers and behaviours.
+    """The local costmap, which rolls with the robot in the odom frame, for controllers and behaviors.
 
     It shows what the sensors see and keepout zones, and no map. What is not said here is as in `costmap`.
     """
@@ -75,7 +75,7 @@ class LocalCostmap(Spec):
     inflation_radius: NonNegativeLength | None = None
     """How far around obstacles cells cost something."""
     cost_scaling_factor: Annotated[float, Field(gt=0, le=100)] | None = None
-    """How fast cost falls with the distance to an obstacle, for each metre."""
+    """How fast cost falls with the distance to an obstacle, for each meter."""
     update_frequency: Frequency | None = None
     """How often what the sensors see is taken in."""
     obstacle_max_range: PositiveLength | None = None

@@ -97,7 +97,7 @@ class MppiGoalCritic(MppiCritic):
     """Towards the plan's end, once that is near."""
 
     cost_weight: Weight = 5.0
-    """Of the mean distance in metres."""
+    """Of the mean distance in meters."""
     threshold_to_consider: NonNegativeLength = 1.4
     """How near."""
 
@@ -114,10 +114,10 @@ class MppiGoalAngleCritic(MppiCritic):
 
 
 class MppiPathAlignCritic(MppiCritic):
-    """Along the plan: where a trajectory is after so many metres, against where the plan is."""
+    """Along the plan: where a trajectory is after so many meters, against where the plan is."""
 
     cost_weight: Weight = 14.0
-    """Of the mean distance in metres."""
+    """Of the mean distance in meters."""
     max_path_occupancy_ratio: Annotated[float, Field(ge=0, le=1), Quantity("ratio")] = 0.05
     """Is silent where more of the plan than this is blocked."""
     trajectory_point_step: Every = 4
@@ -134,7 +134,7 @@ class MppiPathFollowCritic(MppiCritic):
     """Onward: the end of a trajectory, against a point of the plan beyond the furthest that any reaches."""
 
     cost_weight: Weight = 5.0
-    """Of the distance in metres."""
+    """Of the distance in meters."""
     offset_from_furthest: Points = 5
     """How many points of the plan beyond, 5 cm apart; points that are blocked are passed over."""
     threshold_to_consider: NonNegativeLength = 1.4
@@ -160,7 +160,7 @@ class MppiPreferForwardCritic(MppiCritic):
     """Against driving backward."""
 
     cost_weight: Weight = 5.0
-    """Of the metres driven backward."""
+    """Of the meters driven backward."""
     threshold_to_consider: NonNegativeLength = 0.5
     """Is silent nearer to the plan's end than this."""
 

@@ -35,7 +35,7 @@ class OmplPlanner(PlannerSpec):
     allow_unknown: bool = True
     """Whether plans may lead over what is not known, as dear as what is barely free."""
     cost_travel_multiplier: Annotated[float, Field(ge=0, le=100)] = 2.0
-    """A metre of way costs 1 + this times its cost / 252 (nav2_smac_planner's name and meaning; its default is 1)."""
+    """A meter of way costs 1 + this times its cost / 252 (nav2_smac_planner's name and meaning; its default is 1)."""
     sampler: Literal["auto", "uniform", "medial_axis", "corridor"] = "auto"
     """Where it searches; auto: medial_axis for bit_star, which alone can, else uniform."""
     max_iterations: Iterations = 50_000
@@ -64,7 +64,7 @@ class Navfn(PlannerSpec):
 
 
 class Smac2d(PlannerSpec):
-    """nav2_smac_planner::SmacPlanner2D: the cheapest way from cell to neighbouring cell."""
+    """nav2_smac_planner::SmacPlanner2D: the cheapest way from cell to neighboring cell."""
 
     component: ClassVar[str] = "simscen.stack.planners.grid_planner:smac_2d"
     type: Literal["smac_2d"]
@@ -73,7 +73,7 @@ class Smac2d(PlannerSpec):
     allow_unknown: bool = True
     """Whether plans may lead over what is not known, as dear as what is barely free."""
     cost_travel_multiplier: Annotated[float, Field(ge=0, le=100)] = 1.0
-    """A metre of way costs 1 + this times its cost / 252."""
+    """A meter of way costs 1 + this times its cost / 252."""
     smooth_path: bool = True
     """Whether the corners of the cells are taken out of the path."""
 

@@ -1,6 +1,6 @@
 """Default parameters of the stack by profile: `nav2` takes those of nav2_bringup, with Nav2's meanings.
 
-Read from navigation2 of August 2026: nav2_bringup/params/nav2_params.yaml, the default behaviour trees, and for plugins
+Read from navigation2 of August 2026: nav2_bringup/params/nav2_params.yaml, the default behavior trees, and for plugins
 that the file does not use the defaults of their code. What is said in a scenario wins.
 """
 

@@ -1,4 +1,4 @@
-"""What is done when planning or control has failed: the recovery branch of Nav2's default tree, and its behaviours."""
+"""What is done when planning or control has failed: the recovery branch of Nav2's default tree, and its behaviors."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -110,8 +110,8 @@ _Behaviors = Annotated[
 
 
 _NamedOrWhole = Annotated[
-    Annotated[RecoveryBehavior, Tag("a name")] | Annotated[_Behaviors, Tag("a behaviour")],
-    Discriminator(lambda value: "a name" if isinstance(value, str) else "a behaviour"),
+    Annotated[RecoveryBehavior, Tag("a name")] | Annotated[_Behaviors, Tag("a behavior")],
+    Discriminator(lambda value: "a name" if isinstance(value, str) else "a behavior"),
 ]
 
 
@@ -119,12 +119,12 @@ Behavior = Annotated[str | BehaviorSpec, ByType("behavior", _NamedOrWhole, named
 
 
 class Recovery(Spec):
-    """Behaviours of Nav2's default tree, taken in turn when planning or control fails."""
+    """Behaviors of Nav2's default tree, taken in turn when planning or control fails."""
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
     """How often a goal is tried again before it fails."""
     retries_since_progress: bool = True
-    """Whether that is counted anew, and the first behaviour is next, once the robot is a metre nearer to its goal than
+    """Whether that is counted anew, and the first behavior is next, once the robot is a meter nearer to its goal than
     at any recovery before. Nav2 counts for the whole goal."""
     planner_codes: Annotated[list[PlannerCode], Field(max_length=20)] = [
         "PLANNER_UNKNOWN",
@@ -165,11 +165,11 @@ class Recovery(Spec):
 
     @property
     def names(self) -> list[str]:
-        """What the behaviours are called, in turn."""
+        """What the behaviors are called, in turn."""
         return [entry if isinstance(entry, str) else entry.type for entry in self.behaviors]
 
     def chosen(self) -> list[BehaviorSpec]:
-        """The behaviours in turn; each takes what it does not say itself from the parameters of the same name here."""
+        """The behaviors in turn; each takes what it does not say itself from the parameters of the same name here."""
         return [self._completed(entry) for entry in self.behaviors]
 
     def _completed(self, entry: str | BehaviorSpec) -> BehaviorSpec:

@@ -225,7 +225,7 @@ class Lidar(Ranged, SensorSpec):
     beams: Annotated[int, Field(ge=1, le=4096)] = 360
     """How many beams a scan has, spread evenly over its field of view."""
     field_of_view: PositiveAngle = 6.283185307179586
-    """Centred on straight ahead."""
+    """Centered on straight ahead."""
     min_range: NonNegativeLength = 0.12
     """What is nearer gives no answer."""
     max_range: PositiveLength = 12.0
@@ -247,11 +247,11 @@ class WheelOdometry(SensorSpec):
     rate: Frequency = 40.0
     """How often it says something."""
     translation_noise: NonNegativeLength = 0.01
-    """Standard deviation of the distance error after one metre driven; errors grow with the square root."""
+    """Standard deviation of the distance error after one meter driven; errors grow with the square root."""
     rotation_noise: Annotated[NonNegativeAngle, Field(le=1)] = 0.01
     """Standard deviation of the heading error after turning one radian."""
     drift_noise: Annotated[NonNegativeAngle, Field(le=1)] = 0.005
-    """Standard deviation of the heading error after driving one metre straight."""
+    """Standard deviation of the heading error after driving one meter straight."""
 
 
 class InertialUnit(SensorSpec):
@@ -281,7 +281,7 @@ class Bumper(SensorSpec):
 
 
 class Camera(SensorSpec):
-    """A colour and depth camera."""
+    """A color and depth camera."""
 
     component: ClassVar[str] = "simscen.sensors.camera:CameraSensor"
     says: ClassVar[str] = "Image"

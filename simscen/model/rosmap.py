@@ -9,14 +9,14 @@ from simscen.spec.quantities import Length, PositiveLength, Probability
 
 
 class RosMapSpec(Spec):
-    """A ROS map: an image and what its greys mean (nav2_map_server, map_io.cpp, which reads no other keys)."""
+    """A ROS map: an image and what its grays mean (nav2_map_server, map_io.cpp, which reads no other keys)."""
 
     model_config = ConfigDict(extra="ignore")
 
     image: Annotated[str, Field(min_length=1, max_length=4096)]
     """The image file (pgm, png, bmp), relative to this file."""
     resolution: PositiveLength
-    """Metres for each pixel."""
+    """Meters for each pixel."""
     origin: Annotated[list[Length], Field(min_length=3, max_length=3)]
     """Pose of the lowest-left corner of the lowest-left pixel: x, y, yaw."""
     negate: Literal[0, 1] | bool = 0
@@ -26,12 +26,12 @@ class RosMapSpec(Spec):
     free_thresh: Annotated[Probability, Field(validate_default=True)] = 0.25
     """A pixel at most this dark is free."""
     mode: Literal["trinary", "scale", "raw"] = "trinary"
-    """How greys between the thresholds are read."""
+    """How grays between the thresholds are read."""
 
     @field_validator("free_thresh")
     @classmethod
     def _below_occupied(cls, free: float, info: ValidationInfo) -> float:
-        """Otherwise some greys were both free and occupied, and the order of the tests would decide."""
+        """Otherwise some grays were both free and occupied, and the order of the tests would decide."""
         occupied = info.data.get("occupied_thresh", 1.0)
         if free >= occupied:
             raise ValueError(f"free_thresh {free:g} must be less than occupied_thresh {occupied:g}")

@@ -88,7 +88,7 @@ class Payload(Spec):
     mass: PositiveMass
     """In kg."""
     at: Annotated[list[Length], Field(min_length=3, max_length=3)] | None = None
-    """[x, y, z] of its centre of mass in the base frame; default: on top of the hull, above the base's origin."""
+    """[x, y, z] of its center of mass in the base frame; default: on top of the hull, above the base's origin."""
 
 
 class RobotEntry(Spec):

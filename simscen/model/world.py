@@ -18,9 +18,9 @@ class Wall(Spec):
     name: Name = "wall"
     """What a collision with it is reported as; default: wall_1, wall_2, …"""
     points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=10_000)]
-    """Corners, [x, y] or places by name, of its centre line; repeat the first one at the end to close it."""
+    """Corners, [x, y] or places by name, of its center line; repeat the first one at the end to close it."""
     thickness: PositiveLength = 0.1
-    """Across the centre line."""
+    """Across the center line."""
     height: PositiveLength = 1.0
     """From the ground."""
 
@@ -104,7 +104,7 @@ class Door(Spec):
 
 
 class WorldSpec(Spec):
-    """Walls, obstacles, things that move, named places and regions. Metres, in the map frame."""
+    """Walls, obstacles, things that move, named places and regions. Meters, in the map frame."""
 
     simscen: Literal[1]
     """Version of this language."""

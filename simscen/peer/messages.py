@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Pose2D(NamedTuple):
-    """geometry_msgs/msg/Pose2D: metres and radians."""
+    """geometry_msgs/msg/Pose2D: meters and radians."""
 
     x: float
     y: float

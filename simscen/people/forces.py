@@ -1,9 +1,9 @@
 """The forces of the social force model, each an acceleration in m/s², for many people at once.
 
 Sources: [HM95] Helbing and Molnár, Social force model for pedestrian dynamics, Physical Review E 51, 1995.
-[M09] Moussaïd, Helbing, Garnier, Johansson, Combe, Theraulaz, Experimental study of the behavioural mechanisms
+[M09] Moussaïd, Helbing, Garnier, Johansson, Combe, Theraulaz, Experimental study of the behavioral mechanisms
 underlying self-organization in human crowds, Proceedings of the Royal Society B 276, 2009. [M10] Moussaïd, Perozo,
-Garnier, Helbing, Theraulaz, The walking behaviour of pedestrian social groups and its impact on crowd dynamics, PLoS
+Garnier, Helbing, Theraulaz, The walking behavior of pedestrian social groups and its impact on crowd dynamics, PLoS
 ONE 5(4), 2010.
 """
 
@@ -46,8 +46,8 @@ GROUP_GAP = 0.8
 def social(towards: Array, closing: Array, wider: Array) -> Array:
     """What somebody at whom others come does (n, 2): brakes along D, and turns aside.
 
-    `towards` (n, 2) leads from them to the other in metres, `closing` (n, 2) is their own velocity less the other's in
-    m/s, `wider` (n,) how much wider than a person's the other's body is, in metres: so much nearer is it.
+    `towards` (n, 2) leads from them to the other in meters, `closing` (n, 2) is their own velocity less the other's in
+    m/s, `wider` (n,) how much wider than a person's the other's body is, in meters: so much nearer is it.
     """
     apart = np.hypot(towards[:, 0], towards[:, 1])
     distance = np.maximum(apart, 1e-6)
@@ -66,7 +66,7 @@ def social(towards: Array, closing: Array, wider: Array) -> Array:
 
 
 def wall(away: Array, gap: Array) -> Array:
-    """What keeps somebody off a wall or a thing (n, 2): `away` from it, over `gap` (n,) metres of air."""
+    """What keeps somebody off a wall or a thing (n, 2): `away` from it, over `gap` (n,) meters of air."""
     force: Array = (WALL * np.exp(-np.maximum(gap, 0.0) / WALL_RANGE))[:, np.newaxis] * away
     return force
 

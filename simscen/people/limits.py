@@ -13,7 +13,7 @@ SWEEPS = 8
 
 
 class Limits(NamedTuple):
-    """Person `who` (n,) may move by at most `most` (n,) metres along the unit vector `towards` (n, 2)."""
+    """Person `who` (n,) may move by at most `most` (n,) meters along the unit vector `towards` (n, 2)."""
 
     who: Numbers
     towards: Array
@@ -21,7 +21,7 @@ class Limits(NamedTuple):
 
 
 def limits(who: Numbers, towards: Array, gap: Array, share: float = 1.0) -> Limits:
-    """Of what is `gap` (n,) metres away: a `share` of that, and nothing when it touches already.
+    """Of what is `gap` (n,) meters away: a `share` of that, and nothing when it touches already.
 
     What is convex stays apart from who keeps to this: its side of the plane in between is its own.
     """

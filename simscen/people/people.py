@@ -71,7 +71,7 @@ class People:
         return {name: person.pose for name, person in self._people.items()}
 
     def radius(self, name: str) -> float:
-        """That of somebody's body, in metres."""
+        """That of somebody's body, in meters."""
         return self._people[name].who.radius
 
     def top_speed(self, name: str) -> float:

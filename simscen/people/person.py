@@ -23,7 +23,7 @@ LOSES_SIGHT = 1.5
 CURIOUS_SPEED, CURIOUS_GAP = 1.8, 1.5
 """m/s at which the curious come from the far end of their view, slower when nearer; m at which they stop."""
 SCARED_SPEED, SCARED_FORCE = 0.6, 4.0
-"""m/s that the scared walk at most; m²/s² over the gap in metres is the force that drives them off (20 x 0.2)."""
+"""m/s that the scared walk at most; m²/s² over the gap in meters is the force that drives them off (20 x 0.2)."""
 THREATENING_SPEED, THREATENING_GAP, STARES_WITHIN = 2.0, 1.1, 1.2
 """m/s; m in front of the robot where the threatening stand; m within which they look at it."""
 ARRIVED = 0.05
@@ -193,5 +193,5 @@ class Person:
 
 
 def _braking(distance: float) -> float:
-    """The speed at which somebody comes to a stop in a distance in metres, and none within ARRIVED."""
+    """The speed at which somebody comes to a stop in a distance in meters, and none within ARRIVED."""
     return distance / RELAXATION_TIME if distance > ARRIVED else 0.0

@@ -21,7 +21,7 @@ ARMS_LENGTH = 0.3
 
 
 class Walls:
-    """Segments (n, 2, 2) in metres, each of the solid `owners` (n,); those that are `opaque` (n,) hide what is behind.
+    """Segments (n, 2, 2) in meters, each of the solid `owners` (n,); those that are `opaque` (n,) hide what is behind.
 
     Raises ValueError for segments that are not finite.
     """
@@ -51,7 +51,7 @@ class Walls:
         return self._known[column, row]
 
     def gap(self, point: tuple[float, float]) -> float:
-        """Metres from a point to the nearest wall; inf beyond REACH."""
+        """Meters from a point to the nearest wall; inf beyond REACH."""
         here = np.array([point])
         _, _, nearest = self.near(here)
         return float(np.hypot(*(nearest - here).T).min(initial=math.inf))

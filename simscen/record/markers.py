@@ -8,14 +8,14 @@ import numpy as np
 from simscen.core.geometry import Array, Pose3
 from simscen.record.cdr import Template
 
-Colour = tuple[float, float, float, float]
+Color = tuple[float, float, float, float]
 """Red, green, blue and opacity, 0 … 1."""
 ARROW, LINE_LIST, TEXT, TRIANGLE_LIST = 0, 5, 9, 11
 _ADD, _DELETE_ALL = 0, 3
 
 
 class Marker(NamedTuple):
-    """One shape: `group` is its namespace, which viewers show and hide by name; `scale` in metres as ROS has it.
+    """One shape: `group` is its namespace, which viewers show and hide by name; `scale` in meters as ROS has it.
 
     `points` (n, 3) are in the frame of `pose`, which is in `frame`.
     """
@@ -23,7 +23,7 @@ class Marker(NamedTuple):
     frame: str
     group: str
     kind: int
-    colour: Colour
+    color: Color
     scale: tuple[float, float, float]
     pose: Pose3 = Pose3()
     points: Array = np.empty((0, 3))
@@ -51,14 +51,14 @@ def _put(message: Template, marker: Marker, number: int, action: int) -> None:
     message.put("3i", number, marker.kind, action)
     message.put("7d", *marker.pose)
     message.put("3d", *marker.scale)
-    message.put("4f", *marker.colour)
+    message.put("4f", *marker.color)
     message.put("iI", 0, 0)  # it stays
     message.put("B", True)
     message.put("I", len(marker.points))
     if len(marker.points):
         message.align(8)
         message.buffer += np.ascontiguousarray(marker.points, dtype="<f8").tobytes()
-    message.put("I", 0)  # no colours of single points
+    message.put("I", 0)  # no colors of single points
     message.string("")  # no texture
     message.put("iI", 0, 0)
     for _ in ("frame", "format"):

@@ -33,7 +33,7 @@ def log(stamp: Stamp, level: int, name: str, text: str) -> bytes:
 
 
 def image(frame: str, stamp: Stamp, pixels: "npt.NDArray[np.uint8] | npt.NDArray[np.float32]") -> bytes:
-    """sensor_msgs/msg/Image: (h, w, 3) uint8 as rgb8, (h, w) float32 as 32FC1 (REP 118: depth in metres)."""
+    """sensor_msgs/msg/Image: (h, w, 3) uint8 as rgb8, (h, w) float32 as 32FC1 (REP 118: depth in meters)."""
     height, width = pixels.shape[:2]
     encoding, kind = ("rgb8", "u1") if pixels.ndim == 3 else ("32FC1", "<f4")
     content = pixels.astype(kind).tobytes()

@@ -78,7 +78,7 @@ def on_the_ground(poses: Array) -> Array:
 class Rows:
     """All signals of a run in the making. A pose is x, y, z and a quaternion x, y, z, w.
 
-    truth: pose, vx, vy, wz · clearance: metres · belief: pose, xx, xy, xyaw, yy, yyaw, yawyaw · odometry: pose ·
+    truth: pose, vx, vy, wz · clearance: meters · belief: pose, xx, xy, xyaw, yy, yyaw, yawyaw · odometry: pose ·
     command: vx, vy, wz · objects: pose · plans: (tick made, poses (n, 7)).
     """
 

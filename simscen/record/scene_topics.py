@@ -12,18 +12,18 @@ from simscen.core.records.case import Case
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.record import frames, topics
 from simscen.record.frames import RobotFrames
-from simscen.record.markers import ARROW, LINE_LIST, TEXT, TRIANGLE_LIST, Colour, Marker, boxes, marker_array, rims
+from simscen.record.markers import ARROW, LINE_LIST, TEXT, TRIANGLE_LIST, Color, Marker, boxes, marker_array, rims
 from simscen.record.out import Out
 
-THING: Colour = (0.0, 0.41, 0.58, 1.0)
-PERSON: Colour = (0.48, 0.24, 0.51, 1.0)
-DOOR: Colour = (0.59, 0.38, 0.0, 1.0)
-KEEPOUT: Colour = (0.76, 0.19, 0.06, 1.0)
-SPEED: Colour = (0.9, 0.62, 0.0, 1.0)
-PLACE: Colour = (0.44, 0.45, 0.49, 1.0)
-RAMP: Colour = (0.66, 0.58, 0.43, 1.0)
-TRUTH: Colour = (0.0, 0.44, 0.34, 1.0)
-BELIEF: Colour = (0.8, 0.2, 0.5, 1.0)
+THING: Color = (0.0, 0.41, 0.58, 1.0)
+PERSON: Color = (0.48, 0.24, 0.51, 1.0)
+DOOR: Color = (0.59, 0.38, 0.0, 1.0)
+KEEPOUT: Color = (0.76, 0.19, 0.06, 1.0)
+SPEED: Color = (0.9, 0.62, 0.0, 1.0)
+PLACE: Color = (0.44, 0.45, 0.49, 1.0)
+RAMP: Color = (0.66, 0.58, 0.43, 1.0)
+TRUTH: Color = (0.0, 0.44, 0.34, 1.0)
+BELIEF: Color = (0.8, 0.2, 0.5, 1.0)
 """Okabe and Ito's hues, as on pages and pictures."""
 LINE, LETTERS = (0.03, 0.0, 0.0), (0.0, 0.0, 0.25)
 """Scales: the width of a line and the height of letters in m."""
@@ -83,23 +83,23 @@ class SceneTopics:
 
     def _shown_things(self) -> Iterator[Marker]:
         for name, event in self._things.items():
-            group, colour = "things", THING
+            group, color = "things", THING
             if event.data.get("person"):
-                group, colour = "people", PERSON
+                group, color = "people", PERSON
             elif name in self._doors:
-                group, colour = "doors", DOOR
+                group, color = "doors", DOOR
             frame = frames.of_object(name)
             if outlines := _outlines(event):
-                yield Marker(frame, group, LINE_LIST, colour, LINE, points=rims(outlines, _ABOVE))
-            yield Marker(frame, "names", TEXT, colour, LETTERS, _LETTERS_ABOVE, text=name)
+                yield Marker(frame, group, LINE_LIST, color, LINE, points=rims(outlines, _ABOVE))
+            yield Marker(frame, "names", TEXT, color, LETTERS, _LETTERS_ABOVE, text=name)
 
     def _shown_scene(self) -> Iterator[Marker]:
-        for frame, group, colour in (
+        for frame, group, color in (
             (self._names.truth, "footprint", TRUTH),
             (self._names.base, "believed footprint", BELIEF),
         ):
             if self._case.footprint:
-                yield Marker(frame, group, LINE_LIST, colour, LINE, points=rims([self._case.footprint], _ABOVE))
+                yield Marker(frame, group, LINE_LIST, color, LINE, points=rims([self._case.footprint], _ABOVE))
         for zone in self._zones.values():
             yield from _zone(zone)
         for ground in self._scenery.ground:
@@ -128,14 +128,14 @@ def _corners(part: Value) -> list[tuple[float, float]]:
 
 def _zone(zone: FilterZone) -> Iterator[Marker]:
     keepout = zone.filter == "keepout"
-    group, colour = f"{zone.filter} zones", KEEPOUT if keepout else SPEED
+    group, color = f"{zone.filter} zones", KEEPOUT if keepout else SPEED
     told = zone.region if keepout or not zone.speed_limit else f"{zone.region}: {zone.speed_limit:g} m/s"
     if zone.outline:
-        yield Marker(frames.MAP, group, LINE_LIST, colour, LINE, points=rims([zone.outline], _ABOVE))
+        yield Marker(frames.MAP, group, LINE_LIST, color, LINE, points=rims([zone.outline], _ABOVE))
         x, y = np.mean(zone.outline, axis=0).tolist()
-        yield Marker(frames.MAP, group, TEXT, colour, LETTERS, Pose3(x, y, 0.3), text=told)
+        yield Marker(frames.MAP, group, TEXT, color, LETTERS, Pose3(x, y, 0.3), text=told)
     if zone.cells is not None:
         blocks = sorted(zone.cells.blocks, key=lambda block: -block[2] * block[3])[:MOST_BLOCKS]
         corners = np.array([(c, r, c + w, r + h) for c, r, w, h, _ in blocks], dtype=np.float64).reshape(-1, 4)
         points, pose = boxes(corners * zone.cells.resolution, _ABOVE), Pose3.planar(zone.cells.origin)
-        yield Marker(frames.MAP, group, TRIANGLE_LIST, (*colour[:3], 0.35), (1.0, 1.0, 1.0), pose, points)
+        yield Marker(frames.MAP, group, TRIANGLE_LIST, (*color[:3], 0.35), (1.0, 1.0, 1.0), pose, points)

@@ -1,4 +1,4 @@
-"""The console in colour, and on a terminal with live progress below the lines."""
+"""The console in color, and on a terminal with live progress below the lines."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -29,8 +29,8 @@ from simscen.report.text import no_command, one_line
 STYLES = {"plain": "", "name": "bold", "good": "green", "bad": "red", "odd": "yellow", "quiet": "dim"}
 
 
-class ColourReporter(PlainReporter):
-    """The same lines in colour, for CI systems that show it. What one of them might obey stays without."""
+class ColorReporter(PlainReporter):
+    """The same lines in color, for CI systems that show it. What one of them might obey stays without."""
 
     def __init__(self, out: TextIO, look: Look, slow: int | None = None) -> None:
         super().__init__(out, look, slow)
@@ -99,8 +99,8 @@ def _console(out: TextIO, look: Look) -> Console:
     return Console(
         file=out,
         force_terminal=True,
-        color_system="standard" if look.colour else None,
-        no_color=not look.colour,
+        color_system="standard" if look.color else None,
+        no_color=not look.color,
         highlight=False,
         soft_wrap=True,
         emoji=False,

@@ -1,4 +1,4 @@
-"""How a stream wants to be written to: what it is, and what the environment says of colours."""
+"""How a stream wants to be written to: what it is, and what the environment says of colors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ from typing import TextIO
 
 @dataclass(frozen=True)
 class Look:
-    """Whether to write in `colour`, with `live` progress below the lines, and as if for a `terminal`."""
+    """Whether to write in `color`, with `live` progress below the lines, and as if for a `terminal`."""
 
-    colour: bool
+    color: bool
     live: bool
     terminal: bool
 
@@ -25,12 +25,12 @@ def look_of(out: TextIO, environ: Mapping[str, str]) -> Look:
     terminal = out.isatty()
     able = terminal and environ.get("TERM") not in ("dumb", "unknown")
     if environ.get("NO_COLOR"):
-        colour = False
+        color = False
     elif any(environ.get(name, "") not in ("", "0") for name in ("FORCE_COLOR", "CLICOLOR_FORCE")):
-        colour = True
+        color = True
     else:
-        colour = able and environ.get("CLICOLOR") != "0"
-    return Look(colour and can_encode(out), able and can_encode(out), terminal)
+        color = able and environ.get("CLICOLOR") != "0"
+    return Look(color and can_encode(out), able and can_encode(out), terminal)
 
 
 def can_encode(out: TextIO) -> bool:

@@ -29,7 +29,7 @@ class Reporter(Protocol):
 
 
 class PlainReporter:
-    """Each line as it happens: no colour, no cursor movement, ASCII where the stream knows no more."""
+    """Each line as it happens: no color, no cursor movement, ASCII where the stream knows no more."""
 
     def __init__(self, out: TextIO, look: Look, slow: int | None = None) -> None:
         self._out = out

@@ -72,14 +72,14 @@ class Adapter:
 
     def about(self) -> Dict[str, Any]:
         """What is worth knowing of this run, for its log and run.json."""
-        synchronised: Any = self._lockstep if self._options.sync == "lockstep" else self._paced
+        synchronized: Any = self._lockstep if self._options.sync == "lockstep" else self._paced
         about = {
             "sync": self._options.sync,
             "rclpy": version("rclpy"),
             "distribution": os.environ.get("ROS_DISTRO", "unknown"),
             "rmw": rclpy.get_rmw_implementation_identifier(),
             "nodes": self._rest.nodes,
-            **synchronised.counted,
+            **synchronized.counted,
         }
         if self._options.sync == "paced":
             about["factor"] = self._options.factor
@@ -127,10 +127,10 @@ class Adapter:
             # Who came late has not heard the time yet.
             self._wait_until(self._readiness.missing, lambda: self._graph.publish(CLOCK, cdr.time(now)))
             self._begin()
-        synchronised: Any = self._lockstep if self._options.sync == "lockstep" and not warming_up else self._paced
+        synchronized: Any = self._lockstep if self._options.sync == "lockstep" and not warming_up else self._paced
         if not warming_up and self._goals.current is None:
             self._send(now)
-        heard = synchronised.beat(now, messages, due, self._goals.current is not None)
+        heard = synchronized.beat(now, messages, due, self._goals.current is not None)
         commanded = any(message.topic == COMMAND for message in heard)
         # Topics have an order of their own each; which of two came first is chance.
         said = sorted((out for message in heard for out in self._taken(message)), key=lambda out: out[0])

@@ -35,7 +35,7 @@ def time(nanoseconds: int) -> bytes:
 
 
 Pose = Tuple[float, float, float]
-"""x, y in metres and yaw in radians."""
+"""x, y in meters and yaw in radians."""
 
 
 def yaw(x: float, y: float, z: float, w: float) -> float:

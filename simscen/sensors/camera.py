@@ -1,4 +1,4 @@
-"""A colour and depth camera; its pictures come from the engine's renderer."""
+"""A color and depth camera; its pictures come from the engine's renderer."""
 
 from simscen.core.messages.sensor_data import Image
 from simscen.model.robot import Camera

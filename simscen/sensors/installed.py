@@ -67,7 +67,7 @@ def _flaw(name: str, value: object) -> str:
             wrong = value.dtype.kind != "f" or np.isneginf(value).any() or (value < 0).any() or not value.size
             return "are no distances" if wrong else ""
         case np.ndarray():
-            return "" if value.dtype == np.uint8 and value.ndim == 3 else "are no colours"
+            return "" if value.dtype == np.uint8 and value.ndim == 3 else "are no colors"
         case tuple() | Twist():
             return "" if np.isfinite(np.array(value, dtype=float)).all() else "is not finite"
         case float() | np.floating():

@@ -60,7 +60,7 @@ class LidarSensor:
         return ranges
 
     def _noise(self) -> Array:
-        """That of a scan, in metres; drawn ahead for several, as single draws would give it."""
+        """That of a scan, in meters; drawn ahead for several, as single draws would give it."""
         if self._next == len(self._ahead):
             self._ahead, self._next = self._chance.normal(0.0, self._spec.noise, (AT_ONCE, self._spec.beams)), 0
         self._next += 1

@@ -18,13 +18,13 @@ class WheelOdometrySensor:
     """Dead reckoning from where the robot was switched on, which is the origin of its odom frame.
 
     Errors are independent from increment to increment, with variances in proportion to what was driven and turned;
-    so they do not depend on the rate, and after one metre have the standard deviation that the specification says.
+    so they do not depend on the rate, and after one meter have the standard deviation that the specification says.
     """
 
     def __init__(self, spec: WheelOdometry, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
         self._seconds, self._view = setting.seconds, setting.view
-        # Standard deviation along the way, and variances of the heading, after one metre or radian.
+        # Standard deviation along the way, and variances of the heading, after one meter or radian.
         self._spread, self._twist, self._drift = spec.translation_noise, spec.rotation_noise**2, spec.drift_noise**2
         self._normals = Normals(setting.chance)
         self._motion = kinematics_of(setting.drive)

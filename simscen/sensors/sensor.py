@@ -29,8 +29,8 @@ class SensorView(Protocol):
         """What has been rolled so far.
 
         On wheels: the mean angle in rad of the driven wheels on the left, and of those on the right. Mecanum: the
-        angles in rad of the wheels front left, front right, rear left, rear right. Omnidirectional: metres forward,
-        metres to the left, and radians.
+        angles in rad of the wheels front left, front right, rear left, rear right. Omnidirectional: meters forward,
+        meters to the left, and radians.
         """
         ...
 
@@ -41,7 +41,7 @@ class SensorView(Protocol):
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """Colours (h, w, 3) and depths (h, w) in metres along the optical axis, inf beyond `far`.
+        """Colors (h, w, 3) and depths (h, w) in meters along the optical axis, inf beyond `far`.
 
         `mount` is where the camera is in the base frame; it looks along its x axis. `field_of_view` is horizontal,
         in rad.

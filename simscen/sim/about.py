@@ -12,7 +12,7 @@ FARTHER = 2.0
 
 
 class About(NamedTuple):
-    """The actors that at a tick were within a distance in metres of a place, and all that may be pushed unless asleep.
+    """The actors that at a tick were within a distance in meters of a place, and all that may be pushed unless asleep.
 
     `asleep` is since when all of those have been lying still; None where they have not. `lying` are each, its place
     on the ground and its width, where none of these moves.
@@ -26,13 +26,13 @@ class About(NamedTuple):
     lying: tuple[tuple[Actor, tuple[float, float], float], ...] | None
 
     def holds(self, place: Vector, distance: float, tick: int, step: float) -> bool:
-        """Whether no other can be within a distance of a place at a tick, moving `step` metres a tick at most."""
+        """Whether no other can be within a distance of a place at a tick, moving `step` meters a tick at most."""
         return math.dist(place, self.place) + step * (tick - self.tick) + distance <= self.distance
 
     def near(self, client: int, place: Vector, distance: float, level: float, poses: Mapping[str, Pose3]) -> list[int]:
         """The engine's numbers of those that may be as near to a place as a distance, being where `poses` has them.
 
-        `level` is enough of it along the ground; what stands has neighbours nearer than it is high.
+        `level` is enough of it along the ground; what stands has neighbors nearer than it is high.
         A scripted one is put there if that is so near, or where the engine has had it until now.
         """
         if self.lying is not None:
@@ -55,7 +55,7 @@ class About(NamedTuple):
 def look_about(
     actors: Iterable[Actor], poses: Mapping[str, Pose3], place: Vector, distance: float, tick: int, asleep: int | None
 ) -> About:
-    """Those about a place within a distance in metres of what anybody will ask."""
+    """Those about a place within a distance in meters of what anybody will ask."""
     distance += FARTHER
     about = tuple(
         actor

@@ -21,7 +21,7 @@ CREEP = 0.01
 class AckermannDrive:
     """The bicycle model's inverse: curvature = turn rate / speed, tan(steering) = wheel base * curvature.
 
-    Each front wheel is steered about the same centre as the rear axle turns about (Ackermann's condition; Siegwart et
+    Each front wheel is steered about the same center as the rear axle turns about (Ackermann's condition; Siegwart et
     al., Autonomous Mobile Robots, section 3.3). A twist that turns on the spot cannot be driven.
     """
 

@@ -25,7 +25,7 @@ class Actor:
     """A body, and the `path` that it has followed since tick `since`, if any.
 
     `ways` are all on which its origin ever is, `speed` is the fastest that any part of it ever moves on them, in m/s,
-    `size` how far from its origin it extends, and `radius` how far from its axis, in metres. Where the engine has it as
+    `size` how far from its origin it extends, and `radius` how far from its axis, in meters. Where the engine has it as
     a surface without an inside, `surface` is that, in the body's frame.
     """
 
@@ -43,9 +43,9 @@ class Actor:
     """The engine's, once that has it."""
     shown: Pose3 | None = None
     """Where the engine has it, once that has it."""
-    centre_from_base: Pose3 = Pose3()
+    center_from_base: Pose3 = Pose3()
     placed: tuple[Placing, Pose3] | None = None
-    """What the engine last said of its centre of mass, and the pose that comes of it."""
+    """What the engine last said of its center of mass, and the pose that comes of it."""
     resting: bool = False
     """Whether it has not moved at all since the engine was asked before."""
     track: PathSampler | None = None
@@ -97,12 +97,12 @@ class Actor:
         return (vx, vy, 0.0), wrap(there.yaw - here.yaw) * rate
 
     def width(self, pose: Pose3) -> float:
-        """How far from its origin it extends along the ground, at most, in metres: where it leans its top does, too."""
+        """How far from its origin it extends along the ground, at most, in meters: where it leans its top does, too."""
         height = math.sqrt(self.size**2 - self.radius**2)
         return min(self.size, self.radius + 2 * height * math.hypot(pose.qx, pose.qy))
 
     def away(self, place: Vector, pose: Pose3) -> float:
-        """How far from a place it is in metres, being at `pose`, or is as the engine has it."""
+        """How far from a place it is in meters, being at `pose`, or is as the engine has it."""
         away = math.dist(pose[:3], place)
         return away if self.shown is None else min(away, math.dist(self.shown[:3], place))
 
@@ -118,7 +118,7 @@ class Actor:
         self.resting = self.placed is not None and self.placed[0] == said
         if self.resting:
             return None
-        pose = Pose3(*said[0], *said[1]).compose(self.centre_from_base)
+        pose = Pose3(*said[0], *said[1]).compose(self.center_from_base)
         self.placed = said, pose
         return pose
 

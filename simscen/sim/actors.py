@@ -102,7 +102,7 @@ class Actors:
         shape = engine.body_shape(client, body.solids, actor.pushable, self._triangulate)
         if actor.pushable:
             frame = of_solids(body.solids, body.mass).principal()
-            actor.centre_from_base = frame[1].inverse()
+            actor.center_from_base = frame[1].inverse()
             actor.number = engine.body(client, body.mass, shape, body.pose, frame, FRICTION, look)
         elif actor.path is None:
             actor.number = engine.fixed(client, shape, look, body.pose, FRICTION)
@@ -167,13 +167,13 @@ class Actors:
             engine.wake(self._client, self._actors[name].id)
 
     def push(self, name: str, impulse: tuple[float, float]) -> None:
-        """Push a body's centre of mass during the next tick, in N s; what cannot be pushed, or is gone, is not."""
+        """Push a body's center of mass during the next tick, in N s; what cannot be pushed, or is gone, is not."""
         if not self.mass(name):
             return
         number = self._actors[name].id
-        centre = pybullet.getBasePositionAndOrientation(number, physicsClientId=self._client)[0]
+        center = pybullet.getBasePositionAndOrientation(number, physicsClientId=self._client)[0]
         force = (impulse[0] * self._rate, impulse[1] * self._rate, 0.0)
-        pybullet.applyExternalForce(number, -1, force, centre, pybullet.WORLD_FRAME, physicsClientId=self._client)
+        pybullet.applyExternalForce(number, -1, force, center, pybullet.WORLD_FRAME, physicsClientId=self._client)
         self._still_since = None
 
     def follow(self, name: str, path: MotionPath, speed: float, tick: int) -> None:
@@ -292,7 +292,7 @@ class Actors:
     def _asleep(self, tick: int) -> bool:
         """Whether all that can be pushed has long been lying, so that the engine lets it lie, and nobody touched it.
 
-        What something only comes near to wakes in the engine and creeps by less than a micrometre until it is touched.
+        What something only comes near to wakes in the engine and creeps by less than a micrometer until it is touched.
         """
         still = self._still_since is not None and tick - self._still_since > self._until_asleep
         return still and tick <= min(self._undisturbed.values())
@@ -342,7 +342,7 @@ class Actors:
         return None
 
     def within(self, place: Vector, distance: float, level: float, tick: int, by: int) -> list[int]:
-        """The engine's numbers of those that may be as near to a place as a distance in metres, for it to be asked.
+        """The engine's numbers of those that may be as near to a place as a distance in meters, for it to be asked.
 
         Along the ground they need not be farther than `level` to be too far.
         `by` is the number of the robot that asks. A scripted one is put where it is now if that is so near, or where
@@ -360,7 +360,7 @@ class Actors:
         return about.near(self._client, place, distance, level, poses)
 
     def gap(self, place: Vector, distance: float, tick: int, by: int) -> float | None:
-        """How much farther than a distance from a place, in metres, `within` would have to look to find anybody.
+        """How much farther than a distance from a place, in meters, `within` would have to look to find anybody.
 
         None where what is pushed or led may come from anywhere soon. `within` was asked just now.
         """
@@ -370,7 +370,7 @@ class Actors:
         return about.gap(place, self.poses(tick), self.come_in(tick - about.tick)) - distance
 
     def come_in(self, ticks: int) -> float:
-        """How far in metres any script moves anything in so many ticks, at most."""
+        """How far in meters any script moves anything in so many ticks, at most."""
         return self._fastest * ticks / self._rate
 
     @property

@@ -15,7 +15,7 @@ NEAR = 0.02
 def picture(
     client: int, camera: Pose3, width: int, height: int, field_of_view: float, far: float
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-    """Colours (h, w, 3) and depths (h, w) in metres along the optical axis, inf beyond `far`.
+    """Colors (h, w, 3) and depths (h, w) in meters along the optical axis, inf beyond `far`.
 
     The camera looks along the x axis of its pose, z is up; `field_of_view` is horizontal, in rad.
     """
@@ -33,7 +33,7 @@ def picture(
         physicsClientId=client,
     )
     buffer = np.reshape(np.asarray(depth, dtype=np.float64), (height, width))
-    metres = far * NEAR / (far - (far - NEAR) * buffer)
-    metres[buffer >= 1.0] = np.inf
-    colours = np.reshape(np.asarray(rgba, dtype=np.uint8), (height, width, 4))[:, :, :3]
-    return np.ascontiguousarray(colours), metres.astype(np.float32)
+    meters = far * NEAR / (far - (far - NEAR) * buffer)
+    meters[buffer >= 1.0] = np.inf
+    colors = np.reshape(np.asarray(rgba, dtype=np.uint8), (height, width, 4))[:, :, :3]
+    return np.ascontiguousarray(colors), meters.astype(np.float32)

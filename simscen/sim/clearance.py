@@ -30,7 +30,7 @@ Vector = tuple[float, float, float]
 
 
 class _Alone(NamedTuple):
-    """When, and with the robot where, anything that moves was farther than what stands, by a `gap` in metres."""
+    """When, and with the robot where, anything that moves was farther than what stands, by a `gap` in meters."""
 
     tick: int
     pose: Pose3
@@ -58,7 +58,7 @@ class Clearance:
         actors: Actors,
         reach: float,
     ) -> None:
-        """`state` says where the robot is now; `reach` is how far is searched, in metres.
+        """`state` says where the robot is now; `reach` is how far is searched, in meters.
 
         `obstacles` are what of the `static` world is in the robot's way, which a ramp that it drives over is not.
         `uneven`: there is ground besides the floor, for its wheels and casters to stand on.
@@ -75,7 +75,7 @@ class Clearance:
         self.looks = self.size + max(reach, CLEARANCE_RANGE)
         """How far from its base things that move may be that it is measured against, in m, and no less than usual."""
         # Where wheels roll on solids they may also hit them.
-        touching = replace(robot, casters=(*robot.casters, *robot.tyres)) if uneven else robot
+        touching = replace(robot, casters=(*robot.casters, *robot.tires)) if uneven else robot
         self._proximity = Proximity(static, touching, reach)
         self._ways = Proximity(obstacles, robot, reach) if uneven else self._proximity
         self._reach = reach
@@ -107,7 +107,7 @@ class Clearance:
         self._actors.undisturbed(self._base.id, until=tick)
 
     def measure(self, tick: int, ticks: int = NEVER) -> float:
-        """The clearance at `tick`, which is now, in metres; the reach where nothing is nearer.
+        """The clearance at `tick`, which is now, in meters; the reach where nothing is nearer.
 
         It is asked again after so many `ticks`; how long nothing can be touched is told anew if not known until then.
         """
@@ -170,7 +170,7 @@ class Clearance:
         return nearest
 
     def _to_robot(self, robot: "Clearance", place: Vector, within: float) -> float:
-        """Distance in metres to another robot; inf above `within`."""
+        """Distance in meters to another robot; inf above `within`."""
         if math.dist(place, robot._state().pose.position) > within + self.size + robot.size:
             return math.inf
         pairs = itertools.product(self._base.hull_links, robot._base.hull_links)
@@ -208,7 +208,7 @@ class Clearance:
         return 1.25 * (forward + turning + math.hypot(x, y) * self._height)
 
     def owner(self, place: Vector) -> str:
-        """The static solid that is touched at a place; remembered by the centimetre, since contacts last."""
+        """The static solid that is touched at a place; remembered by the centimeter, since contacts last."""
         x, y, z = place
         cell = (round(100 * x), round(100 * y), round(100 * z))
         if cell not in self._touched:

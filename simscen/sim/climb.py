@@ -40,7 +40,7 @@ def grip_angle(body: RobotBody, friction: float) -> float:
 
     That share shrinks on the slope, where the weight leans back by h tan θ on a caster behind the axle.
     """
-    x, z = (float(body.chassis.centre[axis]) for axis in (0, 2))
+    x, z = (float(body.chassis.center[axis]) for axis in (0, 2))
     standing = [caster.pose.x for caster in body.casters if not lowest(caster)]
     if not standing:
         return math.atan(friction * _driven_share(body))
@@ -58,8 +58,8 @@ def _driven_share(body: RobotBody) -> float:
     if not idle:
         return 1.0
     at, other = sum(driven) / len(driven), sum(idle) / len(idle)
-    centre = float(body.chassis.centre[0]) * body.chassis.mass + sum(w.x * w.inertia.mass for w in body.wheels)
-    return min(1.0, max(0.0, (other - centre / body.mass) / (other - at)))
+    center = float(body.chassis.center[0]) * body.chassis.mass + sum(w.x * w.inertia.mass for w in body.wheels)
+    return min(1.0, max(0.0, (other - center / body.mass) / (other - at)))
 
 
 def approach_angle(body: RobotBody) -> float:

@@ -39,7 +39,7 @@ class Base(Protocol):
         ...
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Push its centre of mass during the next step, which lasts `seconds`: N s along the world's x and y."""
+        """Push its center of mass during the next step, which lasts `seconds`: N s along the world's x and y."""
         ...
 
 
@@ -67,8 +67,8 @@ class Drive(Protocol):
         """What has been rolled so far.
 
         On wheels: the mean angle in rad of the driven wheels on the left, and of those on the right. Mecanum: the
-        angles in rad of the wheels front left, front right, rear left, rear right. Omnidirectional: metres forward,
-        metres to the left, and radians.
+        angles in rad of the wheels front left, front right, rear left, rear right. Omnidirectional: meters forward,
+        meters to the left, and radians.
         """
         ...
 

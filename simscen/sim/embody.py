@@ -16,7 +16,7 @@ from simscen.sim.urdf.elements import MeshReader
 from simscen.sim.urdf.files import Found
 
 LOW = 0.5
-"""Height of the centre of mass over that of the hull's volume: batteries and motors lie at the bottom."""
+"""Height of the center of mass over that of the hull's volume: batteries and motors lie at the bottom."""
 
 
 def robot_body(
@@ -47,5 +47,5 @@ def _of_shapes(spec: RobotSpec, file: Path | None) -> RobotBody:
     )
     wheels = wheels_of(spec.drive, spec.mass)
     even = of_solids(parts, spec.mass - sum(w.inertia.mass for w in wheels))
-    chassis = MassProperties(even.mass, even.centre * (1.0, 1.0, LOW), even.tensor)
+    chassis = MassProperties(even.mass, even.center * (1.0, 1.0, LOW), even.tensor)
     return assemble(spec, parts, wheels, chassis)

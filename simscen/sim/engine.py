@@ -203,16 +203,16 @@ def fused(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
 
 
 def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float, look: int = AS_IT_IS) -> int:
-    """A rigid body of a collision shape, with principal moments and centre of mass in `frame`, and how it looks.
+    """A rigid body of a collision shape, with principal moments and center of mass in `frame`, and how it looks.
 
     Nothing pushes one of mass 0, which sleeps while it stands: Bullet looks anew at what lies upon something awake.
     """
-    moments, base_from_centre = frame
-    centre = pose.compose(base_from_centre)
+    moments, base_from_center = frame
+    center = pose.compose(base_from_center)
     number: int = pybullet.createMultiBody(
         mass, shape, look, pose.position, pose.quaternion,
-        baseInertialFramePosition=base_from_centre.position,
-        baseInertialFrameOrientation=base_from_centre.quaternion, physicsClientId=client,
+        baseInertialFramePosition=base_from_center.position,
+        baseInertialFrameOrientation=base_from_center.quaternion, physicsClientId=client,
     )  # fmt: skip
     pybullet.changeDynamics(
         number, -1, lateralFriction=friction, restitution=0.0, linearDamping=0.0, angularDamping=0.0,
@@ -224,7 +224,7 @@ def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, fricti
         pybullet.changeDynamics(number, -1, activationState=sleeps, physicsClientId=client)
     if mass > 0:
         pybullet.changeDynamics(number, -1, localInertiaDiagonal=moments, physicsClientId=client)
-        pybullet.resetBasePositionAndOrientation(number, centre.position, centre.quaternion, physicsClientId=client)
+        pybullet.resetBasePositionAndOrientation(number, center.position, center.quaternion, physicsClientId=client)
     return number
 
 

@@ -1,4 +1,4 @@
-"""Mass, centre of mass and moments of inertia of simple shapes, and of things made up of them."""
+"""Mass, center of mass and moments of inertia of simple shapes, and of things made up of them."""
 
 import math
 from collections.abc import Sequence
@@ -16,20 +16,20 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:
-    """`mass` in kg, `centre` of mass in m, and the `tensor` (3, 3) of inertia about that centre in kg m²."""
+    """`mass` in kg, `center` of mass in m, and the `tensor` (3, 3) of inertia about that center in kg m²."""
 
     mass: float
-    centre: Array
+    center: Array
     tensor: Array
 
     def placed(self, pose: Pose3) -> "MassProperties":
         """The same thing in the frame in which its own frame has this pose."""
         turn = pose.rotation()
-        return MassProperties(self.mass, pose.apply(self.centre[None])[0], turn @ self.tensor @ turn.T)
+        return MassProperties(self.mass, pose.apply(self.center[None])[0], turn @ self.tensor @ turn.T)
 
     def principal(self) -> tuple[Vector, Pose3]:
-        """The principal moments and the frame they are given in: at the centre of mass, along the principal axes."""
-        x, y, z = self.centre.tolist()
+        """The principal moments and the frame they are given in: at the center of mass, along the principal axes."""
+        x, y, z = self.center.tolist()
         if np.abs(self.tensor - np.diag(np.diag(self.tensor))).max() <= 1e-9 * np.trace(self.tensor):
             a, b, c = np.diag(self.tensor).tolist()
             return (a, b, c), Pose3(x, y, z)
@@ -42,10 +42,10 @@ class MassProperties:
 def combined(parts: Sequence[MassProperties]) -> MassProperties:
     """Rigidly joined parts, given in one frame (parallel axis theorem)."""
     mass = sum(part.mass for part in parts)
-    weighted = np.sum([part.mass * part.centre for part in parts], axis=0)
-    centre = weighted / mass if mass > 0 else np.mean([part.centre for part in parts], axis=0)
-    tensor = np.sum([part.tensor + part.mass * _about(part.centre - centre) for part in parts], axis=0)
-    return MassProperties(mass, centre, tensor)
+    weighted = np.sum([part.mass * part.center for part in parts], axis=0)
+    center = weighted / mass if mass > 0 else np.mean([part.center for part in parts], axis=0)
+    tensor = np.sum([part.tensor + part.mass * _about(part.center - center) for part in parts], axis=0)
+    return MassProperties(mass, center, tensor)
 
 
 def of_solids(solids: Sequence[Solid], mass: float) -> MassProperties:

@@ -29,15 +29,15 @@ def top(body: RobotBody) -> float:
     return max(float(solid.pose.apply(extremes(solid.shape))[:, 2].max()) for solid in body.hull)
 
 
-def centre(body: RobotBody) -> Vector:
-    """The centre of mass of the whole robot in its base frame."""
+def center(body: RobotBody) -> Vector:
+    """The center of mass of the whole robot in its base frame."""
     wheels = [wheel.inertia.mass * np.array((wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
-    x, y, z = (np.sum([body.chassis.mass * body.chassis.centre, *wheels], axis=0) / body.mass).tolist()
+    x, y, z = (np.sum([body.chassis.mass * body.chassis.center, *wheels], axis=0) / body.mass).tolist()
     return x, y, z
 
 
 def stands(body: RobotBody) -> bool:
-    """Whether its centre of mass is above what its wheels and casters span; a base without wheels never tips."""
+    """Whether its center of mass is above what its wheels and casters span; a base without wheels never tips."""
     feet = [(wheel.x, wheel.y) for wheel in body.wheels] + [(c.pose.x, c.pose.y) for c in body.casters]
-    x, y, _ = centre(body)
+    x, y, _ = center(body)
     return len(feet) < 3 or body.drive.type == "mecanum" or polygon_contains(convex_hull(np.array(feet)), (x, y))

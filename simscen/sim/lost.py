@@ -3,16 +3,16 @@
 import math
 
 SUNK = 0.2
-"""m below the floor at which the centre of a thing has fallen through it.
+"""m below the floor at which the center of a thing has fallen through it.
 
-What lands sinks in by millimetres; a light thing that a scripted one presses down on is held up to 7 cm below.
+What lands sinks in by millimeters; a light thing that a scripted one presses down on is held up to 7 cm below.
 """
 FAR = 1e5
 """m from the origin of the world at which nothing can be any more: worlds reach to 10 km."""
 
 
 def lost(what: str, x: float, y: float, z: float, others: float) -> str | None:
-    """Why something whose centre is at a place in the world cannot be right, or None.
+    """Why something whose center is at a place in the world cannot be right, or None.
 
     `others` is the sum of more numbers that have to be finite, such as its velocity: one that is not leaves no sum
     that is.

@@ -70,7 +70,7 @@ def extremes(shape: Shape) -> Array:
 
 
 def reach(solids: Iterable[Solid]) -> tuple[float, float]:
-    """How far solids extend from the z axis, and how high above or below the origin, in metres."""
+    """How far solids extend from the z axis, and how high above or below the origin, in meters."""
     points = np.concatenate([solid.pose.apply(extremes(solid.shape)) for solid in solids])
     return float(np.hypot(points[:, 0], points[:, 1]).max()), float(np.abs(points[:, 2]).max())
 

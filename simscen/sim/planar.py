@@ -31,7 +31,7 @@ class PlanarBase:
     def __init__(self, client: int, body: RobotBody, pose: Pose2, look: int = engine.AS_IT_IS) -> None:
         """Set down at `pose`; the renderer is shown a `look` of the engine's."""
         self._client = client
-        moments, base_from_centre = _whole(body).principal()
+        moments, base_from_center = _whole(body).principal()
         sleds = 2
         hulls = engine.hull_shapes(client, body.solid)
         extra = len(hulls) - 1
@@ -42,8 +42,8 @@ class PlanarBase:
             linkVisualShapeIndices=[-1] * sleds + [look] * len(hulls),
             linkPositions=[(0, 0, 0)] * (sleds + len(hulls)),
             linkOrientations=[UPRIGHT] * (sleds + len(hulls)),
-            linkInertialFramePositions=[(0, 0, 0)] * sleds + [base_from_centre.position] + [(0, 0, 0)] * extra,
-            linkInertialFrameOrientations=[UPRIGHT] * sleds + [base_from_centre.quaternion] + [UPRIGHT] * extra,
+            linkInertialFramePositions=[(0, 0, 0)] * sleds + [base_from_center.position] + [(0, 0, 0)] * extra,
+            linkInertialFrameOrientations=[UPRIGHT] * sleds + [base_from_center.quaternion] + [UPRIGHT] * extra,
             linkParentIndices=[0, 1, 2] + [3] * extra,
             linkJointTypes=[pybullet.JOINT_PRISMATIC] * sleds
             + [pybullet.JOINT_REVOLUTE]
@@ -83,7 +83,7 @@ class PlanarBase:
         return Pose2(*(state[0] for state in states))
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Push its centre of mass during the next step, which lasts `seconds`."""
+        """Push its center of mass during the next step, which lasts `seconds`."""
         place = pybullet.getLinkState(self.id, 2, physicsClientId=self._client)[0]
         force = (impulse[0] / seconds, impulse[1] / seconds, 0.0)
         pybullet.applyExternalForce(self.id, 2, force, place, pybullet.WORLD_FRAME, physicsClientId=self._client)
@@ -148,7 +148,7 @@ class OmnidirectionalDrive:
         self._base.motors(STOP)
 
     def encoders(self) -> tuple[float, ...]:
-        """Metres forward, metres to the left and radians so far."""
+        """Meters forward, meters to the left and radians so far."""
         self._count()
         return self._rolled
 

@@ -20,7 +20,7 @@ ROUNDED = 1e-3
 
 
 class Looker(NamedTuple):
-    """Where a robot is, and how far from there it looks for what moves, in metres."""
+    """Where a robot is, and how far from there it looks for what moves, in meters."""
 
     place: Vector
     reach: float
@@ -51,7 +51,7 @@ class Absent:
         return [self._actors[number] for number in np.flatnonzero(met).tolist()]
 
     def _apart(self, place: Vector) -> Array:
-        """How far a place is from what anybody covers of the ground on any of the ways, in metres, at least."""
+        """How far a place is from what anybody covers of the ground on any of the ways, in meters, at least."""
         to = np.array(place[:2]) - self._starts
         share = np.clip((to * self._along).sum(axis=1) / self._squared, 0.0, 1.0)
         away: Array = np.linalg.norm(to - share[:, np.newaxis] * self._along, axis=1) - self._wide

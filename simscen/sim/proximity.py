@@ -42,7 +42,7 @@ Around = tuple[float, int, tuple[float, float, float, float]]
 
 
 class Proximity:
-    """The solids of a static world, as seen from one robot. `reach` is how far it looks, in metres."""
+    """The solids of a static world, as seen from one robot. `reach` is how far it looks, in meters."""
 
     def __init__(self, static: TriangleMesh, robot: RobotBody, reach: float) -> None:
         self._client = CLIENTS.take()
@@ -57,13 +57,13 @@ class Proximity:
         self._travelled = 0.0
         self._nearest: Around | None = None
         self._distance = math.inf
-        self._pose, self._centre = Pose3(), (math.inf, math.inf)
+        self._pose, self._center = Pose3(), (math.inf, math.inf)
         self._standing: npt.NDArray[np.int64] = np.flatnonzero(self._parts.high[:, 2] > FLOOR_HEIGHT_M)
         low, high = self._parts.low[self._standing], self._parts.high[self._standing]
         self._extents = np.ascontiguousarray((low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
 
     def distance(self, pose: Pose3) -> float:
-        """Distance in metres from the robot, with its base at `pose`, to the nearest solid; inf beyond the reach.
+        """Distance in meters from the robot, with its base at `pose`, to the nearest solid; inf beyond the reach.
 
         The distance to a part changes at most by what the robot moves, so only those are measured again that may have
         come nearer than the nearest, and the nearest no farther than it may have gone: what is asked costs time for
@@ -72,7 +72,7 @@ class Proximity:
         moved = motion(self._pose, pose, self._extent)
         self._travelled += moved
         self._pose = pose
-        if math.dist(pose[:2], self._centre) > STRIDE:
+        if math.dist(pose[:2], self._center) > STRIDE:
             self._look_around(pose)
         nearest = math.inf
         if self._nearest is not None:
@@ -126,7 +126,7 @@ class Proximity:
 
     def _look_around(self, pose: Pose3) -> None:
         """Lists the parts that may come within reach during the next stride."""
-        x, y = self._centre = (pose.x, pose.y)
+        x, y = self._center = (pose.x, pose.y)
         left, low, right, high = self._extents
         outside = np.maximum(np.maximum(left - x, x - right), np.maximum(low - y, y - high))
         bounds = outside - (self._radius + self._height)  # less than what is diagonal, which is told when it comes up
@@ -198,7 +198,7 @@ class Proximity:
 
 
 def motion(before: Pose3, after: Pose3, extent: float) -> float:
-    """A bound on how far any point within `extent` of the base's origin has moved, in metres.
+    """A bound on how far any point within `extent` of the base's origin has moved, in meters.
 
     A turn by an angle a moves it by 2 sin(a / 2) times that, and quaternions by 2 sin(a / 4).
     """
@@ -206,7 +206,7 @@ def motion(before: Pose3, after: Pose3, extent: float) -> float:
 
 
 def point_to_triangles(point: Array, corners: Array) -> Array:
-    """Distances (n,) in metres from a point (3,) to triangles (n, 3, 3)."""
+    """Distances (n,) in meters from a point (3,) to triangles (n, 3, 3)."""
     a, b, c = corners.swapaxes(0, 1)
     normal = np.cross(b - a, c - a)
     edges = np.min([_to_segments(point, p, q) for p, q in ((a, b), (b, c), (c, a))], axis=0)

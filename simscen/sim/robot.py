@@ -125,7 +125,7 @@ class Robot:
         reach: float,
         look: int,
     ) -> None:
-        """Set down at `pose`; its firmware runs every `period` seconds, clearance is searched within `reach` metres.
+        """Set down at `pose`; its firmware runs every `period` seconds, clearance is searched within `reach` meters.
 
         The renderer is shown a `look` of the engine's.
 
@@ -248,11 +248,11 @@ class Robot:
         self._scene.changed()
 
     def press(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Push it evenly from now on for so long: an impulse in N s in the world frame, at its centre of mass."""
+        """Push it evenly from now on for so long: an impulse in N s in the world frame, at its center of mass."""
         self._scene.add_press(self.push, impulse, seconds, self._scene.tick)
 
     def push(self, impulse: tuple[float, float]) -> None:
-        """Push it during the next tick: an impulse in N s in the world frame, at its centre of mass."""
+        """Push it during the next tick: an impulse in N s in the world frame, at its center of mass."""
         self.base.push(impulse, 1 / self._scene.rate)
         self._scene.shaken()
 

@@ -43,13 +43,13 @@ class RobotBody:
         return (*self.casters, *self.hull)
 
     @property
-    def tyres(self) -> tuple[Solid, ...]:
+    def tires(self) -> tuple[Solid, ...]:
         """What wheels roll on the ground with: balls."""
         return tuple(Solid(Sphere(wheel.radius), Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in self.wheels)
 
     @property
     def circumscribed_radius(self) -> float:
-        """The smallest circle around the base's origin that holds the footprint, in metres."""
+        """The smallest circle around the base's origin that holds the footprint, in meters."""
         return max(math.hypot(x, y) for x, y in self.footprint)
 
 

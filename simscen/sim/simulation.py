@@ -60,7 +60,7 @@ class Simulation:
         """Build the world with the robots at rest where they are placed.
 
         Neither the order of `robots` nor that of `bodies` matters: the engine gets both by name. Clearance is searched
-        within `clearance_range` metres of a hull. `triangulate` gives the surface of a shape, for moving things that
+        within `clearance_range` meters of a hull. `triangulate` gives the surface of a shape, for moving things that
         the engine has no primitive for. Without `pictures` no robot has eyes that take any, and the renderer need not
         be shown anything.
         """

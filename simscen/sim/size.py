@@ -18,5 +18,5 @@ def refuse_giants(body: RobotBody, file: Path | None) -> None:
     farthest = max(across, up, wheels, body.circumscribed_radius)
     if farthest > FARTHEST:
         message = f"robot {body.name!r} reaches {farthest:.4g} m from its base, more than {FARTHEST:g} m"
-        hint = "are lengths in millimetres? they are in metres here"
+        hint = "are lengths in millimeters? they are in meters here"
         raise InvalidInput([Problem(str(file or body.name), 0, 0, "SC402", message, hint)])

@@ -1,7 +1,7 @@
 """Ground that is not level: what wheels roll on besides the plane z = 0, and how a robot stands there.
 
 Each convex solid is one convex shape, so that a wheel which rolls over a ramp meets no edges between triangles. Concave
-ones (height fields, meshes) stay triangles; on those a wheel loses some millimetres per second at each edge.
+ones (height fields, meshes) stay triangles; on those a wheel loses some millimeters per second at each edge.
 """
 
 import math

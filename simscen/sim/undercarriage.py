@@ -45,7 +45,7 @@ here the loaded caster and the wheels stand on the ground, and the other catches
 
 @dataclass(frozen=True, eq=False)
 class Wheel:
-    """A wheel with its centre at `x`, `y` in the base frame, `radius` above the ground; all in metres.
+    """A wheel with its center at `x`, `y` in the base frame, `radius` above the ground; all in meters.
 
     It turns about y. A driven one has a motor with `torque` in N m and a `rotor` in kg m².
     """
@@ -133,13 +133,13 @@ def on_casters(
     radius = 0.5 * wheel_radius
     front = 0.9 * (max(x for x, _ in outline) - radius)
     rear = 0.9 * (min(x for x, _ in outline) + radius)
-    centre = chassis.centre.copy()
-    loaded = front if centre[0] > BALLAST * front else rear
-    if abs(centre[0]) < BALLAST * abs(loaded):
-        centre[0] = BALLAST * loaded
+    center = chassis.center.copy()
+    loaded = front if center[0] > BALLAST * front else rear
+    if abs(center[0]) < BALLAST * abs(loaded):
+        center[0] = BALLAST * loaded
     gaps = {front: CASTER_GAP, rear: CASTER_GAP} | {loaded: 0.0}
     balls = tuple(Solid(Sphere(radius), Pose3(x, 0.0, radius + gap), "caster") for x, gap in gaps.items())
-    return MassProperties(chassis.mass, centre, chassis.tensor), balls
+    return MassProperties(chassis.mass, center, chassis.tensor), balls
 
 
 def yielding(casters: Sequence[Solid]) -> tuple[Solid, ...]:

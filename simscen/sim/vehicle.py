@@ -51,10 +51,10 @@ class Vehicle:
         The renderer is shown a `look` of the engine's.
         """
         self._client, self._terrain = client, terrain
-        moments, self._base_from_centre = body.chassis.principal()
-        self._centre = self._base_from_centre.position
-        self._centre_from_base = self._base_from_centre.inverse()
-        self._level = self._centre_from_base.quaternion == UPRIGHT
+        moments, self._base_from_center = body.chassis.principal()
+        self._center = self._base_from_center.position
+        self._center_from_base = self._base_from_center.inverse()
+        self._level = self._center_from_base.quaternion == UPRIGHT
         casters = yielding(body.casters) if terrain else ()
         self.id, self.joints, self.hull_links = _build(client, body, casters, tick, look)
         self.rolling: Mapping[int, float] = _rolling(body, self.joints, self.hull_links, casters)
@@ -90,9 +90,9 @@ class Vehicle:
     def place(self, pose: Pose2) -> None:
         """Set it down at rest, its base frame on the ground."""
         base = self._terrain.seat(pose, self._feet) if self._terrain else Pose3.planar(pose)
-        centre = base.compose(self._base_from_centre)
+        center = base.compose(self._base_from_center)
         pybullet.resetBasePositionAndOrientation(
-            self.id, centre.position, centre.quaternion, physicsClientId=self._client
+            self.id, center.position, center.quaternion, physicsClientId=self._client
         )
         pybullet.resetBaseVelocity(self.id, (0, 0, 0), (0, 0, 0), physicsClientId=self._client)
         for joint in range(pybullet.getNumJoints(self.id, physicsClientId=self._client)):
@@ -104,11 +104,11 @@ class Vehicle:
         (px, py, pz), turn = pybullet.getBasePositionAndOrientation(self.id, self._client)
         (vx, vy, vz), angular = pybullet.getBaseVelocity(self.id, self._client)
         if self._level:
-            x, y, z = rotated(turn, self._centre)
+            x, y, z = rotated(turn, self._center)
             pose = _made(Pose3, (px - x, py - y, pz - z, *turn))
         else:
-            pose = Pose3(px, py, pz, *turn).compose(self._centre_from_base)
-            x, y, z = rotated(pose.quaternion, self._centre)
+            pose = Pose3(px, py, pz, *turn).compose(self._center_from_base)
+            x, y, z = rotated(pose.quaternion, self._center)
         wx, wy, wz = angular
         return _made(State, (pose, (vx - (wy * z - wz * y), vy - (wz * x - wx * z), vz - (wx * y - wy * x)), angular))
 
@@ -123,10 +123,10 @@ class Vehicle:
                 pybullet.changeDynamics(self.id, link, lateralFriction=found, physicsClientId=self._client)
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Push its centre of mass during the next step, which lasts `seconds`."""
-        centre = pybullet.getBasePositionAndOrientation(self.id, physicsClientId=self._client)[0]
+        """Push its center of mass during the next step, which lasts `seconds`."""
+        center = pybullet.getBasePositionAndOrientation(self.id, physicsClientId=self._client)[0]
         force = (impulse[0] / seconds, impulse[1] / seconds, 0.0)
-        pybullet.applyExternalForce(self.id, -1, force, centre, pybullet.WORLD_FRAME, physicsClientId=self._client)
+        pybullet.applyExternalForce(self.id, -1, force, center, pybullet.WORLD_FRAME, physicsClientId=self._client)
 
 
 def _rolling(body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]) -> dict[int, float]:
@@ -156,13 +156,13 @@ def _build(
     first, *others = shapes
     hull = (-1, *range(len(links), len(links) + len(others)))
     links += [_Link(HULL_PIECE, shape, (0.0, 0.0, 0.0), 0, pybullet.JOINT_FIXED, (0, 0, 1)) for shape in others]
-    _, centre = body.chassis.principal()
+    _, center = body.chassis.principal()
     robot: int = pybullet.createMultiBody(
         body.chassis.mass,
         first,
         look,
-        baseInertialFramePosition=centre.position,
-        baseInertialFrameOrientation=centre.quaternion,
+        baseInertialFramePosition=center.position,
+        baseInertialFrameOrientation=center.quaternion,
         linkMasses=[link.mass for link in links],
         linkCollisionShapeIndices=[link.shape for link in links],
         linkVisualShapeIndices=[look] * len(links),
@@ -206,7 +206,7 @@ def _links(client: int, wheel: Wheel, number: int, rolled: float) -> list[_Link]
 
 
 def _ball(client: int, wheel: Wheel, rolled: float) -> int:
-    """A wheel that rolls at most so many metres in one step.
+    """A wheel that rolls at most so many meters in one step.
 
     Bullet takes a contact for the one of the step before if it is no farther from it on the wheel than a share of the
     shape's extent, and otherwise keeps both: a bare ball that rolls by more than 2 % of its radius in a step trails up

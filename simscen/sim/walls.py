@@ -22,7 +22,7 @@ Vector = tuple[float, float, float]
 
 
 class _Looked(NamedTuple):
-    """All walls within `far` metres of a place stand."""
+    """All walls within `far` meters of a place stand."""
 
     x: float
     y: float
@@ -49,7 +49,7 @@ class Walls:
         self.complete = not self._missing.any()
 
     def near(self, number: int, place: Vector, within: float) -> list[int]:
-        """Put up the walls within so many metres of a place where a body is now, by its number: their numbers."""
+        """Put up the walls within so many meters of a place where a body is now, by its number: their numbers."""
         x, y, _ = place
         known = self._looked.get(number)
         if known is not None and math.hypot(x - known.x, y - known.y) + within <= known.far:

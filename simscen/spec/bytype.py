@@ -67,7 +67,7 @@ class NameOf:
 
 
 BehaviorName = Annotated[RecoveryBehavior, NameOf("behavior")]
-"""The name of a recovery behaviour, as events of the log have it."""
+"""The name of a recovery behavior, as events of the log have it."""
 
 
 def specification(entry: Entry, value: dict[str, Any]) -> BaseModel:
@@ -102,7 +102,7 @@ def _unknown(group: str, name: str) -> PydanticCustomError:
 
 
 _ASKED = ("horizon", "clearance_range")
-"""What a criterion says of itself, in seconds and metres."""
+"""What a criterion says of itself, in seconds and meters."""
 
 
 @dataclass(frozen=True)

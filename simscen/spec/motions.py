@@ -19,7 +19,7 @@ TURN = 0.25
 EASED = 1.5
 """How much longer a way takes that is eased from rest to rest, at the same top speed."""
 CLOSED = 1e-6
-"""Metres and radians within which the last keyframe of a loop is its first."""
+"""Meters and radians within which the last keyframe of a loop is its first."""
 
 Keyframe = Annotated[tuple[Duration, Length, Length, Angle], Field(strict=False)]
 
@@ -122,7 +122,7 @@ def route(
 
 
 class _Leg(NamedTuple):
-    """A straight way: from where, heading along it, how far in metres, and where to."""
+    """A straight way: from where, heading along it, how far in meters, and where to."""
 
     begin: Pose2
     length: float
@@ -132,8 +132,8 @@ class _Leg(NamedTuple):
     def end(self) -> Pose2:
         return Pose2(*self.to, self.begin.yaw)
 
-    def along(self, metres: float) -> Pose2:
-        return self.begin.compose(Pose2(metres, 0.0))
+    def along(self, meters: float) -> Pose2:
+        return self.begin.compose(Pose2(meters, 0.0))
 
 
 def _even(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:

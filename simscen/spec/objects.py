@@ -33,7 +33,7 @@ class Shaped(Spec):
 
     @property
     def tall(self) -> float:
-        """Its own height in metres."""
+        """Its own height in meters."""
         return self.box[2] if self.box is not None else self.cylinder[1] if self.cylinder is not None else self.height
 
     def solid(self, name: str) -> Solid:

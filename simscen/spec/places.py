@@ -33,12 +33,12 @@ Ring = Annotated[list[Point], Field(min_length=3, max_length=200), AfterValidato
 
 
 class PoseSpec(Spec):
-    """A position in metres and a heading in radians, in the map frame."""
+    """A position in meters and a heading in radians, in the map frame."""
 
     x: Length
-    """Metres along the x axis."""
+    """Meters along the x axis."""
     y: Length
-    """Metres along the y axis."""
+    """Meters along the y axis."""
     yaw: Angle = 0.0
     """The heading, anticlockwise from the x axis."""
     _place: str = PrivateAttr(default="")

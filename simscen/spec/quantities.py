@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-_METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
+_METERS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 _SECONDS = {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0}
 _RADIANS = {"rad": 1.0, "deg": math.pi / 180}
 NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d].*?)\s*")
@@ -19,12 +19,12 @@ def _per(top: dict[str, float], bottom: dict[str, float], power: str = "") -> di
 
 
 UNITS: dict[str, dict[str, float]] = {
-    "length": _METRES,
+    "length": _METERS,
     "duration": _SECONDS,
     "angle": _RADIANS,
-    "speed": _per(_METRES, {"s": 1.0, "h": 3600.0, "min": 60.0}),
+    "speed": _per(_METERS, {"s": 1.0, "h": 3600.0, "min": 60.0}),
     "angular speed": _per(_RADIANS, {"s": 1.0}),
-    "acceleration": _per(_METRES, {"s": 1.0}, "^2"),
+    "acceleration": _per(_METERS, {"s": 1.0}, "^2"),
     "angular acceleration": _per(_RADIANS, {"s": 1.0}, "^2"),
     "jerk": {"m/s^3": 1.0},
     "mass": {"kg": 1.0, "g": 0.001, "t": 1000.0},

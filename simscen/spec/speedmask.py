@@ -18,7 +18,7 @@ class SpeedMask(Spec):
     """A filter mask of speed limits (nav2_costmap_2d's SpeedFilter and its CostmapFilterInfo).
 
     What a cell of the mask says is `base + multiplier · value`, its value being 0 … 100 as map_server reads the mask
-    (`mode: scale` keeps the greys). Cells of value 0 and unknown ones limit nothing, nor does a limit of 0 or less.
+    (`mode: scale` keeps the grays). Cells of value 0 and unknown ones limit nothing, nor does a limit of 0 or less.
     """
 
     file: MaskFile

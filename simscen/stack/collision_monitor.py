@@ -21,14 +21,14 @@ STEPS = 8
 """Moments within the prediction at which the hull is compared with the scan."""
 HERE = Pose2(0.0, 0.0)
 NEARER = 0.005
-"""Metres by which something that moves must come nearer than to a robot that stood, for braking to help."""
+"""Meters by which something that moves must come nearer than to a robot that stood, for braking to help."""
 ROUNDING = 1e-6
-"""Metres: who is that near to coming near has his hull looked at."""
+"""Meters: who is that near to coming near has his hull looked at."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """The newest scan of a lidar: taken at `odometry`, with nothing nearer to the base than `nearest` metres."""
+    """The newest scan of a lidar: taken at `odometry`, with nothing nearer to the base than `nearest` meters."""
 
     scan: Scan
     odometry: Pose2
@@ -150,21 +150,21 @@ class CollisionMonitor:
         The whole horizon where a robot that stood would be met as soon and as closely: to brake for that is no help.
         """
         times = self._times
-        centres = self._moving.at(times)
-        gaps = self._gaps_to(centres, wanted)
+        centers = self._moving.at(times)
+        gaps = self._gaps_to(centers, wanted)
         met = (gaps[1:] < 0.0) & (gaps[1:] < gaps[0] - 1e-4)
         if not met.any():
             return horizon
-        standing = self._gaps_to(centres, STOP)
+        standing = self._gaps_to(centers, STOP)
         anyway = (standing[1:] < 0.0) & (standing[1:] < standing[0] - 1e-4)
         first = (met | anyway).argmax(axis=0)  # of each thing, the moment that tells which of the two is worse
         worse = (gaps < standing - NEARER)[1 + first, np.arange(len(first))]
         when = (met & worse).any(axis=1)
         return float(times[int(when.argmax())]) if when.any() else horizon
 
-    def _gaps_to(self, centres: Array, twist: Twist) -> Array:
+    def _gaps_to(self, centers: Array, twist: Twist) -> Array:
         """How far (times, things) what moves is from the stop margin when the robot goes with `twist`."""
-        return self._gaps(centres, poses_along(HERE, twist, self._times)) - (
+        return self._gaps(centers, poses_along(HERE, twist, self._times)) - (
             self._moving.radii + self._spec.stop_margin
         )
 
@@ -184,7 +184,7 @@ class CollisionMonitor:
 
 
 def _mitre(normals: Array) -> float:
-    """How many metres from the middle something may be at most that is less than a metre beyond each of these lines.
+    """How many meters from the middle something may be at most that is less than a meter beyond each of these lines.
 
     They have the `normals` (n, 2), and it is farthest off between the two that lie widest apart.
     """
@@ -193,7 +193,7 @@ def _mitre(normals: Array) -> float:
 
 
 def _nearest(scan: Scan) -> float | None:
-    """Metres to the nearest thing that a beam answers; None where none does."""
+    """Meters to the nearest thing that a beam answers; None where none does."""
     nearest = float(np.fmin.reduce(scan.ranges, initial=math.inf))
     if nearest >= scan.range_min and nearest < math.inf:
         return nearest
@@ -202,7 +202,7 @@ def _nearest(scan: Scan) -> float | None:
 
 
 def _points_within(scan: Scan, reach: float) -> Array:
-    """The hits (n, 2) at most `reach` metres from the base, in its frame; few of a scan, so little to compute."""
+    """The hits (n, 2) at most `reach` meters from the base, in its frame; few of a scan, so little to compute."""
     most = reach + math.hypot(scan.mount.x, scan.mount.y)
     hits = (scan.ranges >= scan.range_min) & (scan.ranges <= min(most, scan.range_max))
     near = np.flatnonzero(hits & ~scan.moving if isinstance(scan, ScanAmongMoving) else hits)

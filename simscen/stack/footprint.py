@@ -14,7 +14,7 @@ Reals = npt.NDArray[np.floating]
 
 
 def distances(costmap: CostmapView, points: Reals) -> npt.NDArray[np.float32]:
-    """Distance in metres (…,) to the nearest lethal cell at points (…, 2); 0 off the costmap."""
+    """Distance in meters (…,) to the nearest lethal cell at points (…, 2); 0 off the costmap."""
     height, width = costmap.distance.shape
     across = (points[..., 0] - costmap.origin[0]) * (1.0 / costmap.resolution)
     up = (points[..., 1] - costmap.origin[1]) * (1.0 / costmap.resolution)
@@ -34,11 +34,11 @@ def distance_at(costmap: CostmapView, x: float, y: float) -> float:
     return distance.item(row, column) if 0 <= row < height and 0 <= column < width else 0.0
 
 
-def lethal_near(costmap: CostmapView, x: float, y: float, metres: float) -> Array:
-    """The middles (n, 2) of the lethal cells in a square of so many metres to each side of a point."""
+def lethal_near(costmap: CostmapView, x: float, y: float, meters: float) -> Array:
+    """The middles (n, 2) of the lethal cells in a square of so many meters to each side of a point."""
     left, low = costmap.origin
-    first = [max(0, math.floor((at - metres - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
-    last = [max(0, math.ceil((at + metres - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
+    first = [max(0, math.floor((at - meters - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
+    last = [max(0, math.ceil((at + meters - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
     near = np.argwhere(costmap.distance[first[0] : last[0], first[1] : last[1]] <= 0.0) + np.array(first)
     cells: Array = np.array((left, low)) + (near[:, ::-1] + 0.5) * costmap.resolution
     return cells
@@ -47,7 +47,7 @@ def lethal_near(costmap: CostmapView, x: float, y: float, metres: float) -> Arra
 class Footprint:
     """Checks many poses at once.
 
-    A round robot collides where a lethal cell's centre is within its radius. Any other collides where one is within
+    A round robot collides where a lethal cell's center is within its radius. Any other collides where one is within
     the inscribed radius or anywhere under the hull; far from everything (circumscribed radius) it never does. `reach`
     is how far turning in place moves the hull: 0 when it is round; `circumscribed` is the radius around all of it,
     `inscribed` that of the largest circle within.
@@ -86,7 +86,7 @@ class Footprint:
         return free
 
     def clearance(self, costmap: CostmapView, poses: Array) -> Array:
-        """About how far (n,) the hull's edge is from the nearest lethal cell in metres; negative in collision.
+        """About how far (n,) the hull's edge is from the nearest lethal cell in meters; negative in collision.
 
         Then it is how far the deepest of the lethal cells under the hull is from its edge: whether a turn leads out of
         a collision or further into it shows in nothing else.
@@ -102,10 +102,10 @@ class Footprint:
         return np.asarray(np.minimum(edge, middle))
 
     def gap(self, moving: MovingObstacles, poses: Array, times: Array, sigmas: float = 0.0) -> Array:
-        """Metres (…,) from the hull at poses (…, 3) to what moves, where it will be `times` seconds from now.
+        """Meters (…,) from the hull at poses (…, 3) to what moves, where it will be `times` seconds from now.
 
         `times` broadcast with them. Negative where they will meet; of a hull that is not round less than it is, by
-        some centimetres. Things are so many standard deviations of their places wider.
+        some centimeters. Things are so many standard deviations of their places wider.
         """
         x, y, yaw = poses[..., 0], poses[..., 1], poses[..., 2]
         return np.asarray(self.discs.gap(moving, x, y, yaw, times, sigmas), dtype=np.float64)
@@ -123,15 +123,15 @@ class Footprint:
 class Discs:
     """A row of equal discs along the base's x axis that covers the hull: `offsets` (k,) and their `radius`.
 
-    `reach` is how far from the base they reach; `centred` is whether it is one about the base, however that is turned.
+    `reach` is how far from the base they reach; `centered` is whether it is one about the base, however that is turned.
 
-    A check by discs is a few look-ups a pose, and errs to the safe side by a centimetre or two: for the controllers
+    A check by discs is a few look-ups a pose, and errs to the safe side by a centimeter or two: for the controllers
     that compare thousands of trajectories.
     """
 
     def __init__(self, robot: RobotModel) -> None:
         if robot.radius is not None:
-            self.offsets, self.radius, self.reach, self.centred = np.zeros(1), robot.radius, robot.radius, True
+            self.offsets, self.radius, self.reach, self.centered = np.zeros(1), robot.radius, robot.radius, True
             return
         corners = np.array(robot.footprint, dtype=np.float64)
         (back, right), (front, left) = corners.min(axis=0), corners.max(axis=0)
@@ -141,11 +141,11 @@ class Discs:
         self.offsets = back + piece * (np.arange(count) + 0.5)
         self.radius = math.hypot(half, piece / 2)
         self.reach = float(np.abs(self.offsets).max()) + self.radius
-        self.centred = self.offsets.tolist() == [0.0]
+        self.centered = self.offsets.tolist() == [0.0]
 
     def clearance(self, costmap: CostmapView, x: Reals, y: Reals, yaw: Reals) -> npt.NDArray[np.float32]:
         """Distance (…,) from the discs to the nearest lethal cell at poses (…,); negative in collision."""
-        if self.centred:
+        if self.centered:
             return np.asarray(distances(costmap, np.stack((x, y), axis=-1)) - np.float32(self.radius))
         cosine, sine = np.cos(yaw), np.sin(yaw)
         least: npt.NDArray[np.float32] | None = None
@@ -156,7 +156,7 @@ class Discs:
         return np.asarray(least - np.float32(self.radius))
 
     def gap(self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
-        """Metres (…,) from the discs at poses (…,) to what moves, where it will be at `times`; see Moving.gap."""
+        """Meters (…,) from the discs at poses (…,) to what moves, where it will be at `times`; see Moving.gap."""
         least, *others = [moving.gap(*at, times, sigmas) for at in self._placed(x, y, yaw)]
         for other in others:
             np.minimum(least, other, out=least)
@@ -176,7 +176,7 @@ class Discs:
 
     def _placed(self, x: Reals, y: Reals, yaw: Reals) -> list[tuple[Reals, Reals]]:
         """The discs' middles."""
-        if self.centred:
+        if self.centered:
             return [(x, y)]
         cosine, sine = np.cos(yaw), np.sin(yaw)
         return [(x + offset * cosine, y + offset * sine) for offset in self.offsets.tolist()]

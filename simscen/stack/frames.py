@@ -29,7 +29,7 @@ class Frames(NamedTuple):
         return self.odometry.compose(self.pose.inverse())
 
     def moved(self, odom_from_map: Pose2, reach: float) -> float:
-        """Metres by which what lies up to `reach` metres from the robot moved in odom since this was the correction."""
+        """Meters by which what lies up to `reach` meters from the robot moved in odom since this was the correction."""
         (x, y, yaw), (mapped_x, mapped_y, mapped_yaw), (now_x, now_y, now_yaw) = odom_from_map, self.pose, self.odometry
         c, s = math.cos(yaw), math.sin(yaw)
         dx, dy = x + c * mapped_x - s * mapped_y - now_x, y + s * mapped_x + c * mapped_y - now_y

@@ -1,6 +1,6 @@
 """When a goal is reached: nav2_controller::SimpleGoalChecker, a little stricter.
 
-Nav2 accepts at the very edge of the tolerance, which turns a localisation error of a centimetre into a false success.
+Nav2 accepts at the very edge of the tolerance, which turns a localization error of a centimeter into a false success.
 Here the robot goes on until it is well inside, or until it stands anywhere inside.
 """
 

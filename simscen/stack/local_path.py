@@ -7,12 +7,12 @@ from simscen.stack.frames import Frames, placed
 from simscen.stack.protocols import Controller
 
 REACH = 1.0
-"""Metres ahead at which the way a controller takes is decided."""
+"""Meters ahead at which the way a controller takes is decided."""
 MOVED = 0.01
-"""Metres by which the path may lie beside where it belongs before the controller is told of it. The localizer's
+"""Meters by which the path may lie beside where it belongs before the controller is told of it. The localizer's
 corrections are larger, and those of every beat that follow an odometry's drift smaller."""
 STANDS = 1e-9
-"""Metres by which rounding alone may seem to move it."""
+"""Meters by which rounding alone may seem to move it."""
 
 
 class LocalPath:

@@ -11,12 +11,12 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 
 MAX_UNCERTAINTY_M = 0.8
-"""Metres by which what is not known of a place widens it at most."""
+"""Meters by which what is not known of a place widens it at most."""
 MAX_STEP_S, MIN_STEP_S = 0.5, 0.05
 """Seconds that are passed over at once at most, unless all keep clear of each other by WIDEST as well, and at least, to
 be worth it."""
 CONTACT_DISTANCE_M = 0.03
-"""Metres: whoever comes nearer is taken to touch."""
+"""Meters: whoever comes nearer is taken to touch."""
 
 Mask = npt.NDArray[np.bool_]
 Reals = npt.NDArray[np.floating]
@@ -42,7 +42,7 @@ class MovingObstacle(NamedTuple):
         return math.sqrt(variance + seconds * (2.0 * covariance + wanders * seconds) + turned * turned)
 
     def missed_by(self, here: complex, speed: float, seconds: float) -> float:
-        """Metres at least that its surface stays off whoever leaves `here` at `speed` for so long, whichever way."""
+        """Meters at least that its surface stays off whoever leaves `here` at `speed` for so long, whichever way."""
         off, velocity = self.place - here, self.velocity
         own = abs(velocity)
         if speed >= own:
@@ -63,14 +63,14 @@ class MovingObstacles:
     __slots__ = ("acceleration", "things")
 
     def __init__(
-        self, centres: Array, velocities: Array, radii: Array, covariances: Array, acceleration: float
+        self, centers: Array, velocities: Array, radii: Array, covariances: Array, acceleration: float
     ) -> None:
-        """Of `centres` (n, 2) in m, `velocities` (n, 2) in m/s, `radii` (n,) in m.
+        """Of `centers` (n, 2) in m, `velocities` (n, 2) in m/s, `radii` (n,) in m.
 
         `covariances` (n, 4, 4) are of x, y, vx, vy in that order; of the two axes, what is known less holds for both.
         """
         spreads = np.maximum(covariances[:, (0, 0, 2), (0, 2, 2)], covariances[:, (1, 1, 3), (1, 3, 3)])
-        rows = zip(centres.tolist(), velocities.tolist(), radii.tolist(), spreads.tolist(), strict=True)
+        rows = zip(centers.tolist(), velocities.tolist(), radii.tolist(), spreads.tolist(), strict=True)
         self.things = tuple(
             MovingObstacle(complex(*at), complex(*goes), radius, *spread) for at, goes, radius, spread in rows
         )
@@ -87,7 +87,7 @@ class MovingObstacles:
         return len(self.things)
 
     @property
-    def centres(self) -> Array:
+    def centers(self) -> Array:
         """Their middles (n, 2) in m."""
         return np.array([(each.place.real, each.place.imag) for each in self.things]).reshape(-1, 2)
 
@@ -109,11 +109,11 @@ class MovingObstacles:
 
     def at(self, times: Array) -> Array:
         """Where their middles will be (times, n, 2) after `times` (m,) seconds, at constant velocity."""
-        moved: Array = self.centres + self.velocities * times[:, None, None]
+        moved: Array = self.centers + self.velocities * times[:, None, None]
         return moved
 
     def gap(self, x: Reals, y: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
-        """Metres (…,) from points (…,) to the surface of what will be nearest at `times`, which broadcast with them.
+        """Meters (…,) from points (…,) to the surface of what will be nearest at `times`, which broadcast with them.
 
         Things are so many standard deviations wider, up to WIDEST; inf where nothing moves.
         """
@@ -126,7 +126,7 @@ class MovingObstacles:
     def nearness(self, x: Reals, y: Reals, times: Reals, radius: float, kept_off: float) -> tuple[Reals, Mask]:
         """How near discs at points (…,) are to what will be nearest at `times`, and which of them touch it then.
 
-        0 and less from so far off as is to be kept (metres, and a standard deviation of the place, up to WIDEST), 1
+        0 and less from so far off as is to be kept (meters, and a standard deviation of the place, up to WIDEST), 1
         where they touch.
         """
         shape = np.broadcast_shapes(x.shape, times.shape)
@@ -164,7 +164,7 @@ class MovingObstacles:
         return np.asarray(np.sqrt(variance + 2.0 * covariance * times + wanders * times**2 + turned))
 
     def _gaps(self, x: Reals, y: Reals, times: Reals) -> Iterator[tuple[MovingObstacle, Reals]]:
-        """Of each thing, the metres (…,) to its surface."""
+        """Of each thing, the meters (…,) to its surface."""
         for thing in self.things:
             place, velocity, radius, *_ = thing
             dx, dy = x - (place.real + velocity.real * times), y - (place.imag + velocity.imag * times)
@@ -176,7 +176,7 @@ class MovingObstacles:
             yield thing, dx
 
     def near(self, x: float, y: float, reach: float, speed: float, seconds: float) -> "MovingObstacles":
-        """Those whose surface may come within `reach` metres of who leaves a point at `speed`, in so many seconds."""
+        """Those whose surface may come within `reach` meters of who leaves a point at `speed`, in so many seconds."""
         here = complex(x, y)
         close = [each for each in self.things if each.missed_by(here, speed, seconds) < reach]
         return self if len(close) == len(self.things) else MovingObstacles.of(close, self.acceleration)

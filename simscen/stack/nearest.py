@@ -1,7 +1,7 @@
 """How far each cell of a grid is from the nearest marked one: everywhere, a few rows at a time, or up to a reach.
 
 scipy would hold all of it several times over in double precision: 200 MB for a map of 100 x 100 m. It takes 0.3 s for
-that; where nobody asks beyond 2 m, comparing neighbours takes 0.1 s, and 0.05 s for 0.7 m. Of a window of 3 x 3 m it
+that; where nobody asks beyond 2 m, comparing neighbors takes 0.1 s, and 0.05 s for 0.7 m. Of a window of 3 x 3 m it
 takes half of scipy's time.
 """
 

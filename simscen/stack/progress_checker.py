@@ -7,7 +7,7 @@ from simscen.model.checkers import ProgressChecker as ProgressSpec
 
 
 class ProgressChecker:
-    """Wants `required_movement_radius` metres (or the angle, if given) within `movement_time_allowance`."""
+    """Wants `required_movement_radius` meters (or the angle, if given) within `movement_time_allowance`."""
 
     def __init__(self, spec: ProgressSpec) -> None:
         self._radius, self._angle = spec.required_movement_radius, spec.required_movement_angle

@@ -128,9 +128,9 @@ class CostmapView:
 
     `costs` (height, width) uint8 with nav2_costmap_2d's values (0 free, 253 inscribed, 254 lethal, 255 unknown);
     row 0 is the lowest y, `origin` is the corner of cell (0, 0), without rotation. `distance` (height, width) float32
-    is the distance in metres from each cell's centre to the nearest lethal cell's centre; a costmap may cap it, at no
-    less than the inflation radius and half a metre beyond the hull. `revision` grows with each
-    change; `inflation_radius` is how far in metres an obstacle's costs reach. The arrays may be windows on a costmap
+    is the distance in meters from each cell's center to the nearest lethal cell's center; a costmap may cap it, at no
+    less than the inflation radius and half a meter beyond the hull. `revision` grows with each
+    change; `inflation_radius` is how far in meters an obstacle's costs reach. The arrays may be windows on a costmap
     that goes on living: they hold until its next update.
 
     `moving` is what motion prediction says of things that move, now and in this frame; `Footprint.gap` says how near a
@@ -146,10 +146,10 @@ class CostmapView:
     inflation_radius: float = 0.55
     moving: MovingObstacles = NO_MOVING_OBSTACLES
 
-    def with_less_room(self, metres: float) -> "CostmapView":
+    def with_less_room(self, meters: float) -> "CostmapView":
         """The same place with every obstacle so much larger all round."""
-        costs = np.where(self.distance <= metres, np.uint8(LETHAL), self.costs)
-        return replace(self, costs=costs, distance=np.maximum(self.distance - np.float32(metres), np.float32(0)))
+        costs = np.where(self.distance <= meters, np.uint8(LETHAL), self.costs)
+        return replace(self, costs=costs, distance=np.maximum(self.distance - np.float32(meters), np.float32(0)))
 
 
 class Planner(Protocol):
@@ -213,7 +213,7 @@ class DrivesArcs(Protocol):
 
 
 class Behavior(Protocol):
-    """A recovery behaviour such as spin: asked again and again until it is done. Its poses are in the odom frame."""
+    """A recovery behavior such as spin: asked again and again until it is done. Its poses are in the odom frame."""
 
     name: str
 
@@ -261,7 +261,7 @@ class Stack(Protocol):
     """
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Localise at the estimate, then drive to the goals in order."""
+        """Localize at the estimate, then drive to the goals in order."""
         ...
 
     def preempt(self, tick: int, goal: Goal) -> None:

@@ -1,4 +1,4 @@
-"""The recovery branch of Nav2's default tree: a round robin of behaviours, a limited number of times."""
+"""The recovery branch of Nav2's default tree: a round robin of behaviors, a limited number of times."""
 
 import math
 from collections.abc import Sequence
@@ -11,11 +11,11 @@ PLANNER_CODES = frozenset(get_args(PlannerCode))
 
 
 NEARER = 1.0
-"""Metres by which a robot must have come nearer to its goal than at any recovery before, for that to be progress."""
+"""Meters by which a robot must have come nearer to its goal than at any recovery before, for that to be progress."""
 
 
 class RoundRobin:
-    """Hands out behaviours in turn until the retries have been used; a new goal gets a full number again."""
+    """Hands out behaviors in turn until the retries have been used; a new goal gets a full number again."""
 
     def __init__(self, behaviors: Sequence[Behavior], spec: Recovery) -> None:
         self._behaviors, self._retries = tuple(behaviors), spec.number_of_retries
@@ -24,7 +24,7 @@ class RoundRobin:
         self._next, self._used, self._nearest = 0, 0, math.inf
 
     def helps(self, failure: NavigationFailure) -> bool:
-        """Whether clearing and behaviours may help after such a failure."""
+        """Whether clearing and behaviors may help after such a failure."""
         return getattr(failure.code, "name", "") not in self._incurable
 
     def reset(self) -> None:
@@ -32,7 +32,7 @@ class RoundRobin:
         self._used, self._nearest = 0, math.inf
 
     def next(self, to_go: float) -> Behavior | None:
-        """The next behaviour, with the goal `to_go` metres away; None when the retries are used up."""
+        """The next behavior, with the goal `to_go` meters away; None when the retries are used up."""
         if self._anew and to_go <= self._nearest - NEARER and self._used:
             self._used = self._next = 0
         self._nearest = min(self._nearest, to_go)

@@ -28,16 +28,16 @@ class Setting:
     surroundings:     the robot's datasheet, its map, what it must not enter, its lidars by name, ticks a second
     name:             its random stream: "planner", "controller", "localizer", "behavior.spin", …, "stack"
     streams:          random streams by name, derived from the run's seed; `chance` is the one it should use
-    control_period:   seconds between two calls of a controller, a goal checker or a behaviour
-    resolution:       metres, the edge of a cell of the costmaps that it is shown
+    control_period:   seconds between two calls of a controller, a goal checker or a behavior
+    resolution:       meters, the edge of a cell of the costmaps that it is shown
     estimate:         where the robot is said to be when it is switched on; `reset` or `start` says it again
     stop_on_failure:  whether a goal that fails ends the task (for a whole stack)
     mode:             Nav2's action that takes the goals; what it means stands in the goals, as `via` and `wait`
-    clear_costmap:    forgets live obstacles that are not seen any more (for a behaviour)
+    clear_costmap:    forgets live obstacles that are not seen any more (for a behavior)
     clear_around:     the same, as far from the robot as the local costmap reaches
     way:              the poses that the robot came by in the last minute, the oldest first, in the odom frame (for a
-                      behaviour)
-    allowed:          what the collision monitor would make of a command at a pose in the odom frame (for a behaviour)
+                      behavior)
+    allowed:          what the collision monitor would make of a command at a pose in the odom frame (for a behavior)
     heard:            what stands between the localizer and all who ask it; here, nothing (for the reference stack)
     """
 

@@ -15,7 +15,7 @@ from simscen.stack.protocols import CostmapView
 def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> float:
     """Seconds until the first collision at this velocity; `horizon` when there is none before.
 
-    A robot that seems to be in collision already (its map or its belief is off by a few centimetres) may move as long
+    A robot that seems to be in collision already (its map or its belief is off by a few centimeters) may move as long
     as that brings what it is in no more than half a cell further in: otherwise it could never get out. Into nothing
     else, though: who touches a post with one side may not back into the next.
     """

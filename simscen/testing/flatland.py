@@ -54,7 +54,7 @@ def setting(robot: RobotModel, *, name: str = "test", seed: int = 1, grid: Occup
 
 @dataclass
 class Flatland:
-    """Boxes (min x, min y, max x, max y) and discs (x, y, radius) in metres; both may change while driving."""
+    """Boxes (min x, min y, max x, max y) and discs (x, y, radius) in meters; both may change while driving."""
 
     boxes: list[tuple[float, float, float, float]] = field(default_factory=list)
     discs: list[tuple[float, float, float]] = field(default_factory=list)
@@ -70,7 +70,7 @@ class Flatland:
         return self
 
     def grid(self, bounds: tuple[float, float, float, float], resolution: float = 0.05) -> OccupancyGrid:
-        """The occupancy map: a cell is occupied when its centre is inside something."""
+        """The occupancy map: a cell is occupied when its center is inside something."""
         columns, rows = (round((bounds[i + 2] - bounds[i]) / resolution) for i in (0, 1))
         y, x = (np.indices((rows, columns)) + 0.5) * resolution
         distance = self.distance(np.column_stack(((x + bounds[0]).ravel(), (y + bounds[1]).ravel())))

@@ -68,7 +68,7 @@ class PuppetStage:
         return 1.0
 
     def door(self, name: str) -> tuple[Pose2, Pose2]:
-        """A door that slides by a metre."""
+        """A door that slides by a meter."""
         return Pose2(0.0, 0.0, 0.0), Pose2(1.0, 0.0, 0.0)
 
     def spawn(self, body: Body) -> None:

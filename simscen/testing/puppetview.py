@@ -12,7 +12,7 @@ from simscen.model.robot import Differential
 SPEED, TURN = 0.3, 0.2
 """m/s and rad/s."""
 HALF = 4.0
-"""Metres from the middle of the room to its walls."""
+"""Meters from the middle of the room to its walls."""
 DRIVE = Differential(type="differential", wheel_separation=0.3, wheel_radius=0.05)
 
 
@@ -44,7 +44,7 @@ class PuppetView:
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """Grey, two metres away."""
+        """Gray, two meters away."""
         return np.full((height, width, 3), 128, np.uint8), np.full((height, width), min(2.0, far), np.float32)
 
 

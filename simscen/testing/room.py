@@ -161,5 +161,5 @@ def errors(beliefs: list[Belief], truth: Array) -> Array:
 
 
 def nees(belief: Belief, error: Array) -> float:
-    """Normalised estimation error squared of one belief (Bar-Shalom et al. 2001, section 5.4)."""
+    """Normalized estimation error squared of one belief (Bar-Shalom et al. 2001, section 5.4)."""
     return float(error @ np.linalg.solve(belief.covariance, error))

@@ -20,7 +20,7 @@ def sketch(words: Mapping[str, Any]) -> Trace:
     """A trace at the usual rates (240 Hz ticks, truth 40 Hz, scans and belief 10 Hz).
 
     seconds: how long it is · truth: waypoints [t, x, y, yaw], driven straight at constant speed between them ·
-    belief: waypoints too, or {offset: [dx, dy, dyaw]} from the truth, or null for none · clearance: [t, metres] or one
+    belief: waypoints too, or {offset: [dx, dy, dyaw]} from the truth, or null for none · clearance: [t, meters] or one
     number · scans: [from, to] stretches in which they arrive · events: [t, kind, name, {data}] · plans: [t, [[x, y],
     …]] · objects: {name: waypoints} · ended: why the run ended; null for a log that was cut off.
     """
@@ -108,7 +108,7 @@ def _lifted(points: Sequence[Sequence[float]]) -> Array:
 
 def sketch_case(words: Mapping[str, Any]) -> Case:
     """A case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · sent ·
-    expected {goal: failed or a code} · shortest {goal: metres} · passages [[goal, [x, y], [x, y], name, name]] ·
+    expected {goal: failed or a code} · shortest {goal: meters} · passages [[goal, [x, y], [x, y], name, name]] ·
     disturbances [{name, kind, …}] ·
     masks {file: {resolution, origin: [x, y, yaw], blocks: [[column, row, width, height, value]]}} · …"""
     goals, sent = (

@@ -40,7 +40,7 @@ from simscen.testing.promise import Contract, Promise
 from simscen.triggers.base import Condition
 
 ROBOTS = {"round robot": round_robot(), "long robot": box_robot(speed=0.8)}
-"""What planners, controllers and behaviours are tried with where nobody says: 0.44 m wide, and 0.42 m by 0.31 m."""
+"""What planners, controllers and behaviors are tried with where nobody says: 0.44 m wide, and 0.42 m by 0.31 m."""
 
 _WITH_ROBOTS: dict[type, Callable[..., Contract]] = {
     PlannerSpec: PlannerContract,

@@ -54,7 +54,7 @@ class Replan(Spec, Condition):
 
 
 class RecoveryStatus(Spec, Condition):
-    """True once a recovery behaviour has started or ended so often.
+    """True once a recovery behavior has started or ended so often.
 
     Example: `when: {recovery: {status: started}}`
     """

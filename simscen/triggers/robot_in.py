@@ -8,7 +8,7 @@ from simscen.triggers.base import Condition
 
 
 class RobotIn(Spec, Condition):
-    """True while the robot's centre is inside a named region of the world.
+    """True while the robot's center is inside a named region of the world.
 
     Example: `when: {robot_in: {region: hall}}`
     """
@@ -17,5 +17,5 @@ class RobotIn(Spec, Condition):
     """A region of the world, by name."""
 
     def holds(self, now: Situation) -> bool:
-        """The robot's true centre is inside or on the edge."""
+        """The robot's true center is inside or on the edge."""
         return distance_to_polygon(now.robot, now.region(self.region)) <= 0

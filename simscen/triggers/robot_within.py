@@ -13,7 +13,7 @@ from simscen.triggers.base import Condition
 
 
 class RobotWithin(Spec, Condition):
-    """True while the robot's centre is at most `distance` from a point, an object or a region.
+    """True while the robot's center is at most `distance` from a point, an object or a region.
 
     Example: `when: {robot_within: {of: [2, 2], distance: 1.5 m}}`
     """
@@ -25,7 +25,7 @@ class RobotWithin(Spec, Condition):
     region: RegionName | None = None
     """A region of the world, by name."""
     distance: NonNegativeLength
-    """From the robot's centre."""
+    """From the robot's center."""
 
     @model_validator(mode="after")
     def _one_target(self) -> "RobotWithin":
@@ -34,7 +34,7 @@ class RobotWithin(Spec, Condition):
         return self
 
     def holds(self, now: Situation) -> bool:
-        """The robot's true centre is near."""
+        """The robot's true center is near."""
         if self.region is not None:
             return distance_to_polygon(now.robot, now.region(self.region)) <= self.distance
         target = Pose2(self.of[0], self.of[1]) if self.of else now.object(self.object or "")

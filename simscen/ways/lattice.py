@@ -9,7 +9,7 @@ import numpy.typing as npt
 Cells = npt.NDArray[np.bool_]
 Numbers = npt.NDArray[np.int64]
 KING = tuple((a, b) for a in range(-1, 2) for b in range(-1, 2) if (a, b) != (0, 0))
-"""(rows, columns) to the eight neighbours: at most 8.2 % longer than the straight line."""
+"""(rows, columns) to the eight neighbors: at most 8.2 % longer than the straight line."""
 MOVES = tuple((a, b) for a in range(-2, 3) for b in range(-2, 3) if math.gcd(a, b) == 1)
 """These and a knight's move away: at most 2.8 % longer."""
 

@@ -7,7 +7,7 @@ from simscen.worlds.maps.occupancy_map import map_of
 
 
 def build(world: World, lidar_height: float, resolution: float = RESOLUTION) -> BuiltWorld:
-    """Fuse the static solids and draw the map a robot with a lidar at `lidar_height` metres would have.
+    """Fuse the static solids and draw the map a robot with a lidar at `lidar_height` meters would have.
 
     Numpy arrays only, so that the result can be made before forking and shared by every run. Takes some 10 ms for
     a house of 20 x 20 m, 0.1 s for thousands of solids. Raises InvalidInput for a map beyond 16 million cells.

@@ -15,7 +15,7 @@ Extent = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True)
 class Item:
-    """One solid or body: `extent` is (min x, y, z, max x, y, z) in metres in the world's frame."""
+    """One solid or body: `extent` is (min x, y, z, max x, y, z) in meters in the world's frame."""
 
     name: str
     shape: str

@@ -54,7 +54,7 @@ def browser() -> Iterator[Any]:
 
 
 def save(picture: "Image.Image | bytes", file: Path) -> None:
-    """In 256 colours, which nobody sees and a third of the bytes hold."""
+    """In 256 colors, which nobody sees and a third of the bytes hold."""
     image = Image.open(BytesIO(picture)) if isinstance(picture, bytes) else picture
     image.quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
 

@@ -54,7 +54,7 @@ def time(opened: Opened) -> float:
 
 
 FOCUSED = "document.activeElement.getAttribute('aria-label') ?? document.activeElement.textContent.slice(0, 20)"
-COLOURS = """([x, y, reach]) => {
+COLORS = """([x, y, reach]) => {
     const map = simscen.page.maps[0], [w, h] = map.size, dense = devicePixelRatio;
     const [u, v] = map.camera.pixel(x, y, w, h).map((one) => one * dense), r = reach * map.camera.scale * dense;
     const data = map.canvas.getContext("2d").getImageData(u - r, v - r, 2 * r, 2 * r).data, seen = new Set();
@@ -63,9 +63,9 @@ COLOURS = """([x, y, reach]) => {
 }"""
 
 
-def colours(opened: Opened, x: float, y: float, reach: float = 0.35) -> int:
-    """How many colours there are on the map around a point."""
-    return int(opened.page.evaluate(COLOURS, [x, y, reach]))
+def colors(opened: Opened, x: float, y: float, reach: float = 0.35) -> int:
+    """How many colors there are on the map around a point."""
+    return int(opened.page.evaluate(COLORS, [x, y, reach]))
 
 
 def test_a_failed_run_opens_at_its_failing_moment_with_the_line_lit_that_asks_for_it(
@@ -102,7 +102,7 @@ def test_what_lies_on_the_map_moves_with_the_time(open_page: Opener, one: Path, 
         x, y = trace.place(round(seconds * trace.tick_rate))
         shown = opened.page.evaluate("(t) => simscen.runs[0].robots[0].truthAt(t * simscen.runs[0].rate)", seconds)
         assert (shown["x"], shown["y"]) == pytest.approx((x, y), abs=0.0011)
-    assert colours(opened, x, y) > 12
+    assert colors(opened, x, y) > 12
     names = opened.page.evaluate("simscen.runs[0].thingsAt(240 * 10).map((thing) => thing.name).sort()")
     assert names == ["anna", "pallet"]
     assert opened.page.evaluate("simscen.runs[0].thingsAt(10).map((thing) => thing.name)") == []

@@ -53,13 +53,13 @@ def test_pictures_and_bumps_are_in_the_log_and_mean_what_was_there(tmp_path: Pat
 
     times = np.array([time for time, _ in read["/front/image_raw"]]) / 1e9
     assert np.allclose(np.diff(times), 0.2, atol=1e-6)
-    colour, depth = read["/front/image_raw"][0][1], read["/front/depth/image_raw"][0][1]
-    assert (colour.encoding, colour.width, colour.height, len(colour.data)) == ("rgb8", 64, 48, 64 * 48 * 3)
+    color, depth = read["/front/image_raw"][0][1], read["/front/depth/image_raw"][0][1]
+    assert (color.encoding, color.width, color.height, len(color.data)) == ("rgb8", 64, 48, 64 * 48 * 3)
     assert (depth.encoding, depth.header.frame_id) == ("32FC1", "front")
-    metres = np.frombuffer(depth.data.tobytes(), dtype=np.float32).reshape(48, 64)
+    meters = np.frombuffer(depth.data.tobytes(), dtype=np.float32).reshape(48, 64)
     focal = 32 / math.tan(math.radians(30))
-    assert np.allclose(metres[22:26, 20:44], 5.95 - 1.1, atol=0.05), "the wall, before the lens at x = 1.1 m"
-    assert np.allclose(metres[-1], 0.2 * focal / 23.5, rtol=0.03), "the floor, 20 cm below the lens"
+    assert np.allclose(meters[22:26, 20:44], 5.95 - 1.1, atol=0.05), "the wall, before the lens at x = 1.1 m"
+    assert np.allclose(meters[-1], 0.2 * focal / 23.5, rtol=0.03), "the floor, 20 cm below the lens"
 
     pressed = [message.data for _, message in read["/bumper"]]
     assert any(pressed), "it drove into a box that its lidar cannot see"

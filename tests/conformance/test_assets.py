@@ -305,7 +305,7 @@ def test_a_map_whose_description_makes_no_sense(with_map, lines: str, place: str
     assert told in head
 
 
-def test_a_map_whose_pixels_are_kilometres(with_world, folder: Path) -> None:
+def test_a_map_whose_pixels_are_kilometers(with_world, folder: Path) -> None:
     (folder / "map.pgm").write_bytes(b"P5 40 40 255\n" + b"\xff" * 1600)
     told = with_world(MAP.replace("0.05", "1000"), "map.yaml")
     assert told.startswith("map.pgm: error[SC320] map too large: 40 x 40 pixels of 1000 m reach 40000 m")

@@ -1,4 +1,4 @@
-"""A run is a function of scenario and seed: neither neighbours, load, order, folder nor environment show in it."""
+"""A run is a function of scenario and seed: neither neighbors, load, order, folder nor environment show in it."""
 
 import hashlib
 import json
@@ -63,7 +63,7 @@ def reference(once: Path) -> dict[str, tuple[bytes, str]]:
     return found
 
 
-def test_86_87_order_folder_hash_seed_neighbours_and_load_change_nothing(reference, once, pair: Path) -> None:
+def test_86_87_order_folder_hash_seed_neighbors_and_load_change_nothing(reference, once, pair: Path) -> None:
     elsewhere = pair.parent / "elsewhere"
     elsewhere.mkdir()
     busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(2)]

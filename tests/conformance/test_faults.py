@@ -159,7 +159,7 @@ def test_71_the_log_of_a_run_that_broke_off_opens_everywhere(session: Session, f
     assert "its log until then is run.partial.mcap" in session.runs[fault]["error"]["message"]
 
 
-def test_66_the_neighbours_of_all_this_drove_as_if_alone(session: Session, simscen, folder: Path) -> None:
+def test_66_the_neighbors_of_all_this_drove_as_if_alone(session: Session, simscen, folder: Path) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "alone").code == 0
     (alone,) = (folder / "alone").rglob("run.mcap")
     for name in ("66-fine", "66-fine-too", "60-flood.at.0"):

@@ -1,4 +1,4 @@
-"""Every recovery behaviour and goal checker keeps the promises of its protocol."""
+"""Every recovery behavior and goal checker keeps the promises of its protocol."""
 
 import pytest
 

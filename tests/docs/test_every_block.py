@@ -36,7 +36,7 @@ OWN_TESTS = {
     "docs/guides/jenkins.md": "test_ci_guides.py",
     "docs/guides/pre-commit.md": "test_ci_guides.py: pre-commit reads them",
     "docs/guides/extends.md": "test_extends_guide.py does all of it",
-    "docs/reference/language.md": "made of docstrings, whose examples tests/unit/cli/test_catalogue.py validates",
+    "docs/reference/language.md": "made of docstrings, whose examples tests/unit/cli/test_catalog.py validates",
 }
 NOT_RUN = {
     "": "a drawing, or what a command prints",

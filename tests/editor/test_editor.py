@@ -236,13 +236,15 @@ def test_an_example_of_each_word_is_fine_and_the_word_is_explained_over_it(serve
             assert summary(topic.text) in page.shown(line, topic.name), topic.name
 
 
-def test_a_misspelt_word_a_wrong_type_and_a_strange_key_are_underlined_and_nothing_else(server: LanguageServer) -> None:
+def test_a_misspelled_word_a_wrong_type_and_a_strange_key_are_underlined_and_nothing_else(
+    server: LanguageServer,
+) -> None:
     for group, room in ROOMS.items():
         known = words(group)
         mappings = [topic for topic in known if isinstance(body_of(topic), dict)]
-        misspelt = [(f"{topic.name}_x", body_of(topic)) for topic in known]
+        misspelled = [(f"{topic.name}_x", body_of(topic)) for topic in known]
         strange = [(topic.name, {STRANGE: 1, **body_of(topic)}) for topic in mappings]
-        text, lines = written(room, [*misspelt, *((topic.name, True) for topic in known), *strange])
+        text, lines = written(room, [*misspelled, *((topic.name, True) for topic in known), *strange])
         page = Page(server, room.kind, text)
         told = iter([page.told(line) for line in lines])
         for topic in known:

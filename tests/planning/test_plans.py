@@ -73,7 +73,7 @@ def test_a_plan_takes_the_cheaper_one_of_two_ways_that_cost_nearly_the_same(kind
     assert rates.along(points[:, :2]) < 1.045 * cheapest(rates, start, goal)
 
 
-def test_the_way_through_a_maze_of_fifty_metres_is_found() -> None:
+def test_the_way_through_a_maze_of_fifty_meters_is_found() -> None:
     """There were too many samples for the iterations of one search: NO_VALID_PATH, where there was a way."""
     view = Costmap(CostmapSpec(), Surroundings(ROBOT, large_maze(2, 40, 27), RATE)).view
     path = OmplPlanner(Spec(), ROBOT).plan(view, Pose2(0.7, 0.7), Pose2(53.3, 53.3), 1)
@@ -86,8 +86,8 @@ def test_the_way_through_a_maze_of_fifty_metres_is_found() -> None:
 def test_in_a_maze_of_large_blocks_and_too_many_samples_the_first_search_finds_the_cheapest_way(
     number: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One of a hundred metres has them: places on the way over its blocks lay too far apart to be joined, and the
-    corridor was searched instead, for seconds. This one has fifteen metres, and may have few blocks and samples.
+    """One of a hundred meters has them: places on the way over its blocks lay too far apart to be joined, and the
+    corridor was searched instead, for seconds. This one has fifteen meters, and may have few blocks and samples.
     """
     monkeypatch.setattr(informed_set, "MOST_PRICED", 2500)
     monkeypatch.setattr(samplers, "MOST_SAMPLES", 300)

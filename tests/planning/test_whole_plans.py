@@ -1,4 +1,4 @@
-"""All of a plan against brute force, not its points alone: on no half millimetre does it lead through anything."""
+"""All of a plan against brute force, not its points alone: on no half millimeter does it lead through anything."""
 
 from dataclasses import replace
 from typing import get_args
@@ -38,7 +38,7 @@ def way(kind: str, number: int, robot: RobotModel = ROBOT, room: float = 0.0) ->
 
 
 def passed(rates: Rates, points: Array) -> np.ndarray:
-    """What a metre costs on each half millimetre of the way."""
+    """What a meter costs on each half millimeter of the way."""
     return rates.at(spaced(points[:, :2], 0.0005))
 
 

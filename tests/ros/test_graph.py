@@ -22,7 +22,7 @@ ASKED = {
 }
 """https://docs.nav2.org/setup_guides and /configuration; rclcpp/qos.hpp, tf2_ros/qos.hpp."""
 TREE = {("map", "odom"), ("odom", "base_link"), ("base_link", "lidar")}
-"""REP 105: localisation gives map→odom, odometry odom→base_link; https://docs.nav2.org/setup_guides/transformation."""
+"""REP 105: localization gives map→odom, odometry odom→base_link; https://docs.nav2.org/setup_guides/transformation."""
 READY = "6"
 """Seconds: a node takes two or three to be there."""
 STRENGTH = {"BEST_EFFORT": 0, "RELIABLE": 1, "VOLATILE": 0, "TRANSIENT_LOCAL": 1}

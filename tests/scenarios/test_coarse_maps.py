@@ -22,11 +22,11 @@ pass:
 @pytest.mark.parametrize("cell", [0.15, 0.3, 0.4])
 def test_a_robot_arrives_where_it_says_it_does(cell, tmp_path):
     columns, rows = round(8 / cell), round(6 / cell)
-    grey = np.full((rows, columns), 254, dtype=np.uint8)
-    grey[[0, -1]] = grey[:, [0, -1]] = 0
-    grey[: rows // 2, columns // 2] = 0  # a wall from the top to the middle
+    gray = np.full((rows, columns), 254, dtype=np.uint8)
+    gray[[0, -1]] = gray[:, [0, -1]] = 0
+    gray[: rows // 2, columns // 2] = 0  # a wall from the top to the middle
     header = f"P5\n{columns} {rows}\n255\n".encode()
-    (tmp_path / "office.pgm").write_bytes(header + grey.tobytes())
+    (tmp_path / "office.pgm").write_bytes(header + gray.tobytes())
     (tmp_path / "office.yaml").write_text(
         f"image: office.pgm\nresolution: {cell}\norigin: [0, 0, 0]\n"
         "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"

@@ -28,11 +28,11 @@ def seconds(prepared: PreparedScenario, seed: int) -> float:
 
 
 @pytest.mark.slow
-def test_narrow_fields_take_hardly_longer_with_odometry_that_drifts_a_metre(tmp_path: Path) -> None:
+def test_narrow_fields_take_hardly_longer_with_odometry_that_drifts_a_meter(tmp_path: Path) -> None:
     """In sum: one drive in seven swings once whatever drifts. With samples everywhere six take 1.7 times as long."""
-    _, twenty_centimetres, _ = narrow_fields(tmp_path, [9101, 9102, 9103])
+    _, twenty_centimeters, _ = narrow_fields(tmp_path, [9101, 9102, 9103])
     true = slipping = 0.0
-    for drive in twenty_centimetres.drives:
+    for drive in twenty_centimeters.drives:
         slips = drive.file.with_name(f"slipping_{drive.file.name}")
         slips.write_text(SLIPPING.format(field=drive.file.name))
         true += 2 * seconds(prepare(load_scenario(drive.file, tmp_path)), 1)

@@ -60,7 +60,7 @@ def by_hand(ticks, begins, phase, shift, spline):
 @pytest.mark.parametrize(
     ("name", "begins", "phase", "shift"), [("round", BEGINS, PHASE, (0, 0)), ("straight", 0.0, 0.0, (2, 1))]
 )
-def test_it_is_within_a_millimetre_of_its_keyframes_at_every_tick(run, read, name, begins, phase, shift):
+def test_it_is_within_a_millimeter_of_its_keyframes_at_every_tick(run, read, name, begins, phase, shift):
     done, log = run
     trace = done.trace if read == "trace" else read_log(log).trace
     samples = trace.objects[name]

@@ -11,10 +11,10 @@ CELLS, CELL = 800, 0.05
 
 def test_a_noisy_map_of_more_than_a_hundred_thousand_triangles_is_driven_on(tmp_path):
     noise = np.random.default_rng(3).random((CELLS, CELLS)) < 0.02
-    grey = np.where(noise, 0, 254).astype(np.uint8)
-    grey[:4] = grey[-4:] = grey[:, :4] = grey[:, -4:] = 0
-    grey[390:412, 40:760] = 254
-    (tmp_path / "arena.pgm").write_bytes(f"P5\n{CELLS} {CELLS}\n255\n".encode() + grey.tobytes())
+    gray = np.where(noise, 0, 254).astype(np.uint8)
+    gray[:4] = gray[-4:] = gray[:, :4] = gray[:, -4:] = 0
+    gray[390:412, 40:760] = 254
+    (tmp_path / "arena.pgm").write_bytes(f"P5\n{CELLS} {CELLS}\n255\n".encode() + gray.tobytes())
     (tmp_path / "arena.yaml").write_text(
         f"image: arena.pgm\nresolution: {CELL}\norigin: [0, 0, 0]\n"
         "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"

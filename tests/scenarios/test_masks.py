@@ -30,10 +30,10 @@ pass:
 CELL = 0.1
 
 
-def mask(folder, name, grey, *, mode="trinary", origin=(0.0, 0.0, 0.0), more=""):
-    """A mask whose `grey` (rows, columns) has the lowest row first, in cells of 10 cm."""
-    rows, columns = grey.shape
-    (folder / f"{name}.pgm").write_bytes(f"P5\n{columns} {rows}\n255\n".encode() + grey[::-1].tobytes())
+def mask(folder, name, gray, *, mode="trinary", origin=(0.0, 0.0, 0.0), more=""):
+    """A mask whose `gray` (rows, columns) has the lowest row first, in cells of 10 cm."""
+    rows, columns = gray.shape
+    (folder / f"{name}.pgm").write_bytes(f"P5\n{columns} {rows}\n255\n".encode() + gray[::-1].tobytes())
     (folder / f"{name}.yaml").write_text(
         f"image: {name}.pgm\nmode: {mode}\nresolution: {CELL}\norigin: {list(origin)}\n"
         f"negate: 0\noccupied_thresh: 1.0\nfree_thresh: 0.0\n{more}"
@@ -56,9 +56,9 @@ def test_a_keepout_mask_across_the_direct_way_is_driven_around(turned, tmp_path)
     if turned:  # the same strip as an image of its own, on its side and with its corner at (6, 0)
         mask(tmp_path, "strip", np.zeros((20, 40), dtype=np.uint8), origin=(6.0, 0.0, math.pi / 2))
     else:
-        grey = white()
-        grey[:40, 40:60] = 0
-        mask(tmp_path, "strip", grey)
+        gray = white()
+        gray[:40, 40:60] = 0
+        mask(tmp_path, "strip", gray)
     run = simscen.simulate(scenario(tmp_path, "  keepout_mask: strip.yaml\n", "  - keepout: {region: middle}\n"))
     assert run.passed, run.result.verdicts
     assert run.result.metrics["path_length"] > 7.8
@@ -79,9 +79,9 @@ SPEED_MASKS = {
 @pytest.mark.parametrize("kind", SPEED_MASKS)
 def test_a_speed_mask_caps_the_true_speed_inside_and_nowhere_else(kind, tmp_path):
     mode, value, how, limit = SPEED_MASKS[kind]
-    grey = white() if mode == "scale" else np.zeros_like(white())
-    grey[:, 40:60] = value
-    mask(tmp_path, "slow", grey, mode=mode)
+    gray = white() if mode == "scale" else np.zeros_like(white())
+    gray[:, 40:60] = value
+    mask(tmp_path, "slow", gray, mode=mode)
     run = simscen.simulate(scenario(tmp_path, f"  speed_mask: {{file: slow.yaml, {how}}}\n"))
     assert run.passed, run.result.verdicts
     assert 0.7 * limit < fastest(run, 4.5, 5.8) < 1.05 * limit
@@ -130,18 +130,18 @@ def test_a_mask_with_too_many_pixels_is_refused_at_its_line(tmp_path):
 
 
 def test_an_unknown_key_of_a_mask_is_noted_and_ignored(tmp_path):
-    grey = white()
-    grey[:5, :5] = 0
-    mask(tmp_path, "corner", grey, more="kind: keepout\n")
+    gray = white()
+    gray[:5, :5] = 0
+    mask(tmp_path, "corner", gray, more="kind: keepout\n")
     ((path, line, code, severity, text),) = told(scenario(tmp_path, "  keepout_mask: corner.yaml\n"))
     assert (path, line, code, severity) == ("corner.yaml", 8, "SC311", "warning")
     assert "`kind` means nothing" in text
 
 
 def test_a_goal_in_a_masked_cell_is_told_with_the_code_to_expect_and_the_stack_gives_that_code(tmp_path):
-    grey = white()
-    grey[:40, 60:] = 0
-    mask(tmp_path, "right", grey)
+    gray = white()
+    gray[:40, 60:] = 0
+    mask(tmp_path, "right", gray)
     stack = "  keepout_mask: right.yaml\n"
     ((_, line, code, severity, text),) = told(scenario(tmp_path, stack))
     assert (line, code, severity) == (LINE, "SC302", "error")
@@ -154,9 +154,9 @@ def test_a_goal_in_a_masked_cell_is_told_with_the_code_to_expect_and_the_stack_g
 
 
 def test_a_start_in_a_masked_cell_is_warned_of_and_the_stack_gives_that_code(tmp_path):
-    grey = white()
-    grey[:, :30] = 0
-    mask(tmp_path, "left", grey)
+    gray = white()
+    gray[:, :30] = 0
+    mask(tmp_path, "left", gray)
     ((_, line, code, severity, text),) = told(scenario(tmp_path, "  keepout_mask: left.yaml\n"))
     assert (line, code, severity) == (LINE, "SC302", "warning")
     assert "error_code: START_OCCUPIED" in text
@@ -178,9 +178,9 @@ def test_masks_that_say_nothing_are_warned_of(tmp_path):
 
 @pytest.mark.slow
 def test_without_a_map_a_keepout_mask_holds_all_the_same(tmp_path):
-    grey = white()
-    grey[:40, 40:60] = 0
-    mask(tmp_path, "strip", grey)
+    gray = white()
+    gray[:40, 40:60] = 0
+    mask(tmp_path, "strip", gray)
     more = "  - keepout: {region: middle}\nmap: none\n"
     run = simscen.simulate(scenario(tmp_path, "  keepout_mask: strip.yaml\n  localizer: {type: ground_truth}\n", more))
     assert run.passed, run.result.verdicts
@@ -197,16 +197,16 @@ def strip(folder, *, turned=False):
     if turned:
         mask(folder, "strip", np.zeros((20, 40), dtype=np.uint8), origin=(6.0, 0.0, math.pi / 2))
     else:
-        grey = white()
-        grey[:40, 40:60] = 0
-        mask(folder, "strip", grey)
+        gray = white()
+        gray[:40, 40:60] = 0
+        mask(folder, "strip", gray)
 
 
 def slow(folder):
     """30 cm/s between x 4 and 6."""
-    grey = np.zeros_like(white())
-    grey[:, 40:60] = 30
-    mask(folder, "slow", grey, mode="raw")
+    gray = np.zeros_like(white())
+    gray[:, 40:60] = 30
+    mask(folder, "slow", gray, mode="raw")
 
 
 def findings(run, kind):
@@ -310,9 +310,9 @@ def test_criteria_that_no_mask_can_make_fail_are_warned_of(tmp_path):
     ("columns", "words"), [(slice(0, 14), "the robot starts in"), (slice(70, 100), "if goal `goal-1` is reached")]
 )
 def test_a_mask_that_forbids_start_or_goal_can_never_be_kept_out_of(columns, words, tmp_path):
-    grey = white()
-    grey[:, columns] = 0
-    mask(tmp_path, "strip", grey)
+    gray = white()
+    gray[:, columns] = 0
+    mask(tmp_path, "strip", gray)
     ((_, line, code, severity, text),) = told(scenario(tmp_path, KNOWING, STRIP))
     assert (line, code, severity) == (CRITERION, "SC051", "error")
     assert words in text
@@ -330,8 +330,8 @@ def test_a_mask_lies_beside_the_file_that_names_it(tmp_path):
 
 
 def test_a_mask_of_noise_is_too_much_for_a_log(tmp_path):
-    grey = np.random.default_rng(1).integers(0, 2, (800, 800)).astype(np.uint8) * 255
-    mask(tmp_path, "strip", grey)
+    gray = np.random.default_rng(1).integers(0, 2, (800, 800)).astype(np.uint8) * 255
+    mask(tmp_path, "strip", gray)
     ((_, line, code, _, text),) = told(scenario(tmp_path, KNOWING, STRIP))
     assert (line, code) == (CRITERION, "SC320")
     assert "rectangles" in text

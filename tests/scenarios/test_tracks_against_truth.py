@@ -49,11 +49,11 @@ class Compared:
         moving = self.prediction.seen_from(moment.tick, Pose2(0.0, 0.0))
         here = moment.truth.pose.plane
         c, s = math.cos(here.yaw), math.sin(here.yaw)
-        centres, velocities = here.apply(moving.centres), moving.velocities @ np.array([[c, s], [-s, c]])
+        centers, velocities = here.apply(moving.centers), moving.velocities @ np.array([[c, s], [-s, c]])
         self.scans += 1
         self.turning += abs(moment.truth.twist.wz) > 0.3
-        for centre, velocity in zip(centres, velocities, strict=True):
-            off, name = min((math.hypot(centre[0] - pose.x, centre[1] - pose.y), name) for name, pose in people.items())
+        for center, velocity in zip(centers, velocities, strict=True):
+            off, name = min((math.hypot(center[0] - pose.x, center[1] - pose.y), name) for name, pose in people.items())
             if off > 0.5:
                 self.false += 1
             elif name in self.before:
@@ -68,7 +68,7 @@ class Compared:
         pass
 
 
-def test_people_are_known_to_centimetres_and_furniture_does_not_walk(tmp_path: Path) -> None:
+def test_people_are_known_to_centimeters_and_furniture_does_not_walk(tmp_path: Path) -> None:
     file = tmp_path / "walkers.scenario.yaml"
     file.write_text(HOUSE)
     heard: list[Compared] = []

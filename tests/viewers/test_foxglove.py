@@ -127,7 +127,7 @@ def one_tree(links: list[dict[str, Any]]) -> None:
 
 
 def drawn_where_it_was(links: list[dict[str, Any]], log: Log, frame: str, samples: Any) -> None:
-    """What is locked to a frame is where the trace says, within a millimetre."""
+    """What is locked to a frame is where the trace says, within a millimeter."""
     told = {link["time"]: link["pose"] for link in links if link["child"] == frame and link["frame"] == "map"}
     assert len(samples)
     for tick, (x, y, yaw) in zip(samples.ticks.tolist(), samples.values.tolist(), strict=True):

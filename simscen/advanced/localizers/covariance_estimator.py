@@ -1,4 +1,4 @@
-"""How far off a pose may be: by how the poses of the last metres scatter, and by how badly scans fit the map."""
+"""How far off a pose may be: by how the poses of the last meters scatter, and by how badly scans fit the map."""
 
 import math
 from collections import deque
@@ -7,7 +7,7 @@ import numpy as np
 
 from simscen.advanced.localizers.map_residuals import ScanResiduals
 from simscen.advanced.localizers.scan_matcher import FLOOR
-from simscen.advanced.localizers.scan_memory import METRES_A_RAD
+from simscen.advanced.localizers.scan_memory import METERS_A_RAD
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.stack.localizers.planar_motion import swing, turn
 
@@ -17,7 +17,7 @@ LASTS = np.array((2.0, 2.0, 1.1))
 """m driven, turns included, in which errors ahead, aside and of the heading become others: those of poses 4 m apart
 are correlated by 0.4, 0.4 and 0.1, whether everything is as mapped or furniture was moved."""
 DRIFT = np.square((0.002, 0.002, 0.0016))
-"""m, m, rad: squares of what matched scans drift by in one metre where they see enough."""
+"""m, m, rad: squares of what matched scans drift by in one meter where they see enough."""
 FORGOTTEN = 0.99
 """How much of what was learned before counts still, after each correction."""
 PRIOR, BEFORE = np.array((1.7, 1.7, 1.0)), 20.0
@@ -28,7 +28,7 @@ EXPECTED = 0.05
 FREEDOM = 6.0
 """Degrees of freedom of a covariance that is told from so few opinions which hang together."""
 WHEELS = 0.05, 0.05
-"""Standard deviations of odometry before it was compared with steps that were seen: m and rad for each metre."""
+"""Standard deviations of odometry before it was compared with steps that were seen: m and rad for each meter."""
 COMPARED = 0.2
 """m²: squares of steps that these count for: three."""
 LEAST = np.diag(np.square((1e-3, 1e-3, 1e-3)))
@@ -162,5 +162,5 @@ class CovarianceEstimator:
 
 
 def _way(step: Pose2) -> float:
-    """Metres, turns included."""
-    return math.hypot(step.x, step.y) + METRES_A_RAD * abs(step.yaw)
+    """Meters, turns included."""
+    return math.hypot(step.x, step.y) + METERS_A_RAD * abs(step.yaw)

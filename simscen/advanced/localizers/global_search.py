@@ -86,8 +86,8 @@ class GlobalSearch:
         fine = near.thinned(POINTS)
         some = near.thinned(COARSE_POINTS)
         poses, _ = distinct(poses, self.fit(poses, some), REFINED)
-        for metres, turn in ((0.1, 1.0), (0.05, 0.5)):
-            poses = self._climbed(poses, some, metres, np.radians(turn))
+        for meters, turn in ((0.1, 1.0), (0.05, 0.5)):
+            poses = self._climbed(poses, some, meters, np.radians(turn))
         return distinct(poses, self.fit(poses, fine), ANSWERS)
 
     def near(self, view: View, pose: Array) -> tuple[Array, Array]:
@@ -97,8 +97,8 @@ class GlobalSearch:
         aside, turn = (np.arange(-steps, steps + 1) * step for steps, step in NEARBY)
         poses = pose + np.stack(np.meshgrid(aside, aside, turn, indexing="ij"), axis=-1).reshape(-1, 3)
         poses, _ = distinct(poses, self.fit(poses, some), REFINED_NEARBY)
-        for metres, degrees in ((0.1, 1.0), (0.05, 0.5), (0.05, 0.5)):
-            poses = self._climbed(poses, some, metres, np.radians(degrees))
+        for meters, degrees in ((0.1, 1.0), (0.05, 0.5), (0.05, 0.5)):
+            poses = self._climbed(poses, some, meters, np.radians(degrees))
         return distinct(poses, self.fit(poses, fine), ANSWERS)
 
     def fit(self, poses: Array, view: View) -> Array:
@@ -176,18 +176,18 @@ class GlobalSearch:
         yaw: Array = turns[heading] + self._grid.origin.yaw
         return np.column_stack((self._grid.origin.apply(places), wrap_array(yaw)))
 
-    def _climbed(self, poses: Array, view: View, metres: float, turn: float) -> Array:
+    def _climbed(self, poses: Array, view: View, meters: float, turn: float) -> Array:
         """Each pose, or the better one of those around it."""
         steps = np.array([(x, y, a) for x in (0, -1, 1) for y in (0, -1, 1) for a in (0, -1, 1)])
-        around = (poses[:, None] + steps * (metres, metres, turn)).reshape(-1, 3)
+        around = (poses[:, None] + steps * (meters, meters, turn)).reshape(-1, 3)
         best = self.fit(around, view).reshape(len(poses), -1).argmax(axis=1)
         climbed: Array = around.reshape(len(poses), -1, 3)[np.arange(len(poses)), best]
         climbed[:, 2] = wrap_array(climbed[:, 2])
         return climbed
 
 
-def _nearness(metres: Float32) -> Levels:
-    fitting = np.exp(np.square(np.minimum(metres, np.float32(FAR))) / (-2 * WIDTH**2))
+def _nearness(meters: Float32) -> Levels:
+    fitting = np.exp(np.square(np.minimum(meters, np.float32(FAR))) / (-2 * WIDTH**2))
     levels: Levels = np.round(255 * fitting).astype(np.uint8)
     return levels
 

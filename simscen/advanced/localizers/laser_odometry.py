@@ -1,6 +1,6 @@
 """What scans say of a way that was reckoned from wheels and gyroscope: laser odometry beside them.
 
-Wheels that slip count metres that nobody drove, and no gyroscope shows it. What the lidar sees stands still.
+Wheels that slip count meters that nobody drove, and no gyroscope shows it. What the lidar sees stands still.
 """
 
 import math
@@ -25,7 +25,7 @@ class LaserOdometry:
         self._reckoned.add(tick, Pose2(pose.x - self._x, pose.y - self._y, pose.yaw))
 
     def correction(self, scan: Scan) -> tuple[float, float]:
-        """By how many metres along x and y the robot is elsewhere than was reckoned since the last scan.
+        """By how many meters along x and y the robot is elsewhere than was reckoned since the last scan.
 
         Nothing where the scans do not tell, or say something quite different: then it is they that are wrong, for what
         they show moves.

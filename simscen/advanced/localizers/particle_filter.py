@@ -7,12 +7,12 @@ import numpy as np
 from simscen.advanced.localizers.map_trust import MapTrust
 from simscen.advanced.localizers.relocalization import around
 from simscen.advanced.localizers.scan_matcher import Step, moved
-from simscen.advanced.localizers.scan_memory import METRES_A_RAD
+from simscen.advanced.localizers.scan_memory import METERS_A_RAD
 from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.localization import Estimate
 from simscen.stack.localizers.beams import Beams
-from simscen.stack.localizers.clusters import in_touch, summarise
+from simscen.stack.localizers.clusters import in_touch, summarize
 from simscen.stack.localizers.likelihood_field import SensorModel
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
@@ -79,7 +79,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
         One scan of a room fits many poses; several rooms together do not. Until then the initial pose counts more.
         """
         if self._scan_weight < 1.0:
-            distance = math.hypot(delta.x, delta.y) + METRES_A_RAD * abs(delta.yaw)
+            distance = math.hypot(delta.x, delta.y) + METERS_A_RAD * abs(delta.yaw)
             self._scan_weight = min(1.0, self._scan_weight + distance / self._spec.settling_distance)
 
     def redistribute(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:
@@ -88,7 +88,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
         self.particles = Particles.equal(drawn)
         self._random = self._descendants = None
         self._scan_weight = 1.0
-        return summarise(self.particles, self._sensor.peak)
+        return summarize(self.particles, self._sensor.peak)
 
     def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
         """Return the exponent of the scan's likelihood by map trust and settling, and the beams the map covers."""

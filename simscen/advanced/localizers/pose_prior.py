@@ -13,7 +13,7 @@ from simscen.stack.localizers.planar_motion import Noise, swing, turn, turned
 AROUND = (0.1, 0.1, 0.05)
 """m, m, rad: standard deviations of a robot about a place where it is sure to be."""
 DRIFT = (0.03, 0.01)
-"""m and rad: what it may drift by for each metre, turns included, where no scan says how it went."""
+"""m and rad: what it may drift by for each meter, turns included, where no scan says how it went."""
 LED = 0.1, 0.5
 """m, and of the way by wheels: where scans say so much less or more of a step, what they show goes along, as people do;
 wheels that slip are 40 % off at most, but for those that spin on the spot, where nothing new is to be seen."""
@@ -47,10 +47,10 @@ class ObservedMotion:
         wheels = self.step.delta.compose(self.torn.inverse())
         return apart > LED[1] * math.hypot(wheels.x, wheels.y)
 
-    def together(self, metres: float) -> tuple[float, float]:
+    def together(self, meters: float) -> tuple[float, float]:
         """m and rad by which this way and others like it may err in one direction."""
         if self.step is None:
-            return DRIFT[0] * metres, DRIFT[1] * metres
+            return DRIFT[0] * meters, DRIFT[1] * meters
         (xx, _, _), (_, yy, _), _ = self.step.covariance.tolist()
         untold = max(0.0, math.sqrt(max(xx, yy)) - TOLD)
         return untold + math.hypot(self.torn.x, self.torn.y), abs(self.torn.yaw)
@@ -75,12 +75,12 @@ class PosePrior:
         """Sure by what was seen, or by what was told if that says how much."""
         return cls(Pose2(*pose.tolist()), base, np.array(std), np.zeros((3, 3)))
 
-    def after(self, before: Pose2, base: Pose2, metres: float, way: ObservedMotion) -> "PosePrior":
+    def after(self, before: Pose2, base: Pose2, meters: float, way: ObservedMotion) -> "PosePrior":
         """The same, when the base went on from `before`."""
-        metre, rad = way.together(metres)
+        meter, rad = way.together(meters)
         noise = CERTAIN if way.step is None else turned(way.step.covariance, before.yaw)
         covariance = swing(self.covariance, base.x - before.x, base.y - before.y, noise)
-        return replace(self, covariance=covariance, together=(self.together[0] + metre, self.together[1] + rad))
+        return replace(self, covariance=covariance, together=(self.together[0] + meter, self.together[1] + rad))
 
     def expected(self, base: Pose2) -> Array:
         """The pose (3,) where the robot is if it has not drifted."""
@@ -89,8 +89,8 @@ class PosePrior:
     def unlikely(self, poses: Array, base: Pose2) -> Array:
         """The logarithm of how many times unlikelier than the expected pose each of `poses` (n, 3) is: (n,)."""
         frame = turn(self.pose.yaw - self.base.yaw)
-        metre, rad = self.together
-        std = np.square(self.std + np.array((metre, metre, rad)))
+        meter, rad = self.together
+        std = np.square(self.std + np.array((meter, meter, rad)))
         off = errors_about(self.expected(base), poses)
         information = np.linalg.inv(frame @ self.covariance @ frame.T + np.diag(std))
         far: Array = 0.5 * np.einsum("ni,ij,nj->n", off, information, off)

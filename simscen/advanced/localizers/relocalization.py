@@ -24,16 +24,16 @@ BETWEEN, MOST_BETWEEN = 0.7, 8.0
 """m between two searches, turns included; doubled up to the most while the robot has a place and nothing better is
 found."""
 ENOUGH, PLAIN, BETTER, GOOD = 2.0, 0.05, 0.1, 0.75
-"""A robot that was told nothing is where scans of ENOUGH metres fit by PLAIN better than anywhere else; one that had a
+"""A robot that was told nothing is where scans of ENOUGH meters fit by PLAIN better than anywhere else; one that had a
 place is elsewhere when they fit there so, and GOOD, and by BETTER better than where it was, in two searches that agree.
 """
 CHECKED, FITS = 1.5, 0.85
-"""m, turns included, after each of which a robot that has a place is compared with its neighbourhood, if what it saw
+"""m, turns included, after each of which a robot that has a place is compared with its neighborhood, if what it saw
 fits less than that."""
 NEAR_GOOD, NEAR_BETTER = 0.82, 0.04
 """It is moved to a place nearby that fits so and BETTER than where it is, or more than FITS and so much better, and by
 PLAIN better than any other. Each fit counts less by SHARPNESS for each e times that it is unlikely to have drifted
-there since it was last sure of its place: rebuilt corridors fit a metre further on by chance, better than here."""
+there since it was last sure of its place: rebuilt corridors fit a meter further on by chance, better than here."""
 UNREACHED = 0.1
 """At most: where it was sure it may have been wrong."""
 LIKELIER = 3.0
@@ -56,7 +56,7 @@ UNSEEN = ObservedMotion()
 class Relocalizer:
     """Watches how well scans fit where the robot is believed to be, and searches the whole map when they do not.
 
-    The search takes the scans of the last metres together, so that one room of many that look alike is told from the
+    The search takes the scans of the last meters together, so that one room of many that look alike is told from the
     others. Until it is plain where a robot is that was told nothing, its particles lie at all places that fit; a robot
     that was told a place is moved only by what is plainly better.
     """

@@ -1,7 +1,7 @@
 """How far a robot went between two scans, from what it saw: odometry is the guess, and what the scans leave open.
 
 Iterated closest points with a point-to-line metric (Censi, An ICP variant using a point-to-line metric, ICRA 2008),
-against the scans of the last metres; the guess counts as a measurement too, so that along a corridor, which looks the
+against the scans of the last meters; the guess counts as a measurement too, so that along a corridor, which looks the
 same everywhere, odometry has its way (Gauss and Newton with a prior).
 """
 
@@ -23,11 +23,11 @@ FRAMES = 4
 REFERENCE, MATCHED = 120, 90
 """Beams kept of each of those, and of the new one."""
 GATES, ITERATIONS = (0.5, 0.35, 0.25, 0.15, 0.1), 6
-"""m: what is further from its nearest neighbour counts for nothing, in one iteration after the other; and the most."""
+"""m: what is further from its nearest neighbor counts for nothing, in one iteration after the other; and the most."""
 SETTLED, STILL = (0.02, 0.01), (0.002, 0.001)
 """m, rad: after an iteration that moved the scan less the last gate comes next; after one that moved it less, none."""
 LOOSE, LOOSER = 0.1, 1.5
-"""m, and of the root mean square of all gaps, whichever is more: what is so far from its neighbour counts a quarter,
+"""m, and of the root mean square of all gaps, whichever is more: what is so far from its neighbor counts a quarter,
 what is further soon nothing (Geman & McClure). Where most points fit, who walks along and what comes into sight beside
 a thing are no reason to doubt them; where none does, the robot went elsewhere than its wheels say."""
 SIGMA = 0.03
@@ -37,15 +37,15 @@ ALIKE = 0.7
 LEAST = 12
 """Points that must be matched for an answer."""
 DOUBT = (0.15, 0.02, 0.15, 0.03)
-"""Standard deviations of the guess: of each metre driven, and m; of each rad turned, and rad."""
+"""Standard deviations of the guess: of each meter driven, and m; of each rad turned, and rad."""
 COARSEST = 0.04
 """rad between two beams: of a lidar whose beams are further apart nobody can tell which points are of one surface."""
 AGREES = (0.03, 0.1, 0.03, 0.1)
-"""m, and of each metre; rad, and of each rad: within this the match and odometry say the same."""
+"""m, and of each meter; rad, and of each rad: within this the match and odometry say the same."""
 AGAIN = 0.3
 """Share of what a scan shows that the ones before it must have shown: less, and the robot was carried elsewhere."""
 INFLATED, FLOOR = 0.5, (0.004**2, 0.003**2, 0.0015**2)
-"""Of the covariance that the match itself gives, and what is added (m, m, rad): neighbouring frames share the errors of
+"""Of the covariance that the match itself gives, and what is added (m, m, rad): neighboring frames share the errors of
 their surfaces."""
 
 
@@ -77,7 +77,7 @@ class _Reference:
     def pull(self, own: Surface, pose: Pose2, gate: float) -> Equations | None:
         """How a scan that is placed at `pose` is drawn: its normal equations.
 
-        None when too few points have a neighbour within `gate` m that faces as they do.
+        None when too few points have a neighbor within `gate` m that faces as they do.
         """
         turn = cmath.rect(1.0, pose.yaw)
         about = own.points * turn

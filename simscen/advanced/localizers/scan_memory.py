@@ -1,4 +1,4 @@
-"""What was seen on the last few metres, put together by odometry: far more telling than one scan."""
+"""What was seen on the last few meters, put together by odometry: far more telling than one scan."""
 
 import cmath
 from collections import deque
@@ -17,7 +17,7 @@ EACH = 40
 """Beams kept of a scan."""
 APART = 0.2
 """m driven between two scans that are kept."""
-METRES_A_RAD = 0.5
+METERS_A_RAD = 0.5
 """What a turn counts as: it shows a lidar something new, too."""
 
 
@@ -37,14 +37,14 @@ class _Kept:
 
 
 class ScanMemory:
-    """The scans of the last REMEMBERED metres."""
+    """The scans of the last REMEMBERED meters."""
 
     def __init__(self) -> None:
         self._kept: deque[_Kept] = deque()
 
     @property
     def length(self) -> float:
-        """Metres driven between the oldest and the newest scan, turns included."""
+        """Meters driven between the oldest and the newest scan, turns included."""
         return self._kept[-1].driven - self._kept[0].driven if self._kept else 0.0
 
     def add(self, scan: Scan, odometry: Pose2, least: float, most: float) -> Plane:
@@ -78,8 +78,8 @@ class ScanMemory:
 
 
 def travelled(before: Pose2, after: Pose2) -> float:
-    """Metres between two poses, turns included."""
-    return before.distance(after) + METRES_A_RAD * abs(wrap(after.yaw - before.yaw))
+    """Meters between two poses, turns included."""
+    return before.distance(after) + METERS_A_RAD * abs(wrap(after.yaw - before.yaw))
 
 
 def ends_of(scan: Scan, least: float, most: float) -> Plane:

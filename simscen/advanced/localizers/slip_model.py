@@ -16,7 +16,7 @@ SLIP_LASTS = 1.0
 UNKNOWN_RATE = 10.0
 """rad/s: where the wheels slip, nothing is known of the turn rate before the gyroscope measures it."""
 LEVER = 0.1
-"""Metres from the middle of a robot to what it turns about when its wheels slip."""
+"""Meters from the middle of a robot to what it turns about when its wheels slip."""
 SHARE = 0.7
 """Standard deviation of that share, ahead and aside: uniform up to all of it is 0.58, always all of it 1."""
 PUSHED = 0.3
@@ -39,7 +39,7 @@ class Step:
 
     @property
     def length(self) -> float:
-        """Metres."""
+        """Meters."""
         return math.hypot(self.pose.x, self.pose.y)
 
 

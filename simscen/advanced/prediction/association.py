@@ -8,15 +8,15 @@ from simscen.advanced.prediction.track import Track
 from simscen.core.decorators import fast_dataclass
 
 NOISE, RELATIVE, HALF_SEEN = 0.02, 0.004, 0.10
-"""Standard deviation in m of a measured centre: near by, for each metre of range, and more where a piece is hidden."""
+"""Standard deviation in m of a measured center: near by, for each meter of range, and more where a piece is hidden."""
 FIRST_SEEN = 0.1
-"""Metres more of what is seen for the first time."""
+"""Meters more of what is seen for the first time."""
 GATE, GATE_SIGMAS = 0.25, 3.0
-"""Metres, and standard deviations, beyond which a piece is no continuation of a track."""
+"""Meters, and standard deviations, beyond which a piece is no continuation of a track."""
 LEAST_RADIUS = 0.15
-"""Metres: of what may begin a track without having come where it was free."""
+"""Meters: of what may begin a track without having come where it was free."""
 HALF_RADIUS = 0.3
-"""Metres: the least radius of what is half hidden when it is first seen: that of a person."""
+"""Meters: the least radius of what is half hidden when it is first seen: that of a person."""
 RADIUS_GAIN = 0.3
 """How much a new look at a whole piece changes the radius of a track."""
 
@@ -48,10 +48,10 @@ def associate(tracks: list[Track], seen: Seen) -> set[int]:
     possible: list[tuple[float, int, int]] = []
     for number, track in enumerate(tracks):
         expected, gate = lidar.into(track.place), GATE + GATE_SIGMAS * track.place_deviation
-        for piece, (_, _, centre, _, edges) in enumerate(pieces):
+        for piece, (_, _, center, _, edges) in enumerate(pieces):
             # Of what is half hidden, the middle of the visible part may be a radius off.
-            far, hidden = abs(expected - centre), 0.0 if edges == BOTH else track.radius
-            if far <= gate + hidden and (not seen.stands(piece) or _stood(track, centre, lidar, hidden)):
+            far, hidden = abs(expected - center), 0.0 if edges == BOTH else track.radius
+            if far <= gate + hidden and (not seen.stands(piece) or _stood(track, center, lidar, hidden)):
                 possible.append((far, number, piece))
     possible.sort()
     given: dict[int, int] = {}
@@ -65,9 +65,9 @@ def associate(tracks: list[Track], seen: Seen) -> set[int]:
     return taken
 
 
-def _stood(track: Track, centre: complex, lidar: LidarPose, hidden: float) -> bool:
+def _stood(track: Track, center: complex, lidar: LidarPose, hidden: float) -> bool:
     """Whether what stands there is what the track was hit at: nothing hops from one post to the next."""
-    return abs(lidar.into(track.lately[-1].place) - centre) <= GATE + hidden
+    return abs(lidar.into(track.lately[-1].place) - center) <= GATE + hidden
 
 
 def _update(given: list[tuple[Track, int]], seen: Seen) -> None:
@@ -79,9 +79,9 @@ def _update(given: list[tuple[Track, int]], seen: Seen) -> None:
             track.radius += RADIUS_GAIN * (radius - track.radius)
         else:
             guess = lidar.into(track.place)
-        centre = fitted(seen.places[first : last + 1].tolist(), track.radius, guess)
+        center = fitted(seen.places[first : last + 1].tolist(), track.radius, guess)
         hidden = 0.0 if edges == BOTH else HALF_SEEN
-        track.correct(lidar.out(centre), NOISE + RELATIVE * abs(centre) + hidden)
+        track.correct(lidar.out(center), NOISE + RELATIVE * abs(center) + hidden)
         track.note(seen.tick, seen.came[number], seen.stood[number], edges, track.place_deviation)
 
 
@@ -89,13 +89,13 @@ def begin(tracks: list[Track], seen: Seen, taken: set[int]) -> None:
     """Tracks of pieces that no track has taken and that stand where it was free."""
     # Among moving things others may, of which a thing that passed hid that they were not there before.
     least = LEAST_RADIUS if any(track.moving for track in tracks) else math.inf
-    for number, (_, _, centre, radius, edges) in enumerate(seen.pieces):
+    for number, (_, _, center, radius, edges) in enumerate(seen.pieces):
         came, stood = seen.came[number], seen.stood[number]
         if number in taken or not (came or (radius >= least and not stood)):
             continue
         # Of what is half hidden more may be there than is seen.
-        whole, noise = edges == BOTH, NOISE + RELATIVE * abs(centre)
+        whole, noise = edges == BOTH, NOISE + RELATIVE * abs(center)
         size = radius if whole else max(radius, HALF_RADIUS)
-        track = Track.begun(seen.tick, seen.lidar.out(centre), noise + FIRST_SEEN, size)
+        track = Track.begun(seen.tick, seen.lidar.out(center), noise + FIRST_SEEN, size)
         track.note(seen.tick, came, stood, 0, noise if whole else noise + HALF_SEEN)
         tracks.append(track)

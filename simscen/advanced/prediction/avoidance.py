@@ -22,14 +22,14 @@ from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles, R
 from simscen.stack.protocols import CostmapView, RobotModel
 
 ROOM = 0.25
-"""Metres that the robot keeps off what moves, besides a standard deviation of where that will be."""
+"""Meters that the robot keeps off what moves, besides a standard deviation of where that will be."""
 SOON = 1.2
 """Seconds in which what may happen counts e times less."""
 SOONER: Array = np.exp(-TIMES / SOON)
 NEAR, HIT, LASTING = 3.0, 10.0, 1.0
 """Cost of coming too near at the worst moment, of being hit, and of being too near all the time."""
 WALL, WALL_ROOM = 8.0, 0.08
-"""Cost of a way into something that stands, and metres kept off it."""
+"""Cost of a way into something that stands, and meters kept off it."""
 PROGRESS, BACKWARD, CHANGE, OWN = 1.0, 0.15, 0.08, 0.1
 """Gain of a way that goes ahead at full speed; cost of going backward, of another command than the last one, and of any
 way but the controller's."""
@@ -42,7 +42,7 @@ SLOWER = (1.0, 0.75, 0.5, 0.25, 0.0)
 AT_ONCE, ROUNDING = 64, 1e-9
 """Ways that are looked at together, and what sums in another order may differ by."""
 NEARLY_ROUND = 0.15
-"""Metres between its inscribed and its circumscribed radius up to which a robot is taken for round."""
+"""Meters between its inscribed and its circumscribed radius up to which a robot is taken for round."""
 
 
 class Avoidance:
@@ -145,7 +145,7 @@ class Avoidance:
         least: float,
         other: float,
     ) -> Array:
-        """What each way (n,) costs; `least` metres are kept off walls, `other` is added to all."""
+        """What each way (n,) costs; `least` meters are kept off walls, `other` is added to all."""
         cost = self._risk(ways, moving)
         progress = self._progress(ways.x[:, -1], ways.y[:, -1], pose, goal)
         cost += self._walls(ways, costmap, least) - PROGRESS * progress
@@ -160,7 +160,7 @@ class Avoidance:
         """The controller's own way, at these parts of its speed."""
         if path is None or len(path) < 2 or wanted.vx == 0.0:
             return arc(pose, wanted, parts if wanted != STOP else (1.0,))
-        return path.driven(pose, twist, wanted, parts, self._robot, not self._discs.centred)
+        return path.driven(pose, twist, wanted, parts, self._robot, not self._discs.centered)
 
     def _risk(self, ways: Rollouts, moving: MovingObstacles) -> Array:
         """What each way (n,) costs for what it comes near to."""
@@ -170,13 +170,13 @@ class Avoidance:
         return risk
 
     def _walls(self, ways: Rollouts, costmap: CostmapView, least: float) -> Array:
-        """What each way (n,) costs for what stands in it, nearer than `least` metres."""
+        """What each way (n,) costs for what stands in it, nearer than `least` meters."""
         touched = (self._room(ways, costmap, np.s_[:, 1::2]) < least) * np.exp(-TIMES[1::2] / (2 * SOON))
         cost: Array = WALL * touched.max(axis=1)
         return cost
 
     def _room(self, ways: Rollouts, costmap: CostmapView, some: tuple[slice, int | slice]) -> Reals:
-        """Metres from ways to what stands, of some of their moments."""
+        """Meters from ways to what stands, of some of their moments."""
         return np.asarray(self._discs.clearance(costmap, ways.x[some], ways.y[some], ways.yaw[some]))
 
     def _goal(self, pose: Pose2, path: Followed | None, home: Pose2 | None) -> tuple[float, float]:
@@ -205,11 +205,11 @@ class Avoidance:
 
 # MERGED: Where a robot belongs that is to stand, and how it gets back there after it has stepped aside.
 THERE, TURNED = 0.08, 0.15
-"""Metres and rad within which the robot stands where it belongs."""
+"""Meters and rad within which the robot stands where it belongs."""
 LEFT = 0.15
-"""Metres from there at which it sets out to come back."""
+"""Meters from there at which it sets out to come back."""
 PART, GAIN = 0.3, 1.0
-"""Of full speed at most on the way back, and m/s for each metre that is left."""
+"""Of full speed at most on the way back, and m/s for each meter that is left."""
 TURN = 1.0
 """rad/s at most on the way back."""
 FACING = 0.4

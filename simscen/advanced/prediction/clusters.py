@@ -1,4 +1,4 @@
-"""A scan in pieces: runs of neighbouring beams that hit the same thing, and the cylinder that would look like that."""
+"""A scan in pieces: runs of neighboring beams that hit the same thing, and the cylinder that would look like that."""
 
 import cmath
 import math
@@ -12,23 +12,23 @@ from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array
 
 GAP, SPARSE = 0.15, 2.5
-"""Two hits belong together when they are no farther apart than this many metres, or times the spacing of beams."""
+"""Two hits belong together when they are no farther apart than this many meters, or times the spacing of beams."""
 MISSED = 2
 """Beams that may miss within a piece."""
 VALLEY = 0.1
-"""Metres by which the range must rise between two things that touch, as the scan sees them."""
+"""Meters by which the range must rise between two things that touch, as the scan sees them."""
 BOTH = 2
 """Edges of what is seen whole."""
 STEP_APART = 1e3
-"""Metres: more than any beam sees."""
+"""Meters: more than any beam sees."""
 STEEPEST = math.radians(80.0)
 """Half the angle that a piece fills at most, as far as its radius is concerned."""
 FEWEST = 3
 """Hits of a piece that is looked at."""
 ROUNDING = 1e-6
-"""Metres."""
+"""Meters."""
 STEPS, ENOUGH = 4, 3e-3
-"""Of Gauss-Newton: from half a radius off, a circle is found to a millimetre; metres of a step that is the last."""
+"""Of Gauss-Newton: from half a radius off, a circle is found to a millimeter; meters of a step that is the last."""
 
 Indices = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
@@ -66,7 +66,7 @@ class Hits:
 
 @fast_dataclass(eq=False)
 class Runs:
-    """Hits of which neighbours that are not far apart make a run: things that stand apart.
+    """Hits of which neighbors that are not far apart make a run: things that stand apart.
 
     A run is the hits `first[k]` … `last[k]`.
     """
@@ -84,13 +84,13 @@ class Runs:
 class Piece(NamedTuple):
     """A piece of a scan, in the lidar's frame: the hits `first` … `last`.
 
-    `centre` (x + iy) and `radius` in m are of the cylinder that fills the same angle at the same distance. `edges`: at
+    `center` (x + iy) and `radius` in m are of the cylinder that fills the same angle at the same distance. `edges`: at
     how many of its two ends nothing nearer stands, nor the scan ends; at BOTH, all of it is seen.
     """
 
     first: int
     last: int
-    centre: complex
+    center: complex
     radius: float
     edges: int
 
@@ -101,7 +101,7 @@ class Piece(NamedTuple):
 
 
 def answers(ranges: Array, places: Places, step: float, least: float, most: float) -> Hits:
-    """The hits of a scan of beams that answer between `least` and `most` metres, each `step` rad further.
+    """The hits of a scan of beams that answer between `least` and `most` meters, each `step` rad further.
 
     `places` (n,) are what they hit.
     """
@@ -143,9 +143,9 @@ def clusters(found: Runs, scanned: Array, start: float, step: float, largest: fl
         sine = math.sin(min((high - low + 1) * (0.5 * wide), STEEPEST))
         radius = near * sine / (1.0 - sine)
         if radius <= largest:
-            centre = cmath.rect(near + radius, start + (0.5 * step) * (low + high))
+            center = cmath.rect(near + radius, start + (0.5 * step) * (low + high))
             edges = _clear(scanned, low, low - 1, full) + _clear(scanned, high, high + 1, full)
-            pieces.append(Piece(one, other, centre, radius, edges))
+            pieces.append(Piece(one, other, center, radius, edges))
     return pieces
 
 
@@ -213,8 +213,8 @@ def _parts(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]:
     return parts
 
 
-def fitted(arc: list[complex], radius: float, centre: complex) -> complex:
-    """The centre of the circle of this radius that fits an arc, points x + iy, best; `centre` is a first guess.
+def fitted(arc: list[complex], radius: float, center: complex) -> complex:
+    """The center of the circle of this radius that fits an arc, points x + iy, best; `center` is a first guess.
 
     In floats: a dozen points are too few for arrays.
     """
@@ -222,7 +222,7 @@ def fitted(arc: list[complex], radius: float, centre: complex) -> complex:
     for _ in range(STEPS):
         squares = miss = 0j
         for place in arc:
-            off = centre - place
+            off = center - place
             distance = abs(off)
             towards = off / max(distance, 1e-6)
             # Of unit vectors x + iy the squares add up to x² - y² + 2ixy, the squared lengths to their number.
@@ -230,7 +230,7 @@ def fitted(arc: list[complex], radius: float, centre: complex) -> complex:
             miss += towards * (distance - radius)
         square = squares / 2
         change = (half * miss - square * miss.conjugate()) / (half * half - abs(square) ** 2)
-        centre -= change
+        center -= change
         if abs(change) < ENOUGH:
             break
-    return centre
+    return center

@@ -21,7 +21,7 @@ from simscen.stack.protocols import CostmapView
 DECAY_TIME_S = 2.0
 """Seconds in which what will be counts e times less: at constant velocity, nobody goes on for ever."""
 BLOCK_SIZE_M = 0.2
-"""Metres, about: the edge of what is marked alike."""
+"""Meters, about: the edge of what is marked alike."""
 
 
 def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:

@@ -143,7 +143,7 @@ class Followed:
         return int(dx.argmin())
 
     def ahead(self, pose: Pose2, reach: float) -> tuple[float, float]:
-        """Its first point beyond the one nearest to a pose that is so many metres off the pose; else its last."""
+        """Its first point beyond the one nearest to a pose that is so many meters off the pose; else its last."""
         here = self.nearest(pose)
         beyond = np.hypot(self._x[here:] - pose.x, self._y[here:] - pose.y) >= reach
         number = here + int(beyond.argmax()) if beyond.any() else -1

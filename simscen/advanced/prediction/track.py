@@ -78,7 +78,7 @@ class Track(ConstantVelocityFilter):
 
     @classmethod
     def begun(cls, tick: int, place: complex, deviation: float, radius: float) -> "Track":
-        """At a place that is known to so many metres, and of unknown speed."""
+        """At a place that is known to so many meters, and of unknown speed."""
         return cls(place, 0j, deviation * deviation, 0.0, FIRST_SPEED**2, radius, place, tick)
 
     @property

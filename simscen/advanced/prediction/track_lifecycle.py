@@ -12,7 +12,7 @@ SURE, TRAVELLED, HITS = 3.0, 0.15, 3
 m in these, and in so many of them stood where it had been free."""
 ENDS_UNSEEN, ENDS_HIDDEN, ENDS_UNSURE = 0.35, 2.5, 0.8
 """Seconds without a hit after which a track ends: where the lidar sees through; where it cannot see; and for one that
-was not moving. All end when their place is known worse than this many metres."""
+was not moving. All end when their place is known worse than this many meters."""
 UNSURE_PLACE = 1.2
 FASTEST = 4.0
 """m/s: nothing indoors is faster; a track that is has gone from one thing to another."""
@@ -25,7 +25,7 @@ MOSTLY = 0.6
 """Share of the last updates of a track that moves in which it stands where it had been free; what hops along a row of
 posts does not."""
 FAR = 0.5
-"""Metres beyond twice the largest radius: what has gone so far moves, though no beam was ever where it came from. What
+"""Meters beyond twice the largest radius: what has gone so far moves, though no beam was ever where it came from. What
 is seen of a wall, at the end of the field of view, grows by less."""
 UNCOME = 5
 """Updates without standing where it had been free, after which what nobody has seen move is followed no more."""

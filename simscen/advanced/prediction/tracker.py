@@ -25,7 +25,7 @@ APPEARED, FEW = 0.3, 3
 STANDS = 0.5
 """Share of its hits that an earlier scan hit, too, from which a piece stands there."""
 BODY = 0.25
-"""Metres: the least radius of what is told as moving. Of another robot the lidar may see no more than its mast, of a
+"""Meters: the least radius of what is told as moving. Of another robot the lidar may see no more than its mast, of a
 person a leg."""
 
 

@@ -19,7 +19,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 
 MARGIN, RELATIVE = 0.25, 0.02
-"""Metres, and share of the range, by which an earlier beam must have gone farther."""
+"""Meters, and share of the range, by which an earlier beam must have gone farther."""
 SLIPPED = (0.05, 0.1, 0.15)
 """Parts of the way between two scans for which the wheels may have turned in vain. What has come must have been free by
 each of them: posts beside the way of a fast robot seem to hop from one to the next when all come along a little."""
@@ -36,11 +36,11 @@ TURNED = 0.02
 """rad: what beams beside a point must have gone farther, too: headings that are a second apart are wrong by some of it,
 and at an edge it is chance which beam hits."""
 SAME, SAME_RELATIVE = 0.12, 0.01
-"""Metres, and share of the range, within which an earlier beam must have ended to have hit what stands there now."""
+"""Meters, and share of the range, within which an earlier beam must have ended to have hit what stands there now."""
 KEPT = 64
 """Scans at most."""
 FARTHEST = 1e5
-"""Metres: how far a beam saw that met nothing."""
+"""Meters: how far a beam saw that met nothing."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class View:
         return self.start + (self.count - 1) / 2 * self.increment
 
     @cached_property
-    def centre(self) -> float:
+    def center(self) -> float:
         """… and what that is in beams, those that are added at one end included, but `beside` of them."""
         return self.more - self.beside + (self.count - 1) / 2
 
@@ -101,7 +101,7 @@ class View:
 
 
 def _least(values: Array, width: int) -> Array:
-    """The least of each so many neighbours: of two, of twice as many, …"""
+    """The least of each so many neighbors: of two, of twice as many, …"""
     done = 1
     while done < width:
         step = min(done, width - done)
@@ -134,7 +134,7 @@ class Earlier:
         """
         beam = np.arctan2(places.imag, places.real)
         beam *= 1.0 / self.view.increment
-        beam += self.view.centre + 0.5
+        beam += self.view.center + 0.5
         return beam.astype(np.int64), np.abs(places)
 
     def through(self, beam: Indices, distance: Array) -> Mask:

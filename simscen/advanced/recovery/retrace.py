@@ -25,11 +25,11 @@ AT_LEAST = 3
 SLACK = 0.3
 """Cells by which it may come nearer to something than it came on its way."""
 OFF = 2.0
-"""Metres of the way that are worth as much as a metre less beside it."""
+"""Meters of the way that are worth as much as a meter less beside it."""
 GAIN = 0.01
-"""Metres that a command must be worth more than to stand."""
+"""Meters that a command must be worth more than to stand."""
 WINDOW = 0.5
-"""Metres of the way ahead among which the robot looks for where it is."""
+"""Meters of the way ahead among which the robot looks for where it is."""
 SPEEDS = (-1.0, -0.5, 0.0, 0.5)
 """Parts of the speed; forward, too, for a way may have had cusps."""
 RATES = (0.0, 0.07, -0.07, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8)
@@ -55,7 +55,7 @@ class TrailFollower:
         self._commands = _possible(setting.robot, self.speed)
 
     def start(self, pose: Pose2, length: float) -> None:
-        """Begin from this pose in the odom frame, to go back so many metres at most."""
+        """Begin from this pose in the odom frame, to go back so many meters at most."""
         there = np.array([AHEAD])
         self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, there)[0] for each in (*self._commands, STOP)])
         lever = self._footprint.circumscribed
@@ -78,12 +78,12 @@ class TrailFollower:
 
     @property
     def driven(self) -> float:
-        """Metres that the base has come back."""
+        """Meters that the base has come back."""
         return float(self._trail.driven[self._at])
 
     @property
     def moved(self) -> float:
-        """Metres that its hull has, which a turn moves, too."""
+        """Meters that its hull has, which a turn moves, too."""
         return float(self._trail.along[self._at])
 
     def _ahead(self) -> slice:
@@ -94,7 +94,7 @@ class TrailFollower:
         """The command that gets it farthest back of those that are free; else of those that are for a moment.
 
         None where to stand is as good. Who touches a post all but may not turn as the way does, says the monitor, which
-        sees by the centimetre what cells do not show: then whatever else leads back, until there is room again.
+        sees by the centimeter what cells do not show: then whatever else leads back, until there is room again.
         """
         *worth, standing = self._worth(pose).tolist()
         strafed, vetoed = self._trail.strafed, False

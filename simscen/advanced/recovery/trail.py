@@ -8,9 +8,9 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2, wrap_array
 
 STEP = 0.01
-"""Metres that the hull moves between two poses of a trail; turning in place moves it, too."""
+"""Meters that the hull moves between two poses of a trail; turning in place moves it, too."""
 AGAIN, LOOP = 0.12, 0.3
-"""Metres of the hull within which it is where it has been, and by which it must have moved meanwhile: what lies between
+"""Meters of the hull within which it is where it has been, and by which it must have moved meanwhile: what lies between
 was to and fro."""
 ASIDE = 0.1
 """Share of its way that a base must have gone sideways to have strafed; one that slips does so, too, by less."""
@@ -23,7 +23,7 @@ class Trail:
     """
 
     def __init__(self, way: Sequence[Pose2], pose: Pose2, lever: float, length: float) -> None:
-        """`lever`: metres from the base to the hull's far end; `length`: metres that the base needs at least."""
+        """`lever`: meters from the base to the hull's far end; `length`: meters that the base needs at least."""
         self._lever = lever
         came = self._thinned(np.array([pose, *reversed(way)], dtype=np.float64))
         self.strafed = _strafed(came)
@@ -37,7 +37,7 @@ class Trail:
         self.along = np.concatenate(([0.0], np.cumsum(self.apart(self.poses[1:], self.poses[:-1]))))
         steps = np.hypot(np.diff(self.poses[:, 0]), np.diff(self.poses[:, 1]))
         self.driven = np.concatenate(([0.0], np.cumsum(steps)))
-        """Metres (n,) that the base itself has gone until each."""
+        """Meters (n,) that the base itself has gone until each."""
 
     def apart(self, poses: Array, others: Array) -> Array:
         """How far (…,) the hull moves from poses (…, 3) to others."""

@@ -55,7 +55,7 @@ ROOM, DOOR, THICKNESS = (3.2, 8.5), (0.95, 1.3), (0.12, 0.2)
 GLAZED = 0.15
 """Share of the rooms whose wall to the corridor is of glass."""
 CONNECTED = 0.3
-"""Share of neighbouring rooms with a door between them."""
+"""Share of neighboring rooms with a door between them."""
 SWINGS = 0.8
 """m around a door in which nothing stands."""
 MOVED, TAKEN, BROUGHT = 0.25, 0.1, 0.15

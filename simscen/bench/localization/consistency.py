@@ -1,4 +1,4 @@
-"""Whether a localizer is as sure as it may be: normalised estimation error squared, averaged over runs.
+"""Whether a localizer is as sure as it may be: normalized estimation error squared, averaged over runs.
 
 The average is over runs at fixed times, not over time: errors of one run are correlated, and the bounds of the
 chi-square distribution hold for independent samples only. (Bar-Shalom, Li, Kirubarajan 2001, section 5.4.) Runs that

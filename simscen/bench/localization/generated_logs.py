@@ -43,7 +43,7 @@ def drawn(poses: Array, angles: Array, ranges: Array, size: tuple[float, float])
 
     ended = counted(far, np.isfinite(ranges) & (ranges < REACH))
     passed = np.zeros_like(ended)
-    for step in np.arange(0.0, REACH, 2 * CELL):  # neighbouring beams pass the cells between
+    for step in np.arange(0.0, REACH, 2 * CELL):  # neighboring beams pass the cells between
         along = np.full_like(far, step)
         if (chosen := far - step > CELL).any():
             passed += counted(along, chosen)

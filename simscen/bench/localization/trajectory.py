@@ -71,7 +71,7 @@ def _corners(floor: Building, ways: ShortestPaths, chance: np.random.Generator, 
 
 
 def tour(floor: Building) -> Array:
-    """Poses (k, 3) half a metre apart on ways from room to room of an empty floor, none left out that has a door."""
+    """Poses (k, 3) half a meter apart on ways from room to room of an empty floor, none left out that has a door."""
     ways = ShortestPaths(mesh_of(floor.walls, floor.glass), (0.0, 0.0, *floor.size), CLEARANCE, finest=FINEST)
     order = floor.rooms[np.argsort(floor.rooms[:, 0], kind="stable")]
     places, here = [order[:1]], order[0]

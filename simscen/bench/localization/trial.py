@@ -23,7 +23,7 @@ ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), None, 0
 class Trial:
     """How a log went: errors in m, times in s; `found` is None for a robot that was not found for good.
 
-    `tracked`: never LOST. `nees` are the normalised squared errors at MOMENTS. `ms` is the processor's time a scan,
+    `tracked`: never LOST. `nees` are the normalized squared errors at MOMENTS. `ms` is the processor's time a scan,
     `slowest_ms` that of the scan that took longest.
     """
 

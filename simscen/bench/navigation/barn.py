@@ -68,7 +68,7 @@ pass:
 
 @dataclass(frozen=True)
 class BarnWorld:
-    """One world of the challenge: its file, and the length in metres of the reference path that its score refers to."""
+    """One world of the challenge: its file, and the length in meters of the reference path that its score refers to."""
 
     file: Path
     reference_length: float

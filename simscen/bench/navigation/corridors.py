@@ -9,12 +9,12 @@ from simscen.bench.navigation.experiment import Drive, Experiment, write_scenari
 from simscen.core.random_streams import Streams
 
 WIDTH = (1.4, 2.4)
-"""Metres of a corridor: two robots of 0.44 m pass each other in the narrowest with 17 cm on each side."""
+"""Meters of a corridor: two robots of 0.44 m pass each other in the narrowest with 17 cm on each side."""
 LENGTH = 14.0
 SLOPE, HEIGHT = (2.0, 8.0), (0.03, 0.16)
-"""Degrees and metres of ramps; what is as high as the lidar is a wall on the map, and no way leads over it."""
+"""Degrees and meters of ramps; what is as high as the lidar is a wall on the map, and no way leads over it."""
 HALL = 2.4
-"""Metres of the hall that they are in, from wall to wall."""
+"""Meters of the hall that they are in, from wall to wall."""
 
 
 def two_robots(folder: Path, numbers: Iterable[int]) -> Experiment:

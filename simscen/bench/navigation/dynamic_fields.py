@@ -13,7 +13,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.random_streams import Streams
 
 HALF = 10.0
-"""Metres from the middle of the arena, which is square, to its border."""
+"""Meters from the middle of the arena, which is square, to its border."""
 RADIUS, HEIGHT = 0.5, 1.0
 COUNT = (5, 24)
 """Least and most cylinders of a field."""
@@ -26,11 +26,11 @@ DEVIATION = (0.05, 0.25)
 ORDER = (1, 5)
 """Least and most degree of the polynomials."""
 PIECE = 2.0
-"""Metres of way between two keyframes."""
+"""Meters of way between two keyframes."""
 LEAST_WAY = 8.0
-"""Metres: a polynomial that leaves the arena sooner is drawn again."""
+"""Meters: a polynomial that leaves the arena sooner is drawn again."""
 START, GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14159)
-"""Where DynaBARN's robot sets out, a metre outside the arena, and where it goes."""
+"""Where DynaBARN's robot sets out, a meter outside the arena, and where it goes."""
 MOST_TRIES = 1000
 
 

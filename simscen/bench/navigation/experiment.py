@@ -10,7 +10,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Drive:
-    """A scenario file, the seeds to run it with, and BARN's reference length in metres where it has one.
+    """A scenario file, the seeds to run it with, and BARN's reference length in meters where it has one.
 
     `world` tells worlds apart, over which success rates are compared: drives in one world are no independent evidence.
     """

@@ -16,11 +16,11 @@ from simscen.bench.navigation.obstacle_fields import CELL, HEIGHT, ObstacleField
 from simscen.core.random_streams import Streams
 
 NARROW = (0.30, 0.20, 0.10)
-"""Metres that the widest way through a narrow field is wider than the robot."""
+"""Meters that the widest way through a narrow field is wider than the robot."""
 WIDTH = 0.42
-"""Metres from wheel to wheel of the robot that drives there."""
+"""Meters from wheel to wheel of the robot that drives there."""
 LOCALIZATIONS = ("tour", "told 0.5 m and 20° off", "start unknown", "kidnapped")
-"""What the experiments on localisation are called."""
+"""What the experiments on localization are called."""
 
 
 def barn_challenge(
@@ -54,7 +54,7 @@ def narrow_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
 
 
 def narrow_name(room: float) -> str:
-    """What the experiment is called with this much room in metres."""
+    """What the experiment is called with this much room in meters."""
     return f"narrow fields, robot + {100 * room:.0f} cm"
 
 
@@ -147,7 +147,7 @@ def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequen
 def _world_text(field: ObstacleField) -> str:
     pillars = "\n".join(
         f"  - {{name: pillar, cylinder: [{CELL / 2:g}, {HEIGHT:g}], pose: {{x: {x:.3f}, y: {y:.3f}}}}}"
-        for x, y in field.centres.tolist()
+        for x, y in field.centers.tolist()
     )
     return f"simscen: 1\nname: field {field.number}\nobstacles:\n{pillars}\n"
 

@@ -1,7 +1,7 @@
 """Obstacle fields as in the BARN dataset: cylinders on a lattice, grown by a cellular automaton.
 
 Perille, Truong, Xiao, Stone: Benchmarking Metric Ground Navigation, SSRR 2020, section III: cells are filled at
-random, then smoothed: a cell with many filled neighbours is filled, one with hardly any is cleared.
+random, then smoothed: a cell with many filled neighbors is filled, one with hardly any is cleared.
 """
 
 from dataclasses import dataclass
@@ -14,17 +14,17 @@ from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.core.random_streams import Streams
 
 CELL = 0.15
-"""Metres between cylinders; their radius is half of it."""
+"""Meters between cylinders; their radius is half of it."""
 COLUMNS, FIELD_ROWS, ROWS = 30, 30, 64
 """Of the lattice: the field fills the upper rows, between two rows of cylinders that wall the whole lane in."""
 HEIGHT = 1.0
 FILL = (0.20, 0.35)
 """Least and most of the cells filled at first: gives fields as dense as the six worlds of BARN at hand, 5 … 22 %."""
 FILL_AT, CLEAR_AT = 5, 1
-"""Filled neighbours of eight from which a cell is filled, and up to which it is cleared."""
+"""Filled neighbors of eight from which a cell is filled, and up to which it is cleared."""
 START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
 GAP = 0.37
-"""Radius in metres of the disc that has a way through every field, as through every world of BARN."""
+"""Radius in meters of the disc that has a way through every field, as through every world of BARN."""
 MOST_TRIES = 1000
 
 Cells = npt.NDArray[np.bool_]
@@ -32,17 +32,17 @@ Cells = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class ObstacleField:
-    """`centres` (n, 2) of cylinders and the length of the shortest way of the disc from START to GOAL, in m."""
+    """`centers` (n, 2) of cylinders and the length of the shortest way of the disc from START to GOAL, in m."""
 
     number: int
-    centres: Array
+    centers: Array
     shortest: float
 
     @property
     def density(self) -> float:
         """Filled part of the field between its walls."""
-        inside = (np.abs(self.centres[:, 0] + COLUMNS * CELL / 2) < (COLUMNS / 2 - 1) * CELL) & (
-            self.centres[:, 1] > (ROWS - FIELD_ROWS) * CELL
+        inside = (np.abs(self.centers[:, 0] + COLUMNS * CELL / 2) < (COLUMNS / 2 - 1) * CELL) & (
+            self.centers[:, 1] > (ROWS - FIELD_ROWS) * CELL
         )
         return float(np.count_nonzero(inside)) / (FIELD_ROWS * (COLUMNS - 2))
 
@@ -55,9 +55,9 @@ def obstacle_field(number: int, gap: float = GAP, too_wide: float | None = None)
     """
     chance = Streams(number).generator("obstacle field" if gap == GAP else f"obstacle field {gap:g}")
     for _ in range(MOST_TRIES):
-        centres = _centres(_smoothed(chance))
-        if _crossable(centres, gap, too_wide) and np.isfinite(length := _shortest(centres, gap)):
-            return ObstacleField(number, centres, length)
+        centers = _centers(_smoothed(chance))
+        if _crossable(centers, gap, too_wide) and np.isfinite(length := _shortest(centers, gap)):
+            return ObstacleField(number, centers, length)
     raise RuntimeError(f"no way through any of {MOST_TRIES} fields of number {number}")
 
 
@@ -66,13 +66,13 @@ def _smoothed(chance: np.random.Generator) -> Cells:
     cells: Cells = chance.random((FIELD_ROWS, COLUMNS)) < chance.uniform(*FILL)
     for _ in range(int(chance.integers(2, 5))):
         cells[:, [0, -1]] = True
-        around = _neighbours(cells)
+        around = _neighbors(cells)
         cells = (cells | (around >= FILL_AT)) & (around > CLEAR_AT)
     cells[:, [0, -1]] = True
     return cells
 
 
-def _neighbours(cells: Cells) -> npt.NDArray[np.int64]:
+def _neighbors(cells: Cells) -> npt.NDArray[np.int64]:
     """How many of the eight cells around each are filled; there is nothing beyond the edge."""
     wide = np.pad(cells.astype(np.int64), 1)
     rows, columns = cells.shape
@@ -80,7 +80,7 @@ def _neighbours(cells: Cells) -> npt.NDArray[np.int64]:
     return np.asarray(around - cells)
 
 
-def _centres(field: Cells) -> Array:
+def _centers(field: Cells) -> Array:
     """The cylinders (n, 2) of the whole lane: walls, closed behind the start, and the field at its end."""
     lane = np.zeros((ROWS, COLUMNS), np.bool_)
     lane[:, [0, -1]], lane[0] = True, True
@@ -89,7 +89,7 @@ def _centres(field: Cells) -> Array:
     return np.column_stack(((columns + 0.5 - COLUMNS) * CELL, (rows + 0.5) * CELL))
 
 
-def _crossable(centres: Array, gap: float, too_wide: float | None) -> bool:
+def _crossable(centers: Array, gap: float, too_wide: float | None) -> bool:
     """Whether start and goal are in one piece of the free space of a disc of `gap`, and not of one that is too wide.
 
     Quick, for most fields are not crossable.
@@ -98,7 +98,7 @@ def _crossable(centres: Array, gap: float, too_wide: float | None) -> bool:
 
     step = CELL / 3
     x, y = np.meshgrid(np.arange(-COLUMNS * CELL, 0.0, step), np.arange(0.0, GOAL.y + 1.0, step))
-    distance, _ = spatial.cKDTree(centres).query(np.stack((x, y), axis=-1))
+    distance, _ = spatial.cKDTree(centers).query(np.stack((x, y), axis=-1))
 
     def joined(radius: float) -> bool:
         pieces, _ = ndimage.label(distance > radius + CELL / 2)
@@ -108,12 +108,12 @@ def _crossable(centres: Array, gap: float, too_wide: float | None) -> bool:
     return joined(gap) and not (too_wide is not None and joined(too_wide))
 
 
-def _shortest(centres: Array, gap: float) -> float:
+def _shortest(centers: Array, gap: float) -> float:
     from simscen.worlds.geometry.triangulation import fuse
     from simscen.worlds.routes.shortest_paths import ShortestPaths
 
     pillar = Cylinder(CELL / 2, HEIGHT)
-    mesh = fuse(tuple(Solid(pillar, Pose3(x, y, HEIGHT / 2), "") for x, y in centres.tolist()))
+    mesh = fuse(tuple(Solid(pillar, Pose3(x, y, HEIGHT / 2), "") for x, y in centers.tolist()))
     # As wide as the lane, so that no way leads around its walls: those end where the field ends.
     bounds = (-COLUMNS * CELL, 0.0, 0.0, GOAL.y + 1.0)
     return ShortestPaths(mesh, bounds, gap).length(START, GOAL)

@@ -1,4 +1,4 @@
-"""Maps of office floors, as SLAM leaves them: cells of 5 to 25 cm, thin walls, grey pockets; written as ROS maps."""
+"""Maps of office floors, as SLAM leaves them: cells of 5 to 25 cm, thin walls, gray pockets; written as ROS maps."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +10,10 @@ from simscen.bench.navigation.experiment import write_scenario
 from simscen.core.random_streams import Streams
 
 FINE = 0.05
-"""Metres: the cells that a floor is drawn in, before it becomes as coarse as its map."""
+"""Meters: the cells that a floor is drawn in, before it becomes as coarse as its map."""
 RESOLUTIONS = (0.05, 0.05, 0.10, 0.15, 0.20, 0.25)
 WIDE, DEEP = (20.0, 45.0), (12.0, 28.0)
-"""Metres: least and most of a floor's two sides."""
+"""Meters: least and most of a floor's two sides."""
 CORRIDOR, DOOR = (1.7, 2.6), (0.9, 1.3)
 FREE, WALL, UNKNOWN = 254, 0, 205
 """As map_server writes them."""
@@ -36,7 +36,7 @@ class _Floor:
 
 
 def building(number: int) -> tuple[Image, float]:
-    """The map of the floor of this number (from 1), and the edge of its cells in metres: always the same."""
+    """The map of the floor of this number (from 1), and the edge of its cells in meters: always the same."""
     chance = Streams(number).generator("building")
     resolution = RESOLUTIONS[number % len(RESOLUTIONS)]
     width, depth = float(chance.uniform(*WIDE)), float(chance.uniform(*DEEP))
@@ -88,7 +88,7 @@ def _across(floor: _Floor, chance: np.random.Generator, broad: float) -> None:
 
 
 def _as_mapped(image: Image, resolution: float, chance: np.random.Generator) -> Image:
-    """In cells of the map: occupied where a good part of a cell is; some grey, as where a scan never came."""
+    """In cells of the map: occupied where a good part of a cell is; some gray, as where a scan never came."""
     step = round(resolution / FINE)
     rows, columns = (size // step * step for size in image.shape)
     parts = image[:rows, :columns].reshape(rows // step, step, columns // step, step)

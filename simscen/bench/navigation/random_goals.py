@@ -14,15 +14,15 @@ from simscen.core.random_streams import Streams
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 ROOM = 0.12
-"""Metres between a robot's hull, as a disc, and the nearest wall, where it starts and where it is sent."""
+"""Meters between a robot's hull, as a disc, and the nearest wall, where it starts and where it is sent."""
 MOVABLE = 1.5
-"""Metres from a door or a thing that may move within which no drive begins or ends."""
+"""Meters from a door or a thing that may move within which no drive begins or ends."""
 TRIES = 2000
 
 
 @dataclass(frozen=True)
 class RandomDrive:
-    """A number, from where to where, and the length in metres of the shortest way of the robot between them."""
+    """A number, from where to where, and the length in meters of the shortest way of the robot between them."""
 
     number: int
     start: Pose2
@@ -33,7 +33,7 @@ class RandomDrive:
 def random_drives(
     built: BuiltWorld, radius: float, numbers: Iterable[int], least: float = 5.0
 ) -> Iterator[RandomDrive]:
-    """A drive of a disc of `radius` metres for each number, none shorter than `least` metres; always the same for a
+    """A drive of a disc of `radius` meters for each number, none shorter than `least` meters; always the same for a
     number; none for a number of which TRIES draws find none.
     """
     ways = ShortestPaths(built.mesh, built.world.bounds, radius + ROOM)
@@ -41,7 +41,7 @@ def random_drives(
     for number in numbers if len(free) else ():
         chance = Streams(number).generator("errand")
         for _ in range(TRIES):
-            ends = built.map.centre_of(free[chance.integers(0, len(free), 2)]).tolist()
+            ends = built.map.center_of(free[chance.integers(0, len(free), 2)]).tolist()
             start, goal = (Pose2(x, y, float(chance.uniform(-math.pi, math.pi))) for x, y in ends)
             if start.distance(goal) < least / 2 or any(_near(end, built) for end in (start, goal)):
                 continue
@@ -57,7 +57,7 @@ def _near(pose: Pose2, built: BuiltWorld) -> bool:
 
 
 RADIUS = 0.22
-"""Metres: the disc of the default robot, a TurtleBot."""
+"""Meters: the disc of the default robot, a TurtleBot."""
 SLOWEST = 0.2
 """m/s: whoever is slower than this on average has not arrived in time."""
 FAULTS = {

@@ -26,7 +26,7 @@ class DriveOutcome(str, Enum):
 
 @dataclass(frozen=True)
 class Trial:
-    """A run, the reference length in metres that its score refers to (None = the case has no score), and its world.
+    """A run, the reference length in meters that its score refers to (None = the case has no score), and its world.
 
     `top_speed` is the robot's, in m/s.
     """

@@ -156,7 +156,7 @@ def bare_patrol(prepared: PreparedScenario, simulated: float) -> float:
 
 
 def measure_field(obstacles: int) -> Field:
-    """Scan and step in a field of cylinders as dense as a BARN world (0.9 of them to the square metre)."""
+    """Scan and step in a field of cylinders as dense as a BARN world (0.9 of them to the square meter)."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     solids = cylinders(obstacles)
     mesh, start, height = fuse(solids), Pose2(0.0, 0.0, 0.0), lidar_height(prepared.robot)

@@ -67,7 +67,7 @@ def command(
 
     BARN and fields like it, narrow fields, fields of moving cylinders, random goals in shipped worlds and generated
     buildings, sensors that fail, ramps, two robots in a corridor, Nav2's own system test, corner cases and
-    localisation. Intervals are by bootstrap over worlds. Worlds of BARN and Nav2 are no part of simscen: say where you
+    localization. Intervals are by bootstrap over worlds. Worlds of BARN and Nav2 are no part of simscen: say where you
     have them. What is not there is skipped, which is said on standard error, as is every run that did not come out
     well, with the command that repeats it. Interrupted, it prints what there is by then; with the same options and
     --resume it goes on. Exit code 0, or 3 when a run could not be completed.

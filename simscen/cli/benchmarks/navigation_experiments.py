@@ -18,7 +18,7 @@ SHIPPED = ("house", "office", "warehouse")
 BARN = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
 NAV2 = "--nav2 names a folder with it: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
 LIDAR_HEIGHT = 0.2
-"""Metres: at which the maps of worlds are made that drives are drawn from."""
+"""Meters: at which the maps of worlds are made that drives are drawn from."""
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ def comparison_text(before: Result, after: Result) -> str:
     return "\n".join(lines)
 
 
-def judgement(before: Measurement, after: Measurement) -> str:
+def judgment(before: Measurement, after: Measurement) -> str:
     """`noise` where the rounds overlap, `better` or `worse` where they do not; "" where there are too few of them."""
     if min(len(before.rounds), len(after.rounds)) < FEWEST:
         return ""
@@ -117,7 +117,7 @@ def judgement(before: Measurement, after: Measurement) -> str:
 def _row(name: str, before: Measurement, after: Measurement) -> tuple[str, ...]:
     ratio = f"{after.value / before.value:.2f}" if before.value else "-"
     values = (_value(before.value, before.unit), _value(after.value, after.unit))
-    return name, *values, ratio, _spread(before), _spread(after), judgement(before, after)
+    return name, *values, ratio, _spread(before), _spread(after), judgment(before, after)
 
 
 def _value(value: float, unit: str) -> str:

@@ -146,7 +146,7 @@ class _WithInstalled(_Generator):
 
 
 def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
-    """One of `keys`, and only one; where there is none, a misspelt one is told about by what does not know it.
+    """One of `keys`, and only one; where there is none, a misspelled one is told about by what does not know it.
 
     With `maxProperties` yaml-language-server would offer nothing: it counts the key that is being typed.
     """

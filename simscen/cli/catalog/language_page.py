@@ -26,7 +26,7 @@ _GROUPS = {
     "localizer": ("Localizers", "Under `stack.localizer`, chosen by `type`, by default `scan_matching_amcl`."),
     "controller": ("Controllers", "Under `stack.controller`, told apart by `type`."),
     "behavior": (
-        "Recovery behaviours",
+        "Recovery behaviors",
         "Entries of `stack.recovery.behaviors`: a name, or a mapping with that name as its `type`; a parameter that is "
         "left out is the one of `stack.recovery`.",
     ),

@@ -179,7 +179,7 @@ distribution hold for a mean over runs at a fixed time, as `simscen bench nav` t
 SESSION = """\
 A session reports in results.json under `suite`, and `simscen report DIR` prints: `runs`; `success_rate` with its 95 %
 Wilson interval, of all runs, those with errors included; `spl` and `soft_spl`, means over the runs that have them
-(`spl_runs` of them); `collisions_per_km` and `collisions_per_hour` over `kilometres` driven and `hours` simulated of
+(`spl_runs` of them); `collisions_per_km` and `collisions_per_hour` over `kilometers` driven and `hours` simulated of
 the `measured_runs` that came to their end. Each of several robots of a run drives, collides and has an SPL of its own;
 the run succeeds where all do. With several stacks (`--stack`), `simscen report` prints these for each,
 and `comparison` holds, for each stack against the first (`baseline`): `pairs` of the same scenario and seed, what was

@@ -31,7 +31,7 @@ File = Annotated[Path, typer.Argument(metavar="WORLD", help="A *.world.yaml, a R
 Root = Annotated[Path | None, typer.Option(help="Root folder; the world may only refer to files below it.")]
 WorldPath = Annotated[list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")]
 Lenient = Annotated[bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")]
-Height = Annotated[float, typer.Option(min=0.0, max=100.0, help="Height of the lidar in metres.")]
+Height = Annotated[float, typer.Option(min=0.0, max=100.0, help="Height of the lidar in meters.")]
 LIDAR_HEIGHT = 0.2
 
 
@@ -80,7 +80,7 @@ def export(
     path: File,
     map_: Annotated[Path, typer.Option("--map", help="The map's yaml; its image (pgm) goes beside it.")],
     height: Height = LIDAR_HEIGHT,
-    resolution: Annotated[float, typer.Option(min=0.005, max=1.0, help="Metres for each cell.")] = 0.05,
+    resolution: Annotated[float, typer.Option(min=0.005, max=1.0, help="Meters for each cell.")] = 0.05,
     root: Root = None,
     world_path: WorldPath = None,
     lenient: Lenient = False,

@@ -99,7 +99,7 @@ class MaskBlocks:
 
     @property
     def forbidden(self) -> Array:
-        """The occupied blocks (n, 4): least x, least y, greatest x and greatest y in metres in the mask's own frame."""
+        """The occupied blocks (n, 4): least x, least y, greatest x and greatest y in meters in the mask's own frame."""
         found = np.array([block[:4] for block in self.blocks if block[4] == OCCUPIED], dtype=np.float64).reshape(-1, 4)
         found[:, 2:] += found[:, :2]
         boxes: Array = found * self.resolution

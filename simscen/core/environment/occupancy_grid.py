@@ -38,7 +38,7 @@ class OccupancyGrid:
         return self.cells.shape[0], self.cells.shape[1]
 
     def refined(self, finest: float) -> OccupancyGrid:
-        """The same map in whole parts of its cells, none larger than `finest` metres as long as there are not too many.
+        """The same map in whole parts of its cells, none larger than `finest` meters as long as there are not too many.
 
         A cell as large as a robot is a poor place to plan to, and half of it a poor bound on where its wall begins.
         """
@@ -52,8 +52,8 @@ class OccupancyGrid:
         local = self.origin.inverse().apply(points) / self.resolution
         return np.floor(local[:, ::-1]).astype(np.int64)
 
-    def centre_of(self, cells: npt.NDArray[np.int64]) -> Array:
-        """Map points (n, 2) of the centres of cells (n, 2) given as (row, column)."""
+    def center_of(self, cells: npt.NDArray[np.int64]) -> Array:
+        """Map points (n, 2) of the centers of cells (n, 2) given as (row, column)."""
         return self.origin.apply((cells[:, ::-1].astype(np.float64) + 0.5) * self.resolution)
 
     def inside(self, cells: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:

@@ -18,10 +18,10 @@ BODY_HEIGHT = 1.7
 
 @dataclass(frozen=True)
 class WalkingPedestrian:
-    """Somebody called `name` who starts at rest at `pose` and walks to `goals` (x, y) in turn, in metres.
+    """Somebody called `name` who starts at rest at `pose` and walks to `goals` (x, y) in turn, in meters.
 
-    `speed` in m/s is the one they like best, `radius` and `height` those of their body in metres. Those of one `group`
-    keep together. `blind_to` is what they take no notice of. `reacts_within` metres and `reacts_for` seconds say when
+    `speed` in m/s is the one they like best, `radius` and `height` those of their body in meters. Those of one `group`
+    keep together. `blind_to` is what they take no notice of. `reacts_within` meters and `reacts_for` seconds say when
     a behavior other than regular and impassive begins and how long it lasts.
     """
 

@@ -40,7 +40,7 @@ class MovableObject:
 class DrivableSurface:
     """Something that wheels may roll over: a ramp, a sill, a platform.
 
-    `height` is that of its highest point in m; `uphill` how much it rises for each metre of x and of y, zeros where
+    `height` is that of its highest point in m; `uphill` how much it rises for each meter of x and of y, zeros where
     its top is level.
     """
 

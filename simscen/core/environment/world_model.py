@@ -17,7 +17,7 @@ class World:
 
     `doors` maps a door's name, which is also its body's, to that body's pose when closed and when open. `friction` is
     that of the floor in some of the `regions`, by name; elsewhere it is 1. `bounds` is (min x, min y, max x, max y) in
-    metres. `grid` is set when the world came with an occupancy map of its own (a ROS map). `notes` are warnings of the
+    meters. `grid` is set when the world came with an occupancy map of its own (a ROS map). `notes` are warnings of the
     importer, each a sentence that names file and element.
     """
 
@@ -58,7 +58,7 @@ class Patch:
     until: float = math.inf
 
 
-def disc_outline(centre: tuple[float, float], radius: float) -> Polygon:
+def disc_outline(center: tuple[float, float], radius: float) -> Polygon:
     """The outline of a round patch."""
     turns = [2 * math.pi * k / DISC_CORNERS for k in range(DISC_CORNERS)]
-    return tuple((centre[0] + radius * math.cos(turn), centre[1] + radius * math.sin(turn)) for turn in turns)
+    return tuple((center[0] + radius * math.cos(turn), center[1] + radius * math.sin(turn)) for turn in turns)

@@ -21,7 +21,7 @@ WheelValues = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class MecanumWheels:
-    """Wheels of `radius`, `half_base` before and behind and `half_track` beside the middle, all in metres.
+    """Wheels of `radius`, `half_base` before and behind and `half_track` beside the middle, all in meters.
 
     `slant` is the cotangent of the angle between a roller and its wheel's axle: 1 for 45 degrees. Seen from above the
     rollers on top point to the middle (those on the ground make an O). Taheri, Qiao and Ghaeminezhad, Kinematic Model
@@ -36,7 +36,7 @@ class MecanumWheels:
 
     @property
     def lever(self) -> float:
-        """Metres that a wheel rolls for each radian that the base turns."""
+        """Meters that a wheel rolls for each radian that the base turns."""
         return self.half_track + self.slant * self.half_base
 
     def speeds(self, motion: Twist) -> WheelValues:

@@ -70,7 +70,7 @@ class FaceTiles:
         return self.faces[self.starts[number] : self.starts[number + 1]]
 
     def near(self, x: float, y: float, within: float) -> npt.NDArray[np.bool_]:
-        """Which lots may have anything within so many metres of a place."""
+        """Which lots may have anything within so many meters of a place."""
         place = (x, y)
         outside = np.maximum(np.maximum(self.low - place, place - self.high), 0.0)
         found: npt.NDArray[np.bool_] = (outside * outside).sum(axis=1) <= within * within
@@ -78,7 +78,7 @@ class FaceTiles:
 
 
 def tile_faces(vertices: Array, faces: Faces, edge: float) -> FaceTiles:
-    """Faces by the square with an edge of so many metres that their middle lies in."""
+    """Faces by the square with an edge of so many meters that their middle lies in."""
     corners = vertices[faces, :2]
     squares = np.floor(corners.mean(axis=1) / edge)
     order = np.lexsort((squares[:, 1], squares[:, 0]))

@@ -97,18 +97,18 @@ class PathSegment(NamedTuple):
 
 
 def top_speed(path: MotionPath, reach: float = 0.0) -> float:
-    """A speed in m/s that nothing within `reach` metres of its origin ever exceeds; inf where it jumps.
+    """A speed in m/s that nothing within `reach` meters of its origin ever exceeds; inf where it jumps.
 
     It is the fastest that something eased or even ever moves, and no less for a spline.
     """
     speeds = [_speed(path, leg, reach) for leg in range(len(path.times) - 1)]
-    if path.mode == "loop" and _metres(_step(path.poses[-1], path.poses[0]), reach) > 0:
+    if path.mode == "loop" and _meters(_step(path.poses[-1], path.poses[0]), reach) > 0:
         return math.inf
     return max(speeds, default=0.0)
 
 
 class SweptSegment(NamedTuple):
-    """Straight from one place to another in the plane, but for what it may stray from that, all in metres."""
+    """Straight from one place to another in the plane, but for what it may stray from that, all in meters."""
 
     x: float
     y: float
@@ -131,7 +131,7 @@ def _strays(path: MotionPath, leg: int) -> float:
     if path.ease != "spline":
         return 0.0
     third = (path.times[leg + 1] - path.times[leg]) / 3
-    return third * max(_metres(_velocity(path, k), 0.0) for k in (leg, leg + 1))
+    return third * max(_meters(_velocity(path, k), 0.0) for k in (leg, leg + 1))
 
 
 def _speed(path: MotionPath, leg: int, reach: float) -> float:
@@ -140,11 +140,11 @@ def _speed(path: MotionPath, leg: int, reach: float) -> float:
         # The velocity along a cubic curve is a quadratic Bézier curve, which lies within its control points.
         before, after = _velocity(path, leg), _velocity(path, leg + 1)
         middle = [3.0 * way / seconds - a - b for way, a, b in zip(step, before, after, strict=True)]
-        return max(_metres(velocity, reach) for velocity in (before, (middle[0], middle[1], middle[2]), after))
-    metres = _metres(step, reach)
-    if metres == 0:
+        return max(_meters(velocity, reach) for velocity in (before, (middle[0], middle[1], middle[2]), after))
+    meters = _meters(step, reach)
+    if meters == 0:
         return 0.0
-    return metres / seconds * (SMOOTH_PEAK_SPEED_RATIO if path.ease == "smooth" else 1.0) if seconds > 0 else math.inf
+    return meters / seconds * (SMOOTH_PEAK_SPEED_RATIO if path.ease == "smooth" else 1.0) if seconds > 0 else math.inf
 
 
 def _on_curve(path: MotionPath, leg: int, part: float) -> Pose2:
@@ -180,7 +180,7 @@ def _step(begin: Pose2, end: Pose2) -> Step:
     return end.x - begin.x, end.y - begin.y, wrap(end.yaw - begin.yaw)
 
 
-def _metres(step: Step, reach: float) -> float:
+def _meters(step: Step, reach: float) -> float:
     return math.hypot(step[0], step[1]) + reach * abs(step[2])
 
 

@@ -13,7 +13,7 @@ MIN_WIDTH_M = 1e-6
 
 
 def distance_to_polygon(point: Pose2, corners: Sequence[tuple[float, float]]) -> float:
-    """Distance in metres from a point to a filled polygon; 0 inside."""
+    """Distance in meters from a point to a filled polygon; 0 inside."""
     edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
     if polygon_contains(corners, (point.x, point.y)):
         return 0.0
@@ -21,7 +21,7 @@ def distance_to_polygon(point: Pose2, corners: Sequence[tuple[float, float]]) ->
 
 
 def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
-    """Metres from the border of a polygon for a place in it; negative outside."""
+    """Meters from the border of a polygon for a place in it; negative outside."""
     if not polygon_contains(corners, (pose.x, pose.y)):
         return -1.0
     return min(
@@ -95,7 +95,7 @@ def _lies_between(a: Corner, b: Corner, point: Corner) -> bool:
 
 
 def distance_to_segment(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> float:
-    """Distance in metres from (x, y) to the segment from a to b."""
+    """Distance in meters from (x, y) to the segment from a to b."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     squared = dx * dx + dy * dy
     along = ((x - a[0]) * dx + (y - a[1]) * dy) / squared if squared else 0.0

@@ -1,4 +1,4 @@
-"""Poses and rigid motions in the plane and in space. Metres and radians; frames as in ROS REP 103."""
+"""Poses and rigid motions in the plane and in space. Meters and radians; frames as in ROS REP 103."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Pose2(NamedTuple):
         return moved
 
     def distance(self, other: Pose2) -> float:
-        """Distance between the two positions in metres; headings do not count."""
+        """Distance between the two positions in meters; headings do not count."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
 
@@ -128,7 +128,7 @@ class Pose3(NamedTuple):
 
     @property
     def position(self) -> tuple[float, float, float]:
-        """(x, y, z) in metres."""
+        """(x, y, z) in meters."""
         return self.x, self.y, self.z
 
     @property

@@ -133,9 +133,9 @@ class RayCaster(Protocol):
 
     @abstractmethod
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """Distances (n,) in metres along unit `directions` (n, 3) from `origins` (n, 3).
+        """Distances (n,) in meters along unit `directions` (n, 3) from `origins` (n, 3).
 
-        inf where nothing is hit within `reach` metres; who needs to know no more is answered sooner.
+        inf where nothing is hit within `reach` meters; who needs to know no more is answered sooner.
 
         *Given* the same geometry *then* the same distances, bit for bit, whatever was asked before.
         """

@@ -25,7 +25,7 @@ class PredictedPoses:
         return PosesAtTick(self, self.ticks.index(tick)) if tick in self.ticks else None
 
     def far(self, place: Vector, distance: float) -> set[str]:
-        """Those in the table that are never within a distance in metres of a place."""
+        """Those in the table that are never within a distance in meters of a place."""
         ways = self.table[:, :, :3] - place
         nearest = (ways * ways).sum(axis=2).min(axis=0)
         return {name for name, far in zip(self.names, (nearest > distance * distance).tolist(), strict=True) if far}

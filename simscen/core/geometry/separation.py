@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) -> Array:
-    """Signed distance (n,) in metres between `moving`, carried along `poses` (n, 3), and `fixed`, both filled.
+    """Signed distance (n,) in meters between `moving`, carried along `poses` (n, 3), and `fixed`, both filled.
 
     Apart it is the distance of their nearest points. Overlapping it is negative by the shortest way on which `moving`
     would get clear of `fixed`; where one is not convex, of those two of their convex pieces that are deepest in each

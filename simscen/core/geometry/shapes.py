@@ -1,7 +1,7 @@
 """Solids in space: one list of them feeds physics, rays and map alike.
 
-Every shape is given about its own origin: boxes, cylinders, capsules and cones are centred, their axis is z.
-Sizes are in metres.
+Every shape is given about its own origin: boxes, cylinders, capsules and cones are centered, their axis is z.
+Sizes are in meters.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Extrusion:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles as they are, concave ones too: `vertices` (n, 3) in metres, `faces` (m, 3) anticlockwise."""
+    """Triangles as they are, concave ones too: `vertices` (n, 3) in meters, `faces` (m, 3) anticlockwise."""
 
     vertices: Array
     faces: npt.NDArray[np.int32]

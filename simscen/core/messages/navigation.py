@@ -12,7 +12,7 @@ from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array, Pose2
 
 RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup", "retrace"]
-"""The behaviours of a recovery, with Nav2's names."""
+"""The behaviors of a recovery, with Nav2's names."""
 
 ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recovery", "rate"]
 """Why a plan is made anew while its goal stays: it is blocked, the robot has left it, an obstacle came too near to it,
@@ -99,5 +99,5 @@ class Path:
     tick: int = 0
 
     def length(self) -> float:
-        """Length in metres."""
+        """Length in meters."""
         return float(np.hypot(*np.diff(self.points[:, :2], axis=0).T).sum()) if len(self.points) > 1 else 0.0

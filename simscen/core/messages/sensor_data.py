@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class Scan:
     """A planar lidar scan.
 
-    `ranges` (n,) in metres; inf where nothing was hit up to `range_max`, nan where the beam gave no answer. Beam k
+    `ranges` (n,) in meters; inf where nothing was hit up to `range_max`, nan where the beam gave no answer. Beam k
     points at `angle_min + k * angle_increment` in the lidar's frame, which is at `mount` in the robot's base frame.
     """
 
@@ -74,7 +74,7 @@ class Bump:
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """A camera frame: `rgb` (h, w, 3) uint8, `depth` (h, w) in metres along the optical axis, inf where nothing is.
+    """A camera frame: `rgb` (h, w, 3) uint8, `depth` (h, w) in meters along the optical axis, inf where nothing is.
 
     The camera sits at `mount` in the robot's base frame and looks along its x axis; `field_of_view` is horizontal, in
     rad, of square pixels. 0 where nobody has said how it sees.

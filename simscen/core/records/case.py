@@ -27,7 +27,7 @@ class Passage:
 
     @property
     def width(self) -> float:
-        """Metres from solid to solid."""
+        """Meters from solid to solid."""
         return math.dist(*self.ends)
 
     @property
@@ -45,18 +45,18 @@ class Passage:
 
 
 CLEARANCE_RANGE = 2.0
-"""Metres around the robot's hull in which clearance is always measured."""
+"""Meters around the robot's hull in which clearance is always measured."""
 
 
 @dataclass(frozen=True)
 class Case:
     """The parts of a scenario that judging needs; travels in the log, so that a log alone can be judged.
 
-    `shortest` maps a goal's name to the length in metres of the shortest way that a disc of the robot's inscribed
+    `shortest` maps a goal's name to the length in meters of the shortest way that a disc of the robot's inscribed
     radius has from the goal before it (the start for the first) through the static world; inf when there is none.
     `sent` are the goals that events may send on the way.
     `expected` maps the name of a goal at which the robot is to fail to how: "failed", or the name of an error code.
-    `clearance_range` is how far around the hull clearance was searched, in metres: a clearance that is not below it was
+    `clearance_range` is how far around the hull clearance was searched, in meters: a clearance that is not below it was
     cut off, and is at least that.
     `passages` are what these ways lead through, goal by goal, each in the direction of its way.
     `disturbances` are what has to happen: the scenario's events, then its faults.

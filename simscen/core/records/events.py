@@ -18,8 +18,8 @@ class EventKind(str, Enum):
     NAVIGATION_ENDED = "navigation.ended"  # result; error_code, error_name
     PLAN_MADE = "plan.made"  # goal; reason (goal, blocked, …), length
     PLAN_FAILED = "plan.failed"  # error_code, error_name, message
-    RECOVERY_STARTED = "recovery.started"  # behaviour: clear_costmap, spin, wait, …; error_code, error_name
-    RECOVERY_ENDED = "recovery.ended"  # behaviour; outcome
+    RECOVERY_STARTED = "recovery.started"  # behavior: clear_costmap, spin, wait, …; error_code, error_name
+    RECOVERY_ENDED = "recovery.ended"  # behavior; outcome
     ROBOT_HELD = "robot.held"  # what it waits for: collision_monitor, planner, controller; message: why
     ROBOT_RELEASED = "robot.released"  # what it waited for
     COLLISION_STARTED = "collision.started"  # what was hit; x, y, impulse (N s), speed (m/s), robot_part

@@ -33,7 +33,7 @@ else:
 class Truth(NamedTuple):
     """The robot as it really is: `pose` of its base in the world, `twist` in its own frame.
 
-    `clearance` is the distance in metres from the robot's hull to the nearest obstacle surface (negative when they
+    `clearance` is the distance in meters from the robot's hull to the nearest obstacle surface (negative when they
     overlap, at most the range that was searched). `objects` are the poses of things that move.
     """
 

@@ -77,7 +77,7 @@ class Condition(Spec):
     @classmethod
     def _of_the_signals_dimension(cls, value: Any, info: ValidationInfo) -> Any:
         name = info.data.get("signal")
-        dimension = SIGNALS[name].dimension if name else _dimension_of(value)  # a misspelt signal is one mistake
+        dimension = SIGNALS[name].dimension if name else _dimension_of(value)  # a misspelled signal is one mistake
         return Quantity(dimension).parse(value) if dimension in UNITS else value
 
     @model_validator(mode="after")

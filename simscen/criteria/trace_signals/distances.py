@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 
 _TINY = sys.float_info.min
-"""Square metres; stands for the square of a step of no length, to divide by."""
+"""Square meters; stands for the square of a step of no length, to divide by."""
 
 
 def distance_to(query: SignalQuery) -> Array:
-    """From the centre of the robot to a point, to a goal of the scenario, or to the origin of a thing that moves."""
+    """From the center of the robot to a point, to a goal of the scenario, or to the origin of a thing that moves."""
     poses, point, goal = poses_of(query.trace), query.arguments.get("point"), query.arguments.get("goal")
     if isinstance(point, Sequence):
         return np.hypot(poses[:, 0] - float(point[0]), poses[:, 1] - float(point[1]))
@@ -143,7 +143,7 @@ INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M = 0.45, 1.2, 3.6
 
 
 def pedestrian_radii(trace: Trace) -> dict[str, float]:
-    """Everybody who ever was there, by name, and the radius of their body in metres."""
+    """Everybody who ever was there, by name, and the radius of their body in meters."""
     found: dict[str, float] = {}
     for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
         size = event.data.get("size")
@@ -153,7 +153,7 @@ def pedestrian_radii(trace: Trace) -> dict[str, float]:
 
 
 def pedestrian_gap(trace: Trace, case: Case) -> Array:
-    """Metres between the robot's hull and the nearest person at each truth sample; inf while nobody is there.
+    """Meters between the robot's hull and the nearest person at each truth sample; inf while nobody is there.
 
     Of a robot without a footprint its inscribed circle is the hull. Raises Unavailable where nobody ever was there.
     """

@@ -22,7 +22,7 @@ else:
     Flags = object  # annotations are not evaluated; commands that only read files need no numpy
 
 MIN_MOVE_M = 0.01
-"""Metres; shorter moves are the trembling of a body at rest and are not driven (METRICS: path_length)."""
+"""Meters; shorter moves are the trembling of a body at rest and are not driven (METRICS: path_length)."""
 
 BELIEF_TIMEOUT_S = 1.0
 """Seconds; how long a pose estimate may be relied on (AMCL's transform_tolerance)."""
@@ -85,18 +85,18 @@ def turn_rate(trace: Trace) -> Samples:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """The driven way: corner k was left behind at `ticks[k]` after `travelled[k]` metres."""
+    """The driven way: corner k was left behind at `ticks[k]` after `travelled[k]` meters."""
 
     ticks: Ticks
     travelled: Array
 
     @property
     def length(self) -> float:
-        """Metres in all."""
+        """Meters in all."""
         return float(self.travelled[-1]) if len(self.travelled) else 0.0
 
     def until(self, tick: int) -> float:
-        """Metres driven up to `tick`."""
+        """Meters driven up to `tick`."""
         driven = self.travelled[self.ticks <= tick]
         return float(driven[-1]) if len(driven) else 0.0
 
@@ -104,7 +104,7 @@ class Drive:
 def drive(trace: Trace) -> Drive:
     """The way the robot drove: in the plane, in moves of at least SMALLEST_MOVE; being set down elsewhere is no drive.
 
-    Yaw must not enter the norm (as it does in Arena's get_metrics.py, which so adds radians to metres).
+    Yaw must not enter the norm (as it does in Arena's get_metrics.py, which so adds radians to meters).
     """
     poses, carried = truth(trace), set(teleport_samples(trace))
     kept, lengths = [0], [0.0]

@@ -1,4 +1,4 @@
-"""Normalised estimation error squared: how large the error of a belief is, measured by its own covariance."""
+"""Normalized estimation error squared: how large the error of a belief is, measured by its own covariance."""
 
 from __future__ import annotations
 

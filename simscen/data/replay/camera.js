@@ -1,8 +1,8 @@
-// Which part of the plane a map shows: metres, y up, to pixels, y down.
+// Which part of the plane a map shows: meters, y up, to pixels, y down.
 
 export const NEAREST = 2000, FURTHEST = 0.5;
 
-/** Looks at (x, y) in the middle, at `scale` pixels a metre. */
+/** Looks at (x, y) in the middle, at `scale` pixels a meter. */
 export class Camera {
   constructor(x = 0, y = 0, scale = 40) {
     this.x = x;

@@ -33,12 +33,12 @@ export class Deck {
     return this.axis.clientWidth;
   }
 
-  /** Draw everything anew: after a change of size, stretch, colours or selection. */
-  layOut(colours, selected) {
-    this.colours = colours;
+  /** Draw everything anew: after a change of size, stretch, colors or selection. */
+  layOut(colors, selected) {
+    this.colors = colors;
     const { width } = this;
     this.lanes.layOut(this.from, this.to, width, selected);
-    for (const strip of this.strips.values()) strip.draw(this.from, this.to, width, colours);
+    for (const strip of this.strips.values()) strip.draw(this.from, this.to, width, colors);
     const step = roundSeconds((this.to - this.from) / Math.max(2, width / 90)), marks = [];
     for (let k = Math.ceil(this.from / step - 1e-9); k * step <= this.to + 1e-9; k++) {
       const share = (k * step - this.from) / (this.to - this.from), mark = el("span", {}, `${Number((k * step).toFixed(2))} s`);

@@ -1,40 +1,40 @@
-// A run at a tick, drawn on a canvas in metres.
+// A run at a tick, drawn on a canvas in meters.
 import { roundLength } from "./camera.js";
 import { layerOf } from "./layers.js";
 
 const UNKNOWN_RADIUS = 0.2;
 const images = new WeakMap();
 
-/** Draw all that is wanted. `view` has context, width, height (CSS pixels), camera, colours, layers and marked. */
+/** Draw all that is wanted. `view` has context, width, height (CSS pixels), camera, colors, layers and marked. */
 export function drawRun(view, run, tick) {
-  const { context: c, width, height, colours } = view;
-  c.fillStyle = colours.unknown;
+  const { context: c, width, height, colors } = view;
+  c.fillStyle = colors.unknown;
   c.fillRect(0, 0, width, height);
-  if (view.layers.has("map")) for (const robot of run.robots.slice(0, 1)) if (robot.map) drawGrid(view, robot.map, run.column, mapColour(colours));
+  if (view.layers.has("map")) for (const robot of run.robots.slice(0, 1)) if (robot.map) drawGrid(view, robot.map, run.column, mapColor(colors));
   drawLines(view);
   for (const robot of run.robots) drawCostmaps(view, robot, run, tick);
   if (view.layers.has("zones")) drawZones(view, run, tick);
   for (const robot of run.robots) {
-    if (view.layers.has("plan")) drawPath(view, robot.planAt(tick), colours.plan, 3);
+    if (view.layers.has("plan")) drawPath(view, robot.planAt(tick), colors.plan, 3);
     if (view.layers.has("goals")) drawGoals(view, robot, robot.goalAt(tick));
   }
   if (view.layers.has("things")) for (const thing of run.thingsAt(tick)) drawThing(view, thing);
   drawMarks(view, run, tick);
   run.robots.forEach((robot, number) => drawRobot(view, robot, number, tick, run));
-  if (view.marked) ring(view, view.marked, colours.select, 0.35 * view.camera.scale + 8);
+  if (view.marked) ring(view, view.marked, colors.select, 0.35 * view.camera.scale + 8);
   drawScale(view);
 }
 
 function drawRobot(view, robot, number, tick, run) {
-  const { colours, layers } = view, colour = number ? colours.other : colours.truth;
+  const { colors, layers } = view, color = number ? colors.other : colors.truth;
   const believed = robot.beliefAt(tick), true_ = robot.truthAt(tick);
-  if (layers.has("truth")) drawTrail(view, robot, tick, colour);
+  if (layers.has("truth")) drawTrail(view, robot, tick, color);
   if (layers.has("belief")) drawParticles(view, robot.particlesAt(tick));
-  if (layers.has("scan")) for (const points of robot.scansAt(tick)) drawPoints(view, points, colours.scan);
-  if (layers.has("local")) drawPath(view, robot.localAt(tick), colours.local, 2.5);
-  if (layers.has("truth") && true_) drawHull(view, robot, true_, colour, true);
+  if (layers.has("scan")) for (const points of robot.scansAt(tick)) drawPoints(view, points, colors.scan);
+  if (layers.has("local")) drawPath(view, robot.localAt(tick), colors.local, 2.5);
+  if (layers.has("truth") && true_) drawHull(view, robot, true_, color, true);
   if (layers.has("belief") && believed) drawBelief(view, robot, believed);
-  if (run.robots.length > 1 && true_) label(view, robot.name, true_.x, true_.y, colour, 22);
+  if (run.robots.length > 1 && true_) label(view, robot.name, true_.x, true_.y, color, 22);
 }
 
 /** Follow the points of a polygon in the frame of a pose. */
@@ -49,21 +49,21 @@ function spot(view, x, y) {
   return view.camera.pixel(x, y, view.width, view.height);
 }
 
-function mapColour(colours) {
-  const [free, wall, unknown] = [colours.free, colours.wall, colours.unknown].map(rgb);
+function mapColor(colors) {
+  const [free, wall, unknown] = [colors.free, colors.wall, colors.unknown].map(rgb);
   return (value) => (value < 0 ? [...unknown, 255] : [...free.map((part, k) => part + (wall[k] - part) * Math.min(value, 100) / 100), 255]);
 }
 
-function costColour(colours) {
-  const [low, high] = [rgb(colours.belief), rgb(colours.bad)];
+function costColor(colors) {
+  const [low, high] = [rgb(colors.belief), rgb(colors.bad)];
   return (value) => (value <= 0 ? [0, 0, 0, 0] : [...low.map((part, k) => part + (high[k] - part) * value / 100), 60 + value]);
 }
 
-function drawGrid(view, grid, column, colour, cells = null) {
+function drawGrid(view, grid, column, color, cells = null) {
   const { context: c, camera } = view;
   let image = images.get(grid);
   if (!image || image.theme !== view.theme) {
-    image = { theme: view.theme, canvas: painted(grid, cells ?? column(grid.cells), colour) };
+    image = { theme: view.theme, canvas: painted(grid, cells ?? column(grid.cells), color) };
     images.set(grid, image);
   }
   const [u, v] = spot(view, grid.origin[0], grid.origin[1]), size = grid.resolution * camera.scale;
@@ -76,13 +76,13 @@ function drawGrid(view, grid, column, colour, cells = null) {
   c.restore();
 }
 
-function painted(grid, cells, colour) {
+function painted(grid, cells, color) {
   const canvas = document.createElement("canvas");
   canvas.width = grid.width;
   canvas.height = grid.height;
   const context = canvas.getContext("2d"), image = context.createImageData(grid.width, grid.height), known = new Map();
   cells.forEach((value, k) => {
-    if (!known.has(value)) known.set(value, colour(value));
+    if (!known.has(value)) known.set(value, color(value));
     image.data.set(known.get(value), 4 * k);
   });
   context.putImageData(image, 0, 0);
@@ -96,10 +96,10 @@ function rgb(text) {
 
 /** Lines a round length apart, with their coordinates at the edges. */
 function drawLines(view) {
-  const { context: c, camera, width, height, colours } = view, step = roundLength(camera.scale, 130);
+  const { context: c, camera, width, height, colors } = view, step = roundLength(camera.scale, 130);
   const [x0, y1] = camera.point(0, 0, width, height), [x1, y0] = camera.point(width, height, width, height);
-  c.strokeStyle = colours.rule;
-  c.fillStyle = colours.faint;
+  c.strokeStyle = colors.rule;
+  c.fillStyle = colors.faint;
   c.lineWidth = 1;
   c.font = "10px system-ui, sans-serif";
   c.globalAlpha = 0.4;
@@ -119,35 +119,35 @@ function drawLines(view) {
   c.globalAlpha = 1;
   c.textAlign = "center";
   c.textBaseline = "top";
-  for (let k = Math.ceil(x0 / step); k * step <= x1; k++) halo(view, (k * step).toFixed(digits), spot(view, k * step, 0)[0], 3, colours.faint);
+  for (let k = Math.ceil(x0 / step); k * step <= x1; k++) halo(view, (k * step).toFixed(digits), spot(view, k * step, 0)[0], 3, colors.faint);
   c.textAlign = "left";
   c.textBaseline = "middle";
-  for (let k = Math.ceil(y0 / step); k * step <= y1; k++) halo(view, (k * step).toFixed(digits), 4, spot(view, 0, k * step)[1], colours.faint);
+  for (let k = Math.ceil(y0 / step); k * step <= y1; k++) halo(view, (k * step).toFixed(digits), 4, spot(view, 0, k * step)[1], colors.faint);
 }
 
-function halo(view, text, u, v, colour) {
-  const { context: c, colours } = view;
+function halo(view, text, u, v, color) {
+  const { context: c, colors } = view;
   c.lineWidth = 3;
   c.lineJoin = "round";
-  c.strokeStyle = colours.free;
+  c.strokeStyle = colors.free;
   c.strokeText(text, u, v);
-  c.fillStyle = colour;
+  c.fillStyle = color;
   c.fillText(text, u, v);
 }
 
-function label(view, text, x, y, colour, down = 0) {
+function label(view, text, x, y, color, down = 0) {
   const { context: c } = view, [u, v] = spot(view, x, y);
   c.font = "600 12px system-ui, sans-serif";
   c.textAlign = "center";
   c.textBaseline = "middle";
-  halo(view, text, u, v + down, colour);
+  halo(view, text, u, v + down, color);
 }
 
 function drawCostmaps(view, robot, run, tick) {
   for (const costmap of robot.costmaps) {
     const grid = view.layers.has(layerOf(costmap)) && costmapAt(costmap, run, tick);
     if (!grid) continue;
-    drawGrid(view, grid, run.column, costColour(view.colours), grid.whole);
+    drawGrid(view, grid, run.column, costColor(view.colors), grid.whole);
     if (layerOf(costmap) === "near") drawEdge(view, grid);
   }
 }
@@ -156,7 +156,7 @@ function drawCostmaps(view, robot, run, tick) {
 function drawEdge(view, { origin: [x, y, yaw], width, height, resolution }) {
   const { context: c } = view, [across, along] = [width * resolution, height * resolution];
   outline(view, [[0, 0], [across, 0], [across, along], [0, along]], { x, y, yaw });
-  c.strokeStyle = view.colours.belief;
+  c.strokeStyle = view.colors.belief;
   c.lineWidth = 1;
   c.stroke();
 }
@@ -179,55 +179,55 @@ function costmapAt(costmap, run, tick) {
 
 /** Ramps and floors, then the zones in force; what only some of the time is a zone is not drawn otherwise. */
 function drawZones(view, run, tick) {
-  const { colours } = view;
-  for (const ground of run.scenery.ground) drawArea(view, ground.outline, colours.ground, "");
-  for (const floor of run.scenery.floors) drawArea(view, floor.outline, colours.thing, `friction ${floor.friction}`);
+  const { colors } = view;
+  for (const ground of run.scenery.ground) drawArea(view, ground.outline, colors.ground, "");
+  for (const floor of run.scenery.floors) drawArea(view, floor.outline, colors.thing, `friction ${floor.friction}`);
   for (const zone of run.zonesAt(tick)) {
-    const colour = zone.filter === "keepout" ? colours.bad : colours.zone, said = zone.filter === "keepout" ? "keep out" : `${zone.limit} m/s`;
-    if (zone.mask) for (const block of zone.mask.blocks) drawHatched(view, boxOf(zone.mask, block), colour, "");
-    else if (run.regions[zone.region]) drawHatched(view, run.regions[zone.region], colour, `${said}: ${zone.region}`);
+    const color = zone.filter === "keepout" ? colors.bad : colors.zone, said = zone.filter === "keepout" ? "keep out" : `${zone.limit} m/s`;
+    if (zone.mask) for (const block of zone.mask.blocks) drawHatched(view, boxOf(zone.mask, block), color, "");
+    else if (run.regions[zone.region]) drawHatched(view, run.regions[zone.region], color, `${said}: ${zone.region}`);
   }
 }
 
 const STILL = { x: 0, y: 0, yaw: 0 };
 
-function drawArea(view, points, colour, said) {
+function drawArea(view, points, color, said) {
   const { context: c } = view;
   outline(view, points, STILL);
-  c.fillStyle = colour;
+  c.fillStyle = color;
   c.globalAlpha = 0.18;
   c.fill();
   c.globalAlpha = 0.7;
-  c.strokeStyle = colour;
+  c.strokeStyle = color;
   c.lineWidth = 1;
   c.stroke();
   c.globalAlpha = 1;
-  if (said) label(view, said, ...middle(points), colour);
+  if (said) label(view, said, ...middle(points), color);
 }
 
-function drawHatched(view, points, colour, said) {
+function drawHatched(view, points, color, said) {
   const { context: c } = view;
   outline(view, points, STILL);
   c.save();
   c.clip();
-  hatch(view, points, colour);
+  hatch(view, points, color);
   c.restore();
   outline(view, points, STILL);
-  c.strokeStyle = colour;
+  c.strokeStyle = color;
   c.lineWidth = 1.5;
   c.setLineDash([6, 4]);
   c.stroke();
   c.setLineDash([]);
-  if (said) corner(view, said, points, colour);
+  if (said) corner(view, said, points, color);
 }
 
 /** A name inside the upper left of an area: its middle is where things happen. */
-function corner(view, text, points, colour) {
+function corner(view, text, points, color) {
   const { context: c } = view, [u, v] = spot(view, Math.min(...points.map((p) => p[0])), Math.max(...points.map((p) => p[1])));
   c.font = "600 11px system-ui, sans-serif";
   c.textAlign = "left";
   c.textBaseline = "top";
-  halo(view, text, Math.max(u, 0) + 6, Math.max(v, 16) + 5, colour);
+  halo(view, text, Math.max(u, 0) + 6, Math.max(v, 16) + 5, color);
 }
 
 function boxOf({ origin: [ox, oy, yaw], resolution }, [column, row, width, height]) {
@@ -236,12 +236,12 @@ function boxOf({ origin: [ox, oy, yaw], resolution }, [column, row, width, heigh
   return corners.map(([x, y]) => [ox + c * x - s * y, oy + s * x + c * y]);
 }
 
-function hatch(view, points, colour) {
+function hatch(view, points, color) {
   const { context: c } = view, pixels = points.map(([x, y]) => spot(view, x, y));
   const us = pixels.map(([u]) => u), vs = pixels.map(([, v]) => v);
   const [u0, u1] = [Math.max(Math.min(...us), 0), Math.min(Math.max(...us), view.width)];
   const [v0, v1] = [Math.max(Math.min(...vs), 0), Math.min(Math.max(...vs), view.height)];
-  c.strokeStyle = colour;
+  c.strokeStyle = color;
   c.globalAlpha = 0.35;
   c.lineWidth = 1;
   c.beginPath();
@@ -257,29 +257,29 @@ function middle(points) {
   return [0, 1].map((axis) => (Math.min(...points.map((p) => p[axis])) + Math.max(...points.map((p) => p[axis]))) / 2);
 }
 
-function drawPath(view, path, colour, width) {
+function drawPath(view, path, color, width) {
   if (!path || path.x.length < 2) return;
   const { context: c } = view;
   c.beginPath();
   path.x.forEach((x, k) => c.lineTo(...spot(view, x, path.y[k])));
-  c.strokeStyle = colour;
+  c.strokeStyle = color;
   c.lineWidth = width;
   c.lineJoin = "round";
   c.stroke();
 }
 
 function drawGoals(view, robot, active) {
-  const { context: c, camera, colours } = view, told = new Map();
+  const { context: c, camera, colors } = view, told = new Map();
   for (const goal of robot.goals) {
     const [x, y, yaw] = goal.pose, [u, v] = spot(view, x, y), now = active?.name === goal.name || active?.name.startsWith(`${goal.name}#`);
     const reach = Math.max(goal.xy * camera.scale, 5);
     c.beginPath();
     c.arc(u, v, reach, 0, 2 * Math.PI);
-    c.fillStyle = colours.goal;
+    c.fillStyle = colors.goal;
     c.globalAlpha = now ? 0.3 : 0.1;
     c.fill();
     c.globalAlpha = 1;
-    c.strokeStyle = colours.goal;
+    c.strokeStyle = colors.goal;
     c.lineWidth = now ? 2.5 : 1.2;
     c.stroke();
     if (!goal.via) {
@@ -290,44 +290,44 @@ function drawGoals(view, robot, active) {
     }
     const key = `${x} ${y}`;
     told.set(key, [...(told.get(key) ?? []), goal.name]);
-    if (told.get(key).length === 1) label(view, goal.name, x, y, colours.goal, -reach - 10);
+    if (told.get(key).length === 1) label(view, goal.name, x, y, colors.goal, -reach - 10);
   }
 }
 
 function drawThing(view, thing) {
-  const { context: c, colours } = view, colour = thing.person ? colours.person : colours.thing;
+  const { context: c, colors } = view, color = thing.person ? colors.person : colors.thing;
   const parts = thing.parts?.length ? thing.parts : [circle(UNKNOWN_RADIUS)];
   for (const part of parts) {
     outline(view, part, thing.pose);
     c.globalAlpha = 0.4;
-    c.fillStyle = colour;
+    c.fillStyle = color;
     c.fill();
     c.globalAlpha = 1;
-    c.strokeStyle = colour;
+    c.strokeStyle = color;
     c.lineWidth = 1.5;
     c.stroke();
   }
-  if (thing.person) drawHeading(view, thing.pose, colour, 0.3);
-  nameThing(view, thing, parts, colour);
+  if (thing.person) drawHeading(view, thing.pose, color, 0.3);
+  nameThing(view, thing, parts, color);
 }
 
 /** Its name above it; small and quiet where it belongs to the world, as doors do. */
-function nameThing(view, thing, parts, colour) {
-  const { context: c, colours } = view, cos = Math.cos(thing.pose.yaw), sin = Math.sin(thing.pose.yaw);
+function nameThing(view, thing, parts, color) {
+  const { context: c, colors } = view, cos = Math.cos(thing.pose.yaw), sin = Math.sin(thing.pose.yaw);
   const corners = parts.flat().map(([x, y]) => spot(view, thing.pose.x + cos * x - sin * y, thing.pose.y + sin * x + cos * y));
   const us = corners.map(([u]) => u);
   c.font = thing.brought ? "600 12px system-ui, sans-serif" : "10px system-ui, sans-serif";
   c.textAlign = "center";
   c.textBaseline = "bottom";
-  halo(view, thing.name, (Math.min(...us) + Math.max(...us)) / 2, Math.min(...corners.map(([, v]) => v)) - 4, thing.brought ? colour : colours.faint);
+  halo(view, thing.name, (Math.min(...us) + Math.max(...us)) / 2, Math.min(...corners.map(([, v]) => v)) - 4, thing.brought ? color : colors.faint);
 }
 
-function drawHeading(view, pose, colour, length) {
+function drawHeading(view, pose, color, length) {
   const { context: c } = view;
   c.beginPath();
   c.moveTo(...spot(view, pose.x, pose.y));
   c.lineTo(...spot(view, pose.x + length * Math.cos(pose.yaw), pose.y + length * Math.sin(pose.yaw)));
-  c.strokeStyle = colour;
+  c.strokeStyle = color;
   c.lineWidth = 2;
   c.stroke();
 }
@@ -337,7 +337,7 @@ function circle(radius) {
 }
 
 /** The way it truly drove: what is over strong, what is to come faint. */
-function drawTrail(view, robot, tick, colour) {
+function drawTrail(view, robot, tick, color) {
   const { context: c } = view, { ticks, x, y } = robot.truth;
   for (const past of [false, true]) {
     c.beginPath();
@@ -347,7 +347,7 @@ function drawTrail(view, robot, tick, colour) {
       if (k && !jumped) c.lineTo(...spot(view, x[k], y[k]));
       else c.moveTo(...spot(view, x[k], y[k]));
     }
-    c.strokeStyle = colour;
+    c.strokeStyle = color;
     c.globalAlpha = past ? 0.85 : 0.22;
     c.lineWidth = past ? 1.8 : 1.5;
     c.setLineDash(past ? [] : [2, 4]);
@@ -357,42 +357,42 @@ function drawTrail(view, robot, tick, colour) {
   c.globalAlpha = 1;
 }
 
-function drawHull(view, robot, pose, colour, solid) {
-  const { context: c, colours } = view, hull = robot.footprint.length > 2 ? robot.footprint : circle(UNKNOWN_RADIUS);
+function drawHull(view, robot, pose, color, solid) {
+  const { context: c, colors } = view, hull = robot.footprint.length > 2 ? robot.footprint : circle(UNKNOWN_RADIUS);
   outline(view, hull, pose);
-  c.fillStyle = colour;
+  c.fillStyle = color;
   c.globalAlpha = solid ? 0.85 : 0.12;
   c.fill();
   c.globalAlpha = 1;
-  c.strokeStyle = solid ? colours.free : colour;
+  c.strokeStyle = solid ? colors.free : color;
   c.lineWidth = solid ? 1.5 : 2;
   c.setLineDash(solid ? [] : [5, 3]);
   c.stroke();
   c.setLineDash([]);
   const nose = Math.max(...hull.map(([x]) => x)), side = Math.max(...hull.map(([, y]) => y));
   outline(view, [[0.3 * nose, -0.45 * side], [0.9 * nose, 0], [0.3 * nose, 0.45 * side]], pose);
-  c.fillStyle = solid ? colours.free : colour;
+  c.fillStyle = solid ? colors.free : color;
   c.fill();
 }
 
 function drawBelief(view, robot, believed) {
-  const { context: c, camera, colours } = view, [u, v] = spot(view, believed.x, believed.y), { a, b, yaw } = believed.ellipse;
+  const { context: c, camera, colors } = view, [u, v] = spot(view, believed.x, believed.y), { a, b, yaw } = believed.ellipse;
   c.beginPath();
   c.ellipse(u, v, Math.max(a * camera.scale, 1), Math.max(b * camera.scale, 1), -yaw, 0, 2 * Math.PI);
-  c.fillStyle = colours.belief;
+  c.fillStyle = colors.belief;
   c.globalAlpha = 0.16;
   c.fill();
   c.globalAlpha = 1;
-  c.strokeStyle = colours.belief;
+  c.strokeStyle = colors.belief;
   c.lineWidth = 1;
   c.stroke();
-  drawHull(view, robot, believed, colours.belief, false);
+  drawHull(view, robot, believed, colors.belief, false);
 }
 
 function drawParticles(view, cloud) {
   if (!cloud) return;
-  const { context: c, colours, camera } = view, reach = Math.min(0.12 * camera.scale, 9);
-  c.strokeStyle = colours.belief;
+  const { context: c, colors, camera } = view, reach = Math.min(0.12 * camera.scale, 9);
+  c.strokeStyle = colors.belief;
   c.globalAlpha = 0.45;
   c.lineWidth = 1;
   c.beginPath();
@@ -405,9 +405,9 @@ function drawParticles(view, cloud) {
   c.globalAlpha = 1;
 }
 
-function drawPoints(view, points, colour) {
+function drawPoints(view, points, color) {
   const { context: c } = view, size = Math.min(Math.max(view.camera.scale * 0.04, 2), 5);
-  c.fillStyle = colour;
+  c.fillStyle = color;
   for (let k = 0; k < points.length; k += 2) {
     const [u, v] = spot(view, points[k], points[k + 1]);
     c.fillRect(u - size / 2, v - size / 2, size, size);
@@ -416,13 +416,13 @@ function drawPoints(view, points, colour) {
 
 /** Where something went wrong: contacts that have begun, and what did not hold; what is selected in a ring. */
 function drawMarks(view, run, tick) {
-  const { colours } = view;
+  const { colors } = view;
   for (const event of run.events) {
-    if (event.kind === "collision.started" && event.place && event.tick <= tick) star(view, event.place, colours.bad);
-    if (event.kind === "mark" && event.tick <= tick) label(view, `⚑ ${event.name}`, ...spotOf(run, event), colours.fault, -14);
+    if (event.kind === "collision.started" && event.place && event.tick <= tick) star(view, event.place, colors.bad);
+    if (event.kind === "mark" && event.tick <= tick) label(view, `⚑ ${event.name}`, ...spotOf(run, event), colors.fault, -14);
   }
   for (const { verdict, finding } of run.failures) {
-    if (finding.place) crossed(view, finding.place, verdict.severity === "warn" ? colours.odd : colours.bad);
+    if (finding.place) crossed(view, finding.place, verdict.severity === "warn" ? colors.odd : colors.bad);
   }
 }
 
@@ -431,7 +431,7 @@ function spotOf(run, event) {
   return event.place ?? [pose.x, pose.y];
 }
 
-function star(view, [x, y], colour) {
+function star(view, [x, y], color) {
   const { context: c } = view, [u, v] = spot(view, x, y);
   c.beginPath();
   for (let k = 0; k < 16; k++) {
@@ -439,31 +439,31 @@ function star(view, [x, y], colour) {
     c.lineTo(u + reach * Math.cos(angle), v + reach * Math.sin(angle));
   }
   c.closePath();
-  c.fillStyle = colour;
+  c.fillStyle = color;
   c.fill();
-  c.strokeStyle = view.colours.free;
+  c.strokeStyle = view.colors.free;
   c.lineWidth = 1;
   c.stroke();
 }
 
 /** A cross on a pin, so that what stands at the place is seen. */
-function crossed(view, [x, y], colour) {
+function crossed(view, [x, y], color) {
   const { context: c } = view, [u, foot] = spot(view, x, y), v = foot - Math.max(0.35 * view.camera.scale, 10) - 16;
   c.beginPath();
   c.moveTo(u, foot);
   c.lineTo(u, v);
-  c.strokeStyle = colour;
+  c.strokeStyle = color;
   c.lineWidth = 1.5;
   c.stroke();
   c.beginPath();
   c.arc(u, foot, 2.5, 0, 2 * Math.PI);
-  c.fillStyle = colour;
+  c.fillStyle = color;
   c.fill();
   c.beginPath();
   c.arc(u, v, 10, 0, 2 * Math.PI);
-  c.fillStyle = view.colours.free;
+  c.fillStyle = view.colors.free;
   c.fill();
-  c.strokeStyle = colour;
+  c.strokeStyle = color;
   c.lineWidth = 2;
   c.stroke();
   c.lineWidth = 3;
@@ -475,19 +475,19 @@ function crossed(view, [x, y], colour) {
   c.stroke();
 }
 
-function ring(view, [x, y], colour, reach) {
+function ring(view, [x, y], color, reach) {
   const { context: c } = view, [u, v] = spot(view, x, y);
   c.beginPath();
   c.arc(u, v, Math.max(reach, 17), 0, 2 * Math.PI);
-  c.strokeStyle = colour;
+  c.strokeStyle = color;
   c.lineWidth = 3;
   c.stroke();
 }
 
 function drawScale(view) {
-  const { context: c, camera, colours, height } = view, length = roundLength(camera.scale, 160), wide = length * camera.scale;
+  const { context: c, camera, colors, height } = view, length = roundLength(camera.scale, 160), wide = length * camera.scale;
   const u = 40, v = height - 16;
-  c.strokeStyle = colours.ink;
+  c.strokeStyle = colors.ink;
   c.lineWidth = 2;
   c.beginPath();
   c.moveTo(u, v - 4);
@@ -498,5 +498,5 @@ function drawScale(view) {
   c.font = "11px system-ui, sans-serif";
   c.textAlign = "center";
   c.textBaseline = "bottom";
-  halo(view, `${length} m`, u + wide / 2, v - 3, colours.ink);
+  halo(view, `${length} m`, u + wide / 2, v - 3, colors.ink);
 }

@@ -1,4 +1,4 @@
-// What a map can show, in the order in which it is drawn, with the colour that stands for it.
+// What a map can show, in the order in which it is drawn, with the color that stands for it.
 
 export const LAYERS = [
   { id: "map", name: "Map of the robot", key: "1", sign: "area" },
@@ -19,11 +19,11 @@ export function layerOf(costmap) {
   return costmap.name.includes("local_costmap") ? "near" : "global";
 }
 
-const COLOURS = ["page", "ink", "faint", "rule", "free", "wall", "unknown", "zone", "goal", "plan", "local", "thing", "person", "scan",
+const COLORS = ["page", "ink", "faint", "rule", "free", "wall", "unknown", "zone", "goal", "plan", "local", "thing", "person", "scan",
   "belief", "truth", "other", "bad", "odd", "good", "fault", "select", "ground"];
 
-/** The colours of the page as they are now. */
-export function coloursNow() {
+/** The colors of the page as they are now. */
+export function colorsNow() {
   const style = getComputedStyle(document.documentElement);
-  return Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  return Object.fromEntries(COLORS.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }

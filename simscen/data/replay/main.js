@@ -4,7 +4,7 @@ import { Deck } from "./deck.js";
 import { clockText, el, fill } from "./dom.js";
 import { helpWindow } from "./help.js";
 import { icon } from "./icons.js";
-import { LAYERS, coloursNow, layerOf } from "./layers.js";
+import { LAYERS, colorsNow, layerOf } from "./layers.js";
 import { isShown, told } from "./lanes.js";
 import { fromHash, toHash } from "./link.js";
 import { MapView } from "./mapview.js";
@@ -72,9 +72,9 @@ class Page {
 
   /** Draw everything anew. */
   laidOut() {
-    this.colours = coloursNow();
+    this.colors = colorsNow();
     this.theme = `${root.dataset.theme ?? ""}${matchMedia("(prefers-color-scheme: dark)").matches}`;
-    this.deck.layOut(this.colours, this.selected);
+    this.deck.layOut(this.colors, this.selected);
     this.#changed();
   }
 

@@ -35,14 +35,14 @@ export class MapView {
     return [this.canvas.clientWidth, this.canvas.clientHeight];
   }
 
-  draw(tick, { colours, theme, layers, marked }) {
+  draw(tick, { colors, theme, layers, marked }) {
     const [width, height] = this.size, dense = globalThis.devicePixelRatio || 1;
     const across = Math.round(width * dense), along = Math.round(height * dense);
     if (this.canvas.width !== across || this.canvas.height !== along) [this.canvas.width, this.canvas.height] = [across, along];
     const context = this.canvas.getContext("2d");
     context.setTransform(dense, 0, 0, dense, 0, 0);
     this.#tell(tick);
-    drawRun({ context, width, height, camera: this.camera, colours, theme, layers, marked }, this.run, tick);
+    drawRun({ context, width, height, camera: this.camera, colors, theme, layers, marked }, this.run, tick);
   }
 
   /** Faults at work and recoveries under way, in words. */

@@ -11,9 +11,9 @@ export class Panel {
     this.runs = runs;
     this.chosen = chosen;
     this.cards = [];
-    this.now = el("div", { class: "view", id: "view-now", role: "tabpanel", "aria-labelledby": "tab-now", tabindex: "0" });
-    this.text = el("div", { class: "view code", id: "view-text", role: "tabpanel", "aria-labelledby": "tab-text", tabindex: "0" });
-    this.list = el("div", { class: "view", id: "view-events", role: "tabpanel", "aria-labelledby": "tab-events", tabindex: "0" });
+    this.now = el("div", { class: "view", id: "view-now", role: "tabpanel", "aria-labeledby": "tab-now", tabindex: "0" });
+    this.text = el("div", { class: "view code", id: "view-text", role: "tabpanel", "aria-labeledby": "tab-text", tabindex: "0" });
+    this.list = el("div", { class: "view", id: "view-events", role: "tabpanel", "aria-labeledby": "tab-events", tabindex: "0" });
     this.views = { text: ["Scenario", this.text], now: ["Now", this.now], events: ["Events", this.list] };
     this.tabs = Object.entries(this.views).map(([id, [name]]) => this.#tab(id, name));
     const bar = el("div", { role: "tablist", class: "tabs", "aria-label": "Details" }, ...this.tabs);
@@ -121,7 +121,7 @@ export class Panel {
     const rows = run.text.map((text, k) => {
       const number = k + 1, mark = run.verdicts.filter((verdict) => verdict.line === number);
       const look = mark.some((verdict) => verdict.status !== "pass" && verdict.severity !== "warn") ? " bad" : mark.some((verdict) => verdict.status !== "pass") ? " odd" : mark.length ? " good" : "";
-      const row = el("div", { class: `line${asked.has(number) ? " asked" : ""}${look}`, "data-line": number }, el("span", { class: "number", "aria-hidden": "true" }, String(number)), el("code", {}, ...coloured(text)));
+      const row = el("div", { class: `line${asked.has(number) ? " asked" : ""}${look}`, "data-line": number }, el("span", { class: "number", "aria-hidden": "true" }, String(number)), el("code", {}, ...colored(text)));
       this.lines.set(number, row);
       return row;
     });
@@ -178,8 +178,8 @@ function poseText({ x, y, yaw }) {
   return `${x.toFixed(2)}, ${y.toFixed(2)} m, ${((yaw * 180) / Math.PI).toFixed(0)}°`;
 }
 
-/** A line of YAML: its comment and its keys in colours of their own. */
-function coloured(text) {
+/** A line of YAML: its comment and its keys in colors of their own. */
+function colored(text) {
   const comment = text.search(/(^|\s)#/), plain = comment < 0 ? text : text.slice(0, comment);
   const parts = plain.split(/([\w.-]+:(?=\s|$))/).map((part, k) => (k % 2 ? el("span", { class: "key" }, part) : part));
   return [...parts, comment < 0 ? null : el("span", { class: "comment" }, text.slice(comment))].filter((part) => part !== null && part !== "");

@@ -13,7 +13,7 @@ export function newest(ticks, tick) {
 
 /** Poses {ticks, x, y, yaw}: where it is at `tick`, between samples on the straight line; null before the first.
  *
- * A pause of more than `gap` ticks and a jump of more than `jump` metres are no motion: the older sample holds. */
+ * A pause of more than `gap` ticks and a jump of more than `jump` meters are no motion: the older sample holds. */
 export function poseAt(poses, tick, gap, jump = 0.5) {
   const k = newest(poses.ticks, tick);
   if (k < 0) return null;

@@ -35,15 +35,15 @@ export class StripView {
     this.value.textContent = this.lines.map(({ run, strip }) => shown(strip, strip.at(run.tick(seconds)))).join(" · ") + unit;
   }
 
-  draw(from, to, width, colours) {
+  draw(from, to, width, colors) {
     const dense = globalThis.devicePixelRatio || 1;
     if (this.canvas.width !== Math.round(width * dense)) this.canvas.width = Math.round(width * dense);
     if (this.canvas.height !== Math.round(HEIGHT * dense)) this.canvas.height = Math.round(HEIGHT * dense);
     const c = this.canvas.getContext("2d"), v = (value) => HEIGHT - 5 - ((value - this.least) / (this.most - this.least)) * (HEIGHT - 10);
     c.setTransform(dense, 0, 0, dense, 0, 0);
     c.clearRect(0, 0, width, HEIGHT);
-    this.#drawLimits(c, width, v, colours);
-    this.lines.forEach((line, k) => this.#drawLine(c, line, k, from, to, width, v, colours));
+    this.#drawLimits(c, width, v, colors);
+    this.lines.forEach((line, k) => this.#drawLine(c, line, k, from, to, width, v, colors));
   }
 
   #measure() {
@@ -55,15 +55,15 @@ export class StripView {
     if (this.most - this.least < 1e-9) [this.least, this.most] = [this.least - 0.5, this.most + 0.5];
   }
 
-  #drawLimits(c, width, v, colours) {
+  #drawLimits(c, width, v, colors) {
     for (const limit of this.limits) {
       const y = v(limit.value), bad = limit.status !== "pass";
-      c.fillStyle = bad ? colours.bad : colours.faint;
+      c.fillStyle = bad ? colors.bad : colors.faint;
       c.globalAlpha = bad ? 0.14 : 0.1;
       if (limit.least) c.fillRect(0, y, width, HEIGHT - y);
       else c.fillRect(0, 0, width, y);
       c.globalAlpha = 1;
-      c.strokeStyle = bad ? colours.bad : colours.faint;
+      c.strokeStyle = bad ? colors.bad : colors.faint;
       c.setLineDash([4, 3]);
       c.lineWidth = 1;
       c.beginPath();
@@ -79,9 +79,9 @@ export class StripView {
     }
   }
 
-  #drawLine(c, { run, strip }, number, from, to, width, v, colours) {
+  #drawLine(c, { run, strip }, number, from, to, width, v, colors) {
     const ticks = strip.clock, values = strip.samples, begin = Math.max(newest(ticks, from * run.rate), 0);
-    c.strokeStyle = number ? colours.other : colours.truth;
+    c.strokeStyle = number ? colors.other : colors.truth;
     c.lineWidth = 1.4;
     c.setLineDash(DASHES[number % DASHES.length]);
     c.beginPath();

@@ -12,11 +12,11 @@ from simscen.core.records.trace import Trace
 from simscen.judge.diagnosis.objects import MovableObject
 
 SEARCH_STEP_M = 0.005
-"""Metres between the places in a passage that are tried."""
+"""Meters between the places in a passage that are tried."""
 NEGLIGIBLE_WIDTH_M = 0.02
-"""Metres that are as good as nothing, and as no change: passages are measured to that."""
+"""Meters that are as good as nothing, and as no change: passages are measured to that."""
 ON_PATH_DISTANCE_M = 0.5
-"""Metres from a passage within which a robot is on the way that leads through it; passages lie 0.25 m apart."""
+"""Meters from a passage within which a robot is on the way that leads through it; passages lie 0.25 m apart."""
 
 
 def diagnose_blocked_path(
@@ -43,7 +43,7 @@ def diagnose_blocked_path(
 
 
 def free_width(passage: Passage, there: Sequence[MovableObject]) -> float:
-    """The diameter in metres of the largest disc that can cross the passage."""
+    """The diameter in meters of the largest disc that can cross the passage."""
     ends = np.array(passage.ends)
     share = np.linspace(0.0, 1.0, 2 + round(passage.width / SEARCH_STEP_M))[:, None]
     middles = ends[0] + share * (ends[1] - ends[0])
@@ -73,5 +73,5 @@ def _ahead(trace: Trace, case: Case, goal: str, tick: int) -> list[Passage]:
 
 
 def _reach(case: Case) -> float:
-    """How far in metres the robot extends from its own origin."""
+    """How far in meters the robot extends from its own origin."""
     return max((math.hypot(x, y) for x, y in case.footprint), default=case.inscribed_radius)

@@ -15,7 +15,7 @@ from simscen.judge.diagnosis.blocked_path import diagnose_blocked_path
 from simscen.judge.diagnosis.objects import MovableObject, movable_objects
 
 NEAR_ROBOT_M = 0.3
-"""Metres from the robot's hull within which a thing may be what holds it."""
+"""Meters from the robot's hull within which a thing may be what holds it."""
 
 
 def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
@@ -86,7 +86,7 @@ def _given_up(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
 
 
 def _failed_recoveries(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
-    """Recovery behaviours that came to nothing on the way to this goal, each with its code."""
+    """Recovery behaviors that came to nothing on the way to this goal, each with its code."""
     ended = [e for e in trace.of_kind(EventKind.RECOVERY_ENDED) if outcome_start(outcome) <= e.tick <= tick]
     failed = Counter(f"{e.name} with {code_of(e)}" for e in ended if e.data.get("outcome") == "failed")
     told = (what if times == 1 else f"{what} {times} times" for what, times in failed.items())

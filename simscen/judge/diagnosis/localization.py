@@ -12,7 +12,7 @@ ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
 WHEELS, BELIEF = frozenset({"Odometry", "Wheels"}), "Belief"
 """What such faults affect, and those that come between the localizer and the navigator."""
 LOST_DISTANCE_M = 0.5
-"""Metres between belief and truth from which a robot is lost: two radii of a small one."""
+"""Meters between belief and truth from which a robot is lost: two radii of a small one."""
 
 
 def diagnose_localization(trace: Trace, tick: int, known: bool = False) -> tuple[list[str], set[str]]:

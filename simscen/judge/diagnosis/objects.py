@@ -31,7 +31,7 @@ class MovableObject:
         return f"{self.name} ({verb} by event `{self.event}` at t = {trace.seconds(self.since):.2f} s)"
 
     def distance(self, points: Array) -> Array:
-        """Metres (n,) from points (n, 2) to it; 0 inside."""
+        """Meters (n,) from points (n, 2) to it; 0 inside."""
         nearest: Array = np.min([_distance(points, outline) for outline in self.outlines], axis=0)
         return nearest
 
@@ -79,7 +79,7 @@ def _thing(trace: Trace, tick: int, spawned: Event, by: str, last: Event) -> Mov
 
 
 def _distance(points: Array, corners: Array) -> Array:
-    """Metres (n,) from points (n, 2) to a filled polygon (m, 2)."""
+    """Meters (n,) from points (n, 2) to a filled polygon (m, 2)."""
     ends = np.roll(corners, 1, axis=0)
     step, apart = ends - corners, points[:, None] - corners
     along, squared = np.sum(apart * step, axis=2), np.sum(step**2, axis=1)

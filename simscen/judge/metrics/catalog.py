@@ -139,7 +139,7 @@ METRICS: dict[str, Metric] = {
     **{
         f"rpe_trans_{name}": Metric(
             "m",
-            f"Relative pose error over each true metre, position: {text}.",
+            f"Relative pose error over each true meter, position: {text}.",
             "evo, delta 1 m, pairs from reference",
             evidence=frozenset({Evidence.TRUTH, Evidence.BELIEF}),
         )
@@ -148,7 +148,7 @@ METRICS: dict[str, Metric] = {
     **{
         f"rpe_rot_{name}": Metric(
             "rad",
-            f"Relative pose error over each true metre, heading: {text}.",
+            f"Relative pose error over each true meter, heading: {text}.",
             "evo",
             evidence=frozenset({Evidence.TRUTH, Evidence.BELIEF}),
         )

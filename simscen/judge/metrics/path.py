@@ -8,7 +8,7 @@ from simscen.core.records.trace import Trace
 from simscen.criteria.trace_signals.ground_truth import Drive, teleport_samples, truth
 
 CURVATURE_SPACING_M = 0.3
-"""Metres between the points of which curvature is taken; nearer ones are noise (bench-mr)."""
+"""Meters between the points of which curvature is taken; nearer ones are noise (bench-mr)."""
 
 Values = dict[str, float | str]
 """Metrics by name; a text says why there is no number."""

@@ -9,14 +9,14 @@ from simscen.criteria.trace_signals.nees import nees_samples
 from simscen.judge.metrics.path import Values
 
 RPE_DELTA_M = 1.0
-"""Metres of the true way between the two poses of a relative error."""
+"""Meters of the true way between the two poses of a relative error."""
 
 _SUMS = ("rmse", "mean", "median", "max")
 SILENT = "the robot never said where it believes to be"
 
 
 def pose_metrics(trace: Trace) -> Values:
-    """APE, RPE over DELTA metres, NEES."""
+    """APE, RPE over DELTA meters, NEES."""
     error = pose_error(trace)
     if not len(error):
         return dict.fromkeys(POSE_METRICS, SILENT)

@@ -12,7 +12,7 @@ class SessionSummary:
     """`success_rate` is of all `runs`, also of those that broke; its interval is Wilson's at 95 %.
 
     `spl` and `soft_spl` are means over the `spl_runs` that have a shortest way. Collisions are counted over the
-    `kilometres` driven and `hours` simulated of the `measured_runs`; a rate is None where nothing was driven. Each of
+    `kilometers` driven and `hours` simulated of the `measured_runs`; a rate is None where nothing was driven. Each of
     several robots counts as a run of its own would, but for `runs` and successes: a run succeeds where all robots do.
     """
 
@@ -23,14 +23,14 @@ class SessionSummary:
     soft_spl: float | None
     spl_runs: int
     collisions: int
-    kilometres: float
+    kilometers: float
     hours: float
     measured_runs: int
 
     @property
     def collisions_per_km(self) -> float | None:
         """None when nobody drove."""
-        return self.collisions / self.kilometres if self.kilometres > 0 else None
+        return self.collisions / self.kilometers if self.kilometers > 0 else None
 
     @property
     def collisions_per_hour(self) -> float | None:
@@ -52,7 +52,7 @@ def summarize_session(results: Iterable[RunResult]) -> SessionSummary:
         soft_spl=_mean(soft_spl),
         spl_runs=len(spl),
         collisions=round(sum(_known(measured, "collisions"))),
-        kilometres=sum(_known(measured, "path_length")) / 1000.0,
+        kilometers=sum(_known(measured, "path_length")) / 1000.0,
         hours=sum(run.simulated * _robots(run) for run in measured) / 3600.0,
         measured_runs=len(measured),
     )
@@ -71,7 +71,7 @@ def session_summary_data(figures: SessionSummary) -> dict[str, float | list[floa
         "collisions": figures.collisions,
         "collisions_per_km": figures.collisions_per_km,
         "collisions_per_hour": figures.collisions_per_hour,
-        "kilometres": figures.kilometres,
+        "kilometres": figures.kilometers,
         "hours": figures.hours,
         "measured_runs": figures.measured_runs,
     }
@@ -88,7 +88,7 @@ def session_summary_line(figures: SessionSummary) -> str:
         parts.append(f"SPL {figures.spl:.2f} of {_runs(figures.spl_runs)}")
     per_km, per_hour = figures.collisions_per_km, figures.collisions_per_hour
     if per_km is not None and per_hour is not None:
-        way = f"{figures.kilometres:.2f} km, {figures.hours:.2f} h of {_runs(figures.measured_runs)}"
+        way = f"{figures.kilometers:.2f} km, {figures.hours:.2f} h of {_runs(figures.measured_runs)}"
         parts.append(f"{per_km:.1f} collisions/km, {per_hour:.1f}/h in {way}")
     return " · ".join(parts)
 

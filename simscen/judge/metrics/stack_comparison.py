@@ -20,7 +20,7 @@ COMPARED_METRICS = (
 )
 """The metrics that people choose a stack by, in the order of the table."""
 OUTCOME_INDEPENDENT = frozenset({"collisions"})
-"""Metrics that mean something however far a run came; the others favour whoever gives up early."""
+"""Metrics that mean something however far a run came; the others favor whoever gives up early."""
 _SEED = 1
 """Of the bootstrap: the same runs give the same intervals."""
 

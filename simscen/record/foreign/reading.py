@@ -21,7 +21,7 @@ from simscen.record.rows import Rows, on_the_ground
 LONGEST_GAP = 1.0
 """Seconds without a word about the truth from which on something may have happened in between."""
 SMALLEST_UPDATE = 0.3
-"""Metres that a robot may drive before AMCL first says where it is: Nav2's update_min_d of 0.25 m, and a bit."""
+"""Meters that a robot may drive before AMCL first says where it is: Nav2's update_min_d of 0.25 m, and a bit."""
 MOST_NAMED = 12
 _NEVER = (
     *(Evidence.CLEARANCE, Evidence.CONTACTS, Evidence.ERROR_CODES, Evidence.PLANNING, Evidence.RECOVERIES),

@@ -5,7 +5,7 @@
     truth,TIME,X,Y,YAW
     mount,X,Y,YAW
 
-Seconds, metres, radians; `inf` where a beam hit nothing, `nan` where it gave no answer. `mount` is where the lidar is
+Seconds, meters, radians; `inf` where a beam hit nothing, `nan` where it gave no answer. `mount` is where the lidar is
 on the robot, for all scans after it. Rows that are empty or begin with `#` mean nothing.
 """
 

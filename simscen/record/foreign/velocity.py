@@ -8,9 +8,9 @@ from simscen.core.geometry import Array, wrap_array
 from simscen.core.records.trace import Ticks
 
 SPAN = 0.2
-"""Seconds over which a difference of positions becomes a velocity: a motion capture trembles by millimetres."""
+"""Seconds over which a difference of positions becomes a velocity: a motion capture trembles by millimeters."""
 STANDS = 0.1
-"""Metres: what moved further has a velocity that is not zero all the time."""
+"""Meters: what moved further has a velocity that is not zero all the time."""
 
 
 def velocity(ticks: Ticks, poses: Array, rate: int) -> Array:

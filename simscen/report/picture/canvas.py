@@ -1,6 +1,6 @@
-"""A canvas in metres: shapes are drawn twice as large and shrunk, text is set sharp on top.
+"""A canvas in meters: shapes are drawn twice as large and shrunk, text is set sharp on top.
 
-It keeps a list of what was drawn, in metres, so that a picture can be compared part by part.
+It keeps a list of what was drawn, in meters, so that a picture can be compared part by part.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from simscen.core.geometry import Array
-from simscen.report.picture.palette import Colour
+from simscen.report.picture.palette import Color
 from simscen.report.text import one_line
 
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
@@ -34,7 +34,7 @@ def font(size: int) -> Font:
 
 @dataclass(frozen=True)
 class Note:
-    """Text to be set at pixel (x, y): `anchor` as in Pillow; `box` paints a plate of that colour behind it.
+    """Text to be set at pixel (x, y): `anchor` as in Pillow; `box` paints a plate of that color behind it.
 
     Without one, `halo` rims the letters, so that they can be read on anything.
     """
@@ -43,26 +43,26 @@ class Note:
     y: float
     text: str
     size: int
-    colour: Colour
+    color: Color
     anchor: str = "lm"
-    box: Colour | None = None
-    halo: Colour | None = None
+    box: Color | None = None
+    halo: Color | None = None
 
 
 class Part(NamedTuple):
-    """Something on a picture: what it is ("door meeting room"), and its points (n, 2) in metres of the world."""
+    """Something on a picture: what it is ("door meeting room"), and its points (n, 2) in meters of the world."""
 
     what: str
     points: Array
 
 
 class Canvas:
-    """The part `bounds` (x0, y0, x1, y1) of the plane, y up, at `scale` pixels a metre.
+    """The part `bounds` (x0, y0, x1, y1) of the plane, y up, at `scale` pixels a meter.
 
     What is drawn with `part` is on the list of `parts`; with `busy`, labels keep off it.
     """
 
-    def __init__(self, bounds: Bounds, scale: float, background: Colour | None) -> None:
+    def __init__(self, bounds: Bounds, scale: float, background: Color | None) -> None:
         """Without a `background`, an image has to be laid before anything is drawn."""
         self.bounds, self.scale = bounds, scale
         x0, y0, x1, y1 = bounds
@@ -102,9 +102,9 @@ class Canvas:
         self.parts.append(Part(what, np.array(points, dtype=np.float64).reshape(-1, 2)))
 
     def polygon(
-        self, points: Array, fill: Fill | None, outline: Colour | None = None, width: float = 1.5, busy: bool = False
+        self, points: Array, fill: Fill | None, outline: Color | None = None, width: float = 1.5, busy: bool = False
     ) -> None:
-        """A closed shape; points (n, 2) in metres, `width` in pixels."""
+        """A closed shape; points (n, 2) in meters, `width` in pixels."""
         corners = self._corners(points)
         if fill is not None:
             self._draw.polygon(corners, fill=fill)
@@ -114,7 +114,7 @@ class Canvas:
             self._keep_off.polygon([(u / SAMPLES / COARSE, v / SAMPLES / COARSE) for u, v in corners], fill=255)
 
     def hatch(
-        self, outlines: Sequence[Array], colour: Fill, rising: bool, gap: float = 11.0, width: float = 1.2
+        self, outlines: Sequence[Array], color: Fill, rising: bool, gap: float = 11.0, width: float = 1.2
     ) -> None:
         """Slanted lines in closed shapes, `gap` pixels apart; `rising` to the right, or falling."""
         corners = [self._corners(outline) for outline in outlines]
@@ -134,21 +134,21 @@ class Canvas:
         first = -high - ((left + (top if rising else -top)) % step)  # the same slant everywhere on the canvas
         for at in np.arange(first, wide + high, step).tolist():
             ends = [(at, 0), (at - high, high)] if rising else [(at, 0), (at + high, high)]
-            pen.line(ends, fill=colour[3] if len(colour) > 3 else 255, width=_wide(width))
+            pen.line(ends, fill=color[3] if len(color) > 3 else 255, width=_wide(width))
         lines.paste(0, (0, 0), inside.point(lambda value: 255 - value))
-        self._image.paste(colour[:3], (int(left), int(top)), lines)
+        self._image.paste(color[:3], (int(left), int(top)), lines)
 
-    def line(self, points: Array, colour: Fill, width: float = 1.5, busy: bool = False) -> None:
-        """A line through points (n, 2) in metres."""
+    def line(self, points: Array, color: Fill, width: float = 1.5, busy: bool = False) -> None:
+        """A line through points (n, 2) in meters."""
         if len(points) > 1:
             corners = self._corners(points)
-            self._draw.line(corners, fill=colour, width=_wide(width), joint="curve")
+            self._draw.line(corners, fill=color, width=_wide(width), joint="curve")
             if busy:
                 self._keep_off.line(
                     [(u / SAMPLES / COARSE, v / SAMPLES / COARSE) for u, v in corners], fill=255, width=2
                 )
 
-    def dashes(self, points: Array, colour: Colour, width: float = 1.5, dash: float = 5.0) -> None:
+    def dashes(self, points: Array, color: Color, width: float = 1.5, dash: float = 5.0) -> None:
         """A dashed line; `dash` is the length of a dash and of a gap in pixels."""
         if len(points) < 2:
             return
@@ -157,7 +157,7 @@ class Canvas:
         ends = np.column_stack((strokes, np.minimum(strokes + 1, way[-1]))).ravel()
         corners = self._corners(np.column_stack([np.interp(ends, way, points[:, axis]) for axis in (0, 1)]))
         for here, there in zip(corners[::2], corners[1::2], strict=True):
-            self._draw.line((here, there), fill=colour, width=_wide(width))
+            self._draw.line((here, there), fill=color, width=_wide(width))
 
     def disc(
         self,
@@ -165,11 +165,11 @@ class Canvas:
         y: float,
         radius: float,
         fill: Fill | None,
-        outline: Colour | None = None,
+        outline: Color | None = None,
         width: float = 1.5,
         busy: bool = False,
     ) -> None:
-        """A disc of `radius` pixels at a point in metres."""
+        """A disc of `radius` pixels at a point in meters."""
         u, v = (SAMPLES * part for part in self.pixel(x, y))
         reach = SAMPLES * radius
         box = (u - reach, v - reach, u + reach, v + reach)
@@ -177,15 +177,15 @@ class Canvas:
         if busy:
             self._keep_off.ellipse([part / SAMPLES / COARSE for part in box], fill=255)
 
-    def sign(self, x: float, y: float, offsets: Sequence[tuple[float, float]], fill: Colour) -> None:
-        """A filled sign at a point in metres; `offsets` are its corners in pixels, y down. Labels keep off it."""
+    def sign(self, x: float, y: float, offsets: Sequence[tuple[float, float]], fill: Color) -> None:
+        """A filled sign at a point in meters; `offsets` are its corners in pixels, y down. Labels keep off it."""
         u, v = self.pixel(x, y)
         self._draw.polygon([((u + dx) * SAMPLES, (v + dy) * SAMPLES) for dx, dy in offsets], fill=fill)
         self._keep_off.polygon([((u + dx) / COARSE, (v + dy) / COARSE) for dx, dy in offsets], fill=255)
 
-    def leader(self, here: tuple[float, float], there: tuple[float, float], colour: Colour) -> None:
+    def leader(self, here: tuple[float, float], there: tuple[float, float], color: Color) -> None:
         """A thin line between two pixels."""
-        self._draw.line([(u * SAMPLES, v * SAMPLES) for u, v in (here, there)], fill=colour, width=_wide(0.8))
+        self._draw.line([(u * SAMPLES, v * SAMPLES) for u, v in (here, there)], fill=color, width=_wide(0.8))
 
     def note(self, note: Note) -> None:
         """Set text once everything is drawn."""
@@ -218,7 +218,7 @@ def write(draw: ImageDraw.ImageDraw, note: Note) -> None:
     draw.text(
         (note.x, note.y),
         note.text,
-        fill=note.colour,
+        fill=note.color,
         font=font(note.size),
         anchor=note.anchor,
         stroke_width=0 if note.halo is None else 3,

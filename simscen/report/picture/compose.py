@@ -55,7 +55,7 @@ def draw(scene: Scene) -> Image.Image:
 
 
 def parts(scene: Scene) -> list[Part]:
-    """What is on the map, and where in metres of the world."""
+    """What is on the map, and where in meters of the world."""
     return _map(scene).parts
 
 
@@ -102,9 +102,9 @@ def _scale(bounds: Bounds) -> float:
 
 def _header(image: Image.Image, scene: Scene) -> None:
     result, pen = scene.result, ImageDraw.Draw(image)
-    word, colour = result.outcome.value.replace("-", " ").upper(), palette.OUTCOMES[result.outcome]
+    word, color = result.outcome.value.replace("-", " ").upper(), palette.OUTCOMES[result.outcome]
     wide = math.ceil(font(16).getlength(word)) + 24
-    pen.rounded_rectangle((16, 16, 16 + wide, 46), 6, fill=colour)
+    pen.rounded_rectangle((16, 16, 16 + wide, 46), 6, fill=color)
     write(pen, Note(16 + wide / 2, 31, word, 16, palette.PAGE, "mm"))
     write(pen, Note(32 + wide, 23, shown(result.key.scenario), 18, palette.INK))
     write(pen, Note(32 + wide, 45, _facts(scene), 13, palette.FAINT_INK))

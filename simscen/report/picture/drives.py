@@ -44,8 +44,8 @@ def _panel(title: str, trial: Ways, footprint: "np.ndarray[tuple[int, ...], np.d
     canvas.line(_points(ways[1]), AMBER, 1.5)
     canvas.dashes(_points(ways[0]), INK, 1.0)
     canvas.note(Note(10, 16, shown(f"{title}: {name}"), 15, INK))
-    for k, (text, colour) in enumerate((("commanded (dashed)", INK), ("odometry", AMBER), ("true", GREEN))):
-        canvas.note(Note(10 + (0, 150, 230)[k], SIZE - 14, text, 12, colour))
+    for k, (text, color) in enumerate((("commanded (dashed)", INK), ("odometry", AMBER), ("true", GREEN))):
+        canvas.note(Note(10 + (0, 150, 230)[k], SIZE - 14, text, 12, color))
     canvas.note(Note(SIZE - 10, 16, f"grid {GRID:g} m", 12, FAINT_INK, "rm"))
     return canvas.finish().resize((SIZE, SIZE)) if canvas.width != SIZE else canvas.finish()
 

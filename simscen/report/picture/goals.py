@@ -13,7 +13,7 @@ from simscen.core.records.verdict import Status
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Canvas, shown
 from simscen.report.picture.labels import Label
-from simscen.report.picture.palette import Colour
+from simscen.report.picture.palette import Color
 from simscen.report.picture.scene import Scene
 
 _ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
@@ -21,10 +21,10 @@ _ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, E
 
 @dataclass(frozen=True)
 class Fate:
-    """What came of a goal, in a word, its colour, and what its label says of it."""
+    """What came of a goal, in a word, its color, and what its label says of it."""
 
     word: str
-    colour: Colour
+    color: Color
     told: str = ""
 
 
@@ -42,7 +42,7 @@ def fate_of(goal: Goal, scene: Scene) -> Fate:
     if not ends:
         begun = any(event.name == goal.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED))
         return (
-            Fate("not reached", palette.AMBER, "not reached") if begun else Fate("not tried", palette.GREY, "not tried")
+            Fate("not reached", palette.AMBER, "not reached") if begun else Fate("not tried", palette.GRAY, "not tried")
         )
     match ends[-1].kind:
         case EventKind.GOAL_FAILED:
@@ -50,7 +50,7 @@ def fate_of(goal: Goal, scene: Scene) -> Fate:
             told = ", ".join(part for part in (f"failed {expected}".strip(), code_of(ends[-1])) if part)
             return Fate("failed", palette.AMBER if expected else palette.RED, told)
         case EventKind.GOAL_CANCELED:
-            return Fate("canceled", palette.GREY, "canceled")
+            return Fate("canceled", palette.GRAY, "canceled")
         case _:
             denied = _denied(goal, scene)
             return Fate("failed", palette.RED, "not there") if denied else Fate("reached", palette.GREEN)
@@ -77,17 +77,17 @@ def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         x, y, yaw = goal.pose
         reach = max(goal.xy_tolerance * canvas.scale, 5.0)
         hollow = fate.word in ("not tried", "canceled")
-        canvas.disc(x, y, reach, None if hollow else (*fate.colour, 46), fate.colour, 1.8, busy=True)
+        canvas.disc(x, y, reach, None if hollow else (*fate.color, 46), fate.color, 1.8, busy=True)
         tip = (reach + 10) / canvas.scale
         heading = np.array([(x, y), (x + tip * math.cos(yaw), y + tip * math.sin(yaw))])
-        canvas.line(heading, fate.colour, 2.2, busy=True)
+        canvas.line(heading, fate.color, 2.2, busy=True)
         if fate.word == "failed":
             bar = 0.72 * reach / canvas.scale
             for dy in (bar, -bar):
-                canvas.line(np.array([(x - bar, y - dy), (x + bar, y + dy)]), fate.colour, 2.0)
+                canvas.line(np.array([(x - bar, y - dy), (x + bar, y + dy)]), fate.color, 2.0)
         else:
-            canvas.disc(x, y, 2.6, fate.colour)
+            canvas.disc(x, y, 2.6, fate.color)
         canvas.tell(f"goal {scene.called(goal.name)} {fate.word}", heading)
         if told := names.pop((x, y), None):
             rim = max(reach, 8.0)
-            yield Label(1, x, y, shown(scene.called(", ".join(told))), fate.colour, 14, rim)
+            yield Label(1, x, y, shown(scene.called(", ".join(told))), fate.color, 14, rim)

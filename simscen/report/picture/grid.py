@@ -1,4 +1,4 @@
-"""Coordinates: lines of a grid on the map, and their metres along its edges."""
+"""Coordinates: lines of a grid on the map, and their meters along its edges."""
 
 import math
 
@@ -15,7 +15,7 @@ _APART = 55
 
 
 def step_of(canvas: Canvas) -> float:
-    """A round number of metres between two lines: 1, 2, 5, 10, … times a power of ten."""
+    """A round number of meters between two lines: 1, 2, 5, 10, … times a power of ten."""
     least = _APART / canvas.scale
     power = 10.0 ** math.floor(math.log10(least))
     return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= least)
@@ -38,7 +38,7 @@ def draw_grid(canvas: Canvas) -> None:
 
 
 def write_coordinates(pen: ImageDraw.ImageDraw, canvas: Canvas, left: float, top: float) -> None:
-    """The metres of each line, beside the map whose upper left corner is at a pixel of the picture."""
+    """The meters of each line, beside the map whose upper left corner is at a pixel of the picture."""
     x0, y0, x1, y1 = canvas.bounds
     step = step_of(canvas)
     for x in lines_of(x0, x1, step):

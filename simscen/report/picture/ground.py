@@ -12,7 +12,7 @@ from simscen.report.picture import palette
 from simscen.report.picture.canvas import SAMPLES, Bounds, Canvas
 
 MARGIN = 0.4
-"""Metres around what is shown."""
+"""Meters around what is shown."""
 
 
 def extent(grid: OccupancyGrid, points: Array) -> Bounds:
@@ -30,7 +30,7 @@ def extent(grid: OccupancyGrid, points: Array) -> Bounds:
 
 def lay(canvas: Canvas, grid: OccupancyGrid) -> None:
     """Paint the map: cells become pixels by one affine transform, whatever the map's origin and yaw."""
-    image, resolution = _coloured(grid, 1 / (canvas.scale * SAMPLES))
+    image, resolution = _colored(grid, 1 / (canvas.scale * SAMPLES))
     per_pixel = 1 / (canvas.scale * SAMPLES)
     x0, _, _, y1 = canvas.bounds
     corners = np.array([[x0, y1], [x0 + per_pixel, y1], [x0, y1 - per_pixel]])
@@ -41,17 +41,17 @@ def lay(canvas: Canvas, grid: OccupancyGrid) -> None:
     )
 
 
-def _coloured(grid: OccupancyGrid, pixel: float) -> tuple[Image.Image, float]:
-    """The map in colours, and its metres per cell: cells smaller than a pixel are merged, so that walls stay whole."""
+def _colored(grid: OccupancyGrid, pixel: float) -> tuple[Image.Image, float]:
+    """The map in colors, and its meters per cell: cells smaller than a pixel are merged, so that walls stay whole."""
     cells, merge = grid.cells, max(1, int(pixel / grid.resolution))
     if merge > 1:
         cells = _merged(cells, merge)
-    return Image.fromarray(_colours()[cells.view(np.uint8)]), grid.resolution * merge
+    return Image.fromarray(_colors()[cells.view(np.uint8)]), grid.resolution * merge
 
 
 @cache
-def _colours() -> npt.NDArray[np.uint8]:
-    """The colour of each cost as an unsigned byte."""
+def _colors() -> npt.NDArray[np.uint8]:
+    """The color of each cost as an unsigned byte."""
     table = np.empty((256, 3), dtype=np.uint8)
     for value in range(256):
         share = min(value, OCCUPIED) / OCCUPIED

@@ -34,14 +34,14 @@ def draw_faulty(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_faults(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """A bolt where the robot was when a fault began, a grey one where it was when that was over."""
+    """A bolt where the robot was when a fault began, a gray one where it was when that was over."""
     trace = scene.trace
     for begun, ended, name in _faults(scene):
         ends = [(begun, f"{name} from", palette.AMBER), (ended, f"{name} over,", palette.FAINT_INK)]
-        for tick, told, colour in ends if ended < trace.end else ends[:1]:
+        for tick, told, color in ends if ended < trace.end else ends[:1]:
             x, y = trace.place(tick)
-            canvas.disc(x, y, 11, (255, 255, 255, 225), colour, 1.4, busy=True)
-            canvas.sign(x, y, _BOLT, colour)
+            canvas.disc(x, y, 11, (255, 255, 255, 225), color, 1.4, busy=True)
+            canvas.sign(x, y, _BOLT, color)
             text = shown(scene.called(f"{told} {trace.seconds(tick):.1f} s"))
             yield Label(2, x, y, text, palette.AMBER, 12, 12.0)
 

@@ -8,7 +8,7 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import COARSE, Canvas, Note, text_size
-from simscen.report.picture.palette import Colour
+from simscen.report.picture.palette import Color
 
 _AWAY = (4.0, 12.0, 22.0, 36.0, 54.0, 76.0, 104.0, 140.0)
 """Pixels between a mark's rim and its label, in the order in which they are tried."""
@@ -23,7 +23,7 @@ _CROWDED = 0.2
 
 @dataclass(frozen=True)
 class Label:
-    """Text for a mark at (x, y) in metres whose rim is `rim` pixels away; `plate` is the colour of its ground.
+    """Text for a mark at (x, y) in meters whose rim is `rim` pixels away; `plate` is the color of its ground.
 
     One that is `spare` is left out where there is no room. Those of a low `rank` are placed first.
     """
@@ -32,10 +32,10 @@ class Label:
     x: float
     y: float
     text: str
-    colour: Colour
+    color: Color
     size: int = 12
     rim: float = 6.0
-    plate: Colour | None = None
+    plate: Color | None = None
     spare: bool = False
 
 
@@ -58,10 +58,10 @@ def place(canvas: Canvas, labels: list[Label], walls: Array) -> None:
         apart = math.dist((u, v), end)
         if apart > label.rim + _LED:
             share = label.rim / apart
-            canvas.leader((u + share * (end[0] - u), v + share * (end[1] - v)), end, label.plate or label.colour)
+            canvas.leader((u + share * (end[0] - u), v + share * (end[1] - v)), end, label.plate or label.color)
         halo = None if label.plate else palette.FREE
         middle = (left + right) / 2, (top + low) / 2
-        canvas.note(Note(*middle, label.text, label.size, label.colour, "mm", label.plate, halo))
+        canvas.note(Note(*middle, label.text, label.size, label.color, "mm", label.plate, halo))
         canvas.tell(f"label {label.text}", [(label.x, label.y)])
 
 

@@ -19,7 +19,7 @@ def write_localized(grid: OccupancyGrid, belief: Array, reference: Array, path: 
     ground.lay(canvas, grid)
     canvas.line(reference, palette.PLAN, 5.0)
     canvas.dashes(belief, palette.RED, 2.0)
-    for row, (text, colour) in enumerate((("belief", palette.RED), ("reference", palette.PLAN))):
+    for row, (text, color) in enumerate((("belief", palette.RED), ("reference", palette.PLAN))):
         if row == 0 or len(reference):
-            canvas.note(Note(12, 16 + 18 * row, text, 13, colour, halo=palette.INK if row else None))
+            canvas.note(Note(12, 16 + 18 * row, text, 13, color, halo=palette.INK if row else None))
     canvas.finish().save(path, format="PNG", compress_level=3)

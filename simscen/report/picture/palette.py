@@ -1,48 +1,48 @@
-"""The colours of pictures and pages: told apart in grey and by the colour-blind, and never by colour alone.
+"""The colors of pictures and pages: told apart in gray and by the color-blind, and never by color alone.
 
 Hues are those of Okabe and Ito (2008), darkened until text in them has a contrast of 4.5 to 1 on white: good is a
 bluish green, bad vermilion, odd amber, which differ in blue and lightness as well. On the way of a robot time goes from
-dark blue to light orange. What failed has a cross beside its colour, what passed a tick.
+dark blue to light orange. What failed has a cross beside its color, what passed a tick.
 """
 
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import Status
 
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 
-PAGE: Colour = (255, 255, 255)
-FREE: Colour = (252, 251, 249)
-UNKNOWN: Colour = (226, 223, 216)
-WALL: Colour = (58, 63, 71)
-INK: Colour = (38, 42, 48)
-FAINT_INK: Colour = (98, 103, 111)
-RULE: Colour = (222, 224, 227)
+PAGE: Color = (255, 255, 255)
+FREE: Color = (252, 251, 249)
+UNKNOWN: Color = (226, 223, 216)
+WALL: Color = (58, 63, 71)
+INK: Color = (38, 42, 48)
+FAINT_INK: Color = (98, 103, 111)
+RULE: Color = (222, 224, 227)
 GRID = (38, 42, 48, 24)
 """Seen on the floor, and not on walls."""
-BELIEF: Colour = (20, 20, 24)
-PLAN: Colour = (176, 203, 232)
-PLACE: Colour = (112, 116, 124)
-START: Colour = (96, 102, 110)
-ROBOT: Colour = (30, 34, 40)
-OBJECT: Colour = (0, 105, 148)
-PERSON: Colour = (122, 62, 130)
-GROUND: Colour = (196, 176, 140)
-FAULTY: Colour = (240, 208, 148)
-SLIPPERY: Colour = (60, 140, 190)
-RED: Colour = (194, 48, 16)
-AMBER: Colour = (150, 98, 0)
-GREEN: Colour = (0, 113, 86)
-GREY: Colour = (98, 103, 111)
+BELIEF: Color = (20, 20, 24)
+PLAN: Color = (176, 203, 232)
+PLACE: Color = (112, 116, 124)
+START: Color = (96, 102, 110)
+ROBOT: Color = (30, 34, 40)
+OBJECT: Color = (0, 105, 148)
+PERSON: Color = (122, 62, 130)
+GROUND: Color = (196, 176, 140)
+FAULTY: Color = (240, 208, 148)
+SLIPPERY: Color = (60, 140, 190)
+RED: Color = (194, 48, 16)
+AMBER: Color = (150, 98, 0)
+GREEN: Color = (0, 113, 86)
+GRAY: Color = (98, 103, 111)
 GOAL = GREEN
-ROBOTS: tuple[Colour, ...] = ((30, 34, 40), (0, 113, 86), (122, 62, 130), (150, 98, 0), (0, 105, 148))
+ROBOTS: tuple[Color, ...] = ((30, 34, 40), (0, 113, 86), (122, 62, 130), (150, 98, 0), (0, 105, 148))
 """The rims of the ways of several robots, in the order of their names."""
 
 OUTCOMES = {
     Outcome.PASSED: GREEN,
     Outcome.FAILED: RED,
     Outcome.ERROR: AMBER,
-    Outcome.FAILED_AS_EXPECTED: GREY,
-    Outcome.SKIPPED: GREY,
+    Outcome.FAILED_AS_EXPECTED: GRAY,
+    Outcome.SKIPPED: GRAY,
 }
 STATUSES = {Status.PASS: GREEN, Status.FAIL: RED, Status.INCONCLUSIVE: AMBER, Status.ERROR: AMBER}
 SIGNS = {Status.PASS: "✓", Status.FAIL: "✗", Status.INCONCLUSIVE: "?", Status.ERROR: "!"}
@@ -50,8 +50,8 @@ SIGNS = {Status.PASS: "✓", Status.FAIL: "✗", Status.INCONCLUSIVE: "?", Statu
 _STOPS = ((40, 60, 160), (110, 40, 170), (185, 40, 130), (225, 85, 75), (240, 150, 30))
 
 
-def ramp(share: float) -> Colour:
-    """The colour of a share 0 … 1 of the run's time, from deep blue over purple to orange."""
+def ramp(share: float) -> Color:
+    """The color of a share 0 … 1 of the run's time, from deep blue over purple to orange."""
     at = min(max(share, 0.0), 1.0) * (len(_STOPS) - 1)
     low = min(int(at), len(_STOPS) - 2)
     r, g, b = (round(a + (at - low) * (z - a)) for a, z in zip(_STOPS[low], _STOPS[low + 1], strict=True))

@@ -10,7 +10,7 @@ from simscen.core.records.verdict import Status
 from simscen.judge.finding_text import comparison, subject, time_and_place
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Note, font, shown, write
-from simscen.report.picture.palette import Colour
+from simscen.report.picture.palette import Color
 from simscen.report.picture.scene import Scene
 from simscen.report.picture.ways import round_step
 
@@ -20,7 +20,7 @@ _LINE = 17
 _ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
 Pen = ImageDraw.ImageDraw
 Sample = Callable[[Pen, float, float], None]
-Row = tuple[Status, Colour, list[str]]
+Row = tuple[Status, Color, list[str]]
 
 
 def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
@@ -62,15 +62,15 @@ def _criteria(scene: Scene) -> list[Row]:
     for verdict in sorted(scene.result.verdicts, key=lambda verdict: _ORDER.index(verdict.status)):
         finding = verdict.tightest
         warned = verdict.severity == "warn" and verdict.status is not Status.PASS
-        colour = palette.AMBER if warned else palette.STATUSES[verdict.status]
+        color = palette.AMBER if warned else palette.STATUSES[verdict.status]
         if finding is None:
-            rows.append((verdict.status, colour, _wrapped(f"{shown(verdict.id)}: checked nothing")))
+            rows.append((verdict.status, color, _wrapped(f"{shown(verdict.id)}: checked nothing")))
             continue
         failed = verdict.status is not Status.PASS
         where = time_and_place(finding, scene.result.tick_rate) if failed else ""
         told = ", ".join(part for part in (f"{subject(verdict, finding)}: {comparison(finding)}", where) if part)
         texts = [f"warning: {told}" if warned else told, *(finding.detail if failed else ())]
-        rows.append((verdict.status, colour, [line for text in texts for line in _wrapped(shown(text))]))
+        rows.append((verdict.status, color, [line for text in texts for line in _wrapped(shown(text))]))
     return rows
 
 
@@ -82,8 +82,8 @@ def _criteria_list(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
     y += 14 if reasons else 0
     write(draw, Note(_PAD, y, "criteria", 12, palette.FAINT_INK))
     y += 22
-    for status, colour, lines in rows:
-        (_tick if status is Status.PASS else _cross)(draw, _PAD + 5, y, colour)
+    for status, color, lines in rows:
+        (_tick if status is Status.PASS else _cross)(draw, _PAD + 5, y, color)
         for line in lines:
             write(draw, Note(_PAD + 20, y, line, 13, palette.INK))
             y += _LINE
@@ -107,13 +107,13 @@ def _wrapped(text: str, left: int = _PAD + 20, size: int = 13) -> list[str]:
     return [*lines, current]
 
 
-def _tick(draw: Pen, x: float, y: float, colour: Colour) -> None:
-    draw.line([(x - 5, y), (x - 1, y + 4), (x + 5, y - 5)], fill=colour, width=2)
+def _tick(draw: Pen, x: float, y: float, color: Color) -> None:
+    draw.line([(x - 5, y), (x - 1, y + 4), (x + 5, y - 5)], fill=color, width=2)
 
 
-def _cross(draw: Pen, x: float, y: float, colour: Colour) -> None:
-    draw.line([(x - 4, y - 4), (x + 4, y + 4)], fill=colour, width=2)
-    draw.line([(x - 4, y + 4), (x + 4, y - 4)], fill=colour, width=2)
+def _cross(draw: Pen, x: float, y: float, color: Color) -> None:
+    draw.line([(x - 4, y - 4), (x + 4, y + 4)], fill=color, width=2)
+    draw.line([(x - 4, y + 4), (x + 4, y - 4)], fill=color, width=2)
 
 
 def _legend(step: float) -> list[tuple[str, str, Sample]]:
@@ -126,7 +126,7 @@ def _legend(step: float) -> list[tuple[str, str, Sample]]:
         ("goal", "goal, its tolerance and heading", _ring(palette.GREEN, False)),
         ("failed", "goal that failed", _ring(palette.RED, True)),
         ("robot", "robot at the end", _robot),
-        ("object", "object at the end; before, in its time's colour", _block(palette.OBJECT)),
+        ("object", "object at the end; before, in its time's color", _block(palette.OBJECT)),
         ("door", "door at the end; dashed: where it can be", _door),
         ("person", "person at the end, and where they look", _person),
         ("keepout zone", "zone to keep out of", _hatched(palette.RED, -6)),
@@ -161,20 +161,20 @@ def _arrow(draw: Pen, x: float, y: float) -> None:
     draw.polygon([(x + 7, y - 2), (x + 12, y - 8), (x + 17, y - 2)], fill=palette.AMBER)
 
 
-def _ring(colour: Colour, crossed: bool) -> Sample:
+def _ring(color: Color, crossed: bool) -> Sample:
     def sample(draw: Pen, x: float, y: float) -> None:
-        draw.ellipse((x + 5, y - 7, x + 19, y + 7), fill=(*colour, 46), outline=colour, width=2)
+        draw.ellipse((x + 5, y - 7, x + 19, y + 7), fill=(*color, 46), outline=color, width=2)
         if crossed:
-            _cross(draw, x + 12, y, colour)
+            _cross(draw, x + 12, y, color)
         else:
-            draw.line([(x + 12, y), (x + 25, y)], fill=colour, width=2)
+            draw.line([(x + 12, y), (x + 25, y)], fill=color, width=2)
 
     return sample
 
 
-def _block(colour: Colour) -> Sample:
+def _block(color: Color) -> Sample:
     def sample(draw: Pen, x: float, y: float) -> None:
-        draw.rectangle((x + 3, y - 6, x + 21, y + 6), fill=(*colour, 110), outline=colour)
+        draw.rectangle((x + 3, y - 6, x + 21, y + 6), fill=(*color, 110), outline=color)
 
     return sample
 
@@ -190,10 +190,10 @@ def _person(draw: Pen, x: float, y: float) -> None:
     draw.line([(x + 12, y), (x + 23, y)], fill=palette.PERSON, width=2)
 
 
-def _hatched(colour: Colour, down: float) -> Sample:
+def _hatched(color: Color, down: float) -> Sample:
     def sample(draw: Pen, x: float, y: float) -> None:
         for k in range(3):
-            draw.line([(x + 7 * k, y + down), (x + 7 * k + 9, y - down)], fill=colour, width=1)
+            draw.line([(x + 7 * k, y + down), (x + 7 * k + 9, y - down)], fill=color, width=1)
 
     return sample
 
@@ -209,7 +209,7 @@ def _diamond(draw: Pen, x: float, y: float) -> None:
 
 
 def _time_bar(draw: Pen, scene: Scene, y: float) -> None:
-    """The colours of the driven way, from the start to the end of the run."""
+    """The colors of the driven way, from the start to the end of the run."""
     end = f"{scene.result.simulated:.0f} s"
     left, right = _PAD + 34, WIDTH - _PAD - math.ceil(font(12).getlength(end)) - 8
     write(draw, Note(_PAD, y, "0 s", 12, palette.FAINT_INK))

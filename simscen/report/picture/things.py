@@ -21,9 +21,9 @@ _STILL = 0.02
 
 
 def draw_things(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Each where it ended, with its way and ghosts on it in the colour of their time.
+    """Each where it ended, with its way and ghosts on it in the color of their time.
 
-    A ghost has the colour that the robot's way has where the robot was at that moment. What is gone is an empty rim.
+    A ghost has the color that the robot's way has where the robot was at that moment. What is gone is an empty rim.
     """
     trace = scene.trace
     shapes = outlines(trace, scene.scenery.things)
@@ -34,7 +34,7 @@ def draw_things(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         samples, event = trace.objects.get(name), spawned.get(name)
         person = event is not None and event.data.get("person") is True
         kind = "person" if person else "door" if name in doors else "object"
-        colour = palette.PERSON if person else palette.OBJECT
+        color = palette.PERSON if person else palette.OBJECT
         if samples is not None:
             _way(canvas, scene, samples, shapes[name])
         if name in doors:
@@ -48,7 +48,7 @@ def draw_things(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         gone = removed.get(name, -1) >= (event.tick if event else 0)
         placed = [last.apply(outline) for outline in shapes[name]]
         for outline in placed:
-            canvas.polygon(outline, None if gone else (*colour, 150), colour, 1.0 if gone else 1.5, busy=not gone)
+            canvas.polygon(outline, None if gone else (*color, 150), color, 1.0 if gone else 1.5, busy=not gone)
             canvas.tell(f"{kind} {name}{' gone' if gone else ''}", outline)
         if person:
             _nose(canvas, last, placed[0])
@@ -56,7 +56,7 @@ def draw_things(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         x, y = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
         told = f"{name} (gone at {trace.seconds(removed[name]):.1f} s)" if gone else name
         rim = float(np.ptp(corners, axis=0).min()) * canvas.scale / 2 + 2
-        yield Label(4, x, y, shown(told), colour, 12, min(rim, 40.0))
+        yield Label(4, x, y, shown(told), color, 12, min(rim, 40.0))
 
 
 def _way(canvas: Canvas, scene: Scene, samples: Samples, shape: Outlines) -> None:
@@ -65,9 +65,9 @@ def _way(canvas: Canvas, scene: Scene, samples: Samples, shape: Outlines) -> Non
         if np.ptp(stretch.values[:, :2], axis=0).max() > _STILL:
             canvas.dashes(stretch.values[:, :2], palette.PLACE, 1.0, 2.5)
     for k in _ghosts(samples):
-        colour = palette.ramp(int(samples.ticks[k]) / max(scene.trace.end, 1))
+        color = palette.ramp(int(samples.ticks[k]) / max(scene.trace.end, 1))
         for outline in shape:
-            canvas.polygon(_pose(samples, k).apply(outline), (*colour, 30), colour, 0.8)
+            canvas.polygon(_pose(samples, k).apply(outline), (*color, 30), color, 0.8)
 
 
 def _ends(canvas: Canvas, door: MovableObject, shape: Outlines) -> None:

@@ -47,13 +47,13 @@ def draw_plans(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     plans = scene.trace.plans
     for k, plan in enumerate(plans):
         weight = 0.45 + 0.55 * (k + 1) / len(plans)
-        colour = tuple(round(255 + weight * (part - 255)) for part in palette.PLAN)
-        canvas.line(plan.points[:, :2], (colour[0], colour[1], colour[2]), 3.0)
+        color = tuple(round(255 + weight * (part - 255)) for part in palette.PLAN)
+        canvas.line(plan.points[:, :2], (color[0], color[1], color[2]), 3.0)
     yield from ()
 
 
 def draw_truth(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """The driven way, coloured by time, with a dot at round seconds; there is a gap where it was carried."""
+    """The driven way, colored by time, with a dot at round seconds; there is a gap where it was carried."""
     trace, pieces = scene.trace, driven(scene)
     edges = np.linspace(0, trace.end, _BANDS + 1)
     for piece in pieces:
@@ -102,12 +102,12 @@ def draw_robot(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     reach = float(np.hypot(*hull.T).max()) * canvas.scale
     nose = np.array([(0.35, -0.4), (0.85, 0.0), (0.35, 0.4)]) * (float(hull[:, 0].max()), float(hull[:, 1].max()))
     moved = first.distance(last) * canvas.scale > reach
-    for pose, colour, strength, told in ((first, palette.START, 40, "start"), (last, palette.ROBOT, 170, "end")):
-        canvas.polygon(pose.apply(hull), (*colour, strength), colour, busy=True)
-        canvas.polygon(pose.apply(nose), palette.PAGE if strength > 100 else colour)
+    for pose, color, strength, told in ((first, palette.START, 40, "start"), (last, palette.ROBOT, 170, "end")):
+        canvas.polygon(pose.apply(hull), (*color, strength), color, busy=True)
+        canvas.polygon(pose.apply(nose), palette.PAGE if strength > 100 else color)
         canvas.tell(scene.called(f"robot at the {told}"), pose.apply(hull))
         if told == "end" or moved:
-            yield Label(3, pose.x, pose.y, shown(scene.called(told)), colour, 12, reach + 1)
+            yield Label(3, pose.x, pose.y, shown(scene.called(told)), color, 12, reach + 1)
 
 
 def round_step(seconds: float) -> float:

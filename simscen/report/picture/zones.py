@@ -46,7 +46,7 @@ def _chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> None:
 
 
 def draw_floors(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Floor that holds wheels less, or more, than dry concrete; what was spilt says when."""
+    """Floor that holds wheels less, or more, than dry concrete; what was spilled says when."""
     for floor in scene.scenery.floors:
         yield from _floor(canvas, floor.region, np.array(floor.outline), f"friction {floor.friction:g}")
     for event in scene.each[0].trace.of_kind(EventKind.FLOOR_CHANGED):
@@ -69,15 +69,15 @@ def draw_zones(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Zones of the stack's filters: where not to go falls to the right in red, where to go slowly rises in amber."""
     for zone, told in _in_force(scene):
         outlines = [np.array(zone.outline)] if zone.outline else _blocks(zone)
-        colour = palette.RED if zone.filter == "keepout" else palette.AMBER
-        canvas.hatch(outlines, (*colour, 110), rising=zone.filter == "speed")
+        color = palette.RED if zone.filter == "keepout" else palette.AMBER
+        canvas.hatch(outlines, (*color, 110), rising=zone.filter == "speed")
         if zone.outline:
-            canvas.polygon(outlines[0], None, colour, 1.2)
+            canvas.polygon(outlines[0], None, color, 1.2)
         for outline in outlines:
             canvas.tell(f"{zone.filter} zone {scene.called(told)}", outline)
         if outlines:
             x, y = outlines[0].mean(axis=0).tolist()
-            yield Label(2, x, y, shown(scene.called(told)), colour, 12, min(18.0, _reach(canvas, outlines[0])))
+            yield Label(2, x, y, shown(scene.called(told)), color, 12, min(18.0, _reach(canvas, outlines[0])))
 
 
 def _in_force(scene: Scene) -> Iterator[tuple[FilterZone, str]]:

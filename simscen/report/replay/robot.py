@@ -18,7 +18,7 @@ from simscen.report.text import one_line
 
 POSES = 12_000
 """Poses of a robot: five minutes at 40 Hz."""
-MILLIMETRE, MILLIRADIAN = 1e-3, 1e-3
+MILLIMETER, MILLIRADIAN = 1e-3, 1e-3
 
 
 def robot_of(
@@ -70,8 +70,8 @@ def _poses(samples: Samples, columns: Columns) -> dict[str, Any]:
     x, y, yaw = samples.values[kept, :3].T
     return {
         "ticks": columns.add(samples.ticks[kept]),
-        "x": columns.add(x, MILLIMETRE),
-        "y": columns.add(y, MILLIMETRE),
+        "x": columns.add(x, MILLIMETER),
+        "y": columns.add(y, MILLIMETER),
         "yaw": columns.add(np.unwrap(yaw) if np.isfinite(yaw).all() else yaw, MILLIRADIAN),
     }
 

@@ -50,5 +50,5 @@ def _zones(scenery: Scenery) -> list[dict[str, Any]]:
 
 
 def points(polygon: Iterable[Iterable[float]]) -> list[list[float]]:
-    """Corners to the millimetre."""
+    """Corners to the millimeter."""
     return [[round(float(axis), 3) for axis in corner] for corner in polygon]

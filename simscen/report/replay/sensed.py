@@ -21,7 +21,7 @@ PARTICLES, CLOUDS = 250, 300
 PLAN_POINTS, POINTS = 120, 60_000
 LOCAL_PLANS = 1500
 CELLS = 2_000_000
-_CENTIMETRE = 0.01
+_CENTIMETER = 0.01
 
 
 def scans_of(seen: Seen, columns: Columns) -> list[dict[str, Any]]:
@@ -50,7 +50,7 @@ def _lidar(topic: str, messages: Messages, seen: Seen, columns: Columns) -> dict
         "beams": beams,
         "ticks": columns.add([tick for tick, _ in scans]),
         "measured": columns.add([scan.tick if seen.stamped else tick for tick, scan in scans]),
-        "ranges": columns.add(ranges, _CENTIMETRE),
+        "ranges": columns.add(ranges, _CENTIMETER),
     }
 
 
@@ -67,8 +67,8 @@ def particles_of(seen: Seen, columns: Columns) -> dict[str, Any] | None:
     return {
         "ticks": columns.add([tick for tick, _ in clouds]),
         "numbers": columns.add([len(cloud) for cloud in chosen]),
-        "x": columns.add(table[:, 0], _CENTIMETRE),
-        "y": columns.add(table[:, 1], _CENTIMETRE),
+        "x": columns.add(table[:, 0], _CENTIMETER),
+        "y": columns.add(table[:, 1], _CENTIMETER),
         "yaw": columns.add(table[:, 2], 0.02),
     }
 
@@ -94,8 +94,8 @@ def _paths(paths: list[tuple[int, Array]], columns: Columns) -> dict[str, Any] |
     return {
         "ticks": columns.add([tick for tick, _ in paths]),
         "numbers": columns.add([len(path) for path in points]),
-        "x": columns.add(table[:, 0], _CENTIMETRE),
-        "y": columns.add(table[:, 1], _CENTIMETRE),
+        "x": columns.add(table[:, 0], _CENTIMETER),
+        "y": columns.add(table[:, 1], _CENTIMETER),
     }
 
 

@@ -93,7 +93,7 @@ def _strip(strip: Strip, trace: Trace, case: Case, columns: Columns) -> dict[str
 
 
 def _step(unit: str, values: Array) -> float:
-    """A thousandth of a metre and the like; of what counts, whole numbers."""
+    """A thousandth of a meter and the like; of what counts, whole numbers."""
     finite = values[np.isfinite(values)]
     if unit == "" and np.array_equal(finite, np.rint(finite)):
         return 1.0

@@ -30,7 +30,7 @@ def count(number: int, noun: str) -> str:
 
 
 def pill(outcome: Outcome) -> str:
-    """The outcome with its sign, so that its colour need not be seen."""
+    """The outcome with its sign, so that its color need not be seen."""
     word = outcome.value.replace("-", " ")
     return f'<span class="pill {outcome.value}"><span aria-hidden="true">{SIGNS[outcome]} </span>{word}</span>'
 

@@ -78,15 +78,15 @@ def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
     entry = loaded.spec.own
     if entry.payload is None and entry.motor_torque == 1.0:
         return body
-    from simscen.sim.laden import centre, laden, stands, top, weakened
+    from simscen.sim.laden import center, laden, stands, top, weakened
 
     body = weakened(body, entry.motor_torque)
     if entry.payload is not None:
         x, y, z = entry.payload.at or (0.0, 0.0, top(body))
         body = laden(body, entry.payload.mass, (x, y, z))
         if not stands(body):
-            x, y, _ = centre(body)
-            what = f"the robot falls over: with its payload its centre of mass is at ({x:.2f}, {y:.2f}), off its wheels"
+            x, y, _ = center(body)
+            what = f"the robot falls over: with its payload its center of mass is at ({x:.2f}, {y:.2f}), off its wheels"
             raise InvalidInput([loaded.problem(("robot", "payload"), "SC406", what, "put it nearer to the middle")])
     return body
 

@@ -20,7 +20,7 @@ from simscen.run.preparation.scenario import PreparedScenario
 from simscen.sim.outline import convex_hull, footprint, parts
 from simscen.worlds.routes.shortest_paths import Z_RANGE
 
-MILLIMETRES = 3
+MILLIMETERS = 3
 """Decimals of coordinates in m."""
 
 
@@ -41,7 +41,7 @@ def world_scenery(prepared: PreparedScenario) -> Scenery:
 
 def _thing(body: Body, world: World) -> MovableObject:
     outlines = parts(body.solids, Z_RANGE) or ([footprint(body.solids)] if body.solids else [])
-    rounded = tuple(tuple((round(x, MILLIMETRES), round(y, MILLIMETRES)) for x, y in outline) for outline in outlines)
+    rounded = tuple(tuple((round(x, MILLIMETERS), round(y, MILLIMETERS)) for x, y in outline) for outline in outlines)
     closed, opened = world.doors.get(body.name, (None, None))
     return MovableObject(body.name, body.pose.plane, rounded, closed, opened, body.mass)
 
@@ -56,9 +56,9 @@ def _ground(mesh: TriangleMesh, reach: float) -> Iterator[DrivableSurface]:
         own = mesh.owners == owner
         corners = mesh.vertices[mesh.faces[own]].reshape(-1, 3)
         normal = max(slopes[own & up].tolist(), key=lambda one: -one[2])  # its steepest part
-        uphill = (round(-normal[0] / normal[2], MILLIMETRES) + 0.0, round(-normal[1] / normal[2], MILLIMETRES) + 0.0)
-        outline = convex_hull(np.round(corners[:, :2], MILLIMETRES))
-        yield DrivableSurface(mesh.names[owner], outline, round(float(corners[:, 2].max()), MILLIMETRES), uphill)
+        uphill = (round(-normal[0] / normal[2], MILLIMETERS) + 0.0, round(-normal[1] / normal[2], MILLIMETERS) + 0.0)
+        outline = convex_hull(np.round(corners[:, :2], MILLIMETERS))
+        yield DrivableSurface(mesh.names[owner], outline, round(float(corners[:, 2].max()), MILLIMETERS), uphill)
 
 
 def _zones(part: PreparedScenario, robot: str) -> Iterator[FilterZone]:

@@ -60,7 +60,7 @@ def _components(value: object) -> Iterator[Component]:
         yield value
     inner: Iterable[object] = ()
     match value:
-        case Recovery():  # which writes its behaviours as names
+        case Recovery():  # which writes its behaviors as names
             inner = value.chosen()
         case BaseModel():
             inner = value.__dict__.values()

@@ -36,8 +36,8 @@ def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
 def _folder(run: RunFinished, earlier: Path) -> Path:
     """Return the folder of the run in the earlier session, which may have used several stacks."""
     stack = run.result.stack.partition("=")[0]
-    labelled = run_folder(earlier, replace(run.key.first, stack_name=stack))
-    return labelled if not run.key.first.stack_name and labelled.is_dir() else run_folder(earlier, run.key.first)
+    labeled = run_folder(earlier, replace(run.key.first, stack_name=stack))
+    return labeled if not run.key.first.stack_name and labeled.is_dir() else run_folder(earlier, run.key.first)
 
 
 def _disagreement(here: Path, there: Path) -> str | None:

@@ -104,7 +104,7 @@ def _degrees(angle: float) -> float:
 
 def _offset(body: RobotBody) -> str:
     """Describe the offset of the center of mass, which shifts the center of rotation of a skid-steer robot."""
-    x, y, _ = body.chassis.centre.tolist()
+    x, y, _ = body.chassis.center.tolist()
     along = f"{abs(x):.3f} m {'ahead of' if x > 0 else 'behind'}"
     across = f"{abs(y):.3f} m to the {'left' if y > 0 else 'right'} of"
     return f"its mass lies {along if abs(x) >= abs(y) else across} the middle of its wheels"

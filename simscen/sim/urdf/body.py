@@ -159,7 +159,7 @@ def _weighed(tree: Tree, links: Sequence[str], base_from_root: Pose3, scale: flo
     if not parts:
         raise InvalidInput([tree.element.problem("nothing but the wheels has a mass")])
     whole = combined(parts)
-    return MassProperties(whole.mass * scale, whole.centre, whole.tensor * scale)
+    return MassProperties(whole.mass * scale, whole.center, whole.tensor * scale)
 
 
 def _wheel(tree: Tree, wheel: WheelJoint, base_from_root: Pose3, scale: float, spec: RobotSpec) -> Wheel:

@@ -19,8 +19,8 @@ def describe(body: RobotBody) -> str:
     """
     robot = ET.Element("robot", name=body.name)
     base = ET.SubElement(robot, "link", name=BASE)
-    centre = Pose3(*body.chassis.centre.tolist())
-    _inertial(base, body.chassis.mass, centre, [[float(value) for value in row] for row in body.chassis.tensor])
+    center = Pose3(*body.chassis.center.tolist())
+    _inertial(base, body.chassis.mass, center, [[float(value) for value in row] for row in body.chassis.tensor])
     for solid in (*body.hull, *body.casters):
         _shown(base, solid)
     for wheel in body.wheels:
@@ -41,9 +41,9 @@ def _wheel(robot: ET.Element, wheel: Wheel) -> None:
     ET.SubElement(joint, "axis", xyz="0 1 0")
 
 
-def _inertial(link: ET.Element, mass: float, centre: Pose3, tensor: list[list[float]]) -> None:
+def _inertial(link: ET.Element, mass: float, center: Pose3, tensor: list[list[float]]) -> None:
     inertial = ET.SubElement(link, "inertial")
-    _origin(inertial, centre)
+    _origin(inertial, center)
     ET.SubElement(inertial, "mass", value=_text(mass))
     names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
     ET.SubElement(inertial, "inertia", {name: _text(tensor[row][column]) for name, (row, column) in names.items()})

@@ -49,7 +49,7 @@ class Joint:
 class Meshes:
     """Where meshes are looked for, and who reads them.
 
-    `read` gives the triangles of a file in metres, and raises ValueError with a sentence when it cannot. `expanded` =
+    `read` gives the triangles of a file in meters, and raises ValueError with a sentence when it cannot. `expanded` =
     the URDF was a xacro file.
     """
 
@@ -74,7 +74,7 @@ class Meshes:
             vertices = mesh.vertices * np.array(scale)
             farthest = float(np.abs(vertices).max(initial=0.0))
         if not farthest <= MESH_REACH:
-            hint = 'is it in millimetres? give it scale="0.001 0.001 0.001"'
+            hint = 'is it in millimeters? give it scale="0.001 0.001 0.001"'
             raise Unusable(
                 element, f"mesh {written[:200]!r} reaches {farthest:.4g} m, more than {MESH_REACH:g} m", hint
             )

@@ -19,7 +19,7 @@ TURNING = ("revolute", "continuous")
 
 @dataclass(frozen=True, eq=False)
 class WheelJoint:
-    """A wheel in the frame of the root: the `place` of its middle, `radius` and `width` in metres."""
+    """A wheel in the frame of the root: the `place` of its middle, `radius` and `width` in meters."""
 
     joint: Joint
     place: tuple[float, float, float]

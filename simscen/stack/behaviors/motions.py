@@ -1,4 +1,4 @@
-"""Recovery behaviours that move the robot or let it wait (nav2_behaviors)."""
+"""Recovery behaviors that move the robot or let it wait (nav2_behaviors)."""
 
 import math
 
@@ -11,7 +11,7 @@ from simscen.stack.setting import Setting
 from simscen.stack.time_to_collision import time_to_collision
 
 TIME_ALLOWANCE = 10.0
-"""Nav2's default for every behaviour, in seconds."""
+"""Nav2's default for every behavior, in seconds."""
 MIN_ROTATIONAL_VEL = 0.4
 """nav2_behaviors: min_rotational_vel in rad/s."""
 
@@ -51,7 +51,7 @@ class BackUp:
     """Drive straight back by `backup_dist`, or as far as there is room.
 
     Nav2's fails unless there is room for simulate_ahead_time, as it does here without `backup_partial`; but a few
-    centimetres are often what it takes to turn.
+    centimeters are often what it takes to turn.
     """
 
     name = "backup"

@@ -8,7 +8,7 @@ from simscen.stack.protocols import NavigationFailure, RobotModel
 DEFAULT_SPEED = 0.5
 """m/s: Nav2's desired_linear_vel, and vx_max of MPPI."""
 SAME_END = 0.1
-"""Metres by which corrections of the localizer may move the end of the path that is being followed."""
+"""Meters by which corrections of the localizer may move the end of the path that is being followed."""
 
 
 class PathFollower:

@@ -20,7 +20,7 @@ PARTS = (1.0, 0.75, 0.5, 0.25, 0.0)
 MOMENT, SIGMAS = 0.1, 0.5
 """Seconds at most between two moments at which they are compared, and standard deviations by which they count wider."""
 NEARER = 1e-4
-"""Metres: whom one is too near already is met by coming nearer."""
+"""Meters: whom one is too near already is met by coming nearer."""
 
 
 class FreeWay:

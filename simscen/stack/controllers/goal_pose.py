@@ -18,7 +18,7 @@ SETTLING = 2.0
 ever, and one that stands off the middle of its goal has to be at rest to have reached it."""
 
 AT_END = 0.03
-"""Metres of path that a car may leave out: its last arc is what gives it its heading."""
+"""Meters of path that a car may leave out: its last arc is what gives it its heading."""
 
 
 class GoalPose:
@@ -35,7 +35,7 @@ class GoalPose:
         self._there = False
 
     def reached(self, pose: Pose2, twist: Twist, goal: Goal, remaining: float) -> bool:
-        """Whether to stop driving and to turn to the goal's heading; `remaining` metres of path are left."""
+        """Whether to stop driving and to turn to the goal's heading; `remaining` meters of path are left."""
         distance = goal.pose.distance(pose)
         if not self._can_turn:
             return distance <= goal.xy_tolerance and remaining < AT_END

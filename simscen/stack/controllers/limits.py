@@ -15,7 +15,7 @@ Asked = tuple[float | None, float | None, float | None]
 class Limits:
     """Bounds of vx, vy in m/s and turn rate in rad/s; what a second changes upward, and downward (negative).
 
-    `turning_radius` is the least in metres, 0 for a base that turns in place.
+    `turning_radius` is the least in meters, 0 for a base that turns in place.
     """
 
     low: Axes

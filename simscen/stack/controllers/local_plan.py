@@ -11,14 +11,14 @@ from simscen.stack.controllers.tracking import PathTracker
 
 Floats = npt.NDArray[np.float32]
 SPACING = 0.05
-"""Metres between points: Nav2's planners put one into each cell of a costmap, and its critics count points."""
+"""Meters between points: Nav2's planners put one into each cell of a costmap, and its critics count points."""
 
 
 @dataclass(frozen=True, eq=False)
 class LocalPlan:
-    """Poses (n, 3) from where the robot is on its path, `spacing` metres apart, and its `length`.
+    """Poses (n, 3) from where the robot is on its path, `spacing` meters apart, and its `length`.
 
-    It ends where the robot must next turn round, at the path's end, or after as many metres as were asked for.
+    It ends where the robot must next turn round, at the path's end, or after as many meters as were asked for.
     """
 
     points: Array
@@ -31,10 +31,10 @@ class LocalPlan:
         return (x - pose.x).astype(np.float32), (y - pose.y).astype(np.float32), yaw.astype(np.float32)
 
 
-def local_plan(track: PathTracker, metres: float, spacing: float = SPACING) -> LocalPlan:
-    """The next `metres` of the path, its points at most `spacing` metres apart."""
-    points, along = track.ahead(metres)
-    length = float(min(metres, along[-1]))
+def local_plan(track: PathTracker, meters: float, spacing: float = SPACING) -> LocalPlan:
+    """The next `meters` of the path, its points at most `spacing` meters apart."""
+    points, along = track.ahead(meters)
+    length = float(min(meters, along[-1]))
     steps = max(1, math.ceil(length / spacing - 1e-9))
     at = np.arange(steps + 1) * (length / steps)
     at[-1] = length

@@ -117,7 +117,7 @@ class RegulatedPurePursuit(PathFollower):
         return _seen_from(pose, *track.carrot(pose, self._spec.curvature_lookahead_dist, beyond=beyond))
 
     def _as_far_as(self, carrot: tuple[float, float]) -> float:
-        """Metres for which the way must be free: to the carrot; of a car's, that may lie beyond where it stops."""
+        """Meters for which the way must be free: to the carrot; of a car's, that may lie beyond where it stops."""
         assert self._track is not None
         away = math.hypot(*carrot)
         return min(away, max(AT_CUSP, self._track.to_cusp())) if self._robot.turning_radius > 0.0 else away

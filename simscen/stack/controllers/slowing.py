@@ -11,7 +11,7 @@ from simscen.stack.setting import Setting
 BRAKES, REACTION = 0.9, 0.1
 """Part of the base's deceleration that is counted on, and seconds for which it drives on as it did."""
 STEP = 0.1
-"""Metres of path between two places that are looked at."""
+"""Meters of path between two places that are looked at."""
 ACROSS = 10.0
 """1/s. Beside the hull it needs the way of a tenth of a second: who comes off the middle of a gap has to notice it."""
 
@@ -24,7 +24,7 @@ class Slowing:
         self._brakes = 2.0 * BRAKES * setting.robot.linear_deceleration
 
     def beside(self, speed: float, distance: float) -> float:
-        """The speed where the nearest obstacle is `distance` metres from the base: Nav2's, less in a gap."""
+        """The speed where the nearest obstacle is `distance` meters from the base: Nav2's, less in a gap."""
         spec = self._spec
         if not spec.use_cost_regulated_linear_velocity_scaling or distance >= spec.cost_scaling_dist:
             return speed
@@ -43,11 +43,11 @@ class Slowing:
         """What is left of the speed `slow` here, so that the brakes suffice for all that is ahead on the path."""
         if not self._spec.slow_down_ahead:
             return slow
-        for metres, place, bend in track.stations(STEP, slow * (slow / self._brakes + REACTION)):
+        for meters, place, bend in track.stations(STEP, slow * (slow / self._brakes + REACTION)):
             there, near = self.within(speed, bend), distance_at(costmap, place.real, place.imag)
             if near > 0.0:  # in an obstacle, or off the costmap, is for others to see to
                 there = min(there, self.beside(speed, near))
             if there < slow:
-                braking = self._brakes * max(0.0, metres - REACTION * slow)
+                braking = self._brakes * max(0.0, meters - REACTION * slow)
                 slow = min(slow, math.sqrt(there * there + braking))
         return slow

@@ -12,13 +12,13 @@ from simscen.core.messages.navigation import Path
 from simscen.stack.cusps import changes, forward_steps
 
 SEARCH_AHEAD = 1.5
-"""Metres of path beyond the last place that are searched for the nearest point, so that a path may cross itself."""
+"""Meters of path beyond the last place that are searched for the nearest point, so that a path may cross itself."""
 AT_CUSP = 0.03
-"""Metres before a change of direction at which it counts as reached."""
+"""Meters before a change of direction at which it counts as reached."""
 BEND = 0.3
-"""Metres to both sides of a point over which the path's bend there is told."""
+"""Meters to both sides of a point over which the path's bend there is told."""
 ROUNDING = 1e-9
-"""Metres: sums of lengths are not exact."""
+"""Meters: sums of lengths are not exact."""
 
 
 class PathTracker:
@@ -27,8 +27,8 @@ class PathTracker:
     A path may change between forward and backward (Reeds-Shepp). It is followed piece by piece: nothing beyond the
     next such cusp is looked at until the robot is there.
 
-    Searches pass over what cannot be what they look for: so many metres along the path change the distance to the robot
-    by no more than that, and so many points are no more metres than that many of the longest steps. A handful of points
+    Searches pass over what cannot be what they look for: so many meters along the path change the distance to the robot
+    by no more than that, and so many points are no more meters than that many of the longest steps. A handful of points
     x + iy is looked at, which takes less than arrays of thirty do.
     """
 
@@ -37,12 +37,12 @@ class PathTracker:
         steps = np.diff(self.points[:, :2], axis=0)
         lengths = np.hypot(steps[:, 0], steps[:, 1])
         self.along = np.concatenate(([0.0], np.cumsum(lengths)))
-        self._metres: list[float] = self.along.tolist()
+        self._meters: list[float] = self.along.tolist()
         self._places: list[complex] = (self.points[:, 0] + 1j * self.points[:, 1]).tolist()
         self.longest = float(lengths.max(initial=0.0))
-        """Metres of the longest step."""
+        """Meters of the longest step."""
         self._most = 1.0 / (self.longest + ROUNDING)
-        """Points for each metre, at least."""
+        """Points for each meter, at least."""
         ahead = forward_steps(self.points)
         self._ends: list[int] = [*changes(ahead).tolist(), len(self.points) - 1]
         self._forward: list[bool] = [bool(ahead[max(0, end - 1)]) if len(ahead) else True for end in self._ends]
@@ -50,8 +50,8 @@ class PathTracker:
 
     @property
     def length(self) -> float:
-        """Length of the path in metres."""
-        return self._metres[-1]
+        """Length of the path in meters."""
+        return self._meters[-1]
 
     @property
     def has_cusps(self) -> bool:
@@ -72,19 +72,19 @@ class PathTracker:
             self._nearest(pose)
 
     def _nearest(self, pose: Pose2) -> None:
-        places, metres, most, here = self._places, self._metres, self._most, complex(pose.x, pose.y)
+        places, meters, most, here = self._places, self._meters, self._most, complex(pose.x, pose.y)
         index = nearest = self.index
-        end, far, near = self._ends[0], metres[index] + SEARCH_AHEAD, math.inf
-        while index <= end and metres[index] <= far:
+        end, far, near = self._ends[0], meters[index] + SEARCH_AHEAD, math.inf
+        while index <= end and meters[index] <= far:
             away = abs(places[index] - here)
             if away < near:
                 nearest, near = index, away
             index += int((away - near) * most) or 1
         self.index = nearest
 
-    def ahead(self, metres: float) -> tuple[Array, Array]:
-        """Points (n, 3) of this piece for so many metres, at least two where it has any, and metres (n,) to them."""
-        end = min(self._stop(metres) + 1, self._ends[0] + 1)
+    def ahead(self, meters: float) -> tuple[Array, Array]:
+        """Points (n, 3) of this piece for so many meters, at least two where it has any, and meters (n,) to them."""
+        end = min(self._stop(meters) + 1, self._ends[0] + 1)
         start = min(self.index, max(0, end - 2))
         return self.points[start:end], self.along[start:end] - self.along[start]
 
@@ -93,33 +93,33 @@ class PathTracker:
         return self._places[self.index :: every]
 
     def stations(self, step: float, reach: float) -> Iterator[tuple[float, complex, float]]:
-        """Points of this piece about `step` metres apart, the first so far ahead: metres to each, x + iy, its bend."""
-        metres, here = self._metres, self._metres[self.index]
+        """Points of this piece about `step` meters apart, the first so far ahead: meters to each, x + iy, its bend."""
+        meters, here = self._meters, self._meters[self.index]
         at = step
         while at <= reach:
-            index = bisect_left(metres, here + at)
+            index = bisect_left(meters, here + at)
             if index > self._ends[0]:
                 return
-            yield metres[index] - here, self._places[index], self._bend(index)
-            at = metres[index] - here + step
+            yield meters[index] - here, self._places[index], self._bend(index)
+            at = meters[index] - here + step
 
     def _bend(self, index: int) -> float:
         """About the curvature at a point in 1/m; 0 where the piece does not go on so far to both sides."""
-        metres, places = self._metres, self._places
-        before = bisect_right(metres, metres[index] - BEND) - 1
-        after = bisect_left(metres, metres[index] + BEND)
+        meters, places = self._meters, self._places
+        before = bisect_right(meters, meters[index] - BEND) - 1
+        after = bisect_left(meters, meters[index] + BEND)
         if before < self._begin or after > self._ends[0]:
             return 0.0
         turn = phase((places[after] - places[index]) * (places[index] - places[before]).conjugate())
-        return 2.0 * abs(turn) / (metres[after] - metres[before])
+        return 2.0 * abs(turn) / (meters[after] - meters[before])
 
     def remaining(self) -> float:
-        """Metres of path from the nearest point to the end."""
-        return self._metres[-1] - self._metres[self.index]
+        """Meters of path from the nearest point to the end."""
+        return self._meters[-1] - self._meters[self.index]
 
     def to_cusp(self) -> float:
-        """Metres of path to the end of this piece."""
-        return self._metres[self._ends[0]] - self._metres[self.index]
+        """Meters of path to the end of this piece."""
+        return self._meters[self._ends[0]] - self._meters[self.index]
 
     @property
     def piece_end(self) -> tuple[float, float]:
@@ -133,10 +133,10 @@ class PathTracker:
         Interpolated between points, so that the carrot glides (RPP's circleSegmentIntersection). `beyond` prolongs
         the piece in the direction it ends in, so that the robot comes in straight (interpolate_curvature_after_goal).
         """
-        far = self._metres[self.index] + 2 * distance + 0.5
+        far = self._meters[self.index] + 2 * distance + 0.5
         first = self._leaving(pose, distance, far)
         if first is None:
-            x, y, yaw = self.points[min(bisect_right(self._metres, far), self._ends[0])].tolist()
+            x, y, yaw = self.points[min(bisect_right(self._meters, far), self._ends[0])].tolist()
             if not beyond:
                 return x, y
             more = distance if self.forward else -distance
@@ -152,24 +152,24 @@ class PathTracker:
 
     def _leaving(self, pose: Pose2, distance: float, far: float) -> int | None:
         """The first point of the piece, up to the first that is `far` along the path, no nearer to the robot."""
-        places, metres, most, here = self._places, self._metres, self._most, complex(pose.x, pose.y)
+        places, meters, most, here = self._places, self._meters, self._most, complex(pose.x, pose.y)
         index, end = self.index, self._ends[0]
-        while index <= end and (index == 0 or metres[index - 1] <= far):
+        while index <= end and (index == 0 or meters[index - 1] <= far):
             near = abs(places[index] - here)
             if near >= distance:
                 return index
             index += int((distance - near) * most) or 1
         return None
 
-    def _stop(self, metres: float) -> int:
+    def _stop(self, meters: float) -> int:
         """One past the last point so far ahead, or of this piece."""
-        end = bisect_right(self._metres, self._metres[self.index] + metres)
+        end = bisect_right(self._meters, self._meters[self.index] + meters)
         return min(end, self._ends[0] + 1)
 
 
-def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, centre: Pose2) -> tuple[float, float]:
-    """The point between a (inside) and b (outside) on the circle around the origin, moved to `centre`."""
+def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, center: Pose2) -> tuple[float, float]:
+    """The point between a (inside) and b (outside) on the circle around the origin, moved to `center`."""
     dx, dy = bx - ax, by - ay
     a, b, c = dx * dx + dy * dy, ax * dx + ay * dy, ax * ax + ay * ay - radius * radius
     t = (-b + math.sqrt(max(0.0, b * b - a * c))) / a if a > 0 else 1.0
-    return centre.x + ax + t * dx, centre.y + ay + t * dy
+    return center.x + ax + t * dx, center.y + ay + t * dy

@@ -12,7 +12,7 @@ from simscen.stack.protocols import CostmapView
 from simscen.stack.time_to_collision import time_to_collision
 
 ROOM = 1.01
-"""Cells between the hull and the nearest lethal cell's centre that a turn must keep: cells stand for obstacles that
+"""Cells between the hull and the nearest lethal cell's center that a turn must keep: cells stand for obstacles that
 may reach half a cell nearer, and behind the robot no scan corrects them."""
 BACK_OUT, AHEAD = 0.15, 1.0
 """m/s of backing out, Nav2's backup_speed, and seconds of free way that it needs."""

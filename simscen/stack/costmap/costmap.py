@@ -26,7 +26,7 @@ from simscen.stack.nearest import FARTHEST, SquaredWithin
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 
 BEYOND_HULL = 0.5
-"""Metres beyond the hull up to which distances are told, or the inflation radius if that is more."""
+"""Meters beyond the hull up to which distances are told, or the inflation radius if that is more."""
 LOOK_AROUND = 5
 """Every which scan is asked what unknown cells it shows to be free: once a second at the default rate, Nav2's own for
 the global costmap. Nothing that drives waits for it, and of a map's outside there are many."""
@@ -39,9 +39,9 @@ class Costmap:
 
     The distance field of the static map is computed once. A scan changes few cells, so distances to live obstacles
     are computed again only around those. For that to suffice, distances end at a reach of the inflation radius, or
-    half a metre beyond the hull: farther away than that, nothing asks how far.
+    half a meter beyond the hull: farther away than that, nothing asks how far.
 
-    Where there is no map it is a window that rolls with the robot, `size` metres along x and y. It lives in the frame
+    Where there is no map it is a window that rolls with the robot, `size` meters along x and y. It lives in the frame
     in which it is told where the robot is: that of the map, or odom.
     """
 
@@ -95,8 +95,8 @@ class Costmap:
         """Another one after each update that changed something."""
         return self._revision
 
-    def changed_near(self, revision: int, places: Plane, metres: float) -> bool:
-        """Whether since that revision something may have come to, or gone from, within so many metres of a place.
+    def changed_near(self, revision: int, places: Plane, meters: float) -> bool:
+        """Whether since that revision something may have come to, or gone from, within so many meters of a place.
 
         `places` are x + iy (n,). Where it says no, the view need not be looked at for how far obstacles are from these.
         """
@@ -104,7 +104,7 @@ class Costmap:
         if since > len(self._changes):
             return True
         changes = list(self._changes)[len(self._changes) - since :]
-        reach = metres + (1 + self._speck) * math.sqrt(2.0) * self._frame.resolution  # of cells, told by their middles
+        reach = meters + (1 + self._speck) * math.sqrt(2.0) * self._frame.resolution  # of cells, told by their middles
         for cells in changes:
             if cells is None or (np.abs(self._frame.points(cells)[:, None] - places) <= reach).any():
                 return True
@@ -130,9 +130,9 @@ class Costmap:
             self._learn(base, seen)
 
     def clear(self, within: float = math.inf, unseen: float = BEYOND_HULL) -> None:
-        """Forget every live obstacle `within` so many metres of the robot along x and y, but those that it sees now.
+        """Forget every live obstacle `within` so many meters of the robot along x and y, but those that it sees now.
 
-        Nav2's ClearEntireCostmap, or ClearCostmapAroundRobot. What is `unseen`, where no lidar looks, so many metres
+        Nav2's ClearEntireCostmap, or ClearCostmapAroundRobot. What is `unseen`, where no lidar looks, so many meters
         beyond the hull at most, is kept: that nobody sees it does not tell that it has gone, and the next thing a robot
         does may be to back up.
         """
@@ -167,8 +167,8 @@ class Costmap:
         if self._static_squared[here] == 0:
             return False
         near = self._frame.window(here, here, math.ceil(tolerance / self._frame.resolution))
-        fits = self._inflation.metres.take(self._static_squared[near]) > self._inscribed
-        points = self._frame.centres(np.argwhere(fits) + np.array((near[0].start, near[1].start)))
+        fits = self._inflation.meters.take(self._static_squared[near]) > self._inscribed
+        points = self._frame.centers(np.argwhere(fits) + np.array((near[0].start, near[1].start)))
         return bool((np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y) <= tolerance).any())
 
     def aim(self, start: Pose2, goal: Pose2) -> Pose2:
@@ -186,8 +186,8 @@ class Costmap:
             self._unknown = carried(self._unknown, before, window, True)
         self._touch(*self._whole)
 
-    def _layer(self, centre: Pose2) -> StaticLayer:
-        return self._layer_in(window_around(centre, self._size, self._spec.resolution))
+    def _layer(self, center: Pose2) -> StaticLayer:
+        return self._layer_in(window_around(center, self._size, self._spec.resolution))
 
     def _layer_in(self, window: Frame) -> StaticLayer:
         """What never changes but by an order; in this window, where there is no map."""
@@ -222,7 +222,7 @@ class Costmap:
         if costs is None:
             costs = self._inflation.costs(self._static_squared, self._unknown if self._tracks else None)
         self._costs = costs
-        self._distance = self._inflation.metres.take(self._static_squared)
+        self._distance = self._inflation.meters.take(self._static_squared)
         self._note(None)
         self._changed = None
         if len(marked := self._live.cells):
@@ -286,7 +286,7 @@ class Costmap:
         squared = squared_distances(self._obstacles(outer), self._margin)[part]
         if self._walled:
             squared = np.minimum(self._static_squared[inner], squared)
-        self._distance[inner] = self._inflation.metres.take(squared)
+        self._distance[inner] = self._inflation.meters.take(squared)
         self._costs[inner] = self._inflation.costs(squared, self._unknown[inner] if self._tracks else None)
 
     @cached_property
@@ -301,12 +301,12 @@ class Costmap:
         if self._walled:
             squared = np.minimum(self._static_squared, squared)
         places = squared.astype(np.intp)  # once, for both look-ups
-        self._distance = self._inflation.metres.take(places)
+        self._distance = self._inflation.meters.take(places)
         self._costs = self._inflation.costs(places, self._unknown if self._tracks else None)
 
 
 def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
-    """How far in metres from obstacles distances are told."""
+    """How far in meters from obstacles distances are told."""
     return max(spec.inflation_radius, robot.circumscribed_radius + BEYOND_HULL)
 
 

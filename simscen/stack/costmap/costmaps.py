@@ -17,9 +17,9 @@ from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
 
 SMALLEST = 3.0
-"""Metres: the edge of Nav2's local costmap, and the least of ours unless somebody asks for less."""
+"""Meters: the edge of Nav2's local costmap, and the least of ours unless somebody asks for less."""
 ZONES_MOVED = 0.02
-"""Metres by which zones may lie beside where they belong in the odom frame before they are painted anew."""
+"""Meters by which zones may lie beside where they belong in the odom frame before they are painted anew."""
 
 
 class Costmaps:
@@ -31,7 +31,7 @@ class Costmaps:
     """
 
     def __init__(self, spec: StackSpec, surroundings: Surroundings, reach: float, latency: int = 0) -> None:
-        """`reach`: how far in metres the controller looks ahead; `latency`: ticks that an update takes."""
+        """`reach`: how far in meters the controller looks ahead; `latency`: ticks that an update takes."""
         self.wide = Costmap(spec.costmap, surroundings)
         near = spec.local_costmap.completed(spec.costmap)
         edge = max(SMALLEST, 2.0 * (reach + surroundings.robot.circumscribed_radius + NO_FARTHER))

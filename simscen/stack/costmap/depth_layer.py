@@ -52,7 +52,7 @@ def shown(image: Image, base: Pose2, frame: Frame, spec: CostmapSpec, known: Mas
 
 def seen_through(cells: Cells, heights: Heights, frame: Frame, image: Image, base: Pose2, spec: CostmapSpec) -> Mask:
     """Which of the cells (n, 2) the camera looks through at their heights (n,), to something farther away."""
-    place = base.inverse().apply(frame.centres(cells))
+    place = base.inverse().apply(frame.centers(cells))
     seen = image.mount.inverse().apply(np.column_stack((place, heights.astype(np.float64))))
     ahead = seen[:, 0] > 0.0
     depth = np.where(ahead, seen[:, 0], 1.0)
@@ -74,7 +74,7 @@ def _focal(columns: int, field_of_view: float) -> float:
 
 @lru_cache(maxsize=8)
 def _slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Array]:
-    """For each pixel how far it looks to the left, and up, for each metre of depth."""
+    """For each pixel how far it looks to the left, and up, for each meter of depth."""
     rows, columns = shape
     focal = _focal(columns, field_of_view)
     left, up = (columns / 2 - 0.5 - np.arange(columns)) / focal, (rows / 2 - 0.5 - np.arange(rows)) / focal

@@ -16,7 +16,7 @@ Numbers = npt.NDArray[np.int64]
 """Cells (n,) by number: row by row, from cell (0, 0) on."""
 
 MOST_KNOWN = 10_000
-"""Cells of a grid of which all centres are kept: those of a local costmap."""
+"""Cells of a grid of which all centers are kept: those of a local costmap."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Frame:
         cells: Cells = np.floor(local[:, ::-1]).astype(np.int64)
         return cells
 
-    def centres(self, cells: Cells) -> Array:
-        """Points (n, 2) of the centres of cells (n, 2)."""
+    def centers(self, cells: Cells) -> Array:
+        """Points (n, 2) of the centers of cells (n, 2)."""
         points: Array = (cells[:, ::-1] + 0.5) * self.resolution + np.array(self.origin)
         return points
 
@@ -48,14 +48,14 @@ class Frame:
         rows, columns = cells[:, 0], cells[:, 1]
         return (rows >= 0) & (columns >= 0) & (rows < self.shape[0]) & (columns < self.shape[1])
 
-    def numbers(self, points: Plane, centre: complex, reach: float) -> Numbers:
-        """The cells under those of the points (n,) that lie on the grid; all lie within `reach` of the `centre`.
+    def numbers(self, points: Plane, center: complex, reach: float) -> Numbers:
+        """The cells under those of the points (n,) that lie on the grid; all lie within `reach` of the `center`.
 
         Where all of that is on the grid, nobody is asked.
         """
         local = points - complex(*self.origin)
         local *= 1.0 / self.resolution
-        flat, some = local.view(np.float64), not self._holds(centre, reach + self.resolution)
+        flat, some = local.view(np.float64), not self._holds(center, reach + self.resolution)
         if some:
             np.floor(flat, out=flat)  # where all are positive, to cut off does the same
         cells = flat.astype(np.int64).reshape(-1, 2)
@@ -65,9 +65,9 @@ class Frame:
             numbers = numbers[(off[:, 0] < self.shape[1]) & (off[:, 1] < self.shape[0])]
         return numbers
 
-    def _holds(self, centre: complex, reach: float) -> bool:
-        """Whether all that is within `reach` metres of a point lies on the grid."""
-        (left, low), (rows, columns), x, y = self.origin, self.shape, centre.real, centre.imag
+    def _holds(self, center: complex, reach: float) -> bool:
+        """Whether all that is within `reach` meters of a point lies on the grid."""
+        (left, low), (rows, columns), x, y = self.origin, self.shape, center.real, center.imag
         wide, high = columns * self.resolution, rows * self.resolution
         return left + reach <= x <= left + wide - reach and low + reach <= y <= low + high - reach
 
@@ -77,11 +77,11 @@ class Frame:
         return np.array((1, self.shape[1]))
 
     def points(self, numbers: Numbers) -> Plane:
-        """The centres (n,) of cells."""
+        """The centers (n,) of cells."""
         corner, (rows, columns) = complex(*self.origin), self.shape
         if rows * columns > MOST_KNOWN:
             return _middles(numbers, columns, self.resolution, corner)
-        points: Plane = _centres(self.shape, self.resolution).take(numbers)
+        points: Plane = _centers(self.shape, self.resolution).take(numbers)
         points += corner
         return points
 
@@ -112,13 +112,13 @@ class Frame:
 
 
 def _middles(numbers: Numbers, columns: int, edge: float, corner: complex = 0j) -> Plane:
-    """The centres x + iy (n,) of cells of a grid with this corner."""
+    """The centers x + iy (n,) of cells of a grid with this corner."""
     up, across = np.divmod(numbers, columns)
     middles: Plane = up * (1j * edge) + (across * edge + (corner + (0.5 + 0.5j) * edge))
     return middles
 
 
 @lru_cache(maxsize=8)
-def _centres(shape: tuple[int, int], edge: float) -> Plane:
+def _centers(shape: tuple[int, int], edge: float) -> Plane:
     """The same of all cells of a grid, from its corner."""
     return _middles(np.arange(shape[0] * shape[1]), shape[1], edge)

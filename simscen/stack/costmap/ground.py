@@ -13,15 +13,15 @@ from simscen.core.geometry import Array
 
 Pixels = npt.NDArray[np.bool_]
 STEP = 0.05
-"""Metres that the ground has to go on for what follows to be measured from there."""
+"""Meters that the ground has to go on for what follows to be measured from there."""
 UPRIGHT = 1.0
-"""What rises by more than this for each metre is a face, and the point below it belongs to it."""
+"""What rises by more than this for each meter is a face, and the point below it belongs to it."""
 WINDOW = 8
 """The part of a picture's rows that tells how what is seen first rises."""
 
 
 def above_ground(away: Array, heights: Array, slope: float, low: float, known: Pixels) -> tuple[Array, Pixels]:
-    """How high points (rows, columns) are above the ground, in metres, and which of them are ground.
+    """How high points (rows, columns) are above the ground, in meters, and which of them are ground.
 
     `away` are their distances along the plane from the camera, `heights` above the plane on which the robot stands,
     from the top row down; nan where nothing is seen. Ground rises by no more than the angle `slope`. What is seen

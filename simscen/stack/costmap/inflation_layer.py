@@ -1,6 +1,6 @@
 """From distances to costs: nav2_costmap_2d's inflation layer.
 
-Distances are kept as squared whole cells (uint16), so that distance in metres and cost are one table look-up each.
+Distances are kept as squared whole cells (uint16), so that distance in meters and cost are one table look-up each.
 """
 
 from functools import lru_cache
@@ -37,17 +37,17 @@ def inflation(resolution: float, inscribed: float, radius: float, scaling: float
 
 
 class Inflation:
-    """Tables over squared cell distances: `metres` and nav2's exponential `cost`.
+    """Tables over squared cell distances: `meters` and nav2's exponential `cost`.
 
     cost = 252 · exp(-cost_scaling_factor · (distance - inscribed_radius)) between the inscribed and the inflation
-    radius (nav2_costmap_2d/inflation_layer.hpp, computeCost). Metres end at `reach`.
+    radius (nav2_costmap_2d/inflation_layer.hpp, computeCost). Meters end at `reach`.
     """
 
     def __init__(
         self, resolution: float, inscribed: float, inflation_radius: float, scaling: float, reach: float
     ) -> None:
         distance = np.sqrt(np.arange(FAR + 1)) * resolution
-        self.metres: npt.NDArray[np.float32] = np.minimum(distance, reach).astype(np.float32)
+        self.meters: npt.NDArray[np.float32] = np.minimum(distance, reach).astype(np.float32)
         decay = MAX_NON_OBSTACLE * np.exp(-scaling * np.maximum(distance - inscribed, 0.0))
         cost = np.where(distance <= inscribed, INSCRIBED, decay)
         cost = np.where(distance > inflation_radius, FREE, cost)

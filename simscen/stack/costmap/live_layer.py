@@ -40,19 +40,19 @@ class LiveLayer:
         self._ground: Mask = NOWHERE
         self._marks: Numbers = NONE
 
-    def forget_around(self, base: Pose2, metres: float) -> None:
+    def forget_around(self, base: Pose2, meters: float) -> None:
         """Forget what lies so near to the robot along x and y."""
         here = self._frame.cell(base.x, base.y)
-        window = self._frame.window(here, here, math.ceil(metres / self._frame.resolution))
+        window = self._frame.window(here, here, math.ceil(meters / self._frame.resolution))
         self._scanned[window] = False
         self._marks = np.flatnonzero(self._scanned)
         if self._heights is not None:
             self._heights[window] = np.nan
 
-    def out_of_view(self, base: Pose2, metres: float, scans: list[tuple[Pose2, Scan]]) -> Cells:
+    def out_of_view(self, base: Pose2, meters: float, scans: list[tuple[Pose2, Scan]]) -> Cells:
         """The cells so near to the robot that are marked by a lidar and that none looked at in these scans."""
         here = self._frame.cell(base.x, base.y)
-        window = self._frame.window(here, here, math.ceil(metres / self._frame.resolution))
+        window = self._frame.window(here, here, math.ceil(meters / self._frame.resolution))
         cells: Cells = np.argwhere(self._scanned[window]) + np.array((window[0].start, window[1].start))
         for place, scan in scans:
             cells = cells[~in_view(cells, self._frame, scan, place)]
@@ -145,23 +145,23 @@ class LiveLayer:
         marked = np.argwhere(~np.isnan(self._heights))
         heights = self._heights[marked[:, 0], marked[:, 1]]
         gone = seen_through(marked, heights, self._frame, image, base, self._spec)
-        gone |= self._under_robot(self._frame.centres(marked), base)
+        gone |= self._under_robot(self._frame.centers(marked), base)
         _set(self._heights, marked[gone], np.nan)
         cells, heights, ground = shown(image, base, self._frame, self._spec, self._ground)
         _set(self._ground, ground, True)
-        fresh = (_get(walls, cells) > BESIDE_A_WALL) & ~self._under_robot(self._frame.centres(cells), base)
+        fresh = (_get(walls, cells) > BESIDE_A_WALL) & ~self._under_robot(self._frame.centers(cells), base)
         cells = cells[fresh]
         self._heights[cells[:, 0], cells[:, 1]] = heights[fresh]
         return np.concatenate((marked[gone], cells))
 
     def around(self, base: Pose2, mount: float) -> Window:
-        """The cells that a sensor `mount` metres from the base can reach."""
+        """The cells that a sensor `mount` meters from the base can reach."""
         here = self._frame.cell(base.x, base.y)
         far = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + mount
         return self._frame.window(here, here, math.ceil(far / self._frame.resolution) + 1)
 
     def _under_robot(self, points: Array, base: Pose2) -> Mask:
-        """Nav2's footprint_clearing_enabled, for the inscribed circle and cells with these centres (n, 2)."""
+        """Nav2's footprint_clearing_enabled, for the inscribed circle and cells with these centers (n, 2)."""
         return np.asarray(np.hypot(points[:, 0] - base.x, points[:, 1] - base.y) < self._inscribed)
 
 

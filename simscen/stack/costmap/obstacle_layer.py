@@ -19,7 +19,7 @@ from simscen.stack.costmap.frame import Cells, Frame, Numbers
 from simscen.stack.localizers.beams import Plane, directions
 
 ROUNDING = 1e-9
-"""Metres before the end of what a beam shows to be free, nearer to which it is asked exactly whether a cell is."""
+"""Meters before the end of what a beam shows to be free, nearer to which it is asked exactly whether a cell is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class ScanAmongMoving(Scan):
 
 
 def hits(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tuple[Plane, complex]:
-    """Map points x + iy (n,) of the beams that hit something that stands, `nearest` to `farthest` metres away.
+    """Map points x + iy (n,) of the beams that hit something that stands, `nearest` to `farthest` meters away.
 
     And where the lidar is.
     """
@@ -71,18 +71,18 @@ def _shown_free(scan: Scan, farthest: float, inf_is_valid: bool) -> Array:
 def in_view(cells: Cells, frame: Frame, scan: Scan, base: Pose2) -> npt.NDArray[np.bool_]:
     """Which of the cells (n, 2) lie where the lidar looks, whatever it sees there."""
     lidar = base.compose(scan.mount)
-    offset = frame.centres(cells) - np.array([lidar.x, lidar.y])
+    offset = frame.centers(cells) - np.array([lidar.x, lidar.y])
     bearing = np.arctan2(offset[:, 1], offset[:, 0])
     turned = (bearing - lidar.yaw - scan.angle_min) % (2 * math.pi)
     return np.asarray(turned <= abs(scan.angle_increment) * len(scan.ranges))
 
 
 def crossed(points: Plane, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec) -> tuple[Numbers, float]:
-    """Indices of those cells with these centres x + iy (n,) that a beam crosses before it hits anything.
+    """Indices of those cells with these centers x + iy (n,) that a beam crosses before it hits anything.
 
-    And how far the nearest of all centres, of which there is one, is from the lidar. A line crosses a square of
-    half-width h when its distance from the centre is at most h (|cos| + |sin|); each cell is tested against the beam
-    nearest to its centre, which crosses it if any does.
+    And how far the nearest of all centers, of which there is one, is from the lidar. A line crosses a square of
+    half-width h when its distance from the center is at most h (|cos| + |sin|); each cell is tested against the beam
+    nearest to its center, which crosses it if any does.
     """
     first, step, half = base.yaw + scan.mount.yaw + scan.angle_min, scan.angle_increment, resolution / 2
     seen = points - _place(scan, base)

@@ -12,17 +12,17 @@ from simscen.stack.costmap.frame import Frame
 Cell = TypeVar("Cell", bound=np.generic)
 
 EDGE = 0.6
-"""Metres inside the window's edge where a goal beyond it is aimed at."""
+"""Meters inside the window's edge where a goal beyond it is aimed at."""
 FOLLOW = 1 / 8
 """The window is moved when the robot is this part of its size away from its middle, …"""
 NO_FARTHER = 0.25
-"""… and a local costmap's at the latest when it is so many metres away: Nav2 moves it at each update."""
+"""… and a local costmap's at the latest when it is so many meters away: Nav2 moves it at each update."""
 
 
-def window_around(centre: Pose2, size: tuple[float, float], resolution: float) -> Frame:
-    """A window of so many metres along x and y around a point; its cells are always the same ones of the plane."""
+def window_around(center: Pose2, size: tuple[float, float], resolution: float) -> Frame:
+    """A window of so many meters along x and y around a point; its cells are always the same ones of the plane."""
     columns, rows = (math.ceil(edge / resolution) for edge in size)
-    column, row = round(centre.x / resolution) - columns // 2, round(centre.y / resolution) - rows // 2
+    column, row = round(center.x / resolution) - columns // 2, round(center.y / resolution) - rows // 2
     return Frame((column * resolution, row * resolution), resolution, (rows, columns))
 
 

@@ -39,7 +39,7 @@ def static_layer(
         cells = grid.cells
     else:
         frame = _bounding_frame(grid)
-        cells = grid.values_at(_all_centres(frame)).reshape(frame.shape)
+        cells = grid.values_at(_all_centers(frame)).reshape(frame.shape)
     lethal = np.ascontiguousarray(cells >= OCCUPIED_FROM) | _forbidden(frame, keepout, mask)
     return StaticLayer(frame, lethal, (cells == UNKNOWN) & ~lethal & unknown)
 
@@ -70,13 +70,13 @@ def _forbidden(frame: Frame, keepout: tuple[Polygon, ...], mask: OccupancyGrid |
     if mask is not None:
         columns = np.arange(frame.shape[1])
         for row in range(frame.shape[0]):
-            lethal[row] |= in_keepout_mask(mask, frame.centres(np.column_stack((np.full_like(columns, row), columns))))
+            lethal[row] |= in_keepout_mask(mask, frame.centers(np.column_stack((np.full_like(columns, row), columns))))
     return lethal
 
 
 def inside_polygon(frame: Frame, polygon: Polygon) -> Mask:
-    """The cells whose centre lies inside the polygon (even-odd rule)."""
-    points = _all_centres(frame)
+    """The cells whose center lies inside the polygon (even-odd rule)."""
+    points = _all_centers(frame)
     inside = np.zeros(len(points), dtype=bool)
     for (ax, ay), (bx, by) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
         if ay == by:
@@ -86,9 +86,9 @@ def inside_polygon(frame: Frame, polygon: Polygon) -> Mask:
     return inside.reshape(frame.shape)
 
 
-def _all_centres(frame: Frame) -> Array:
+def _all_centers(frame: Frame) -> Array:
     rows, columns = np.indices(frame.shape)
-    return frame.centres(np.column_stack((rows.ravel(), columns.ravel())))
+    return frame.centers(np.column_stack((rows.ravel(), columns.ravel())))
 
 
 def _bounding_frame(grid: OccupancyGrid) -> Frame:

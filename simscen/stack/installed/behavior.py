@@ -1,4 +1,4 @@
-"""A recovery behaviour behind its door."""
+"""A recovery behavior behind its door."""
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -9,7 +9,7 @@ from simscen.stack.setting import Setting
 
 
 class InstalledBehavior(Watched):
-    """Asks the behaviour, and looks at its commands before anybody obeys them. Its name is that of its type."""
+    """Asks the behavior, and looks at its commands before anybody obeys them. Its name is that of its type."""
 
     def __init__(self, spec: BehaviorSpec, setting: Setting) -> None:
         super().__init__("behavior", spec, setting, Behavior)
@@ -20,6 +20,6 @@ class InstalledBehavior(Watched):
         self.ask(self.inner.start, pose)
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """The behaviour's command; None when it is done. Raises RunError when it is none of them."""
+        """The behavior's command; None when it is done. Raises RunError when it is none of them."""
         command = self.ask(self.inner.step, pose, costmap, seconds)
         return None if command is None else self.checked_twist(command)

@@ -11,7 +11,7 @@ from simscen.stack.protocols import LETHAL, CostmapView, Planner
 from simscen.stack.setting import Setting
 
 AT_START = 0.05
-"""Metres between the start that was asked for and the first point of a path, at most."""
+"""Meters between the start that was asked for and the first point of a path, at most."""
 
 
 class InstalledPlanner(Watched):

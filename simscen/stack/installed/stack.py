@@ -29,7 +29,7 @@ class InstalledStack(Watched):
         self._command: Twist | None = None
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Localise at the estimate, then drive to the goals in order."""
+        """Localize at the estimate, then drive to the goals in order."""
         self.ask(self.inner.start, estimate, goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:

@@ -10,7 +10,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.localization import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import AmclParameters
-from simscen.stack.localizers.clusters import spread, summarise
+from simscen.stack.localizers.clusters import spread, summarize
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.odometry_history import OdometryHistory
@@ -76,7 +76,7 @@ class AmclLocalizer:
         """The newest correction; at first, the initial estimate. Computed lazily because global clusters take 4 ms."""
         initial = self._initial_estimate
         if initial.pose is None:
-            pose, covariance = summarise(self._filter.particles)
+            pose, covariance = summarize(self._filter.particles)
         else:
             pose, covariance = initial.pose, np.diag(np.square(initial.std))
         return Correction(pose, covariance, Pose2(0, 0, 0), 0)

@@ -42,7 +42,7 @@ def _march(field: DistanceField, x: Array, y: Array, angle: Array, limit: float)
         row = (y[flying] + sin[flying] * flown[flying]).astype(np.float32)
         free = field.table.take(field.cells(column, row)) / field.resolution
         flying, free = flying[free > 0], free[free > 0]
-        # Distances are between centres: both the ray and the obstacle may be half a diagonal nearer.
+        # Distances are between centers: both the ray and the obstacle may be half a diagonal nearer.
         flown[flying] += np.maximum(free - np.sqrt(2), 0.5)
         flying = flying[flown[flying] < limit]
     return np.minimum(flown, limit)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap
-from simscen.stack.localizers.kld import BIN_METRES, BINS_OF_YAW, Keys, bins, join, split
+from simscen.stack.localizers.kld import BIN_METERS, BINS_OF_YAW, Keys, bins, join, split
 from simscen.stack.localizers.particles import Particles, wrapped
 
 BINS_IN_TOUCH = 8
@@ -25,15 +25,15 @@ def clusters(keys: Keys) -> Keys:
     wanted = join(x + _AROUND[:, :1], y + _AROUND[:, 1:2], (yaw + _AROUND[:, 2:]) % BINS_OF_YAW)
     found = np.minimum(np.searchsorted(occupied, wanted), len(occupied) - 1)
     itself = np.arange(len(occupied))
-    neighbours, labels = np.where(occupied[found] == wanted, found, itself), itself
+    neighbors, labels = np.where(occupied[found] == wanted, found, itself), itself
     while True:
-        lowest = labels[neighbours].min(axis=0)
+        lowest = labels[neighbors].min(axis=0)
         if np.array_equal(lowest, labels):
             return labels[bin_of]
         labels = lowest[lowest]
 
 
-def summarise(particles: Particles, peak: float = 1.0) -> tuple[Pose2, Array]:
+def summarize(particles: Particles, peak: float = 1.0) -> tuple[Pose2, Array]:
     """Where the particles say the robot is, and the covariance (3, 3) of *all* particles about that pose.
 
     The pose is that of the heaviest cluster. nav2_amcl takes its mean, which lags behind a moving robot where weights
@@ -82,7 +82,7 @@ def _together(particles: Particles) -> tuple[Pose2, Array]:
 def in_touch(particles: Particles) -> bool:
     """Whether they are so near to each other that their bins touch, whichever these are."""
     x, y, yaw = particles.extent
-    return x < BIN_METRES and y < BIN_METRES and yaw < 2 * math.pi / BINS_OF_YAW
+    return x < BIN_METERS and y < BIN_METERS and yaw < 2 * math.pi / BINS_OF_YAW
 
 
 def _mean(poses: Array, weights: Array) -> Pose2:

@@ -31,7 +31,7 @@ def by_blocks(judge: Callable[[Array], Array], poses: Array) -> Array:
 
 
 class DistanceField:
-    """Distances in m between cell centres, as a flat table with a border that stands for everything off the map.
+    """Distances in m between cell centers, as a flat table with a border that stands for everything off the map.
 
     The border makes a look-up off the map a look-up like any other: coordinates are clipped onto it.
     """
@@ -45,8 +45,8 @@ class DistanceField:
         distance = np.full(bordered.shape, limit, dtype=np.float32)
         if bordered.any():
             if limit <= FARTHEST * grid.resolution:
-                metres = np.minimum(np.sqrt(np.arange(BEYOND + 1)) * grid.resolution, limit).astype(np.float32)
-                distance = metres.take(squared_within(bordered, math.ceil(limit / grid.resolution)))
+                meters = np.minimum(np.sqrt(np.arange(BEYOND + 1)) * grid.resolution, limit).astype(np.float32)
+                distance = meters.take(squared_within(bordered, math.ceil(limit / grid.resolution)))
             else:
                 for rows, squared in squared_cells(bordered):
                     distance[rows] = np.minimum(np.sqrt(squared) * grid.resolution, limit)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 
-BIN_METRES = 0.5
+BIN_METERS = 0.5
 BINS_OF_YAW = 36
 _HALF = 1 << 21
 Keys = npt.NDArray[np.int64]
@@ -19,7 +19,7 @@ Keys = npt.NDArray[np.int64]
 
 def bins(poses: Array) -> Keys:
     """Return the keys (n,) of the histogram bins of `poses` (n, 3). Headings a full turn apart share one."""
-    places = np.clip(np.floor(poses[:, :2] / BIN_METRES), -_HALF + 2, _HALF - 2).astype(np.int64)
+    places = np.clip(np.floor(poses[:, :2] / BIN_METERS), -_HALF + 2, _HALF - 2).astype(np.int64)
     yaw = np.floor(poses[:, 2] * (BINS_OF_YAW / (2 * np.pi))).astype(np.int64) % BINS_OF_YAW
     return join(places[:, 0], places[:, 1], yaw)
 

@@ -50,14 +50,14 @@ class SensorModel(Protocol):
 def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
     """Distances to the surfaces of what is occupied; off the map counts as far from everything, as in nav2_amcl.
 
-    A beam cannot end inside a solid. Nav2's maps come from SLAM, which draws surfaces only; a map that was rasterised
+    A beam cannot end inside a solid. Nav2's maps come from SLAM, which draws surfaces only; a map that was rasterized
     from a model is filled, and if the inside counted as near, particles would be drawn into what they look at.
     """
     return DistanceField(grid, surfaces(grid.cells == OCCUPIED), max_distance, walled=False)
 
 
 def surfaces(solid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Solid cells (height, width) with a neighbour that is not; what is off the map does not count as one."""
+    """Solid cells (height, width) with a neighbor that is not; what is off the map does not count as one."""
     padded = np.pad(solid, 1, constant_values=True)
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
     return solid & ~inside

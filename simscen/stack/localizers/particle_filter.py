@@ -13,7 +13,7 @@ from simscen.core.messages.localization import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.localizers import AmclParameters
 from simscen.stack.localizers.beams import Beams, select_beams
-from simscen.stack.localizers.clusters import BINS_IN_TOUCH, in_touch, summarise
+from simscen.stack.localizers.clusters import BINS_IN_TOUCH, in_touch, summarize
 from simscen.stack.localizers.kld import KldBound
 from simscen.stack.localizers.likelihood_field import SensorModel
 from simscen.stack.localizers.motion_models import MotionModel
@@ -85,7 +85,7 @@ class ParticleFilter:
             self._observe(beams, weights, shift, exponent)
         weights = weights / total if total > 0 else alike(len(poses))
         self.particles = self.particles.weighted(weights)
-        estimate = summarise(self.particles, self._sensor.peak) if total > 0 else None
+        estimate = summarize(self.particles, self._sensor.peak) if total > 0 else None
         self._resample()
         return estimate
 

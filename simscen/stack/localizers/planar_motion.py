@@ -47,8 +47,8 @@ def turned(covariance: Array, yaw: float) -> Noise:
 def grown(covariance: Array, yaw: float, step: Pose2, translation_noise: float, rotation_noise: float) -> Array:
     """A covariance (3, 3) after `step` in the base frame, taken at heading `yaw`.
 
-    `translation_noise` is the standard deviation in m along the way after one metre, `rotation_noise` that of the
-    heading in rad after one metre or one rad.
+    `translation_noise` is the standard deviation in m along the way after one meter, `rotation_noise` that of the
+    heading in rad after one meter or one rad.
     """
     c, s = math.cos(yaw), math.sin(yaw)
     dx, dy, length = c * step.x - s * step.y, s * step.x + c * step.y, math.hypot(step.x, step.y)

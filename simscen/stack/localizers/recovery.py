@@ -33,7 +33,7 @@ class Recovery:
 
     nav2_amcl sets both averages to zero when it put particles anywhere ("to avoid spiraling off into complete
     randomness"), which ends a recovery after a few dozen of them. Nothing spirals here: particles that were put
-    anywhere by the last scan are not asked how well the filter knows its place. The averages are normalised from the
+    anywhere by the last scan are not asked how well the filter knows its place. The averages are normalized from the
     first scan on; the book begins at zero, nav2_amcl at the first scan's.
     """
 
@@ -71,7 +71,7 @@ class Recovery:
 class RunningAverage:
     """An exponentially weighted average of everything so far; of equal weights if `alpha` is zero.
 
-    The weights are normalised from the first value on (Kingma & Ba, Adam, 2015, section 3).
+    The weights are normalized from the first value on (Kingma & Ba, Adam, 2015, section 3).
     """
 
     def __init__(self, alpha: float) -> None:

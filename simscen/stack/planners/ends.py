@@ -15,7 +15,7 @@ from simscen.stack.planners.rates import Rates
 from simscen.stack.protocols import NavigationFailure
 
 ESCAPE = 0.5
-"""How far in metres a robot that stands too near an obstacle may drive to where a plan can begin."""
+"""How far in meters a robot that stands too near an obstacle may drive to where a plan can begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ def _cell(rates: Rates, point: tuple[float, float]) -> tuple[int, int]:
 
 
 def near(rates: Rates, free: npt.NDArray[np.bool_], pose: Pose2, within: float) -> Iterator[tuple[float, float]]:
-    """The point itself if its cell is free, then the centres of free cells at most `within` away, nearest first."""
+    """The point itself if its cell is free, then the centers of free cells at most `within` away, nearest first."""
     row, column = _cell(rates, (pose.x, pose.y))
     if free[row, column]:
         yield pose.x, pose.y

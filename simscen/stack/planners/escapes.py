@@ -28,7 +28,7 @@ def escapes(space: Space, turning_radius: float, start: Pose2) -> Iterator[Array
 
 
 def _arc(start: Pose2, along: Array, curvature: float, heading: float) -> Array:
-    """Poses so many metres along an arc that begins at `heading` to the base's own."""
+    """Poses so many meters along an arc that begins at `heading` to the base's own."""
     turned = curvature * along
     chord = along * np.sinc(turned / (2.0 * math.pi))
     towards = start.yaw + heading + 0.5 * turned

@@ -5,11 +5,11 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 
 SPACING = 0.05
-"""Metres between the points of a finished path."""
+"""Meters between the points of a finished path."""
 
 
 def spaced(points: Array, spacing: float) -> Array:
-    """The polyline (n, 2) with points at most `spacing` metres apart; its corners are kept, so that none is cut."""
+    """The polyline (n, 2) with points at most `spacing` meters apart; its corners are kept, so that none is cut."""
     steps = np.diff(points, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     counts = np.maximum(1, np.ceil(lengths / spacing - 1e-9)).astype(np.int64)

@@ -28,7 +28,7 @@ def navfn(spec: Navfn, setting: Setting) -> Planner:
 
 
 def smac_2d(spec: Smac2d, setting: Setting) -> Planner:
-    """Moves to the eight neighbours, as SmacPlanner2D's Moore neighbourhood."""
+    """Moves to the eight neighbors, as SmacPlanner2D's Moore neighborhood."""
     return GridPlanner(
         spec.tolerance, spec.cost_travel_multiplier, spec.allow_unknown, KING, spec.smooth_path, setting.robot
     )

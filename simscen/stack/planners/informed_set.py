@@ -22,25 +22,25 @@ from simscen.stack.planners.search import Point
 from simscen.stack.protocols import CostmapView
 
 BLOCK, PRICED_BLOCK = 0.2, 0.15
-"""Metres, about: the coarse grid's resolution."""
+"""Meters, about: the coarse grid's resolution."""
 MOST_BLOCKS, MOST_PRICED = 40_000, 20_000
 """Larger maps get larger blocks: Dijkstra on 40 000 takes 10 ms. None is wider than the robot, though, for in one that
 holds a wall both sides of the wall would be one place."""
 SPARSE = 0.45
-"""Metres between the places of a way where there is room: every third block, or every one on a large map."""
+"""Meters between the places of a way where there is room: every third block, or every one on a large map."""
 LEG = 30.0
-"""Metres of a way that are searched in one go."""
+"""Meters of a way that are searched in one go."""
 Mask = npt.NDArray[np.bool_]
 
 
 class InformedSet:
-    """The points on near-shortest ways from start to goal; `length` is about that of the shortest, in metres.
+    """The points on near-shortest ways from start to goal; `length` is about that of the shortest, in meters.
 
     Distances are those of king's and knight's moves, at most 2.8 % too long (8.2 % without the knight).
     """
 
     def __init__(self, rates: Rates, start: Point, goal: Point, priced: bool = False) -> None:
-        """`priced`: by what ways cost, in metres of free ground, rather than by their lengths."""
+        """`priced`: by what ways cost, in meters of free ground, rather than by their lengths."""
         size, most = (PRICED_BLOCK, MOST_PRICED) if priced else (BLOCK, MOST_BLOCKS)
         widest = max(1, int(2.0 * rates.inscribed / rates.resolution))
         fewest = min(math.ceil(math.sqrt(rates.height * rates.width / most)), widest)
@@ -61,7 +61,7 @@ class InformedSet:
     def narrow(self, slack: float, leg: tuple[float, float] = (0.0, math.inf)) -> None:
         """Keep the blocks on ways at most `slack` (ratio) longer than the shortest, and a block's diagonal more.
 
-        `leg` keeps those only that are so many metres along such a way.
+        `leg` keeps those only that are so many meters along such a way.
         """
         more = 2 * math.sqrt(2.0) * self._size
         inside = self._sum <= self.length * (1.0 + slack) + more
@@ -85,7 +85,7 @@ class InformedSet:
 
     def way(self, costmap: CostmapView, roomy: float) -> Array:
         """The places (n, 2) with most room in the blocks of the way itself, but those of its ends; where there is as
-        much as `roomy` metres, those `SPARSE` metres apart only.
+        much as `roomy` meters, those `SPARSE` meters apart only.
         """
         blocks = [int(self._before[0, self._end])]
         while blocks[-1] >= 0:
@@ -98,7 +98,7 @@ class InformedSet:
         return places
 
     def stops(self, costmap: CostmapView) -> list[tuple[Point, float]]:
-        """Points of a near-shortest way to search between, at most LEG metres apart, and how far along they are.
+        """Points of a near-shortest way to search between, at most LEG meters apart, and how far along they are.
 
         A tree that fills 20 m in a hundred samples needs many thousands for 200 m with a door each ten.
         """
@@ -203,7 +203,7 @@ def _graph(rates: Rates, factor: int, priced: bool) -> csr_matrix:
 
 
 def _prices(rates: Rates, factor: int) -> Array:
-    """What a metre costs in each block, flat: between its best cell and the mean of those where the robot can be.
+    """What a meter costs in each block, flat: between its best cell and the mean of those where the robot can be.
 
     The best alone makes nothing of what is dear for a cell or two, the mean makes a gap dearer than its middle.
     """

@@ -14,18 +14,18 @@ from simscen.stack.planners.blocks import pooled, roomiest
 from simscen.stack.protocols import CostmapView
 
 BLOCK = 0.1
-"""Metres, about: cells are looked at in blocks of this size."""
+"""Meters, about: cells are looked at in blocks of this size."""
 BESIDE = 0.2
-"""Metres to either side of the axis at which the distance has to be less."""
+"""Meters to either side of the axis at which the distance has to be less."""
 IN_THE_TIGHT, ON_AXIS, IN_THE_OPEN = 0.3, 0.8, 1.1
-"""Metres between samples."""
+"""Meters between samples."""
 TIGHT = 0.15
-"""Metres of room beyond the least up to which it is tight: a straight line from sample to sample hardly fits there."""
+"""Meters of room beyond the least up to which it is tight: a straight line from sample to sample hardly fits there."""
 Mask = npt.NDArray[np.bool_]
 
 
 def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: int = 1) -> Array:
-    """Centres of `free` cells (n, 2), another choice for each seed; `density` times as many to the metre."""
+    """Centers of `free` cells (n, 2), another choice for each seed; `density` times as many to the meter."""
     chance = np.random.default_rng(seed)
     factor = max(1, round(BLOCK / costmap.resolution)) if density == 1 else 1
     size = factor * costmap.resolution

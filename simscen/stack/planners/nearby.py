@@ -12,7 +12,7 @@ from simscen.stack.protocols import CostmapView, NavigationFailure
 LARGE = 1_000_000
 """Cells of a costmap of which not all are looked at each time: 50 x 50 m at 5 cm."""
 MARGIN = 10.0
-"""Metres around both ends that are looked at first, …"""
+"""Meters around both ends that are looked at first, …"""
 SHARE = 1 / 3
 """… or so much of the straight way between them, if that is more: then a way may be a fifth longer than straight."""
 
@@ -37,7 +37,7 @@ def nearby(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2, seed: in
 
 
 def window(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> CostmapView | None:
-    """The costmap within `margin` metres of both ends along x and y; None where an end is off the map."""
+    """The costmap within `margin` meters of both ends along x and y; None where an end is off the map."""
     (rows, columns), size = costmap.costs.shape, costmap.resolution
     low, high = [], []
     for ends, corner, cells in (
@@ -54,7 +54,7 @@ def window(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> Co
 
 
 def _around(costmap: CostmapView, part: CostmapView, start: Pose2, goal: Pose2) -> float:
-    """The length in metres of the shortest way from start to goal that leaves a part of the costmap; inf without one.
+    """The length in meters of the shortest way from start to goal that leaves a part of the costmap; inf without one.
 
     It is that to the goal's image in one of the part's sides; those that are the map's own cannot be crossed.
     """
@@ -73,6 +73,6 @@ def _around(costmap: CostmapView, part: CostmapView, start: Pose2, goal: Pose2) 
 
 
 def _sides(costmap: CostmapView, axis: int) -> tuple[float, float]:
-    """The least and the greatest x (axis 0) or y (1) of a costmap, in metres."""
+    """The least and the greatest x (axis 0) or y (1) of a costmap, in meters."""
     begin = costmap.origin[axis]
     return begin, begin + costmap.costs.shape[1 - axis] * costmap.resolution

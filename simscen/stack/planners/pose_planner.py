@@ -22,11 +22,11 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 PLANE_ONLY = ("bit_star", "aorrtc")
 """RRT-Connect stands in for them: over poses OMPL's AORRTC (2.0.1) calls a path of the goal alone an exact solution."""
 TIGHTEST = 0.2
-"""Metres: the arcs of a long robot that could turn in place, but should not have to."""
+"""Meters: the arcs of a long robot that could turn in place, but should not have to."""
 ROOM_TO_STEER = 1.15
 """A car's arcs are this much wider than its tightest: at full lock a controller has nothing left to correct with."""
 ROOM, LESS_ROOM = 0.10, 0.05
-"""Metres beyond the hull that are kept where that is possible: belief and map are off by as much at times."""
+"""Meters beyond the hull that are kept where that is possible: belief and map are off by as much at times."""
 ATTEMPTS = (
     (0.15, ROOM, 0.1, SPACING),
     (0.3, ROOM, 0.1, SPACING),
@@ -36,16 +36,16 @@ ATTEMPTS = (
     (2.0, 0.0, 0.4, SPACING),
     (2.0, 0.0, 0.4, SPACING / 10),
 )
-"""Slack of the informed set, room, share of the iterations, metres between looks. Cars need wider sets than discs: they
+"""Slack of the informed set, room, share of the iterations, meters between looks. Cars need wider sets than discs: they
 swing out."""
 TRIES = 6
 """Searches in all once there is a path: trees over poses make detours, and each takes only milliseconds."""
 LOOKS = 50
 """Poses from one of an answer to the next at which the hull is looked at in the end."""
 DEEPER = 0.01
-"""Metres that a hull may sink further into what it touches while it gets away: the costmap tells no less."""
+"""Meters that a hull may sink further into what it touches while it gets away: the costmap tells no less."""
 CUSP = 1.0
-"""Metres that a change of direction counts as: about what a car could drive while it stops and steers round."""
+"""Meters that a change of direction counts as: about what a car could drive while it stops and steers round."""
 
 
 class PosePlanner:

@@ -15,11 +15,11 @@ from simscen.stack.planners.search import PLANNERS, after
 Space = Literal["se2", "dubins", "reeds_shepp"]
 Valid = Callable[[float, float, float], bool]
 SPACING = 0.05
-"""Metres between the states of an answer."""
+"""Meters between the states of an answer."""
 STRAIGHT = 0.995
 """Of a way of `SPACING`, how much of it an arc of 0.2 m gets from its begin at least."""
 EXACT = 1e-4
-"""Metres to which the place of a change of direction is told."""
+"""Meters to which the place of a change of direction is told."""
 SHORTCUTS = 60
 """Attempts to leave out states of the found path; counted, as OMPL's own simplify() stops by the clock."""
 
@@ -36,7 +36,7 @@ def search_poses(
     iterations: int,
     looks: float = SPACING,
 ) -> list[Pose2] | None:
-    """Poses from start to goal, `SPACING` apart, `valid` every `looks` metres; None if iterations did not suffice.
+    """Poses from start to goal, `SPACING` apart, `valid` every `looks` meters; None if iterations did not suffice.
 
     "dubins" drives forward only, "reeds_shepp" also backward, both on arcs of at least `turning_radius`; "se2" moves
     in any direction.

@@ -1,4 +1,4 @@
-"""What a metre of way costs, wherever the robot can be: Nav2's costs as a planner counts them."""
+"""What a meter of way costs, wherever the robot can be: Nav2's costs as a planner counts them."""
 
 import math
 from typing import Any
@@ -13,7 +13,7 @@ MAX_NON_OBSTACLE, NO_INFORMATION = 252, 255
 UNKNOWN_COSTS = 253
 """nav2_navfn_planner: what is not known costs as much as what is barely free."""
 CRAMPED = 4.0
-"""Times that a metre costs more where a hull with corners fits, but could not turn in place: it may get stuck there."""
+"""Times that a meter costs more where a hull with corners fits, but could not turn in place: it may get stuck there."""
 STEP = 0.67
 """Cells between two looks at what a path leads over."""
 STRIDE = 0.4
@@ -22,7 +22,7 @@ radius, and between two looks no line comes deeper into one than 2 % of it."""
 
 
 class Rates:
-    """Costs of a metre on a costmap: 1 where it is free, 1 + `multiplier` beside obstacles, inf where none can be.
+    """Costs of a meter on a costmap: 1 where it is free, 1 + `multiplier` beside obstacles, inf where none can be.
 
     That is nav2_smac_planner's count, 1 + cost_travel_multiplier · cost / 252, taken along the way instead of from cell
     to cell. A robot can be where its inscribed circle is (and where it is known, if `allow_unknown` is false).
@@ -41,7 +41,7 @@ class Rates:
             rates[costmap.distance <= np.float32(robot.circumscribed_radius)] *= np.float32(CRAMPED)
         rates[costmap.distance <= np.float32(robot.inscribed_radius)] = np.inf
         self.rates: npt.NDArray[np.float32] = rates
-        self._per_metre = 1.0 / costmap.resolution
+        self._per_meter = 1.0 / costmap.resolution
         padded: Any = np.append(rates.reshape(-1), np.full(self.width + 1, np.inf, dtype=np.float32))
         self._look: Any = memoryview(padded)  # answers in a tenth of numpy's time for a scalar
         coarse = STRIDE * robot.inscribed_radius if allow_unknown else 0.0  # a single cell may be unknown
@@ -63,9 +63,9 @@ class Rates:
         return np.isfinite(self.rates)
 
     def at(self, points: Array) -> npt.NDArray[np.float32]:
-        """Costs of a metre (…,) at points (…, 2); inf off the map."""
-        across = (points[..., 0] - self.origin[0]) * self._per_metre
-        up = (points[..., 1] - self.origin[1]) * self._per_metre
+        """Costs of a meter (…,) at points (…, 2); inf off the map."""
+        across = (points[..., 0] - self.origin[0]) * self._per_meter
+        up = (points[..., 1] - self.origin[1]) * self._per_meter
         outside = (up < 0) | (across < 0) | (up >= self.height) | (across >= self.width)
         columns = np.clip(across, 0, self.width - 1).astype(np.int32)
         rates = self.rates[np.clip(up, 0, self.height - 1).astype(np.int32), columns]
@@ -82,9 +82,9 @@ class Rates:
             return self._answer
         dx, dy = bx - ax, by - ay
         length = math.sqrt(dx * dx + dy * dy)
-        per_metre, look, width = self._per_metre, self._look, self.width
-        u, v = (ax - self.origin[0]) * per_metre, (ay - self.origin[1]) * per_metre
-        du, dv = dx * per_metre, dy * per_metre
+        per_meter, look, width = self._per_meter, self._look, self.width
+        u, v = (ax - self.origin[0]) * per_meter, (ay - self.origin[1]) * per_meter
+        du, dv = dx * per_meter, dy * per_meter
         total: float = look[int(v + 0.5 * dv) * width + int(u + 0.5 * du)]
         if total < math.inf:
             count = int(length / self.stride) + 1
@@ -103,7 +103,7 @@ class Rates:
         """The cost of a polyline (n, 2); inf where the robot cannot go."""
         steps = np.diff(points, axis=0)
         lengths = np.hypot(steps[:, 0], steps[:, 1])
-        counts = np.ceil(lengths * self._per_metre / STEP).astype(np.int64)
+        counts = np.ceil(lengths * self._per_meter / STEP).astype(np.int64)
         which = np.repeat(np.arange(len(steps)), counts)
         number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         part = (number + 0.5) / counts[which]

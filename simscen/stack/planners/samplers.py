@@ -13,7 +13,7 @@ from simscen.stack.planners.rates import Rates
 from simscen.stack.planners.search import Motion, Problem
 
 DENSITIES = (1, 2, 4, 8)
-"""Samples to the metre of one search after the other, as multiples."""
+"""Samples to the meter of one search after the other, as multiples."""
 CORRIDORS = (0.05, 0.15, 1.0)
 """How much longer than the coarse grid's shortest way a way in the corridor may be (ratio), one after the other."""
 DEARER = 0.15
@@ -21,9 +21,9 @@ DEARER = 0.15
 MOST_SAMPLES = 3000
 """Where there are more, those on the cheapest ways: BIT* takes some ten iterations for each."""
 REACH, FAR_REACH = 1.8, 2.3
-"""Metres between samples up to which a straight way is tried: where a way over blocks is among them, and elsewhere."""
+"""Meters between samples up to which a straight way is tried: where a way over blocks is among them, and elsewhere."""
 ROOMY = 0.15
-"""Metres beyond the robot's radius where a straight way from one sample to the next has room."""
+"""Meters beyond the robot's radius where a straight way from one sample to the next has room."""
 Legs = Iterator[Problem]
 
 

@@ -17,7 +17,7 @@ from simscen.core.geometry import Array
 
 Point = tuple[float, float]
 Motion = Callable[[float, float, float, float], float]
-"""The cost of going straight from (x, y) to (x, y), at least its length in metres; inf where the robot cannot."""
+"""The cost of going straight from (x, y) to (x, y), at least its length in meters; inf where the robot cannot."""
 
 PLANNERS: dict[str, Callable[[Any], Any]] = {
     "rrt_connect": og.RRTConnect,
@@ -30,7 +30,7 @@ PLANNERS: dict[str, Callable[[Any], Any]] = {
 SATISFIED = frozenset(("rrt_connect", "kpiece"))
 """These end with their first path; the others go on to improve it."""
 RANGE = 1.0
-"""Metres that a tree grows at most in one step. OMPL's default, a fifth of the map, mostly ends in walls of a house."""
+"""Meters that a tree grows at most in one step. OMPL's default, a fifth of the map, mostly ends in walls of a house."""
 BATCH = 200
 """Samples that BIT* draws at a time where it draws them itself."""
 FIRST_DRAWN = 4
@@ -42,7 +42,7 @@ ou.setLogLevel(ou.LOG_NONE)
 class Problem:
     """What is searched: `bounds` are (min x, min y, max x, max y).
 
-    `samples` (n, 2) are those to use, if not OMPL's own, and `reach` the metres up to which two of them are joined.
+    `samples` (n, 2) are those to use, if not OMPL's own, and `reach` the meters up to which two of them are joined.
     """
 
     start: Point
@@ -94,7 +94,7 @@ class _Priced(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # ompl 
         return ob.Cost(self.motion(a[0], a[1], b[0], b[1]))
 
     def motionCostHeuristic(self, a: Any, b: Any) -> Any:
-        """Its length: no metre costs less than 1."""
+        """Its length: no meter costs less than 1."""
         return ob.Cost(math.hypot(b[0] - a[0], b[1] - a[1]))
 
 

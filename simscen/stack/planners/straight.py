@@ -1,4 +1,4 @@
-"""The straight way: no metre costs less than 1, so where nothing on it costs anything none is cheaper.
+"""The straight way: no meter costs less than 1, so where nothing on it costs anything none is cheaper.
 
 Where its begin is dear, beside an obstacle or where the robot would meet what moves, the way past that is searched for
 only, and straight on from there is as good as any other, as long as all of it costs hardly more than the straight way
@@ -18,7 +18,7 @@ from simscen.stack.protocols import CostmapView, NavigationFailure
 MOST_DEAR = 0.5
 """Of the way, what may be searched for: of a longer part that is no less than of all."""
 BEYOND, BESIDE = 2.0, 2.0
-"""Metres behind what is dear of the straight way, and on all sides of both ends, in which the way past is sought."""
+"""Meters behind what is dear of the straight way, and on all sides of both ends, in which the way past is sought."""
 HARDLY_DEARER = 1.01
 """How much more than its length (ratio) the whole may cost then. Plans are promised within 5 % of the optimum."""
 Past = Callable[[CostmapView, Pose2], tuple[Array, float]]
@@ -47,7 +47,7 @@ def straight_on(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float, 
 
 
 def dear_until(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float) -> float:
-    """Metres from the start up to which something that a robot of this radius passes straight to the goal costs more
+    """Meters from the start up to which something that a robot of this radius passes straight to the goal costs more
     than its length: 0 where nothing does, inf where it leads off the costmap.
     """
     columns, rows, left = _passed(costmap, start, goal)

@@ -16,7 +16,7 @@ from simscen.stack.planners.rates import STEP, Rates
 from simscen.ways.polyline import resampled
 
 ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
-"""Metres between stations, metres to either side, points across."""
+"""Meters between stations, meters to either side, points across."""
 LEAST_LEGS = 2
 """So that there is a station to move."""
 SMOOTHINGS, MOST_RISE = 8, 1.003
@@ -63,7 +63,7 @@ def _cut_short(rates: Rates, points: Array) -> Array:
 def _through(rates: Rates, stations: Array, offsets: Array, stride: float) -> Array:
     """The cheapest way through points at `offsets` to the left of each station but the first and last.
 
-    Costs are looked at every `stride` metres.
+    Costs are looked at every `stride` meters.
     """
     ahead = np.empty_like(stations)
     ahead[1:-1] = stations[2:] - stations[:-2]

@@ -1,4 +1,4 @@
-"""The promises of a recovery behaviour."""
+"""The promises of a recovery behavior."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from simscen.testing.flatland import Flatland
 from simscen.testing.promise import demand, promise
 
 LONGEST = 120.0
-"""Simulated seconds after which a behaviour must have ended."""
+"""Simulated seconds after which a behavior must have ended."""
 MIDDLE = Pose2(0.0, 0.0, 0.4)
 
 
@@ -26,7 +26,7 @@ class BehaviorContract(ComponentContract):
     role = "behavior"
 
     def view(self, half: float = 4.0) -> CostmapView:
-        """The costmap of a square room around the robot, `half` as wide, in metres."""
+        """The costmap of a square room around the robot, `half` as wide, in meters."""
         walls = [(-half - 0.2, -half - 0.2, half + 0.2, -half), (-half - 0.2, half, half + 0.2, half + 0.2)]
         walls += [(-half - 0.2, -half, -half, half), (half, -half, half + 0.2, half)]
         edge = half + 1.0
@@ -69,7 +69,7 @@ class BehaviorContract(ComponentContract):
 
     @promise
     def it_has_a_name(self) -> None:
-        """Given a behaviour then its name says what it is in events and criteria."""
+        """Given a behavior then its name says what it is in events and criteria."""
         name = heard("is asked for its name", lambda: self.built().name)
         demand(isinstance(name, str) and name, f"is called {name!r}")
 

@@ -21,7 +21,7 @@ GOAL = Goal("g", Pose2(7.0, 3.0, 1.0))
 STRAIGHT = np.column_stack((np.arange(1.0, 7.01, 0.05), np.full(121, 3.0), np.zeros(121)))
 SLACK = 1e-6
 NEAR, REST = 0.25, 3.0
-"""Metres and radians off the goal at most, and seconds for which it must stay there."""
+"""Meters and radians off the goal at most, and seconds for which it must stay there."""
 
 
 class ControllerContract(ComponentContract):

@@ -32,14 +32,14 @@ GRID = OccupancyGrid(np.where(np.eye(20, dtype=bool), OCCUPIED, FREE).astype(np.
 
 
 class Elsewhere:
-    """What is seen from elsewhere, or through something: two metres more, and another picture."""
+    """What is seen from elsewhere, or through something: two meters more, and another picture."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
         """Straight ahead a wall, for want of a world."""
         return np.full(len(scan.ranges), 2.0 if error is None and not without else 4.0)
 
     def image(self, error: Pose3) -> Image:
-        """Grey."""
+        """Gray."""
         return Image("it", 0, np.full((4, 6, 3), 90, np.uint8), np.full((4, 6), 3.0, np.float32))
 
 

@@ -75,7 +75,7 @@ class PlannerContract(ComponentContract):
             )
 
     @promise
-    def points_are_at_most_a_tenth_of_a_metre_apart(self) -> None:
+    def points_are_at_most_a_tenth_of_a_meter_apart(self) -> None:
         """Given success then no two points that follow each other are further apart than 0.1 m."""
         widest = float(np.hypot(*np.diff(self.planned(self.built(), self.view(), 1)[:, :2], axis=0).T).max())
         demand(widest <= APART + 1e-9, f"two points are {widest:.3f} m apart")

@@ -44,7 +44,7 @@ class Conversion:
 
 
 def convert(world: World, height: float) -> Conversion:
-    """The solids and bodies of a world; what cannot be said exactly is cut at `height` metres or left out, and told."""
+    """The solids and bodies of a world; what cannot be said exactly is cut at `height` meters or left out, and told."""
     done = Conversion()
     for solid in world.solids:
         for form in forms_of(solid, height, done.changes):

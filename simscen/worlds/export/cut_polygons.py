@@ -10,7 +10,7 @@ Point = tuple[float, float]
 Ring = list[Point]
 
 STRAIGHT = 1e-6
-"""Metres that a corner may stick out and still not count."""
+"""Meters that a corner may stick out and still not count."""
 MOST_CORNERS = 200
 """What a polygon of the world language may have."""
 

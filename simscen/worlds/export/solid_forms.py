@@ -14,14 +14,14 @@ from simscen.worlds.geometry.cross_section import outlines
 from simscen.worlds.geometry.triangulation import fuse
 
 UPRIGHT = 1 - 1e-8
-"""Cosine of the tilt up to which something counts as upright: 0.1 mm on a metre."""
+"""Cosine of the tilt up to which something counts as upright: 0.1 mm on a meter."""
 DIGITS = 6
-"""Decimals of a metre that are written."""
+"""Decimals of a meter that are written."""
 
 
 @dataclass(frozen=True)
 class Form:
-    """One shape of our language, from `bottom` metres above the ground to `height` metres above that.
+    """One shape of our language, from `bottom` meters above the ground to `height` meters above that.
 
     Exactly one is given: `box` (lengths along x and y), `radius`, or `polygon` (corners in the frame of `pose`).
     """
@@ -35,7 +35,7 @@ class Form:
 
     @property
     def fields(self) -> dict[str, object]:
-        """The fields of an obstacle but for its name, rounded to the micrometre."""
+        """The fields of an obstacle but for its name, rounded to the micrometer."""
         x, y, yaw = _rounded(self.pose)
         height, bottom = round(self.height, DIGITS), round(self.bottom, DIGITS)
         fields: dict[str, object] = {"pose": PoseSpec(x=x, y=y, yaw=yaw)}
@@ -51,7 +51,7 @@ class Form:
 def forms_of(solid: Solid, height: float, changes: list[str]) -> list[Form]:
     """The forms of a solid; a sentence goes to `changes` when they are not exactly what it was above the ground.
 
-    What cannot be said exactly is cut at `height` metres, or at half its height where that misses it.
+    What cannot be said exactly is cut at `height` meters, or at half its height where that misses it.
     """
     exact = _exact(solid)
     found = [exact] if exact else list(_prisms(solid, height, changes))

@@ -15,7 +15,7 @@ from simscen.core.geometry.shapes import TriangleMesh
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """Directed segments (n, 2, 2) in metres with the solid on their left, and the owner (n,) of each."""
+    """Directed segments (n, 2, 2) in meters with the solid on their left, and the owner (n,) of each."""
 
     segments: Array
     owners: npt.NDArray[np.int32]
@@ -57,7 +57,7 @@ def _crossing(tip: Array, base: Array, height: float, tip_above: npt.NDArray[np.
 def distance_in_plan(
     mesh: TriangleMesh, point: tuple[float, float], z_range: tuple[float, float], within: float = math.inf
 ) -> float:
-    """Horizontal distance in metres from a point to what a mesh has between two heights; 0 inside of it.
+    """Horizontal distance in meters from a point to what a mesh has between two heights; 0 inside of it.
 
     inf if there is nothing at those heights, or nothing nearer than `within`.
     """

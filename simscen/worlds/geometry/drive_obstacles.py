@@ -92,7 +92,7 @@ def _edges(mesh: TriangleMesh, ground: Owners, step: float) -> Iterator[Solid]:
 class _Edge(NamedTuple):
     """A piece of what an upright face is in plan: its ends (2,), the unit vector outwards, and whose face it is.
 
-    One that leans covers `depth` metres inwards of that line.
+    One that leans covers `depth` meters inwards of that line.
     """
 
     start: Array

@@ -20,7 +20,7 @@ ZRange = tuple[float, float]
 def blocking_solid(world: World, point: tuple[float, float], radius: float, z_range: ZRange) -> str | None:
     """The name of the first static solid that a disc at `point` would overlap, or None.
 
-    The disc is a cylinder of `radius` metres between the heights `z_range`; touching is not overlapping. Takes a
+    The disc is a cylinder of `radius` meters between the heights `z_range`; touching is not overlapping. Takes a
     few milliseconds for thousands of solids, as only those whose bounding ball is near are looked at.
     """
     return first_blocking(world.solids, point, radius, z_range)
@@ -35,7 +35,7 @@ def first_blocking(solids: Iterable[Solid], point: tuple[float, float], radius: 
 
 
 def _distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within: float) -> float:
-    """Horizontal distance in metres to what a solid has between two heights; inf if that is not `within`."""
+    """Horizontal distance in meters to what a solid has between two heights; inf if that is not `within`."""
     prism = upright_prism(solid)
     if prism is not None:
         return prism.distance(point, z_range)
@@ -46,7 +46,7 @@ def _distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within:
 
 
 def is_near(solid: Solid, point: tuple[float, float], radius: float) -> bool:
-    """Whether the ball that holds a solid comes as near as `radius` metres to a point, in plan."""
+    """Whether the ball that holds a solid comes as near as `radius` meters to a point, in plan."""
     return math.hypot(solid.pose.x - point[0], solid.pose.y - point[1]) <= radius + _reach(solid.shape)
 
 

@@ -21,7 +21,7 @@ from simscen.worlds.geometry.circle_facets import facet_count
 
 
 class UprightPrism(NamedTuple):
-    """A prism over a convex polygon, anticlockwise, from the height `bottom` to the height `top`, in metres."""
+    """A prism over a convex polygon, anticlockwise, from the height `bottom` to the height `top`, in meters."""
 
     base: Polygon
     bottom: float

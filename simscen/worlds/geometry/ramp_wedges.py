@@ -16,7 +16,7 @@ _WEDGE = np.array(
 
 
 def wedge(start: Point, end: Point, width: float, height: float, name: str, friction: float = 1.0) -> Solid:
-    """A ramp whose middle line rises from the ground at `start` to `height` metres at `end`, where it ends upright.
+    """A ramp whose middle line rises from the ground at `start` to `height` meters at `end`, where it ends upright.
 
     Corners 0, 1 are the right and left end of its foot, 2, 3 those below its upper edge, 4, 5 … of that edge.
     """

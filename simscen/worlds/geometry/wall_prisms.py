@@ -1,4 +1,4 @@
-"""Walls along polylines: a prism for each straight piece, mitred where two pieces meet."""
+"""Walls along polylines: a prism for each straight piece, mitered where two pieces meet."""
 
 import math
 from itertools import pairwise
@@ -8,14 +8,14 @@ from simscen.core.geometry.shapes import Extrusion, Solid
 Point = tuple[float, float]
 
 SHARPEST_MITRE = -0.5
-"""Cosine of the turn beyond which (120°) a mitre would stick out further than the wall is thick."""
+"""Cosine of the turn beyond which (120°) a miter would stick out further than the wall is thick."""
 
 
 def wall_solids(points: list[Point], thickness: float, height: float, name: str) -> list[Solid]:
-    """The pieces of a wall about the centre line `points`; closed if the last point is the first.
+    """The pieces of a wall about the center line `points`; closed if the last point is the first.
 
-    Corners up to 120° are mitred, so that pieces neither overlap nor leave a notch; at sharper ones, and where a piece
-    is too short for its mitres, pieces run on straight by half the thickness. Repeated points are skipped.
+    Corners up to 120° are mitered, so that pieces neither overlap nor leave a notch; at sharper ones, and where a piece
+    is too short for its miters, pieces run on straight by half the thickness. Repeated points are skipped.
     """
     corners = [p for k, p in enumerate(points) if k == 0 or p != points[k - 1]]
     if len(corners) < 2:
@@ -40,7 +40,7 @@ def _direction(a: Point, b: Point) -> Point:
 
 
 def _behind(start: Point, end: Point, way: Point) -> bool:
-    """Whether a side of a piece would run backwards, as its mitres cross."""
+    """Whether a side of a piece would run backwards, as its miters cross."""
     return (end[0] - start[0]) * way[0] + (end[1] - start[1]) * way[1] <= 0
 
 

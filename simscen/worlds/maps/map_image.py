@@ -31,9 +31,9 @@ _PNM_HEADER = re.compile(rb"(P[25])" + _GAP + rb"(\d{1,10})" + _GAP + rb"(\d{1,1
 
 @dataclass(frozen=True, eq=False)
 class MapImage:
-    """Pixels as nav2_map_server gets them from GraphicsMagick: `grey` (h, w), top row first; `alpha` if it has one."""
+    """Pixels as nav2_map_server gets them from GraphicsMagick: `gray` (h, w), top row first; `alpha` if it has one."""
 
-    grey: Bytes8
+    gray: Bytes8
     alpha: Bytes8 | None = None
 
 
@@ -74,7 +74,7 @@ def _check_size(width: int, height: int) -> None:
 
 
 def _portable(data: bytes) -> Quanta:
-    """A PGM as 16-bit greys (h, w). Source: netpbm's pgm(5); larger samples are big-endian."""
+    """A PGM as 16-bit grays (h, w). Source: netpbm's pgm(5); larger samples are big-endian."""
     match = _PNM_HEADER.match(data)
     if match is None:
         raise BadImage("the PGM header is damaged; expected width, height and maxval")
@@ -128,7 +128,7 @@ def _compressed(data: bytes) -> MapImage:
         raise BadImage(f"the {kind} cannot be decoded") from None
     except (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError) as error:
         raise BadImage(f"the {kind} cannot be decoded: {error}") from None
-    return _grey_and_alpha(image)
+    return _gray_and_alpha(image)
 
 
 def _bmp_size(data: bytes) -> tuple[int, int]:
@@ -137,13 +137,13 @@ def _bmp_size(data: bytes) -> tuple[int, int]:
     return width, abs(height)
 
 
-def _grey_and_alpha(image: "Image.Image") -> MapImage:
-    """8-bit greys as GraphicsMagick makes them of colours: 0.299 R + 0.587 G + 0.114 B (Rec. 601), in integers."""
+def _gray_and_alpha(image: "Image.Image") -> MapImage:
+    """8-bit grays as GraphicsMagick makes them of colors: 0.299 R + 0.587 G + 0.114 B (Rec. 601), in integers."""
     if image.mode.startswith("I"):
         return MapImage(_eight_bits(np.clip(np.asarray(image), 0, 65535).astype(np.uint16)))
     transparent = image.mode in ("LA", "PA", "RGBA") or "transparency" in image.info
     red, green, blue, *alpha = np.moveaxis(np.asarray(image.convert("RGBA" if transparent else "RGB")), 2, 0)
-    quanta = [colour.astype(np.uint32) * 257 for colour in (red, green, blue)]
+    quanta = [color.astype(np.uint32) * 257 for color in (red, green, blue)]
     luma = (306 * quanta[0] + 601 * quanta[1] + 117 * quanta[2]) >> 10
     return MapImage(_eight_bits(luma.astype(np.uint16)), alpha[0] if transparent else None)
 

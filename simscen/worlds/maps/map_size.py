@@ -4,14 +4,14 @@ import math
 from typing import NamedTuple
 
 MARGIN = 1.0
-"""Metres of map around everything there is, so that a robot outside of the last wall is still on the map."""
+"""Meters of map around everything there is, so that a robot outside of the last wall is still on the map."""
 MOST_CELLS = 16_000_000
 """Of a map that is drawn: 200 x 200 m at 5 cm."""
 RESOLUTION = 0.05
-"""Metres of a cell of the robot's map, as is usual with SLAM."""
+"""Meters of a cell of the robot's map, as is usual with SLAM."""
 
 Bounds = tuple[float, float, float, float]
-"""min x, min y, max x, max y in metres."""
+"""min x, min y, max x, max y in meters."""
 
 
 class MapSize(NamedTuple):
@@ -24,7 +24,7 @@ class MapSize(NamedTuple):
 
 
 def map_size(bounds: Bounds, resolution: float = RESOLUTION) -> MapSize:
-    """The cells over `bounds` and MARGIN; the lines of the map are multiples of `resolution` in metres."""
+    """The cells over `bounds` and MARGIN; the lines of the map are multiples of `resolution` in meters."""
     left, bottom = (math.floor(round((edge - MARGIN) / resolution, 6)) for edge in bounds[:2])
     right, top = (math.ceil(round((edge + MARGIN) / resolution, 6)) for edge in bounds[2:])
     return MapSize(left, bottom, right - left, top - bottom)

@@ -18,7 +18,7 @@ MOST_EDGES = 500_000
 
 
 def walls_of(grid: OccupancyGrid, height: float, name: str = "map") -> list[Solid]:
-    """The occupied cells of a map as one closed mesh of walls, `height` metres tall; nothing if there are none.
+    """The occupied cells of a map as one closed mesh of walls, `height` meters tall; nothing if there are none.
 
     A straight edge becomes one face, however many cells long it is, and there are no faces between cells, so that
     nothing can catch on a seam. Raises InvalidInput for a map with more than MOST_EDGES straight edges.

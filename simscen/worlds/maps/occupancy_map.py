@@ -14,7 +14,7 @@ from simscen.worlds.maps.rasterization import Cells, filled, touched
 
 
 def map_of(world: World, mesh: TriangleMesh, height: float, resolution: float = RESOLUTION) -> OccupancyGrid:
-    """The map a robot gets of a world whose static solids are `mesh`, cut at `height` in metres.
+    """The map a robot gets of a world whose static solids are `mesh`, cut at `height` in meters.
 
     A cell is occupied if any part of a solid is in it at that height, hollow or not; unknown if it lies outside of
     the building, where nobody ever went (see `_outside`); free otherwise. A world that came with a map of its own

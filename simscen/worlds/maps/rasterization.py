@@ -47,10 +47,10 @@ def _on_outline(segments: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.
 
 
 def filled(cut: Section, shape: tuple[int, int]) -> Cells:
-    """The cells whose centre is inside: the winding number of the outlines about it is positive.
+    """The cells whose center is inside: the winding number of the outlines about it is positive.
 
     Rows in which an owner's outline is not closed (meshes with holes) are left to its outline, and so are owners
-    that turn their inside out, such as a room modelled as a box seen from within.
+    that turn their inside out, such as a room modeled as a box seen from within.
     """
     rows, columns, signs, owners = _crossings(cut, shape)
     keep = _balanced(rows + shape[0] * owners.astype(np.int64), signs) & ~_inside_out(cut)[owners]
@@ -64,7 +64,7 @@ def filled(cut: Section, shape: tuple[int, int]) -> Cells:
 def _crossings(
     cut: Section, shape: tuple[int, int]
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Array, npt.NDArray[np.int32]]:
-    """Where outlines cross the middle lines of the rows: row, first column whose centre is beyond, sign, owner."""
+    """Where outlines cross the middle lines of the rows: row, first column whose center is beyond, sign, owner."""
     (x0, y0), (x1, y1) = cut.segments[:, 0].T, cut.segments[:, 1].T
     first = np.clip(np.ceil(np.minimum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
     last = np.clip(np.ceil(np.maximum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)

@@ -13,8 +13,8 @@ from simscen.core.geometry import Pose2
 from simscen.model.rosmap import RosMapSpec
 from simscen.worlds.maps.map_image import CODE, read_image
 
-UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 205, 254, 0
-"""The greys in which map_saver writes trinary maps."""
+UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 205, 254, 0
+"""The grays in which map_saver writes trinary maps."""
 
 FARTHEST = 1e4
 """m from the origin: where coordinates end in all files."""
@@ -23,21 +23,21 @@ FARTHEST = 1e4
 def load_grid(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[str, ...]]:
     """The map of an image, and warnings about it; raises InvalidInput for an image that cannot be read.
 
-    Every pixel is judged by its 8-bit grey alone, in single precision like map_server; in trinary and scale mode
+    Every pixel is judged by its 8-bit gray alone, in single precision like map_server; in trinary and scale mode
     pixels that are not opaque are unknown.
     """
     image = read_image(image_path)
-    _refuse_distance(spec, image.grey.shape[::-1], image_path)
+    _refuse_distance(spec, image.gray.shape[::-1], image_path)
     table = cell_values(spec)
-    cells = table[image.grey]
+    cells = table[image.gray]
     if image.alpha is not None and spec.mode != "raw":
         cells[image.alpha < 255] = UNKNOWN
     grid = OccupancyGrid(np.ascontiguousarray(cells[::-1]), spec.resolution, Pose2(*spec.origin))
-    return grid, _doubts(spec, table, int(np.count_nonzero(image.grey == UNKNOWN_GREY)))
+    return grid, _doubts(spec, table, int(np.count_nonzero(image.gray == UNKNOWN_GRAY)))
 
 
 def _refuse_distance(spec: RosMapSpec, pixels: tuple[int, ...], image_path: Path) -> None:
-    """Metres taken for millimetres would make a map that takes forever to prepare."""
+    """Meters taken for millimeters would make a map that takes forever to prepare."""
     reach = max(pixels) * spec.resolution + max(abs(spec.origin[0]), abs(spec.origin[1]))
     if reach > FARTHEST:
         size = " x ".join(str(count) for count in pixels)
@@ -48,11 +48,11 @@ def _refuse_distance(spec: RosMapSpec, pixels: tuple[int, ...], image_path: Path
 
 
 def cell_values(spec: RosMapSpec) -> npt.NDArray[np.int8]:
-    """What each of the 256 greys means as a cell of nav_msgs/OccupancyGrid."""
-    greys = np.arange(256)
+    """What each of the 256 grays means as a cell of nav_msgs/OccupancyGrid."""
+    grays = np.arange(256)
     if spec.mode == "raw":
-        return np.where(greys <= OCCUPIED, greys, UNKNOWN).astype(np.int8)
-    share = greys.astype(np.float32) / np.float32(255)
+        return np.where(grays <= OCCUPIED, grays, UNKNOWN).astype(np.int8)
+    share = grays.astype(np.float32) / np.float32(255)
     occupancy = share if spec.negate else np.float32(1) - share
     free, occupied = np.float32(spec.free_thresh), np.float32(spec.occupied_thresh)
     values = np.where(occupancy >= occupied, OCCUPIED, UNKNOWN)
@@ -65,11 +65,11 @@ def cell_values(spec: RosMapSpec) -> npt.NDArray[np.int8]:
     return values.astype(np.int8)
 
 
-def _doubts(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_greys: int) -> tuple[str, ...]:
-    if spec.mode == "raw" or spec.negate or not unknown_greys or table[UNKNOWN_GREY] != FREE:
+def _doubts(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_grays: int) -> tuple[str, ...]:
+    if spec.mode == "raw" or spec.negate or not unknown_grays or table[UNKNOWN_GRAY] != FREE:
         return ()
     return (
-        f"{spec.image}: {unknown_greys} pixels of grey 205, which map_saver writes for unknown, are read as free "
+        f"{spec.image}: {unknown_grays} pixels of gray 205, which map_saver writes for unknown, are read as free "
         f"because free_thresh is {spec.free_thresh:g}; 0.196 keeps them unknown",
     )
 
@@ -77,14 +77,14 @@ def _doubts(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_greys: int) -
 def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
     """Write a map as `yaml_path` and a PGM beside it, which load as exactly this grid. Raises OSError.
 
-    Trinary with map_saver's greys and thresholds, or raw where cells hold more than free, occupied and unknown.
+    Trinary with map_saver's grays and thresholds, or raw where cells hold more than free, occupied and unknown.
     """
     image_path = yaml_path.with_suffix(".pgm")
     require_regular_file(image_path)
     trinary = bool(np.isin(grid.cells, (FREE, OCCUPIED, UNKNOWN)).all())
     height, width = grid.shape
     header = f"P5\n{width} {height}\n255\n".encode()
-    image_path.write_bytes(header + _greys(grid.cells, trinary)[::-1].tobytes())
+    image_path.write_bytes(header + _grays(grid.cells, trinary)[::-1].tobytes())
     origin = ", ".join(decimal(value) for value in grid.origin)
     lines = (
         f"image: {json.dumps(image_path.name)}",
@@ -98,10 +98,10 @@ def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
     yaml_path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _greys(cells: npt.NDArray[np.int8], trinary: bool) -> npt.NDArray[np.uint8]:
+def _grays(cells: npt.NDArray[np.int8], trinary: bool) -> npt.NDArray[np.uint8]:
     if not trinary:
         return np.where(cells < 0, 255, cells).astype(np.uint8)
-    return np.select((cells == FREE, cells == OCCUPIED), (FREE_GREY, OCCUPIED_GREY), UNKNOWN_GREY).astype(np.uint8)
+    return np.select((cells == FREE, cells == OCCUPIED), (FREE_GRAY, OCCUPIED_GRAY), UNKNOWN_GRAY).astype(np.uint8)
 
 
 def decimal(value: float) -> str:

@@ -17,7 +17,7 @@ from simscen.worlds.geometry.triangulation import fuse
 if TYPE_CHECKING:
     from PIL import Image, ImageDraw
 
-Colour = tuple[int, int, int, int]
+Color = tuple[int, int, int, int]
 
 PAPER, FREE_GROUND, UNKNOWN_GROUND = (226, 230, 236, 255), (255, 255, 255, 255), (226, 230, 236, 255)
 MAPPED_WALL, WALL = (147, 178, 214, 255), (16, 42, 82, 255)
@@ -34,7 +34,7 @@ RING = 18 * FINER
 
 @dataclass(frozen=True)
 class View:
-    """Where world points land on the canvas: `left`, `top` in metres, `scale` in canvas pixels per metre."""
+    """Where world points land on the canvas: `left`, `top` in meters, `scale` in canvas pixels per meter."""
 
     left: float
     top: float
@@ -53,9 +53,9 @@ def picture(
     footprints: Sequence[Polygon] = (),
     gaps: Sequence[tuple[float, float]] = (),
 ) -> "Image.Image":
-    """The world cut at `height` metres, as an RGB image of at most LONGEST pixels a side, north (y) up.
+    """The world cut at `height` meters, as an RGB image of at most LONGEST pixels a side, north (y) up.
 
-    Dark lines are the cut, light blue cells the map over it, grey what the map does not know; bodies are orange where
+    Dark lines are the cut, light blue cells the map over it, gray what the map does not know; bodies are orange where
     they start, places green, regions violet. `footprints` are drawn in red, and red rings around `gaps`.
     """
     from PIL import Image, ImageDraw
@@ -120,9 +120,9 @@ def _body_outline(body: Body, height: float) -> Array:
     return outlines(placed, float(low + high) / 2)
 
 
-def _lines(pen: "ImageDraw.ImageDraw", view: View, segments: Array, colour: Colour) -> None:
+def _lines(pen: "ImageDraw.ImageDraw", view: View, segments: Array, color: Color) -> None:
     for a, b in zip(view.pixels(segments[:, 0]), view.pixels(segments[:, 1]), strict=True):
-        pen.line((a, b), fill=colour, width=FINER + 1)
+        pen.line((a, b), fill=color, width=FINER + 1)
 
 
 def _names(pen: "ImageDraw.ImageDraw", view: View, built: BuiltWorld) -> None:
@@ -140,19 +140,19 @@ def _names(pen: "ImageDraw.ImageDraw", view: View, built: BuiltWorld) -> None:
         _text(pen, (x, y), name, PLACE)
 
 
-def _text(pen: "ImageDraw.ImageDraw", place: tuple[float, float], text: str, colour: Colour) -> None:
+def _text(pen: "ImageDraw.ImageDraw", place: tuple[float, float], text: str, color: Color) -> None:
     from PIL import ImageFont
 
     font = ImageFont.load_default(13 * FINER)
     x, y = place[0] + 6 * FINER, place[1] + 4 * FINER
-    pen.text((x, y), text, fill=colour, font=font, stroke_width=FINER, stroke_fill=(255, 255, 255, 220))
+    pen.text((x, y), text, fill=color, font=font, stroke_width=FINER, stroke_fill=(255, 255, 255, 220))
 
 
 def _ruler(pen: "ImageDraw.ImageDraw", view: View) -> None:
     """A scale bar in the lower left corner, about a fifth of the picture long: 1, 2 or 5 times a power of ten."""
     wanted = view.size[0] / view.scale / 5
     power = 10.0 ** math.floor(math.log10(wanted))
-    metres = max(step * power for step in (1, 2, 5) if step * power <= wanted)
+    meters = max(step * power for step in (1, 2, 5) if step * power <= wanted)
     x, y = 14 * FINER, view.size[1] - 14 * FINER
-    pen.line((x, y, x + metres * view.scale, y), fill=RULER, width=3 * FINER)
-    _text(pen, (x - 6 * FINER, y - 24 * FINER), f"{metres:g} m", RULER)
+    pen.line((x, y, x + meters * view.scale, y), fill=RULER, width=3 * FINER)
+    _text(pen, (x - 6 * FINER, y - 24 * FINER), f"{meters:g} m", RULER)

@@ -26,7 +26,7 @@ class MeshScene:
         """About a `middle` of something larger, if that is given."""
         self.middle = middle_of(mesh.vertices) if middle is None else middle
         x, y, z = self.middle.tolist()
-        self.centre = (x, y, z)
+        self.center = (x, y, z)
         corners = mesh.vertices - self.middle
         # A little more, for rays that graze the furthest corner.
         self.radius = 1.001 * float(np.linalg.norm(corners, axis=1).max(initial=0.0))
@@ -45,7 +45,7 @@ class MeshScene:
 
         Of some `packets` of them alone.
         """
-        (x, y, z), (mx, my, mz) = place, self.centre
+        (x, y, z), (mx, my, mz) = place, self.center
         fan.begin(x - mx, y - my, z - mz, packets)
         self._scene.cut(fan.rays, packets)
 
@@ -70,7 +70,7 @@ class MovingMesh:
         """Where its middle is in the world."""
         if self._middle is None:
             x, y, z, i, j, k, w = self.pose
-            p, q, r = rotated((i, j, k, w), self.part.centre)
+            p, q, r = rotated((i, j, k, w), self.part.center)
             self._middle = x + p, y + q, z + r
         return self._middle
 
@@ -81,7 +81,7 @@ class MovingMesh:
         return self._rotation
 
     def away(self, place: Vector) -> float:
-        """How far in metres from a place in the world the nearest of it may be."""
+        """How far in meters from a place in the world the nearest of it may be."""
         return math.dist(self.pose[:3], place) - self.part.extent
 
     def distances(self, origins: Array, directions: Array, ends: Singles) -> Singles:

@@ -29,8 +29,8 @@ class RayScene(RayCaster):
     A body that moves stays as it was built; the few rays that come near it are carried into its frame. Of what lies at
     home the triangles are carried into the frame of the world instead, once, so that many are asked at once: that is
     told by where it is now, not by what was asked before, and in which frame decides about last bits. Distances agree
-    with PyBullet's rays within 1 mm. Embree works in single precision, so everything is kept about its own centre: a
-    world that lies 10 km from the origin loses nothing, one that is itself 10 km wide half a millimetre. What is
+    with PyBullet's rays within 1 mm. Embree works in single precision, so everything is kept about its own center: a
+    world that lies 10 km from the origin loses nothing, one that is itself 10 km wide half a millimeter. What is
     built of a mesh is kept with that, for other scenes and for what is forked.
     """
 

@@ -74,8 +74,8 @@ class RestingGroup:
         corners = np.concatenate([mesh.vertices for mesh in meshes.values()])
         self._low, self._high = corners.min(axis=0), corners.max(axis=0)
         x, y, z = ((self._low + self._high) / 2).tolist()
-        self._centre = x, y, z
-        self._radius = 1.001 * float(np.linalg.norm(corners - self._centre, axis=1).max())
+        self._center = x, y, z
+        self._radius = 1.001 * float(np.linalg.norm(corners - self._center, axis=1).max())
         self._part: MeshScene | None = None
         self._heights: Heights | None = None
 
@@ -113,17 +113,17 @@ class RestingGroup:
         return self._part
 
     def away(self, place: Vector) -> float:
-        """How far in metres from a place the nearest of it may be."""
-        return math.dist(self._centre, place) - self._radius
+        """How far in meters from a place the nearest of it may be."""
+        return math.dist(self._center, place) - self._radius
 
     def sweep(self, fan: RayFan, pose: Pose3, heights: Heights) -> None:
         """Rays of a fan at `pose` that was turned to it end at what they meet here."""
-        for packets in towards(fan, pose, self._centre, self._radius):
+        for packets in towards(fan, pose, self._center, self._radius):
             self._scene(heights).sweep(fan, pose[:3], packets)
 
     def cast(self, origins: Array, directions: Array, heights: Heights, ends: Singles) -> None:
         """Of rays that begin in places of their own, what they meet before their `ends` (n,) becomes these."""
-        rays = meeting(self._centre, self._radius, origins, directions, ends)
+        rays = meeting(self._center, self._radius, origins, directions, ends)
         if len(rays):
             ends[rays] = self._scene(heights).distances(origins[rays], directions[rays], ends[rays])
 

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 MOST_LEVELS = 12
 """Cuts through the robot's height; walls and boxes need one, whatever their number."""
 SPACING = 0.02
-"""Metres between the points that stand for an outline: at 0.2 m, half of it away errs by 0.25 mm."""
+"""Meters between the points that stand for an outline: at 0.2 m, half of it away errs by 0.25 mm."""
 NOTHING = 1e6
-"""The clearance in metres where there is no solid at all."""
+"""The clearance in meters where there is no solid at all."""
 HALF_DIAGONAL = 0.7072
 """Of a cell, in cells: how far anything in it may be from its middle."""
 
@@ -32,7 +32,7 @@ HALF_DIAGONAL = 0.7072
 class ClearanceField:
     """The distance to the nearest solid, roughly for cells and exactly for points; negative inside of solids.
 
-    `rough` (rows, columns) are metres from the middle of a cell to that of the nearest cell that a solid reaches into:
+    `rough` (rows, columns) are meters from the middle of a cell to that of the nearest cell that a solid reaches into:
     the truth is at most HALF_DIAGONAL cells away from it. `inside` are the cells whose middle is in a solid. Point k of
     the outline is on the solid `names[owners[k]]`.
     """
@@ -45,11 +45,11 @@ class ClearanceField:
     names: tuple[str, ...] = ()
 
     def exact(self, points: Array) -> Array:
-        """Clearance (n,) in metres at points (n, 2)."""
+        """Clearance (n,) in meters at points (n, 2)."""
         return self._nearest(points)[0]
 
     def keeps(self, points: Array, distance: float) -> npt.NDArray[np.bool_]:
-        """Which of the points (n, 2) are at least `distance` metres away from every solid."""
+        """Which of the points (n, 2) are at least `distance` meters away from every solid."""
         rough = self.rough[self._cells(points)]
         # Twice, as the point may be as far from the middle of its cell as the outline from that of its own.
         answer: npt.NDArray[np.bool_] = rough >= distance + 2 * HALF_DIAGONAL * self.grid.resolution
@@ -58,15 +58,15 @@ class ClearanceField:
         return answer
 
     def free_cells(self, distance: float) -> Cells:
-        """The cells whose middle is at least `distance` metres away from every solid."""
+        """The cells whose middle is at least `distance` meters away from every solid."""
         slack = HALF_DIAGONAL * self.grid.resolution
         free: Cells = (self.rough >= distance + slack) & ~self.inside
         unsure = (np.abs(self.rough - distance) < slack) & ~self.inside
-        free[unsure] = self.exact(self.grid.centre_of(np.argwhere(unsure))) >= distance
+        free[unsure] = self.exact(self.grid.center_of(np.argwhere(unsure))) >= distance
         return free
 
     def push(self, points: Array, distance: float) -> Array:
-        """How to move each of the points (n, 2) away from the solid nearest to it, to be `distance` metres off."""
+        """How to move each of the points (n, 2) away from the solid nearest to it, to be `distance` meters off."""
         moves = np.zeros_like(points)
         near = self.rough[self._cells(points)] < distance + 2 * HALF_DIAGONAL * self.grid.resolution
         clearance, away = self._nearest(points[near])

@@ -23,7 +23,7 @@ OPPOSITE = -0.5
 
 @dataclass(frozen=True)
 class Gap:
-    """The narrowest point of the widest way: its middle and `width` in metres; 0 where there is no gap at all.
+    """The narrowest point of the widest way: its middle and `width` in meters; 0 where there is no gap at all.
 
     `sides` are the points of the solids on either side.
     """
@@ -41,7 +41,7 @@ def narrowest_gap(
     radius: float,
     z_range: tuple[float, float],
 ) -> Gap:
-    """What keeps a disc of `radius` metres from getting from one end to the other; widths are exact to some 2 cm."""
+    """What keeps a disc of `radius` meters from getting from one end to the other; widths are exact to some 2 cm."""
     x0, y0, x1, y1 = bounds
     room = 2 * radius
     area = (x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2)
@@ -54,7 +54,7 @@ def narrowest_gap_in(field: ClearanceField, ends: tuple[Pose2, Pose2], radius: f
     grid = field.grid
     clearance = _clearances(field, 2 * radius)
     cell = _bottleneck(clearance, grid.cell_of(np.array([ends[0][:2], ends[1][:2]])))
-    place: Array = grid.centre_of(cell[None])[0]
+    place: Array = grid.center_of(cell[None])[0]
     least = clearance[tuple(cell)]
     if least < UNRESOLVED * grid.resolution:
         return Gap(*_thinnest(clearance, grid, ends), 0.0)
@@ -65,12 +65,12 @@ def _clearances(field: ClearanceField, most: float) -> Array:
     """Of the middle of each cell, negative in solids, and at most `most`, as more does not matter."""
     clearance: Array = np.minimum(field.rough, most)
     near = field.rough < most
-    clearance[near] = np.minimum(field.exact(_centres(field.grid, near)), most)
+    clearance[near] = np.minimum(field.exact(_centers(field.grid, near)), most)
     return clearance
 
 
-def _centres(grid: OccupancyGrid, cells: npt.NDArray[np.bool_]) -> Array:
-    return grid.centre_of(np.argwhere(cells))
+def _centers(grid: OccupancyGrid, cells: npt.NDArray[np.bool_]) -> Array:
+    return grid.center_of(np.argwhere(cells))
 
 
 def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
@@ -122,7 +122,7 @@ def _thinnest(clearance: Array, grid: OccupancyGrid, ends: tuple[Pose2, Pose2]) 
         part[row, column] = True
         away.append(ndimage.distance_transform_edt(~part))
     depth = np.where(walls, np.maximum(*away), np.inf)
-    middles = grid.centre_of(np.argwhere(depth < depth.min() + AS_THICK))
+    middles = grid.center_of(np.argwhere(depth < depth.min() + AS_THICK))
     x, y = middles[np.argmin(np.linalg.norm(middles - places.mean(axis=0), axis=1))].tolist()
     return x, y
 

@@ -13,11 +13,11 @@ from simscen.worlds.routes.clearance import ClearanceField
 from simscen.worlds.routes.path_tightening import length
 
 WIDEST = 4.0
-"""Metres: no wider passage is looked at."""
+"""Meters: no wider passage is looked at."""
 SPACING, MOST = 0.25, 80
-"""Metres of way from one line to the next, and how many lines a way has at most."""
+"""Meters of way from one line to the next, and how many lines a way has at most."""
 NARROW = 2.0
-"""Metres: passages up to this width are measured where they are narrowest, not where the way happens to cross."""
+"""Meters: passages up to this width are measured where they are narrowest, not where the way happens to cross."""
 FAN = np.array([[[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]] for a in np.radians(np.arange(-60, 61, 10))])
 """Turns (n, 2, 2) of the rays that look for the other side: it need not be right opposite, at an oblique door."""
 MOST_POINTS = 400
@@ -123,7 +123,7 @@ def _name(number: int, field: ClearanceField) -> str:
 
 
 def _end(number: int, field: ClearanceField) -> Point:
-    """To the millimetre, so that a log stays small."""
+    """To the millimeter, so that a log stays small."""
     assert field.outline is not None
     x, y = field.outline.data[number].tolist()
     return round(x, 3), round(y, 3)

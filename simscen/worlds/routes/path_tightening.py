@@ -16,7 +16,7 @@ SLIDES = 24
 
 
 def tighten(way: Array, field: ClearanceField, radius: float) -> Array:
-    """The way (n, 2) pulled tight, so that it keeps `radius` metres from everything but for a tenth of a cell.
+    """The way (n, 2) pulled tight, so that it keeps `radius` meters from everything but for a tenth of a cell.
 
     Straight legs come from string pulling; between them an elastic band (Quinlan and Khatib 1993) slides the way
     onto the curves around obstacles, arcs of `radius`.
@@ -31,12 +31,12 @@ def tighten(way: Array, field: ClearanceField, radius: float) -> Array:
 
 
 def length(way: Array) -> float:
-    """Metres along a way (n, 2)."""
+    """Meters along a way (n, 2)."""
     return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
 
 
 def is_clear(a: Array, b: Array, field: ClearanceField, allowed: float) -> bool:
-    """Whether the straight line between two points keeps a clearance of `allowed` metres, seen twice in each cell."""
+    """Whether the straight line between two points keeps a clearance of `allowed` meters, seen twice in each cell."""
     count = 2 + math.ceil(2 * math.dist(a, b) / field.grid.resolution)
     line = a + np.linspace(0.0, 1.0, count)[:, None] * (b - a)
     return bool(field.keeps(line, allowed).all())

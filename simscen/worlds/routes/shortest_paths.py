@@ -30,7 +30,7 @@ MOST_CELLS = 1_000_000
 
 @dataclass(frozen=True)
 class Leg:
-    """A shortest way to a goal: metres, inf where there is none, and what it passes between."""
+    """A shortest way to a goal: meters, inf where there is none, and what it passes between."""
 
     length: float
     passages: tuple[Passage, ...] = ()
@@ -52,7 +52,7 @@ class ShortestPaths:
         z_range: tuple[float, float] = Z_RANGE,
         finest: float = FINEST,
     ) -> None:
-        """Searched in cells of `finest` metres, or larger ones in a large world."""
+        """Searched in cells of `finest` meters, or larger ones in a large world."""
         x0, y0, x1, y1 = bounds
         room = 2 * radius  # all around the world, so that a way may lead around it
         bounds = (x0 - room, y0 - room, x1 + room, y1 + room)
@@ -64,7 +64,7 @@ class ShortestPaths:
         self._allowed = self._radius - 0.1 * resolution
 
     def length(self, start: Pose2, goal: Pose2) -> float:
-        """Metres of the shortest way between two positions; inf if there is none or the disc does not fit there."""
+        """Meters of the shortest way between two positions; inf if there is none or the disc does not fit there."""
         way = self.way(start, goal)
         return math.inf if way is None else length(way)
 
@@ -113,7 +113,7 @@ class ShortestPaths:
             [self._free_cell(self._bold_lattice, np.array(start[:2])) for start in starts]
         )
         slack = HALF_DIAGONAL * grid.resolution
-        return any(arrived(Pose2(x, y)) <= slack for x, y in grid.centre_of(cells).tolist())
+        return any(arrived(Pose2(x, y)) <= slack for x, y in grid.center_of(cells).tolist())
 
     @cached_property
     def _bold_lattice(self) -> Lattice:
@@ -130,7 +130,7 @@ class ShortestPaths:
         cells = lattice.way(first, last) if first and last else None
         if cells is None:
             return None
-        inner = self._field.grid.centre_of(cells)
+        inner = self._field.grid.center_of(cells)
         return tighten(np.concatenate((ends[:1], inner, ends[1:])), self._field, self._radius)
 
     def _is_clear(self, way: Array) -> bool:
@@ -145,7 +145,7 @@ class ShortestPaths:
         cells = cells[lattice.is_free(cells)]
         if not len(cells):
             return None
-        row, column = cells[np.argmin(np.linalg.norm(grid.centre_of(cells) - point, axis=1))].tolist()
+        row, column = cells[np.argmin(np.linalg.norm(grid.center_of(cells) - point, axis=1))].tolist()
         return row, column
 
 

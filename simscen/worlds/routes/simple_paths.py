@@ -17,17 +17,17 @@ Point = tuple[float, float]
 Cell = tuple[int, int]
 
 STEP = 0.2
-"""Metres between the points of the search."""
+"""Meters between the points of the search."""
 HALF_STEP = STEP * math.sqrt(0.5)
 """How far a diagonal move may be from the nearer of its ends."""
 SLACK = 0.02
-"""Metres of clearance that looking at single points of a straight line costs."""
+"""Meters of clearance that looking at single points of a straight line costs."""
 MOST_POINTS = 4000
 """Of a search; beyond, the library is faster."""
 
 
 class SimplePaths:
-    """Ways of a disc of `radius` metres between solids that stand upright over convex bases."""
+    """Ways of a disc of `radius` meters between solids that stand upright over convex bases."""
 
     def __init__(self, prisms: Iterable[UprightPrism], radius: float) -> None:
         self._radius = radius
@@ -42,7 +42,7 @@ class SimplePaths:
                 self._near.setdefault(bucket, []).append(prism)
 
     def length(self, start: Point, goal: Point) -> float:
-        """Metres of a way from start to goal, perhaps not the shortest; inf when none was found."""
+        """Meters of a way from start to goal, perhaps not the shortest; inf when none was found."""
         if (start, goal) not in self._lengths:
             self._lengths[start, goal] = self._length(start, goal)
         return self._lengths[start, goal]
@@ -85,7 +85,7 @@ class SimplePaths:
         return math.inf
 
     def _passes(self, here: Point, there: Point, first: bool) -> bool:
-        """Whether the disc can move to a neighbour; the start alone may be nearer to things than the search allows."""
+        """Whether the disc can move to a neighbor; the start alone may be nearer to things than the search allows."""
         return self._keeps(there, HALF_STEP) and (not first or self._is_clear(here, there))
 
     def _is_clear(self, a: Point, b: Point) -> bool:
@@ -94,7 +94,7 @@ class SimplePaths:
         return all(self._keeps((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])), SLACK) for t in parts)
 
     def _keeps(self, point: Point, more: float) -> bool:
-        """Whether everything is at least the radius and `more` metres away."""
+        """Whether everything is at least the radius and `more` meters away."""
         near = self._near.get((math.floor(point[0]), math.floor(point[1])), ())
         return all(prism.distance(point, (prism.bottom, prism.top)) >= self._radius + more for prism in near)
 

@@ -16,7 +16,7 @@ LARGEST = 513
 
 
 def read_heightmap(element: Element, library: Library) -> Solid:
-    """The terrain as a mesh centred on `pos`; raises Unusable. Source: gz-common, ImageHeightmap.cc."""
+    """The terrain as a mesh centered on `pos`; raises Unusable. Source: gz-common, ImageHeightmap.cc."""
     uri = element.child("uri")
     if uri is None:
         raise element.unusable("<uri> is missing")
@@ -33,7 +33,7 @@ def _heights(uri: Element, library: Library) -> Array:
     path = library.locate(uri)
     data = library.read(path, uri, MESH_BYTES)
     try:
-        # A bomb is recognised by its header below, Pillow's own warning would only say the same again.
+        # A bomb is recognized by its header below, Pillow's own warning would only say the same again.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             image = Image.open(io.BytesIO(data), formats=("PNG", "BMP", "PPM", "JPEG"))
@@ -41,8 +41,8 @@ def _heights(uri: Element, library: Library) -> Array:
             if max(image.size) > LARGEST or min(image.size) < 2:
                 raise uri.unusable(f"{library.shown(path)}: {image.size[0]} x {image.size[1]} pixels;"
                                    f" 2 to {LARGEST} an edge are read")  # fmt: skip
-            grey = image if image.mode in ("L", "I", "I;16", "F") else image.convert("L")
-            pixels = np.asarray(grey, dtype=np.float64)
+            gray = image if image.mode in ("L", "I", "I;16", "F") else image.convert("L")
+            pixels = np.asarray(gray, dtype=np.float64)
     except Image.DecompressionBombError as error:
         raise uri.unusable(f"{library.shown(path)}: image too large") from error
     except (OSError, ValueError, SyntaxError) as error:
@@ -52,7 +52,7 @@ def _heights(uri: Element, library: Library) -> Array:
 
 
 def terrain(heights: Array, width: float, depth: float) -> Mesh:
-    """Two triangles for each cell between samples `heights` (rows, columns), first row at +y, centred on x and y."""
+    """Two triangles for each cell between samples `heights` (rows, columns), first row at +y, centered on x and y."""
     rows, columns = heights.shape
     x, y = np.meshgrid(np.linspace(-width / 2, width / 2, columns), np.linspace(depth / 2, -depth / 2, rows))
     vertices = np.column_stack([x.ravel(), y.ravel(), heights.ravel()])

@@ -29,7 +29,7 @@ class UnusableMesh(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A named part of a mesh: `vertices` (n, 3) in metres, `faces` (m, 3); `names` is what a submesh may call it."""
+    """A named part of a mesh: `vertices` (n, 3) in meters, `faces` (m, 3); `names` is what a submesh may call it."""
 
     names: tuple[str, ...]
     vertices: Array
@@ -48,7 +48,7 @@ UNREAD = {"tristrips", "trifans", "convex_mesh", "spline", "instance_controller"
 
 
 def read_dae(data: bytes, _: str) -> Iterator[Part]:
-    """The parts of a COLLADA scene in metres; raises UnusableMesh."""
+    """The parts of a COLLADA scene in meters; raises UnusableMesh."""
     import collada
 
     try:

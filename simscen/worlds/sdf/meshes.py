@@ -1,6 +1,6 @@
 """`<mesh>`: triangles of COLLADA, STL and OBJ files, concave ones as they are.
 
-A COLLADA `<unit>` is honoured; `<up_axis>` is not, because Gazebo does not: its ColladaLoader never reads it and its
+A COLLADA `<unit>` is honored; `<up_axis>` is not, because Gazebo does not: its ColladaLoader never reads it and its
 AssimpLoader undoes the rotation that assimp adds. Worlds are drawn accordingly: Nav2's tb3_sandbox says Y_UP in
 meshes that stand upright along z.
 """
@@ -28,7 +28,7 @@ class _Wish:
     path: Path
     scale: tuple[float, ...]
     submesh: str
-    centred: bool
+    centered: bool
 
 
 class MeshShelf:
@@ -61,7 +61,7 @@ class MeshShelf:
         if scale and 0.0 in factors:
             raise scale.unusable("a scale of zero")
         if submesh is None:
-            return _Wish(path, factors, "", centred=False)
+            return _Wish(path, factors, "", centered=False)
         name = submesh.child("name")
         if name is None or not name.text:
             raise submesh.unusable("<name> is missing")
@@ -87,7 +87,7 @@ class MeshShelf:
 
 
 def read_mesh(path: Path) -> Mesh:
-    """All triangles of a DAE, STL or OBJ file in metres, for a caller that knows that this file may be read.
+    """All triangles of a DAE, STL or OBJ file in meters, for a caller that knows that this file may be read.
 
     Raises InvalidInput for the file as a whole: not a regular file, too large, broken, no triangles.
     """
@@ -97,14 +97,14 @@ def read_mesh(path: Path) -> Mesh:
         parts = READ.read(data, path.suffix.lower(), path.name)
     except (Trouble, UnusableMesh) as error:
         raise InvalidInput([Problem(str(path), 0, 0, CODE, str(error))]) from error
-    return _joined(parts, _Wish(path, (1.0, 1.0, 1.0), "", centred=False))
+    return _joined(parts, _Wish(path, (1.0, 1.0, 1.0), "", centered=False))
 
 
 def _joined(parts: tuple[Part, ...], wish: _Wish) -> Mesh:
     vertices = np.vstack([part.vertices for part in parts])
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     faces = np.vstack([part.faces + start for part, start in zip(parts, starts, strict=True)]).astype(np.int32)
-    if wish.centred:
+    if wish.centered:
         vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     vertices = vertices * wish.scale
     if np.prod(wish.scale) < 0:  # a mirrored triangle runs clockwise

@@ -12,13 +12,13 @@ FEW = 0.05
 
 
 def outliers(extents: Mapping[str, Array]) -> dict[str, float]:
-    """The things to leave out for the others to fit on a map, and how many metres they lie off the middle.
+    """The things to leave out for the others to fit on a map, and how many meters they lie off the middle.
 
     `extents` are the corners (2, 2) of what each covers in plan. Empty when all fit, or when too many do not.
     """
     names, corners = list(extents), np.array(list(extents.values())).reshape(-1, 2, 2)
-    centres = corners.mean(axis=1)
-    distance = np.hypot(*(centres - np.median(centres, axis=0)).T) if names else np.empty(0)
+    centers = corners.mean(axis=1)
+    distance = np.hypot(*(centers - np.median(centers, axis=0)).T) if names else np.empty(0)
     order = np.argsort(distance, kind="stable")[::-1]
     for count in range(int(FEW * len(names)) + 2):
         kept = corners[order[count:]]

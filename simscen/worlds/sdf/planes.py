@@ -14,7 +14,7 @@ from simscen.worlds.sdf.report import Report
 
 THICKNESS = 0.02
 GROUND_TOLERANCE = 0.01
-"""Metres that a horizontal plane may lie off z = 0 and still be the simulator's own floor."""
+"""Meters that a horizontal plane may lie off z = 0 and still be the simulator's own floor."""
 LEVEL = math.cos(math.radians(0.5))
 
 
@@ -54,16 +54,16 @@ def _turn_to(normal: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Pose3:
 
 
 HIGHEST = 0.3
-"""Metres above z = 0 up to which a level face can be the floor rather than a platform."""
+"""Meters above z = 0 up to which a level face can be the floor rather than a platform."""
 LOWEST = 0.001
-"""Metres below which a floor is at z = 0 anyhow."""
+"""Meters below which a floor is at z = 0 anyhow."""
 COVERED = 0.8
 """Share of the world's extent that a floor covers; the rest may be a stair or what lies outside."""
-MILLIMETRES = 1000
+MILLIMETERS = 1000
 
 
 def floor_height(solids: Sequence[Solid], bounds: tuple[float, float, float, float]) -> float:
-    """How high in metres the floor lies on which everything in `bounds` stands; 0 when that is the ground itself.
+    """How high in meters the floor lies on which everything in `bounds` stands; 0 when that is the ground itself.
 
     Of AWS's small_warehouse it is the top of a plate, 2.7 cm above Gazebo's ground plane, over the whole hall.
     """
@@ -74,7 +74,7 @@ def floor_height(solids: Sequence[Solid], bounds: tuple[float, float, float, flo
     areas = np.linalg.norm(normals, axis=1)
     top = corners[:, :, 2].max(axis=1)
     faces_up = (normals[:, 2] >= LEVEL * areas) & (top > LOWEST) & (top <= HIGHEST)
-    heights = np.round(top[faces_up] * MILLIMETRES).astype(np.int64)
+    heights = np.round(top[faces_up] * MILLIMETERS).astype(np.int64)
     wanted = COVERED * (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
     covering = [h for h in np.unique(heights) if areas[faces_up][heights == h].sum() >= wanted]
     if not covering:

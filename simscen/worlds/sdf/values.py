@@ -8,7 +8,7 @@ from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.report import OutOfReach
 
 FARTHEST = 1e4
-"""Metres: no coordinate and no size may be larger."""
+"""Meters: no coordinate and no size may be larger."""
 LONGEST_NAME = 120
 
 
@@ -39,7 +39,7 @@ def _expression_hint(text: str) -> str:
 
 
 def sizes(parent: Element, tag: str, count: int, default: Sequence[float] | None = None) -> tuple[float, ...]:
-    """`count` positive lengths in metres from the child `tag`."""
+    """`count` positive lengths in meters from the child `tag`."""
     element = parent.child(tag)
     if element is None:
         if default is None:
@@ -54,7 +54,7 @@ def sizes(parent: Element, tag: str, count: int, default: Sequence[float] | None
 
 
 def size(parent: Element, tag: str) -> float:
-    """One positive length in metres from the child `tag`."""
+    """One positive length in meters from the child `tag`."""
     return sizes(parent, tag, 1)[0]
 
 

@@ -82,7 +82,7 @@ def judge_unknown(element: Element, parent: str, report: Report) -> None:
 
 @lru_cache(maxsize=1000)  # a file of many elements has few kinds, and each look takes 0.3 ms
 def _closest(tag: str, known: frozenset[str]) -> str:
-    """The known tag that is meant by a misspelt one, or nothing."""
+    """The known tag that is meant by a misspelled one, or nothing."""
     return next(iter(difflib.get_close_matches(tag, sorted(known), n=1, cutoff=0.75)), "")
 
 

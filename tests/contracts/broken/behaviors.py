@@ -1,4 +1,4 @@
-"""Behaviours that break a promise each."""
+"""Behaviors that break a promise each."""
 
 import random
 from typing import Any

@@ -16,7 +16,7 @@ PLANNER = OmplPlanner()
 
 
 def _nudged(path, share):
-    """A path of which one pose is up to a millimetre off: plans from two seeds are now and then the same."""
+    """A path of which one pose is up to a millimeter off: plans from two seeds are now and then the same."""
     points = path.points.copy()
     points[len(points) // 2, 0] += 1e-3 * share
     return Path(points)

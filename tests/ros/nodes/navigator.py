@@ -27,8 +27,8 @@ except ImportError:
     TFMessage = None
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-CELL = 0.1  # of the grid that is planned on, in metres
-NEIGHBOURS = [(dy, dx, math.hypot(dy, dx)) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
+CELL = 0.1  # of the grid that is planned on, in meters
+NEIGHBORS = [(dy, dx, math.hypot(dy, dx)) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
 
 
 def yaw_of(q):
@@ -122,7 +122,7 @@ class World:
             if cell in done:
                 continue
             done.add(cell)
-            for dy, dx, length in NEIGHBOURS:
+            for dy, dx, length in NEIGHBORS:
                 other = (cell[0] + dy, cell[1] + dx)
                 if not (0 <= other[0] < cost.shape[0] and 0 <= other[1] < cost.shape[1]):
                     continue

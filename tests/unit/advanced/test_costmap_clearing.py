@@ -56,7 +56,7 @@ def test_all_is_forgotten_at_first_and_then_ever_more_rarely() -> None:
 
 
 @pytest.mark.parametrize(("to_go", "again"), [(4.5, False), (3.9, True)])
-def test_who_has_come_a_metre_nearer_may_forget_at_once(to_go: float, again: bool) -> None:
+def test_who_has_come_a_meter_nearer_may_forget_at_once(to_go: float, again: bool) -> None:
     forgetting = ClearingBackoff()
     assert forgetting.entirely(0.0, 5.0)
     assert forgetting.entirely(1.0, to_go) == again

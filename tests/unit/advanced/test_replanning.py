@@ -22,7 +22,7 @@ WORLD = Flatland().room(8, 6)
 
 
 class Scripted:
-    """A planner and a controller that do as told: the straight way, by way of `bulge` metres, or a failure."""
+    """A planner and a controller that do as told: the straight way, by way of `bulge` meters, or a failure."""
 
     def __init__(self) -> None:
         self.seeds: list[int] = []

@@ -66,7 +66,7 @@ def test_a_robot_whose_wheels_slip_on_one_side_drives_on_its_plan_and_not_beside
 
 
 def beside(d: Drive) -> float:
-    """Metres, at most."""
+    """Meters, at most."""
     return max(abs(pose.y - 1.3) for pose in d.track if 4.0 < pose.x < 11.0)
 
 

@@ -62,7 +62,7 @@ def test_of_half_a_map_nothing_is_known_right_of_the_middle() -> None:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("circumstance", ["tracked", "unknown"])
 @pytest.mark.parametrize("parameters", ["default", "consistent"])
-def test_a_robot_is_tracked_on_raw_odometry_and_found_on_a_floor_of_forty_metres(
+def test_a_robot_is_tracked_on_raw_odometry_and_found_on_a_floor_of_forty_meters(
     circumstance: str, parameters: str
 ) -> None:
     made = short(circumstance)

@@ -8,8 +8,8 @@ from simscen.bench.navigation.obstacle_fields import CELL, GAP, GOAL, START, obs
 
 def test_the_same_number_gives_the_same_field_and_another_one_another() -> None:
     first, again, other = obstacle_field(3), obstacle_field(3), obstacle_field(4)
-    assert np.array_equal(first.centres, again.centres)
-    assert not np.array_equal(first.centres, other.centres)
+    assert np.array_equal(first.centers, again.centers)
+    assert not np.array_equal(first.centers, other.centers)
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
@@ -17,7 +17,7 @@ def test_a_disc_has_a_way_by_the_word_of_another_library(number: int) -> None:
     field = obstacle_field(number)
     lane = box(-30 * CELL, 0.0, 0.0, GOAL.y + 1.0)
     # 2 mm less than the disc: shapely's circles are polygons, and a lattice finds ways to its resolution only.
-    free = lane.difference(MultiPoint(field.centres).buffer(CELL / 2 + GAP - 0.002))
+    free = lane.difference(MultiPoint(field.centers).buffer(CELL / 2 + GAP - 0.002))
     pieces = [piece for piece in getattr(free, "geoms", [free]) if piece.contains(Point(START.x, START.y))]
     assert pieces and pieces[0].contains(Point(GOAL.x, GOAL.y))
 
@@ -35,7 +35,7 @@ def test_fields_are_as_dense_as_the_worlds_of_barn() -> None:
 def test_lonely_cells_vanish_and_crowded_ones_fill() -> None:
     alone = np.zeros((3, 3), np.bool_)
     alone[1, 1] = True
-    assert obstacle_fields._neighbours(alone).tolist() == [[1, 1, 1], [1, 0, 1], [1, 1, 1]]
+    assert obstacle_fields._neighbors(alone).tolist() == [[1, 1, 1], [1, 0, 1], [1, 1, 1]]
 
 
 def test_a_narrow_field_has_a_way_for_the_robot_and_none_for_a_wider_one_by_the_word_of_another_library() -> None:
@@ -44,7 +44,7 @@ def test_a_narrow_field_has_a_way_for_the_robot_and_none_for_a_wider_one_by_the_
     lane = box(-30 * CELL, 0.0, 0.0, GOAL.y + 1.0)
 
     def crossable(radius: float) -> bool:
-        free = lane.difference(MultiPoint(field.centres).buffer(CELL / 2 + radius))
+        free = lane.difference(MultiPoint(field.centers).buffer(CELL / 2 + radius))
         pieces = [piece for piece in getattr(free, "geoms", [free]) if piece.contains(Point(START.x, START.y))]
         return bool(pieces) and bool(pieces[0].contains(Point(GOAL.x, GOAL.y)))
 

@@ -26,8 +26,8 @@ def ranges_at(x: float, y: float, yaw: float, angles: np.ndarray = ANGLES) -> li
 
 def write_map(folder: Path) -> None:
     """The room at 5 cm."""
-    centre = 0.025 + 0.05 * np.arange(128) - 0.2
-    x, y = np.meshgrid(centre, centre[:88])
+    center = 0.025 + 0.05 * np.arange(128) - 0.2
+    x, y = np.meshgrid(center, center[:88])
     solid = sum((x + 0.02 > b[0]) & (x - 0.02 < b[2]) & (y + 0.02 > b[1]) & (y - 0.02 < b[3]) for b in BOXES)
     pixels = np.where(np.asarray(solid) > 0, 0, 254).astype(np.uint8)[::-1]
     (folder / "room.pgm").write_bytes(b"P5 128 88 255\n" + pixels.tobytes())

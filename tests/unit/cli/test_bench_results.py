@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from simscen.bench.speed.measurement import Measurement
-from simscen.cli.benchmarks.results import FORMAT, Result, as_json, comparison_text, judgement, read_result
+from simscen.cli.benchmarks.results import FORMAT, Result, as_json, comparison_text, judgment, read_result
 from simscen.core.errors import UsageError
 
 BEFORE = Result(
@@ -56,8 +56,8 @@ def test_more_of_what_is_better_is_better_and_fewer_than_two_rounds_say_nothing(
         Measurement.of((10.0, 11.0), "", more_is_better=True),
         Measurement.of((20.0, 21.0), "", more_is_better=True),
     )
-    assert (judgement(few, many), judgement(many, few)) == ("better", "worse")
-    assert judgement(few, Measurement.of((20.0,), "")) == ""
+    assert (judgment(few, many), judgment(many, few)) == ("better", "worse")
+    assert judgment(few, Measurement.of((20.0,), "")) == ""
 
 
 def test_a_figure_that_was_nothing_has_no_ratio() -> None:

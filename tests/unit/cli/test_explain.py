@@ -109,7 +109,7 @@ def test_keys_and_codes_are_explained(simscen, name: str, told: str) -> None:
     ("name", "meant"),
     [("amcl.update_min_b", "amcl.update_min_"), ("goal_ocupied", "GOAL_OCCUPIED"), ("lingr", "linger")],
 )
-def test_misspelt_keys_and_codes_are_told_what_was_meant(simscen, name: str, meant: str) -> None:
+def test_misspelled_keys_and_codes_are_told_what_was_meant(simscen, name: str, meant: str) -> None:
     assert f"did you mean `{meant}" in simscen("explain", name).err
 
 

@@ -77,7 +77,7 @@ def test_a_log_that_cannot_be_used_is_told_in_words(simscen, tmp_path: Path, nam
 
 
 def judged(out: Path) -> dict[str, float]:
-    """What the one verdict of a session says of the error of localisation."""
+    """What the one verdict of a session says of the error of localization."""
     (run,) = json.loads((out / "results.json").read_text())["runs"]
     (verdict,) = run["verdicts"]
     return {

@@ -83,7 +83,7 @@ def test_every_shipped_robot_drives_what_it_is_told(check, name):
     assert max(map(len, told.splitlines())) <= 80
 
 
-def test_a_caster_a_millimetre_too_low_is_told_at_its_line(check):
+def test_a_caster_a_millimeter_too_low_is_told_at_its_line(check):
     text = urdf(wheels(), CASTER.format(z=0.019))
     code, told, _ = check("cart.urdf", cart_urdf=text)
     assert code == 0

@@ -19,7 +19,7 @@ SHIPPED = {
 }
 FORM = [
     "five_mistakes", "typo_in_a_key", "key_far_from_all", "wrong_types", "units", "choices", "empty_values", "names",
-    "single_key_choices", "another_version", "misspelt_instead_of_missing",
+    "single_key_choices", "another_version", "misspelled_instead_of_missing",
 ]  # fmt: skip
 
 

@@ -58,7 +58,7 @@ def test_something_seen_at_half_a_place_is_not_placed():
 
 
 @pytest.mark.parametrize(("speed", "status"), [(0.1, Status.PASS), (0.10001, Status.FAIL)])
-def test_up_to_a_tenth_of_a_metre_a_second_is_standing(speed, status):
+def test_up_to_a_tenth_of_a_meter_a_second_is_standing(speed, status):
     trace = sketch({"seconds": 8, "truth": [[0, 0, 0]], "events": HIT})
     trace.velocity.values[:, 0] = speed
     assert verdict({"caused_by_robot": True}, trace).status is status

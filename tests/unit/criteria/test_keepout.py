@@ -163,7 +163,7 @@ def test_a_way_in_any_direction_between_two_samples_is_searched(x, y):
     assert in_one_step(around(x, y, 0.02), (0, 0), (2 * x, 2 * y)).value < 0
 
 
-def test_the_nearest_moment_is_found_to_half_a_centimetre():
+def test_the_nearest_moment_is_found_to_half_a_centimeter():
     tip = [[0.0165, 0.0], [0.0166, -1.0], [0.0164, -1.0]]
     assert in_one_step(tip, (0, 0), (0.022, 0), [], radius=0.0).value < 0.005
 

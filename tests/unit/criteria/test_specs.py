@@ -92,7 +92,7 @@ def test_what_is_not_said_means_what_the_reference_says(kind, words, meant):
     assert {key: getattr(found, key) for key in meant} == meant
 
 
-def test_only_clearance_asks_for_clearance_and_for_half_a_metre_more_than_its_bound():
+def test_only_clearance_asks_for_clearance_and_for_half_a_meter_more_than_its_bound():
     assert spec("clearance", {"min": 3}).clearance_range == 3.5
     others = [spec("speed", {"max": 1}), spec("collisions", {}), spec("goals_reached", {})]
     assert [isinstance(other, Criterion) and other.clearance_range for other in others] == [0.0, 0.0, 0.0]

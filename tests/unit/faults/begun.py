@@ -44,9 +44,9 @@ def imu(tick=0, turning=(0.0, 0.0, 0.2), pushing=(0.1, 0.0, 9.81)) -> Imu:
     return Imu("imu", tick, turning, pushing)
 
 
-def image(depth, tick=0, grey=100) -> Image:
+def image(depth, tick=0, gray=100) -> Image:
     depths = np.asarray(depth, dtype=np.float32)
-    return Image("camera", tick, np.full((*depths.shape, 3), grey, np.uint8), depths)
+    return Image("camera", tick, np.full((*depths.shape, 3), gray, np.uint8), depths)
 
 
 def belief(pose: Pose2, odom: Pose2) -> Belief:

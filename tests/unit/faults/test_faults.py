@@ -19,8 +19,8 @@ def scan(ranges) -> Scan:
     return Scan("lidar", 0, np.asarray(ranges, dtype=float), -math.pi, 0.01, 0.1, 12.0)
 
 
-def straight(metres: float, steps: int = 100):
-    return [Odometry("odom", k, Pose2(metres * k / steps, 0, 0), Twist(0.5, 0, 0)) for k in range(steps + 1)]
+def straight(meters: float, steps: int = 100):
+    return [Odometry("odom", k, Pose2(meters * k / steps, 0, 0), Twist(0.5, 0, 0)) for k in range(steps + 1)]
 
 
 def test_a_sensor_that_is_off_says_nothing():
@@ -68,7 +68,7 @@ def test_a_linear_bias_scales_the_reported_way():
     assert reported[-1].twist.vx == pytest.approx(0.55)
 
 
-def test_a_turn_for_each_metre_bends_the_reported_way_into_an_arc():
+def test_a_turn_for_each_meter_bends_the_reported_way_into_an_arc():
     fault = begun({"bias": {"turn_per_metre": 0.5}})
     end = [fault.reading(odometry) for odometry in straight(2.0, 2000)][-1].pose
     assert end.yaw == pytest.approx(1.0)

@@ -134,7 +134,7 @@ def test_a_belief_jumps_in_the_robots_own_frame_and_then_moves_as_the_map_lies_n
 
 
 def corrections(fault: dict, ticks: int, until: int | None = None) -> list[float]:
-    """What the navigator knows of a correction that grows by a metre a tick, as does the way by odometry."""
+    """What the navigator knows of a correction that grows by a meter a tick, as does the way by odometry."""
     now = Hand()
     work, told = begun(fault, "Belief", now), []
     for now.tick in range(ticks):

@@ -12,7 +12,7 @@ from simscen.core.geometry.kinematics import Twist
 MANY = 10_000
 
 
-def test_depths_and_colours_are_noisy_by_what_is_said_and_stay_what_they_can_be():
+def test_depths_and_colors_are_noisy_by_what_is_said_and_stay_what_they_can_be():
     seen = begun({"noise": {"std": "5 cm", "colour": "4 %"}}, "Image").reading(image(np.full((100, 100), 2.0)))
     assert seen.depth.std() == pytest.approx(0.05, rel=0.05)
     assert seen.rgb.std() == pytest.approx(0.04 * 255, rel=0.05)
@@ -31,7 +31,7 @@ def test_a_noisy_imu_spreads_each_axis_by_what_is_said():
 
 
 @pytest.mark.parametrize("steps", [4, 40])
-def test_noise_of_odometry_after_a_metre_does_not_depend_on_its_rate(steps):
+def test_noise_of_odometry_after_a_meter_does_not_depend_on_its_rate(steps):
     ends = []
     for seed in range(300):
         work = begun({"noise": {"linear": "5 cm", "angular": "3 deg"}}, "Odometry", seed=seed)
@@ -69,7 +69,7 @@ def test_a_bias_is_added_to_what_is_measured_and_to_nothing_else():
     felt = begun({"bias": {"gyro": 0.1, "accelerometer": -0.5}}, "Imu").reading(imu())
     assert felt.angular_velocity == pytest.approx((0, 0, 0.3))
     assert felt.linear_acceleration == pytest.approx((-0.4, 0, 9.81))
-    seen = begun({"bias": {"range": 0.5, "brightness": "20 %"}}, "Image").reading(image([[1.0, np.inf]], grey=230))
+    seen = begun({"bias": {"range": 0.5, "brightness": "20 %"}}, "Image").reading(image([[1.0, np.inf]], gray=230))
     assert seen.depth.tolist() == [[1.5, np.inf]]
     assert (seen.rgb == 255).all()
 

@@ -29,7 +29,7 @@ NAV2_PARAMS = {
     "velocity_smoother.max_accel": 3.0, "velocity_smoother.max_decel": 3.0, "velocity_smoother.max_angular_accel": 3.5,
     "collision_monitor.source_timeout": 1.0, "collision_monitor.time_before_collision": 1.2,
     "collision_monitor.min_points": 6,
-    # its default behaviour tree
+    # its default behavior tree
     "planner.replanning": "rate", "recovery.number_of_retries": 6, "recovery.spin_dist": 1.57,
     "recovery.wait_duration": 5.0, "recovery.backup_dist": 0.30, "recovery.backup_speed": 0.15,
     "recovery.planner_codes": ["PLANNER_UNKNOWN", "PLANNER_TIMEOUT", "NO_VALID_PATH"],

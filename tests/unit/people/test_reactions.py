@@ -46,7 +46,7 @@ def test_the_surprised_stop_and_look_until_they_have_seen_enough():
     assert anna[begun + 100, 2] == pytest.approx(bearing, abs=1e-6)
 
 
-def test_the_curious_come_to_a_metre_and_a_half_and_lose_interest():
+def test_the_curious_come_to_a_meter_and_a_half_and_lose_interest():
     crowd = people(walker("anna", 7.0, 3.0, (7.0, -9.0), yaw=math.pi, **CURIOUS))
     tracks, deeds = walk(crowd, 45.0, robot(0.0, 0.0))
     assert [deed.what for deed in deeds] == ["reacted", "calmed", "reached"]

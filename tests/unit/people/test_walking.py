@@ -97,7 +97,7 @@ def test_lanes_form_where_two_crowds_walk_through_each_other():
 
 
 def test_those_of_a_group_keep_together_and_walk_side_by_side():
-    """Within the (N - 1)/2 metres of their middle and its surroundings, where those who know nobody drift apart."""
+    """Within the (N - 1)/2 meters of their middle and its surroundings, where those who know nobody drift apart."""
 
     def spread(group: str | None) -> np.ndarray:
         goal = (40.0, 0.0)

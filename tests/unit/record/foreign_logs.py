@@ -30,7 +30,7 @@ class Said:
 
 
 def drive(seconds: float = 10.0, begin: int = BEGIN, off: float = 0.05, mocap: str = "map") -> list[Said]:
-    """A robot that drives along x at 0.5 m/s and believes itself `off` metres further; /mocap knows better."""
+    """A robot that drives along x at 0.5 m/s and believes itself `off` meters further; /mocap knows better."""
     said = []
     for k in range(round(seconds * 20) + 1):
         t = k / 20

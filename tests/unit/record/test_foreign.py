@@ -191,7 +191,7 @@ def test_a_gap_in_the_truth_leaves_room_for_doubt(read: Callable[..., ForeignLog
     assert late.coverage.partial[Evidence.TRUTH].startswith("/mocap says nothing from t = 0.00 s to 6.0")
 
 
-def test_a_belief_that_begins_after_a_metre_of_driving_leaves_room_for_doubt(read: Callable[..., ForeignLog]) -> None:
+def test_a_belief_that_begins_after_a_meter_of_driving_leaves_room_for_doubt(read: Callable[..., ForeignLog]) -> None:
     log = read([one for one in drive() if one.topic != "/amcl_pose" or one.time > BEGIN + 2 * SECOND])
     assert log.coverage.partial[Evidence.BELIEF].startswith("/amcl_pose begins at t = 2.0")
 

@@ -62,7 +62,7 @@ def disguised(own: Path) -> Path:
 
 
 def test_the_signals_are_the_same_to_the_last_bit(own: Path, disguised: Path) -> None:
-    """But for the normalised quaternions' last one; ticks are found exactly."""
+    """But for the normalized quaternions' last one; ticks are found exactly."""
     assert is_own(own) and not is_own(disguised)
     ours, theirs = read_log(own).trace, read_foreign(disguised, TRUTH).trace
     for name in ("truth", "velocity", "belief", "odometry", "command"):

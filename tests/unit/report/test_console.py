@@ -114,7 +114,7 @@ def test_a_terminal_that_knows_only_ascii_gets_plain_lines(session):
     assert b"\x1b" not in raw.getvalue()
 
 
-def test_a_terminal_gets_the_same_facts_in_colour_and_user_text_is_no_markup(session):
+def test_a_terminal_gets_the_same_facts_in_color_and_user_text_is_no_markup(session):
     out = io.StringIO()
     told(text_reporter(out, live=True), session)
     plain = re.sub(r"\x1b(\[[0-9;?]*[a-zA-Z]|\]8;.*?\x1b\\)", "", out.getvalue())

@@ -1,4 +1,4 @@
-"""Who gets colours and a live display."""
+"""Who gets colors and a live display."""
 
 import io
 
@@ -23,17 +23,17 @@ class Stream(io.StringIO):
 @pytest.mark.parametrize(
     ("terminal", "environ", "look"),
     [
-        (True, {}, Look(colour=True, live=True, terminal=True)),
-        (False, {}, Look(colour=False, live=False, terminal=False)),
-        (True, {"NO_COLOR": "1"}, Look(colour=False, live=True, terminal=True)),
-        (True, {"NO_COLOR": ""}, Look(colour=True, live=True, terminal=True)),
-        (True, {"TERM": "dumb"}, Look(colour=False, live=False, terminal=True)),
-        (True, {"CLICOLOR": "0"}, Look(colour=False, live=True, terminal=True)),
-        (False, {"FORCE_COLOR": "1"}, Look(colour=True, live=False, terminal=False)),
-        (False, {"FORCE_COLOR": "0"}, Look(colour=False, live=False, terminal=False)),
-        (False, {"CLICOLOR_FORCE": "1"}, Look(colour=True, live=False, terminal=False)),
-        (False, {"FORCE_COLOR": "1", "NO_COLOR": "1"}, Look(colour=False, live=False, terminal=False)),
-        (False, {"FORCE_COLOR": "1", "TERM": "dumb"}, Look(colour=True, live=False, terminal=False)),
+        (True, {}, Look(color=True, live=True, terminal=True)),
+        (False, {}, Look(color=False, live=False, terminal=False)),
+        (True, {"NO_COLOR": "1"}, Look(color=False, live=True, terminal=True)),
+        (True, {"NO_COLOR": ""}, Look(color=True, live=True, terminal=True)),
+        (True, {"TERM": "dumb"}, Look(color=False, live=False, terminal=True)),
+        (True, {"CLICOLOR": "0"}, Look(color=False, live=True, terminal=True)),
+        (False, {"FORCE_COLOR": "1"}, Look(color=True, live=False, terminal=False)),
+        (False, {"FORCE_COLOR": "0"}, Look(color=False, live=False, terminal=False)),
+        (False, {"CLICOLOR_FORCE": "1"}, Look(color=True, live=False, terminal=False)),
+        (False, {"FORCE_COLOR": "1", "NO_COLOR": "1"}, Look(color=False, live=False, terminal=False)),
+        (False, {"FORCE_COLOR": "1", "TERM": "dumb"}, Look(color=True, live=False, terminal=False)),
     ],
     ids=str,
 )
@@ -42,10 +42,10 @@ def test_the_environment_decides_before_the_terminal_does(terminal, environ, loo
 
 
 def test_a_stream_that_knows_only_ascii_gets_no_escapes():
-    assert look_of(Stream(True, "ascii"), {"FORCE_COLOR": "1"}) == Look(colour=False, live=False, terminal=True)
+    assert look_of(Stream(True, "ascii"), {"FORCE_COLOR": "1"}) == Look(color=False, live=False, terminal=True)
 
 
 def test_only_a_terminal_has_columns(monkeypatch):
     monkeypatch.setenv("COLUMNS", "57")
-    assert Look(colour=True, live=False, terminal=False).columns is None
-    assert Look(colour=True, live=True, terminal=True).columns == 57
+    assert Look(color=True, live=False, terminal=False).columns is None
+    assert Look(color=True, live=True, terminal=True).columns == 57

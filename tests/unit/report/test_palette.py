@@ -1,4 +1,4 @@
-"""Colours that can be read and told apart."""
+"""Colors that can be read and told apart."""
 
 import pytest
 
@@ -7,9 +7,9 @@ from simscen.report.picture import palette
 TEXTS = ("ink", "quiet", "good", "bad", "odd", "link")
 
 
-def luminance(colour):
+def luminance(color):
     """Relative luminance as WCAG 2.1 defines it."""
-    parts = [part / 255 for part in colour]
+    parts = [part / 255 for part in color]
     r, g, b = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts)
     return 0.2126 * r + 0.7152 * g + 0.0722 * b
 
@@ -25,9 +25,9 @@ def rgb(text):
     return tuple(int(text[k : k + 2], 16) for k in (1, 3, 5))
 
 
-def deuteranope(colour):
+def deuteranope(color):
     """What somebody sees who lacks the green cones (Viénot, Brettel and Mollon 1999, in linear light)."""
-    r, g, b = ((part / 255) ** 2.2 for part in colour)
+    r, g, b = ((part / 255) ** 2.2 for part in color)
     seen = (0.2928 * r + 0.7072 * g, 0.2928 * r + 0.7072 * g, -0.0223 * r + 0.0223 * g + b)
     return [max(0.0, part) ** (1 / 2.2) * 255 for part in seen]
 
@@ -39,9 +39,9 @@ def test_every_text_of_a_page_can_be_read_on_it(theme, text):
         assert contrast(rgb(theme[text]), rgb(theme[ground])) >= 4.5
 
 
-@pytest.mark.parametrize("colour", [palette.RED, palette.AMBER, palette.GREEN, palette.OBJECT, palette.PERSON])
-def test_every_text_of_a_picture_can_be_read_on_it(colour):
-    assert contrast(colour, palette.PAGE) >= 4.5
+@pytest.mark.parametrize("color", [palette.RED, palette.AMBER, palette.GREEN, palette.OBJECT, palette.PERSON])
+def test_every_text_of_a_picture_can_be_read_on_it(color):
+    assert contrast(color, palette.PAGE) >= 4.5
 
 
 def test_good_and_bad_differ_for_who_does_not_see_green():
@@ -49,6 +49,6 @@ def test_good_and_bad_differ_for_who_does_not_see_green():
     assert apart > 60
 
 
-def test_the_colours_of_time_grow_lighter():
+def test_the_colors_of_time_grow_lighter():
     steps = [luminance(palette.ramp(k / 8)) for k in range(9)]
     assert steps == sorted(steps)

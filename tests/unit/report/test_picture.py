@@ -1,4 +1,4 @@
-"""The picture of a run, checked where colours must be: on the path, on walls, on marks."""
+"""The picture of a run, checked where colors must be: on the path, on walls, on marks."""
 
 import numpy as np
 import pytest
@@ -52,14 +52,14 @@ def scene(**changes):
 
 
 def pixel(image, x, y):
-    """The colour at a point of the world: the map fills its area from the margin around the known cells on."""
+    """The color at a point of the world: the map fills its area from the margin around the known cells on."""
     scale = min(LARGEST[0] / (WIDE * RESOLUTION + 2 * MARGIN), LARGEST[1] / (TALL * RESOLUTION + 2 * MARGIN))
     u, v = (x + MARGIN) * scale + grid.LEFT, (TALL * RESOLUTION + MARGIN - y) * scale + HEADER + _EDGE
     return image.getpixel((int(u), int(v)))
 
 
-def near(colour, wanted, tolerance=30):
-    return all(abs(a - b) <= tolerance for a, b in zip(colour, wanted, strict=True))
+def near(color, wanted, tolerance=30):
+    return all(abs(a - b) <= tolerance for a, b in zip(color, wanted, strict=True))
 
 
 def test_free_space_and_walls_are_where_the_map_has_them():
@@ -69,7 +69,7 @@ def test_free_space_and_walls_are_where_the_map_has_them():
     assert near(pixel(image, -0.2, 3.0), palette.UNKNOWN)
 
 
-def test_the_driven_way_runs_through_the_door_and_changes_colour_with_time():
+def test_the_driven_way_runs_through_the_door_and_changes_color_with_time():
     image = draw(scene())
     early, late = pixel(image, 1.0, 1.75), pixel(image, 7.0, 2.5)
     assert near(early, palette.ramp(0.25), 40)
@@ -94,7 +94,7 @@ def test_a_mark_has_a_flag_where_the_robot_was():
     assert near(pixel(draw(scene()), 4.5, 2.5), palette.ramp(0.75), 60), "the robot is there then"
 
 
-def test_the_verdict_is_on_the_picture_in_its_colour():
+def test_the_verdict_is_on_the_picture_in_its_color():
     image = draw(scene())
     assert near(image.getpixel((20, 31)), palette.RED)
 

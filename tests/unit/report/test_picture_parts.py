@@ -1,4 +1,4 @@
-"""What is on a picture and where, in metres of the world, part by part."""
+"""What is on a picture and where, in meters of the world, part by part."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -87,7 +87,7 @@ def everything(**changes):
 
 
 def told(scene):
-    """The parts, one a line: what, then where in metres."""
+    """The parts, one a line: what, then where in meters."""
     lines = []
     for what, points in parts(scene):
         rounded = np.round(points, 2) + 0.0

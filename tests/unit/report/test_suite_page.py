@@ -227,6 +227,6 @@ def test_a_session_without_a_run_has_a_page_too():
     assert "<h1>✓ 0 passed</h1>" in to_html(Session([], live=Live(5)))
 
 
-def test_every_outcome_has_a_sign_beside_its_colour(passed):
+def test_every_outcome_has_a_sign_beside_its_color(passed):
     page = to_html(Session([passed]))
     assert f'class="pill {Outcome.PASSED.value}"><span aria-hidden="true">✓ </span>passed' in page

@@ -17,7 +17,7 @@ def test_the_hall_holds_its_movable_meshes_and_a_way_past_them(tmp_path):
     assert None not in prepared.case.shortest.values()
 
 
-def test_the_arena_is_a_hundred_metres_wide_and_its_goals_can_be_reached(tmp_path):
+def test_the_arena_is_a_hundred_meters_wide_and_its_goals_can_be_reached(tmp_path):
     file = write_arena(tmp_path / "arena")
     prepared = prepare(load_scenario(file, file.parent))
     cells = prepared.built.map

@@ -62,8 +62,8 @@ def test_zones_are_those_of_the_stack():
     assert [(z.region, z.speed_limit) for z in scenery("zones/quiet_ward").zones] == [("north_corridor", 0.25)]
 
 
-def test_a_log_carries_the_scenery_the_map_as_it_is_and_what_is_spilt(tmp_path):
-    file = tmp_path / "spilt.scenario.yaml"
+def test_a_log_carries_the_scenery_the_map_as_it_is_and_what_is_spilled(tmp_path):
+    file = tmp_path / "spilled.scenario.yaml"
     file.write_text("""\
 simscen: 1
 world: {simscen: 1, walls: [{points: [[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]}], places: {dock: {x: 3, y: 1}}}
@@ -82,7 +82,7 @@ pass: [{collisions: {max: 0}}]
     assert found == scenery_in(prepared)
     assert found.map is not None and np.array_equal(found.map.grid.cells, prepared.built.map.cells)
     assert found.places["dock"].x == 3
-    (spilt,) = log.trace.of_kind(EventKind.FLOOR_CHANGED)
-    assert (spilt.name, spilt.data["friction"], spilt.data["until"]) == ("patch", 0.1, 2.5)
-    assert len(spilt.data["outline"]) == 32
+    (spilled,) = log.trace.of_kind(EventKind.FLOOR_CHANGED)
+    assert (spilled.name, spilled.data["friction"], spilled.data["until"]) == ("patch", 0.1, 2.5)
+    assert len(spilled.data["outline"]) == 32
     assert NAME in log.about.files

@@ -92,7 +92,7 @@ def test_noise_has_the_moments_that_were_asked_for():
     assert abs((z**4).mean() - 3.0) < 4 * math.sqrt(24 / count)  # the kurtosis of a normal distribution
 
 
-def test_noise_of_neighbouring_beams_and_scans_is_independent():
+def test_noise_of_neighboring_beams_and_scans_is_independent():
     sensor = lidar(at(0, 0), SquareRoom(3.0), noise=0.02)
     quiet = lidar(at(0, 0), SquareRoom(3.0), **QUIET).read(0).ranges
     errors = np.array([sensor.read(k).ranges - quiet for k in range(100)]) / 0.02

@@ -80,7 +80,7 @@ def test_a_robot_at_rest_does_not_drift():
 
 
 @pytest.mark.parametrize("rate", [10, 40])
-def test_errors_after_a_metre_are_those_of_the_specification_at_any_rate(rate):
+def test_errors_after_a_meter_are_those_of_the_specification_at_any_rate(rate):
     spec = {"translation_noise": 0.02, "rotation_noise": 0.0, "drift_noise": 0.03}
     ends = []
     for seed in range(400):

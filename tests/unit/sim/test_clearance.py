@@ -13,7 +13,7 @@ from simscen.core.geometry.shapes import Body, Box, Cylinder, Extrusion, MotionP
 from simscen.core.records.case import CLEARANCE_RANGE
 
 RADIUS = 0.22  # of the turtlebot
-MILLIMETRE = 1e-3
+MILLIMETER = 1e-3
 
 
 def test_nothing_around_counts_as_the_reach_of_the_search(simulate):
@@ -22,14 +22,14 @@ def test_nothing_around_counts_as_the_reach_of_the_search(simulate):
 
 def test_the_search_reaches_as_far_as_it_is_asked_to(simulate):
     wall = box("wall", RADIUS + 3.0 + 0.05, 0, 0.1, 4)
-    assert simulate(solids=[wall], clearance_range=3.5).truth().clearance == pytest.approx(3.0, abs=MILLIMETRE)
+    assert simulate(solids=[wall], clearance_range=3.5).truth().clearance == pytest.approx(3.0, abs=MILLIMETER)
     assert simulate(solids=[wall], clearance_range=2.5).truth().clearance == 2.5
 
 
 @pytest.mark.parametrize("gap", [0.001, 0.02, 0.3, 1.0, 1.9])
 def test_a_round_robot_before_a_wall(simulate, gap):
     wall = box("wall", RADIUS + gap + 0.05, 0, 0.1, 4)
-    assert simulate(solids=[wall]).truth().clearance == pytest.approx(gap, abs=MILLIMETRE)
+    assert simulate(solids=[wall]).truth().clearance == pytest.approx(gap, abs=MILLIMETER)
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4, 1.2])
@@ -37,12 +37,12 @@ def test_a_round_robot_before_a_corner(simulate, yaw):
     corner = box("corner", 1.0, 1.0, 0.4, 0.4, yaw=yaw)
     edges = Polygon([(x, y) for x, y in _corners(1.0, 1.0, 0.4, 0.4, yaw)])
     expected = edges.distance(Point(0, 0)) - RADIUS
-    assert simulate(solids=[corner]).truth().clearance == pytest.approx(expected, abs=MILLIMETRE)
+    assert simulate(solids=[corner]).truth().clearance == pytest.approx(expected, abs=MILLIMETER)
 
 
 def test_a_round_robot_beside_a_post(simulate):
     post = Solid(Cylinder(0.15, 1.0), Pose3(0.6, 0.8, 0.5), "post")
-    assert simulate(solids=[post]).truth().clearance == pytest.approx(1.0 - 0.15 - RADIUS, abs=MILLIMETRE)
+    assert simulate(solids=[post]).truth().clearance == pytest.approx(1.0 - 0.15 - RADIUS, abs=MILLIMETER)
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.3, 0.8, 1.5])
@@ -52,17 +52,17 @@ def test_a_rectangular_robot_between_boxes(simulate, yaw):
     hull = Polygon(_corners(0, 0, 0.9, 0.6, yaw))
     expected = hull.distance(unary_union([Polygon(_corners(*values)) for values in others]))
     simulation = simulate("amr", solids, pose=Pose2(0.0, 0.0, yaw))
-    assert simulation.truth().clearance == pytest.approx(expected, abs=MILLIMETRE)
+    assert simulation.truth().clearance == pytest.approx(expected, abs=MILLIMETER)
 
 
 def test_things_that_move_count_and_the_ground_does_not(simulate):
     cart = Body("cart", (box("cart", 0, 0, 0.4, 0.4),), Pose3(1.0, 0.0))
     simulation = simulate(bodies=[cart])
-    assert simulation.truth().clearance == pytest.approx(0.8 - RADIUS, abs=MILLIMETRE)
+    assert simulation.truth().clearance == pytest.approx(0.8 - RADIUS, abs=MILLIMETER)
     simulation.remove("cart")
     assert simulation.truth().clearance == CLEARANCE_RANGE
     simulation.spawn(Body("prism", (Solid(Extrusion(((-0.1, -1), (0.1, -1), (0.1, 1), (-0.1, 1)), 0.5)),), Pose3(0.7)))
-    assert simulation.truth().clearance == pytest.approx(0.6 - RADIUS, abs=MILLIMETRE)
+    assert simulation.truth().clearance == pytest.approx(0.6 - RADIUS, abs=MILLIMETER)
 
 
 def test_things_that_come_from_afar_or_wake_there_count_as_soon_as_they_are_near(simulate):
@@ -92,20 +92,20 @@ def test_what_sleeps_is_as_wide_as_it_lies_not_as_it_would_stand(simulate):
     upright = Body("upright", post, Pose3(0.0, -2.0, 1.2), mass=20.0)
     simulation = simulate(solids=[box("wall", RADIUS + 0.95, 0, 0.1, 4)], bodies=[fallen, upright])
     simulation.step(1200)
-    assert simulation.truth().clearance == pytest.approx(0.8 - RADIUS, abs=2 * MILLIMETRE)
+    assert simulation.truth().clearance == pytest.approx(0.8 - RADIUS, abs=2 * MILLIMETER)
     simulation.remove("fallen")
     simulation.step(1200)
-    assert simulation.truth().clearance == pytest.approx(0.9, abs=MILLIMETRE)
+    assert simulation.truth().clearance == pytest.approx(0.9, abs=MILLIMETER)
 
 
 def test_clearance_is_negative_where_hull_and_obstacle_overlap(simulate):
     wall = box("wall", RADIUS - 0.01 + 0.05, 0, 0.1, 4)
-    assert simulate(solids=[wall]).truth().clearance == pytest.approx(-0.01, abs=MILLIMETRE)
+    assert simulate(solids=[wall]).truth().clearance == pytest.approx(-0.01, abs=MILLIMETER)
 
 
 def test_what_hangs_above_the_robot_is_as_far_as_it_is_high(simulate):
     shelf = Solid(box("shelf", 0, 0, 2, 2, 0.1).shape, Pose3(z=0.75), "shelf")
-    assert simulate(solids=[shelf]).truth().clearance == pytest.approx(0.7 - 0.21, abs=MILLIMETRE)
+    assert simulate(solids=[shelf]).truth().clearance == pytest.approx(0.7 - 0.21, abs=MILLIMETER)
 
 
 def test_clearance_along_a_drive_is_that_of_the_plane(simulate):
@@ -117,7 +117,7 @@ def test_clearance_along_a_drive_is_that_of_the_plane(simulate):
         simulation.step(6)
         truth = simulation.truth()
         expected = min(CLEARANCE_RANGE, shapes.distance(Point(truth.pose.x, truth.pose.y)) - RADIUS)
-        assert truth.clearance == pytest.approx(expected, abs=MILLIMETRE)
+        assert truth.clearance == pytest.approx(expected, abs=MILLIMETER)
 
 
 def _corners(x, y, length, width, yaw):

@@ -51,7 +51,7 @@ def test_a_collision_ends_a_tenth_of_a_second_after_the_last_touch(simulate):
 
 
 def test_grazing_a_wall_counts_although_the_robot_hardly_moves_towards_it(simulate):
-    # The hull reaches a millimetre into the line of the wall while it drives along.
+    # The hull reaches a millimeter into the line of the wall while it drives along.
     wall = box("wall", 3.0, RADIUS + 0.05 - 0.001, 4.0, 0.1)
     (hit, *_) = started(collisions(simulate(solids=[wall], drive=(0.5, 0.0, 0.0)), 960))
     assert hit.data["robot_caused"] is True

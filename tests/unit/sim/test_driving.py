@@ -24,7 +24,7 @@ def test_a_robot_at_rest_stays_where_it_is(simulate, robot):
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "amr", "jackal", "car", "omni"])
-def test_five_metres_straight_ahead_take_the_time_that_ramp_and_speed_say(simulate, robot):
+def test_five_meters_straight_ahead_take_the_time_that_ramp_and_speed_say(simulate, robot):
     simulation = simulate(robot, drive=(0.5, 0.0, 0.0))
     simulation.step(TICKS)
     begin = simulation.truth().pose
@@ -172,7 +172,7 @@ def test_a_push_moves_the_robot_the_way_it_points(simulate):
 
 
 def test_a_push_in_free_flight_gives_the_robot_its_impulse(simulate):
-    """Half a metre above the ground there is no friction: the change of momentum is the impulse."""
+    """Half a meter above the ground there is no friction: the change of momentum is the impulse."""
     simulation = simulate("turtlebot")
     place, turn = pybullet.getBasePositionAndOrientation(
         simulation.robot.base.id, physicsClientId=simulation._scene.client

@@ -22,7 +22,7 @@ ROUND = {
 
 
 @pytest.mark.parametrize("shape", ROUND)
-def test_what_is_left_out_stands_out_by_less_than_a_millimetre(shape):
+def test_what_is_left_out_stands_out_by_less_than_a_millimeter(shape):
     """Brute force: the distance of every vertex to each plane of the hull of those that are kept."""
     full = ROUND[shape].vertices
     kept = few_corners(ROUND[shape])

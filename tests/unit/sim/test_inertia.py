@@ -27,7 +27,7 @@ def test_mass_properties_are_those_trimesh_integrates_over_the_surface(shape):
     mesh.density = 3.0 / mesh.volume
     ours = of_shape(shape, 3.0)
     assert volume(shape) == pytest.approx(mesh.volume, rel=0.01)
-    assert ours.centre == pytest.approx(mesh.center_mass, abs=1e-3)
+    assert ours.center == pytest.approx(mesh.center_mass, abs=1e-3)
     assert ours.tensor == pytest.approx(mesh.moment_inertia, rel=0.01, abs=1e-3)
 
 
@@ -35,7 +35,7 @@ def test_two_halves_of_a_box_are_the_box():
     halves = [Solid(Box((0.2, 0.3, 0.1)), Pose3(x=side)) for side in (-0.1, 0.1)]
     whole = of_shape(Box((0.4, 0.3, 0.1)), 2.0)
     ours = of_solids(halves, 2.0)
-    assert ours.centre == pytest.approx(whole.centre)
+    assert ours.center == pytest.approx(whole.center)
     assert ours.tensor == pytest.approx(whole.tensor)
 
 

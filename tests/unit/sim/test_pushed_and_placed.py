@@ -92,7 +92,7 @@ def test_motion_tells_the_path_until_it_is_over(simulate):
 
 
 def test_a_force_on_the_robot_adds_up_to_its_impulse_evenly_and_ends(simulate):
-    """Half a metre above the ground there is no friction: the change of momentum is force times time."""
+    """Half a meter above the ground there is no friction: the change of momentum is force times time."""
     simulation = simulate("turtlebot")
     number, client = simulation.robot.base.id, simulation._scene.client
     place, turn = pybullet.getBasePositionAndOrientation(number, physicsClientId=client)

@@ -24,7 +24,7 @@ def run(simulation, ticks, every=6):
 
 
 def engine_pose(simulation, name):
-    """What the engine itself says of a body whose centre of mass is above its origin."""
+    """What the engine itself says of a body whose center of mass is above its origin."""
     number = simulation._scene.actors._actors[name].id
     return pybullet.getBasePositionAndOrientation(number, physicsClientId=simulation._scene.client)[0]
 

@@ -14,7 +14,7 @@ class Calm(Spec, Criterion):
     """Calm at the wheel."""
 
     max: PositiveSpeed = 1.0
-    """Metres per second."""
+    """Meters per second."""
 
     def judge(self, trace, case) -> list[Finding]:
         """One bound."""

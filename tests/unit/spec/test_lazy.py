@@ -29,10 +29,10 @@ def test_a_mapping_becomes_the_specification_and_a_specification_stays_itself():
 
 def test_problems_are_told_at_their_places_together_with_those_around():
     with pytest.raises(ValidationError) as raised:
-        Site.model_validate({"wall": {"points": [[0, 0], [1, "x"]], "colour": 1}, "number": "one"})
+        Site.model_validate({"wall": {"points": [[0, 0], [1, "x"]], "color": 1}, "number": "one"})
     assert {error["loc"] for error in raised.value.errors()} == {
         ("wall", "points", 1, "written out", 1),
-        ("wall", "colour"),
+        ("wall", "color"),
         ("number",),
     }
 

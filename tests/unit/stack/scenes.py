@@ -141,7 +141,7 @@ def wedged(spec: StackSpec) -> Iterator[object]:
 
 
 def in_a_corridor(spec: StackSpec) -> Iterator[object]:
-    """Something shuts a corridor in which a long robot that came a metre cannot turn; later it goes."""
+    """Something shuts a corridor in which a long robot that came a meter cannot turn; later it goes."""
     door = (2.9, 1.5, 3.0, 2.5)
     world = room((0.0, 2.3, 2.9, 2.4), (0.0, 1.6, 2.9, 1.7))
     d = begin(world, Pose2(0.8, 2.0), spec, Pose2(4.0, 2.0), robot=box_robot(0.8, 0.3, 1.0))

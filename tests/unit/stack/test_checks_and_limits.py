@@ -324,7 +324,7 @@ def test_recoveries_are_handed_out_in_turn_until_the_retries_are_used_up() -> No
 @pytest.mark.parametrize(
     ("anew", "there_are"), [(True, [True, True, False, True, True, False]), (False, [True, True, *[False] * 4])]
 )
-def test_the_retries_count_anew_for_who_has_come_a_metre_nearer(anew: bool, there_are: list[bool]) -> None:
+def test_the_retries_count_anew_for_who_has_come_a_meter_nearer(anew: bool, there_are: list[bool]) -> None:
     robin = RoundRobin(
         [Wait(WaitSpec(), setting(round_robot()))], Recovery(number_of_retries=2, retries_since_progress=anew)
     )

@@ -323,7 +323,7 @@ def test_a_failure_to_navigate_is_no_error_of_the_run(odd) -> None:
     assert driven(Pose2(40.0, 0.0)).run(5).result == "FAILED"
 
 
-def test_a_behaviour_is_named_or_written_out_and_takes_what_it_does_not_say_from_recovery(odd) -> None:
+def test_a_behavior_is_named_or_written_out_and_takes_what_it_does_not_say_from_recovery(odd) -> None:
     words = ["nod", {"type": "nod", "wait_duration": 1.0}, {"type": "spin", "spin_dist": 3.0}, "spin"]
     recovery = StackSpec.model_validate(
         {"recovery": {"behaviors": words, "wait_duration": 2.0, "spin_dist": 1.0}}
@@ -334,7 +334,7 @@ def test_a_behaviour_is_named_or_written_out_and_takes_what_it_does_not_say_from
     assert (wide.spin_dist, spin.spin_dist) == (3.0, 1.0)  # type: ignore[attr-defined]
 
 
-def test_a_behaviour_of_a_package_runs_and_is_in_the_log_by_its_name(odd) -> None:
+def test_a_behavior_of_a_package_runs_and_is_in_the_log_by_its_name(odd) -> None:
     d = driven(Pose2(2.95, 1.0, 0.0), recovery={"behaviors": ["nod"], "number_of_retries": 2}).run(20)
     assert [event.name for event in d.kinds("recovery.started")] in ([], ["nod", "nod"])
     d = driven(Pose2(2.5, 1.0), controller={"type": "regulated_pure_pursuit"}, recovery={"behaviors": ["nod"]})
@@ -343,7 +343,7 @@ def test_a_behaviour_of_a_package_runs_and_is_in_the_log_by_its_name(odd) -> Non
     assert {event.name for event in d.kinds("recovery.started")} == {"nod"}
 
 
-def test_a_behaviour_of_a_package_is_named_in_triggers_criteria_and_the_schema(odd, tmp_path: Path) -> None:
+def test_a_behavior_of_a_package_is_named_in_triggers_criteria_and_the_schema(odd, tmp_path: Path) -> None:
     file = scenario(tmp_path, "{recovery: {behaviors: [nod, {type: nod, wait_duration: 1.0}]}}")
     text = file.read_text().replace("pass: [", "pass: [recoveries: {max: 3, name: nod}, ")
     events = "events: [{name: e, when: {recovery: {name: nod}}, do: {cancel_goal: {}}}]\n"

@@ -86,7 +86,7 @@ def test_a_controller_that_takes_longer_than_its_period_is_asked_less_often_and_
 
 
 def test_costmaps_show_late_what_was_where_it_was_seen() -> None:
-    """The robot has moved on by half a metre when they are done."""
+    """The robot has moved on by half a meter when they are done."""
     maps = Costmaps(StackSpec(), Surroundings(round_robot(), None, RATE), 0.5, latency=36)
     odometry, ranges = OdometryHistory(RATE), np.full(360, np.inf)
     ranges[180] = 1.0

@@ -51,7 +51,7 @@ def costmaps(d: Drive) -> Costmaps:
 
 
 def lethal(view: CostmapView) -> np.ndarray:
-    """Points (n, 2) of the centres of lethal cells."""
+    """Points (n, 2) of the centers of lethal cells."""
     cells = np.argwhere(view.costs == 254)
     return (cells[:, ::-1] + 0.5) * view.resolution + view.origin
 
@@ -125,7 +125,7 @@ def test_keepout_zones_stand_in_the_local_costmap_where_the_robot_believes_them_
 
 
 def test_a_robot_that_backs_out_does_not_forget_what_stands_behind_it_where_its_lidar_does_not_look() -> None:
-    """A post that it has passed is a metre behind the hull, in the blind quarter of a lidar of 270 degrees."""
+    """A post that it has passed is a meter behind the hull, in the blind quarter of a lidar of 270 degrees."""
     world = Flatland(discs=[(2.0, 0.45, 0.05)])
     grid = Flatland().grid((-0.5, -2.0, 9.5, 2.0))
     d = drive(world, Pose2(0.5, 0.0), Goal("g", Pose2(8.0, 0.0)), grid=grid, field_of_view=1.5 * math.pi)

@@ -27,11 +27,11 @@ def test_arrays_are_what_it_was_made_of_and_turn_with_the_frame() -> None:
     one = MovingObstacles(np.array([[3.0, 1.0]]), np.array([[1.0, 0.0]]), np.array([0.3]), spread, 1.0)
     assert one.covariances == pytest.approx(spread)
     seen = one.seen_from(Pose2(1.0, 1.0, np.pi / 2)).after(2.0)
-    assert seen.centres == pytest.approx(np.array([[0.0, -4.0]]))
+    assert seen.centers == pytest.approx(np.array([[0.0, -4.0]]))
     assert seen.velocities == pytest.approx(np.array([[0.0, -1.0]]))
     step = np.eye(4) + 2.0 * np.eye(4, k=2)
     assert seen.covariances == pytest.approx(step @ spread @ step.T)
-    assert MovingObstacles.of((), 1.0).centres.shape == (0, 2) and MovingObstacles.of((), 1.0).covariances.shape == (
+    assert MovingObstacles.of((), 1.0).centers.shape == (0, 2) and MovingObstacles.of((), 1.0).covariances.shape == (
         0,
         4,
         4,

@@ -23,7 +23,7 @@ DOOR = (4.9, 2.5, 5.0, 3.5)
 
 
 def rooms(*more: tuple[float, float, float, float]) -> Flatland:
-    """Two rooms and a door of one metre between them."""
+    """Two rooms and a door of one meter between them."""
     world = Flatland().room(10, 6)
     world.boxes += [(4.9, 0.0, 5.0, 2.5), (4.9, 3.5, 5.0, 6.0), *more]
     return world
@@ -383,7 +383,7 @@ def test_a_dead_end_that_was_seen_is_not_forgotten_when_control_fails_out_of_its
 
 
 @pytest.mark.parametrize("off", [0.04, -0.04])
-def test_it_gets_round_the_end_of_a_wall_that_stands_a_few_centimetres_off_the_map(off: float) -> None:
+def test_it_gets_round_the_end_of_a_wall_that_stands_a_few_centimeters_off_the_map(off: float) -> None:
     """As for a robot whose belief is off by as much; it has been told to take the shortest way, not the roomiest."""
     mapped, world = (Flatland([(2.5 + x, 2.7, 9.5, 2.8)]).room(12, 5) for x in (0.0, off))
     spec = StackSpec(localizer=TRUTH, planner=OmplPlanner(cost_travel_multiplier=0.2))

@@ -53,9 +53,9 @@ def test_a_time_is_reached_at_its_tick(tick, expected):
     assert holds({"time": "1 s"}, tick=tick) is expected
 
 
-@pytest.mark.parametrize(("metres", "expected"), [(1.99, False), (2.0, True), (2.01, True)])
-def test_a_way_is_travelled_when_it_is_as_long(metres, expected):
-    assert holds({"travelled": 2.0}, travelled=metres) is expected
+@pytest.mark.parametrize(("meters", "expected"), [(1.99, False), (2.0, True), (2.01, True)])
+def test_a_way_is_travelled_when_it_is_as_long(meters, expected):
+    assert holds({"travelled": 2.0}, travelled=meters) is expected
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ def free_poses(grid, count, seed):
 
     roomy = ndimage.distance_transform_edt(grid.cells == FREE) * grid.resolution > 0.2
     cells = np.argwhere(roomy)
-    return grid.centre_of(cells[np.random.default_rng(seed).choice(len(cells), count, replace=False)])
+    return grid.center_of(cells[np.random.default_rng(seed).choice(len(cells), count, replace=False)])
 
 
 def beams_from(places, count):
@@ -47,7 +47,7 @@ def ranges_on_map(grid, starts, directions, reach=12.0):
     first = grid.cell_of(starts)
     step = directions[:, ::-1] / np.abs(directions).max(axis=1)[:, None]
     cells = np.round(first[:, None] + np.arange(reach / grid.resolution)[:, None] * step[:, None]).astype(int)
-    hit = (grid.values_at(grid.centre_of(cells.reshape(-1, 2))) == OCCUPIED).reshape(cells.shape[:2])
+    hit = (grid.values_at(grid.center_of(cells.reshape(-1, 2))) == OCCUPIED).reshape(cells.shape[:2])
     last = cells[np.arange(len(cells)), np.argmax(hit, axis=1)]
     return np.where(hit.any(axis=1), np.linalg.norm(last - first, axis=1) * grid.resolution, math.inf)
 

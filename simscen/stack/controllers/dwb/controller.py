@@ -19,7 +19,7 @@ from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 FURTHER, BEYOND = 1.2, 0.5
-"""The plan is looked at so much further than the robot gets in `sim_time` as it drives now, and metres more: what ends
+"""The plan is looked at so much further than the robot gets in `sim_time` as it drives now, and meters more: what ends
 nearer holds it back, and from what lies beyond a bend of the plan the straight way leads into a wall."""
 
 
@@ -41,7 +41,7 @@ class DynamicWindowController(PathFollower):
         self._best: Array | None = None
 
     def begin(self) -> None:
-        """Another goal: what was learnt on the way to the last one does not count."""
+        """Another goal: what was learned on the way to the last one does not count."""
         self._goal_pose.reset()
         self._rotate.reset()
         self._oscillation.reset()

@@ -1,7 +1,7 @@
 """What DWB's trajectories are judged by: the scores of dwb_critics, which see the end of a trajectory.
 
 Each raw score is counted in cells, costs, rad or rad/s, and weighs as much as its scale says; the scale of those that
-count cells is for half a metre, whatever the costmap's resolution.
+count cells is for half a meter, whatever the costmap's resolution.
 """
 
 from dataclasses import dataclass

@@ -11,7 +11,7 @@ from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView
 
 ROOM = 0.05
-"""Metres that trajectories keep off obstacles where any can."""
+"""Meters that trajectories keep off obstacles where any can."""
 AT_ONCE = 50
 """Trajectories that are looked at together: mostly one of the best is free, and the others need no look."""
 

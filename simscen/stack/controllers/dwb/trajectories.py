@@ -40,14 +40,14 @@ class Trajectories:
 
 
 def trajectories(
-    pose: Pose2, now: Twist, velocities: Array, kinematics: Kinematics, seconds: float, metres: float, radians: float
+    pose: Pose2, now: Twist, velocities: Array, kinematics: Kinematics, seconds: float, meters: float, radians: float
 ) -> Trajectories:
     """Of a base that changes to each of the velocities (n, 3).
 
-    A trajectory has as many steps as it takes for none to be longer than `metres` or to turn by more than `radians`
+    A trajectory has as many steps as it takes for none to be longer than `meters` or to turn by more than `radians`
     at its velocity; those with fewer than others stay at their end. Each step keeps the heading it begins with.
     """
-    linear = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / metres
+    linear = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / meters
     counts = np.maximum(1.0, np.ceil(np.maximum(linear, np.abs(velocities[:, 2]) * seconds / radians)))
     _, one, turn = np.unique(velocities[:, 2] + 1j * counts, return_index=True, return_inverse=True)
     count, dt = counts[one], seconds / counts[one]

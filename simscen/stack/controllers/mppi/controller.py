@@ -19,7 +19,7 @@ from simscen.stack.controllers.free_way import FreeWay
 from simscen.stack.controllers.goal_pose import GoalPose
 from simscen.stack.controllers.limits import Limits
 from simscen.stack.controllers.local_plan import LocalPlan, local_plan
-from simscen.stack.controllers.mppi.judgement import Judgement
+from simscen.stack.controllers.mppi.judgment import Judgment
 from simscen.stack.controllers.mppi.limits import in_order, mppi_limits
 from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ, Rollouts, delay, integrated, predicted
 from simscen.stack.controllers.mppi.scene import Scene
@@ -31,7 +31,7 @@ Floats = npt.NDArray[np.float32]
 SURE = 0.5
 """Seconds that the command itself must be free of collisions for."""
 LEAST, BEYOND = 2.0, 1.0
-"""Metres of plan that it looks at, at least, which is Nav2's prune_distance; and beyond what the rollouts
+"""Meters of plan that it looks at, at least, which is Nav2's prune_distance; and beyond what the rollouts
 reach, for the critics that look at points further on."""
 SPREAD = 0.5
 """Standard deviation of the sampled speeds, of the greatest. What draws the speed up grows with its square, what holds
@@ -52,7 +52,7 @@ class MppiController(PathFollower):
         self._std = np.array(deviations[: self._axes], np.float32)
         late = (spec.model_delay_vx, spec.model_delay_wz, spec.model_delay_vy)
         self._delays = tuple(math.floor(each / spec.model_dt + 0.5) for each in late[: self._axes])
-        self._judgement = Judgement(spec, omni=model == "Omni")
+        self._judgment = Judgment(spec, omni=model == "Omni")
         self._period, self._shift = setting.control_period, setting.control_period / spec.model_dt
         self._goal_pose = GoalPose(robot, spec.wz_max, robot.angular_acceleration, setting.control_period)
         self._free_way = FreeWay(setting.footprint)
@@ -93,7 +93,7 @@ class MppiController(PathFollower):
             command = self._goal_pose.turn_to_goal(pose, goal, twist)
         else:
             plan = local_plan(track, self._reach)
-            command = self._optimised(twist, lambda rolled: self._scene(rolled, plan, costmap, goal))
+            command = self._optimized(twist, lambda rolled: self._scene(rolled, plan, costmap, goal))
         free = self._free_way.seconds(costmap, pose, command, SURE)
         return self._free_way.within(command, free, SURE, SURE)
 
@@ -103,7 +103,7 @@ class MppiController(PathFollower):
             goal.xy_tolerance,
         )  # fmt: skip
 
-    def _optimised(self, twist: Twist, seen: Callable[[Rollouts], Scene]) -> Twist:
+    def _optimized(self, twist: Twist, seen: Callable[[Rollouts], Scene]) -> Twist:
         """Improve the sequence; what hits something is forgotten, and begun anew as often as is allowed."""
         for _ in range(1 + self._spec.retry_attempt_limit):
             now = self._velocity(twist)
@@ -136,7 +136,7 @@ class MppiController(PathFollower):
         controls = self._sequence[:, :, None] + self._noise
         velocities = predicted(now, controls, limits, dt)
         delay(velocities, self._sent, self._delays)
-        costs, all_hit = self._judgement.costs(seen(integrated(velocities, self._pose.yaw, dt)))
+        costs, all_hit = self._judgment.costs(seen(integrated(velocities, self._pose.yaw, dt)))
         deviations: list[float] = self._std.tolist()
         average = controls @ weights(costs, self._sequence, self._noise, deviations, spec.gamma, spec.temperature)
         average = smoothed(average, self._sent[:, -PAST:], spec.sgf_order)

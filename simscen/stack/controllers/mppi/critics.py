@@ -16,7 +16,7 @@ ALMOST_STRAIGHT = np.float32(1e-6)
 
 
 def constraint(spec: model.MppiConstraintCritic, scene: Scene) -> Floats:
-    """m/s too many over the seconds; of a car also metres by which it turns too tightly."""
+    """m/s too many over the seconds; of a car also meters by which it turns too tightly."""
     velocities, limits = scene.rolled.velocities, scene.limits
     vx, (low, *_), (high, left, _) = velocities[VX], limits.low, limits.high
     excess = np.minimum(np.maximum(vx, np.float32(low)), np.float32(high))
@@ -80,7 +80,7 @@ def goal_angle(spec: model.MppiGoalAngleCritic, scene: Scene) -> Floats:
 
 
 def prefer_forward(spec: model.MppiPreferForwardCritic, scene: Scene) -> Floats:
-    """Metres driven backward."""
+    """Meters driven backward."""
     return np.asarray(spec.cost_weight * scene.dt * -np.minimum(scene.rolled.velocities[VX], 0).sum(axis=0))
 
 

@@ -13,7 +13,7 @@ HALF_TURN = np.float32(np.pi)
 
 
 def path_align(spec: model.MppiPathAlignCritic, scene: Scene) -> Floats | None:
-    """The mean distance from each pose to the point of the plan that is as many metres from the start.
+    """The mean distance from each pose to the point of the plan that is as many meters from the start.
 
     None where the critic is silent: before the robot has got going, and where the plan is blocked.
     """

@@ -19,7 +19,7 @@ VX, WZ, VY = 0, 1, 2
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:
-    """Trajectories (steps, n): metres from the robot in the unrotated frame, headings, velocities (axes, steps, n)."""
+    """Trajectories (steps, n): meters from the robot in the unrotated frame, headings, velocities (axes, steps, n)."""
 
     x: Floats
     y: Floats

@@ -19,11 +19,11 @@ Floats = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
 INSCRIBED, UNKNOWN = 253, 255
 KEPT_OFF = 0.25
-"""Metres that rollouts keep off what moves, and a standard deviation of where it will be."""
+"""Meters that rollouts keep off what moves, and a standard deviation of where it will be."""
 SOON = 1.2
 """Seconds in which what may happen counts e times less."""
 ESCAPE = 0.01
-"""Metres: a robot in collision may go where it is no more than so much nearer to the obstacle."""
+"""Meters: a robot in collision may go where it is no more than so much nearer to the obstacle."""
 
 
 class Spots(NamedTuple):
@@ -149,17 +149,17 @@ class Scene:
 
     @cached_property
     def _here(self) -> tuple[float, float]:
-        """Metres between what is nearest and the inscribed circle, and the hull, where the robot is."""
+        """Meters between what is nearest and the inscribed circle, and the hull, where the robot is."""
         origin, yaw = np.zeros((1, 1), np.float32), np.full((1, 1), self.pose.yaw, np.float32)
         spots = self.spots(origin, origin)
         return float(self.gap(spots, yaw, False)[0, 0]), float(self.gap(spots, yaw, True)[0, 0])
 
     def gap(self, spots: Spots, yaw: Floats, whole: bool) -> Floats:
-        """Metres (…,) between the hull, or its inscribed circle, and the nearest obstacle."""
+        """Meters (…,) between the hull, or its inscribed circle, and the nearest obstacle."""
         discs: Discs = self.footprint.discs
         if not whole:
             return np.asarray(self._distance(spots) - np.float32(self.footprint.inscribed))
-        if discs.centred:
+        if discs.centered:
             return np.asarray(self._distance(spots) - np.float32(discs.radius))
         cosine, sine = np.cos(yaw), np.sin(yaw)
         least = np.full(spots.x.shape, np.inf, np.float32)

@@ -11,9 +11,9 @@ from theta_star.spec import ThetaStar
 
 LETHAL = 254
 SPACING = 0.05
-"""Metres between two poses of a path; simscen asks for at most 0.1."""
+"""Meters between two poses of a path; simscen asks for at most 0.1."""
 WAY_OUT = 0.5
-"""Metres that the robot may have to go until it is as far from obstacles as it would like."""
+"""Meters that the robot may have to go until it is as far from obstacles as it would like."""
 
 
 class ThetaStarPlanner:

@@ -9,11 +9,11 @@ from simscen.plugin import Array, CostmapView, distances
 
 Cell = tuple[int, int]
 XY = tuple[float, float]
-NEIGHBOURS = [(r, c) for r in (-1, 0, 1) for c in (-1, 0, 1) if (r, c) != (0, 0)]
+NEIGHBORS = [(r, c) for r in (-1, 0, 1) for c in (-1, 0, 1) if (r, c) != (0, 0)]
 
 
 class Grid:
-    """Cells of `edge` metres over a costmap; a place is free where it is farther than `room` from anything lethal."""
+    """Cells of `edge` meters over a costmap; a place is free where it is farther than `room` from anything lethal."""
 
     def __init__(self, costmap: CostmapView, edge: float, room: float) -> None:
         self._costmap, self._edge, self._room = costmap, edge, room
@@ -28,7 +28,7 @@ class Grid:
         return x + (cell[1] + 0.5) * self._edge, y + (cell[0] + 0.5) * self._edge
 
     def nearest(self, place: XY, most: float) -> Cell | None:
-        """The free cell nearest to a place, at most so far away in metres; None where there is none."""
+        """The free cell nearest to a place, at most so far away in meters; None where there is none."""
         rows, columns = np.nonzero(self.free)
         x, y = self._costmap.origin
         away = np.hypot(x + (columns + 0.5) * self._edge - place[0], y + (rows + 0.5) * self._edge - place[1])
@@ -49,9 +49,9 @@ class Grid:
         return bool((distances(self._costmap, line) > self._room).all())
 
     def around(self, cell: Cell) -> list[Cell]:
-        """The free neighbours."""
+        """The free neighbors."""
         height, width = self.free.shape
-        near = [(cell[0] + r, cell[1] + c) for r, c in NEIGHBOURS]
+        near = [(cell[0] + r, cell[1] + c) for r, c in NEIGHBORS]
         return [(r, c) for r, c in near if 0 <= r < height and 0 <= c < width and self.free[r, c]]
 
 
@@ -65,7 +65,7 @@ def lazy_theta_star(grid: Grid, begin: Cell, end: Cell) -> list[XY] | None:
         if cell in closed:
             continue
         if parent[cell] != cell and not grid.sees(parent[cell], cell):
-            # Out of sight after all: come from the best neighbour that has been expanded.
+            # Out of sight after all: come from the best neighbor that has been expanded.
             known = [(cost[near] + math.dist(near, cell), near) for near in grid.around(cell) if near in closed]
             cost[cell], parent[cell] = min(known)
         if cell == end:

@@ -31,7 +31,7 @@ from vfh_plus.wavefront import EDGE, Terrain, inside
 
 DEFAULT_SPEED = 0.4
 AHEAD = 0.8
-"""Metres: how far ahead on its way it aims."""
+"""Meters: how far ahead on its way it aims."""
 LOOK_AGAIN = 0.5
 """Seconds between two looks at whether the way is still free."""
 
@@ -64,7 +64,7 @@ class VfhPlusStack:
         self.plan: Path | None = None
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Localise at the estimate, then drive to the goals in order."""
+        """Localize at the estimate, then drive to the goals in order."""
         self._restart(estimate)
         self._task.start(goals)
 
@@ -180,7 +180,7 @@ class VfhPlusStack:
         return self._way[nearest:]
 
     def _stuck(self, tick: int, goal: Goal) -> bool:
-        """Whether it has come no nearer for too long: by points of its way, or by decimetres where there is no map."""
+        """Whether it has come no nearer for too long: by points of its way, or by decimeters where there is no map."""
         left = len(self._ahead()) if self._way is not None else round(10 * self._pose.distance(goal.pose))
         best, since = self._progress
         if left < best:
@@ -227,7 +227,7 @@ class VfhPlusStack:
 
 
 def _blocked(way: Array, obstacles: Array, radius: float) -> bool:
-    """Whether anything lies within `radius` of the next metres of a way."""
+    """Whether anything lies within `radius` of the next meters of a way."""
     if not len(way) or not len(obstacles):
         return False
     soon = way[: round(3.0 / EDGE)]

@@ -9,9 +9,9 @@ from scipy.ndimage import distance_transform_edt
 from simscen.plugin import Array, OccupancyGrid
 
 EDGE = 0.1
-"""Metres: the cells of the wavefront."""
+"""Meters: the cells of the wavefront."""
 ROOMY, CROWDED = 0.35, 3.0
-"""Metres beyond the robot's radius within which a step costs up to CROWDED times as much: ways keep off walls."""
+"""Meters beyond the robot's radius within which a step costs up to CROWDED times as much: ways keep off walls."""
 STEPS = [(r, c, math.hypot(r, c)) for r in (-1, 0, 1) for c in (-1, 0, 1) if (r, c) != (0, 0)]
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 class Dwell(Spec, Criterion):
     """The robot leaves a region again soon enough.
 
-    What is measured: the longest time that its centre stays in the region without a break.
+    What is measured: the longest time that its center stays in the region without a break.
     When it fails: that is longer than `max`.
     Why this: a robot that waits in a doorway or before a fire door blocks everybody, and reaches its goal all the same.
 

@@ -29,7 +29,7 @@ def test_the_place_that_fits_best_is_where_the_scan_was_taken(pose: Pose2) -> No
 
 
 @pytest.mark.parametrize("pose", PLACES)
-def test_a_robot_that_is_told_a_place_half_a_metre_off_is_found_nearby(pose: Pose2) -> None:
+def test_a_robot_that_is_told_a_place_half_a_meter_off_is_found_nearby(pose: Pose2) -> None:
     told = np.array(pose.compose(Pose2(0.4, -0.3, 0.2)))
     poses, fits = GlobalSearch(grid()).near(scanned(pose), told)
     off = pose.between(Pose2(*poses[0].tolist()))
@@ -58,10 +58,10 @@ def test_places_that_are_near_to_each_other_are_one() -> None:
     assert scores.tolist() == [0.9, 0.2, 0.1]
 
 
-def test_the_memory_holds_the_last_metres_about_where_the_base_is() -> None:
+def test_the_memory_holds_the_last_meters_about_where_the_base_is() -> None:
     memory, view = ScanMemory(), scanned(PLACES[0])
-    for metre in np.arange(0.0, 20.0, 0.5):
-        memory.add(scan(np.full(8, 2.0)), Pose2(float(metre), 0.0, 0.0), 0.0, 100.0)
+    for meter in np.arange(0.0, 20.0, 0.5):
+        memory.add(scan(np.full(8, 2.0)), Pose2(float(meter), 0.0, 0.0), 0.0, 100.0)
     assert memory.length <= REMEMBERED
     about = memory.about(Pose2(19.5, 0.0, 0.0))
     assert about.ends.real.min() == pytest.approx(-2.0 - memory.length)

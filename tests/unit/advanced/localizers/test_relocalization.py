@@ -48,7 +48,7 @@ def found(
     return places
 
 
-def test_a_robot_that_is_half_a_metre_off_is_put_where_its_last_metres_fit() -> None:
+def test_a_robot_that_is_half_a_meter_off_is_put_where_its_last_meters_fit() -> None:
     (place,) = found(OFF)
     assert np.hypot(place[0], place[1]) < 0.1
     assert abs(place[2]) < 0.03
@@ -85,7 +85,7 @@ def test_what_was_told_counts_for_the_settling_distance_only() -> None:
     assert found(Pose2(0.9, -0.5, 0.1), way=0.3, settling=0.0) == []
 
 
-def test_a_robot_is_moved_far_only_when_searches_agree_over_two_metres() -> None:
+def test_a_robot_is_moved_far_only_when_searches_agree_over_two_meters() -> None:
     """Within 0.7 m, on a floor that was rebuilt, what was seen fitted a room 11 m away by chance."""
     away = Pose2(3.0, 2.0, 2.5)
     assert found(away, way=3.0) == []

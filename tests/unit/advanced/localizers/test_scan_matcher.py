@@ -24,7 +24,7 @@ def stepped(guess: Pose2, before: Scan, after: Scan) -> Step | None:
 
 
 @pytest.mark.parametrize("guess", [STEP, Pose2(0.4, 0.0, 0.2), Pose2(0.2, 0.0, 0.05)])
-def test_a_step_is_seen_to_a_centimetre_although_wheels_slip(guess: Pose2) -> None:
+def test_a_step_is_seen_to_a_centimeter_although_wheels_slip(guess: Pose2) -> None:
     step = stepped(guess, view(START), view(START.compose(STEP)))
     assert step is not None
     off = STEP.between(step.delta)

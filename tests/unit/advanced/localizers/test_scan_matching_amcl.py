@@ -78,8 +78,8 @@ def test_a_blocked_view_is_ignored_while_particles_are_spread_widely(
 ) -> None:
     """A person 0.3 m from the lidar hides half of the room. Narrow particles use the scan nevertheless."""
     subject = localizer(ScanMatchingAmcl(settling_distance=400.0), Estimate(START, (std, std, 0.2)), 1)
-    for tick, metres in ((0, 0.0), (24, 0.26), (48, 0.52)):
-        there = Pose2(metres, 0.0, 0.0)
+    for tick, meters in ((0, 0.0), (24, 0.26), (48, 0.52)):
+        there = Pose2(meters, 0.0, 0.0)
         view = seen(START.compose(there), tick)
         if tick == 24:
             view.ranges[: BEAMS // 2] = 0.3
@@ -161,6 +161,6 @@ def test_in_unknown_space_the_pose_follows_the_scans_and_not_slipping_wheels() -
 
 
 def test_the_first_scan_has_little_weight_beside_the_initial_pose() -> None:
-    settling, at_once = (started(ScanMatchingAmcl(settling_distance=metres)).belief for metres in (4.0, 0.0))
+    settling, at_once = (started(ScanMatchingAmcl(settling_distance=meters)).belief for meters in (4.0, 0.0))
     assert np.trace(settling.covariance) > 1.5 * np.trace(at_once.covariance)
     assert np.hypot(*(np.array(START) - settling.pose)[:2]) < 0.2

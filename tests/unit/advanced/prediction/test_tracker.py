@@ -67,7 +67,7 @@ def room() -> Flatland:
 
 @pytest.mark.parametrize("discs", [crossing, oncoming])
 @pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
-def test_a_moving_cylinder_is_found_within_a_second_and_known_to_centimetres(
+def test_a_moving_cylinder_is_found_within_a_second_and_known_to_centimeters(
     discs: Callable[[float], list[Disc]], view: float, beams: int
 ) -> None:
     watch = Watch(discs, view=view, beams=beams).run(1.2)
@@ -79,7 +79,7 @@ def test_a_moving_cylinder_is_found_within_a_second_and_known_to_centimetres(
         later = discs(watch.time + 1.0)[0]
         moving = watch.tracker.moving
         assert len(moving) == 1
-        places.append(math.dist(moving.centres[0], (x, y)))
+        places.append(math.dist(moving.centers[0], (x, y)))
         speeds.append(math.dist(moving.velocities[0], (later[0] - x, later[1] - y)))
         assert moving.radii[0] == pytest.approx(radius, abs=0.08)
 
@@ -94,7 +94,7 @@ def test_the_covariance_covers_the_error() -> None:
 
     def compare(watch: Watch) -> None:
         moving = watch.tracker.moving
-        error = moving.centres[0] - np.array(crossing(watch.time)[0][:2])
+        error = moving.centers[0] - np.array(crossing(watch.time)[0][:2])
         values.append(float(error @ np.linalg.solve(moving.covariances[0, :2, :2], error)))
         assert math.sqrt(moving.covariances[0, 0, 0]) < 0.05
 
@@ -122,7 +122,7 @@ def test_what_stops_is_a_thing_like_any_other_a_moment_later() -> None:
     assert len(watch.tracker.moving) == 0
 
 
-def test_what_comes_at_a_walk_is_told_before_it_is_a_metre_away() -> None:
+def test_what_comes_at_a_walk_is_told_before_it_is_a_meter_away() -> None:
     """At 0.45 m/s, head on, as another robot does; seen to move by its way of a second rather than by its speed now."""
     watch = Watch(lambda t: [(4.0 - 0.45 * t, 0.1, 0.22)], view=FULL, beams=360).run(2.5)
     assert len(watch.tracker.moving) == 1
@@ -130,7 +130,7 @@ def test_what_comes_at_a_walk_is_told_before_it_is_a_metre_away() -> None:
 
 
 def test_of_another_robot_only_the_mast_is_seen_and_its_body_is_kept_off() -> None:
-    """Three beams of a degree hit it, two metres away."""
+    """Three beams of a degree hit it, two meters away."""
     watch = Watch(lambda t: [(4.0 - 0.5 * t, 0.1, 0.06)], view=FULL, beams=360).run(5.0)
     assert len(watch.tracker.moving) == 1
     assert watch.tracker.moving.radii[0] >= 0.25
@@ -156,13 +156,13 @@ def test_what_is_only_ever_half_seen_at_the_edge_of_the_view_is_told_when_it_has
         return (1.5 * t + 3.0 * math.cos(edge), -3.0 * math.sin(edge), 0.5)
 
     watch = Watch(lambda t: [beside(t), (14.0, 6.0 - 1.2 * t, 0.5)], base).run(4.0)
-    assert any(math.dist(centre, beside(watch.time)[:2]) < 0.5 for centre, _ in told(watch))
+    assert any(math.dist(center, beside(watch.time)[:2]) < 0.5 for center, _ in told(watch))
 
 
 def told(watch: Watch) -> list[tuple[list[float], list[float]]]:
     """Where what moves is said to be, and how fast."""
     moving = watch.tracker.moving
-    return list(zip(moving.centres.tolist(), moving.velocities.tolist(), strict=True))
+    return list(zip(moving.centers.tolist(), moving.velocities.tolist(), strict=True))
 
 
 def claims(watch: Watch, seconds: float) -> int:
@@ -244,7 +244,7 @@ def test_the_last_piece_of_a_scan_is_as_near_as_its_last_hit() -> None:
     (piece,) = clusters(found, ranges, 0.0, step, 1.0)
     sine = math.sin(1.5 * step)
     assert piece.radius == pytest.approx(1.9 * sine / (1.0 - sine))
-    assert abs(piece.centre) == pytest.approx(1.9 + piece.radius)
+    assert abs(piece.center) == pytest.approx(1.9 + piece.radius)
 
 
 def test_hits_that_are_in_one_run_are_never_told_beforehand_to_be_in_several() -> None:
@@ -296,7 +296,7 @@ def test_a_scan_that_is_garbage_moves_nothing_and_breaks_nothing() -> None:
         tracker.on_scan(
             Scan("lidar", k * 24, ranges[: 360 if k % 3 else k // 3], -3.14, 0.0175, 0.1, 30.0), Pose2(0, 0)
         )
-    assert np.isfinite(tracker.moving.centres).all()
+    assert np.isfinite(tracker.moving.centers).all()
 
 
 @pytest.mark.parametrize("seen", [1.2, 1.8, 2.5])

@@ -5,7 +5,7 @@ from simscen.core.geometry.meshes import submesh, tile_faces
 
 
 def grid(edge: int):
-    """Two triangles in each square metre of a floor."""
+    """Two triangles in each square meter of a floor."""
     x, y = np.meshgrid(np.arange(edge + 1.0), np.arange(edge + 1.0))
     vertices = np.column_stack((x.ravel(), y.ravel(), np.zeros(x.size)))
     first = (np.arange(edge)[:, None] * (edge + 1) + np.arange(edge)).ravel()

@@ -36,6 +36,6 @@ def test_what_is_pushed_in_or_turned_inside_out_is_not_convex():
 
 
 @pytest.mark.parametrize(("part", "convex"), [(0.4, True), (0.6, False)])
-def test_a_corner_may_stand_out_of_a_face_by_a_micrometre(part, convex):
+def test_a_corner_may_stand_out_of_a_face_by_a_micrometer(part, convex):
     # Of the faces that end in the middle of the edge, the edge's end is twice as far out as that is in.
     assert is_convex(cube(out=-part * CONVEX_TOLERANCE_M)) == convex

@@ -140,8 +140,8 @@ def test_nothing_strays_farther_from_its_ways_than_they_say(ease, mode):
         for moment in range(60):
             x, y, _ = pose_at(path, 0.3 * moment)
             away = [(beside(x, y, way), way.strays) for way in swept_segments(path)]
-            assert any(metres <= strays + 1e-9 for metres, strays in away)
-            strayed.append(min(metres for metres, _ in away))
+            assert any(meters <= strays + 1e-9 for meters, strays in away)
+            strayed.append(min(meters for meters, _ in away))
     assert (max(strayed) > 0.1) == (ease == "spline")
 
 

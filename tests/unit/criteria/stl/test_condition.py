@@ -103,7 +103,7 @@ def test_a_bound_is_of_the_signals_dimension():
     assert Condition.model_validate({"signal": "nees", "op": ">", "value": 3}).value == 3.0
 
 
-def test_a_misspelt_signal_is_one_mistake_whatever_the_unit_of_its_bound():
+def test_a_misspelled_signal_is_one_mistake_whatever_the_unit_of_its_bound():
     assert refused({"signal": "sped", "op": ">", "value": "1 m/s"}).count(";") == 0
     assert refused({"signal": "sped", "op": ">", "value": "1 N s"}).count(";") == 0
     assert refused({"signal": "sped", "op": ">", "value": 1}).count(";") == 0

@@ -33,7 +33,7 @@ STILL = {"seconds": 1, "truth": [[0, 0, 0]]}
 
 
 @pytest.mark.parametrize(
-    ("words", "metres"),
+    ("words", "meters"),
     [
         ({"always": FAR}, 2.5),
         ({"always": {"any": [FARTHER, FAR, SLOW]}}, 3.5),
@@ -43,8 +43,8 @@ STILL = {"seconds": 1, "truth": [[0, 0, 0]]}
         ({"always": HURT}, 0.0),
     ],
 )
-def test_the_clearance_is_searched_for_half_a_metre_beyond_the_largest_bound_on_it(words, metres):
-    assert criterion(words).clearance_range == metres
+def test_the_clearance_is_searched_for_half_a_meter_beyond_the_largest_bound_on_it(words, meters):
+    assert criterion(words).clearance_range == meters
 
 
 def test_it_needs_what_its_signals_need_and_objects_only_for_what_is_about_one():

@@ -88,7 +88,7 @@ def test_trembling_is_no_drive_and_small_moves_add_up_to_one():
     assert creeping.travelled.tolist() == [0.0, 0.015625, 0.03125, 0.046875, 0.0625]
 
 
-def test_a_move_of_exactly_a_centimetre_counts():
+def test_a_move_of_exactly_a_centimeter_counts():
     assert drive(at_half_seconds([(0, 0), (0.01, 0)])).length == 0.01
     assert drive(at_half_seconds([(0, 1), (0, 1.5)])).length == 0.5
 

@@ -330,7 +330,7 @@ def test_a_plan_of_one_point_is_a_place():
     assert set(read_signal("plan_deviation", trace, sketch_case({}), {})) == {5.0}
 
 
-def test_a_robot_is_in_a_region_with_its_centre():
+def test_a_robot_is_in_a_region_with_its_center():
     case = {"regions": {"hall": [[1, -1], [3, -1], [3, 1], [2, 0], [1, 1]]}}
     values = signal("in_region", {"seconds": 4, "truth": [[0, 0, 0.5], [4, 4, 0.5]]}, case, region="hall")
     assert [at(values, t) for t in (0.5, 1.2, 2.0, 2.8, 3.5)] == [0, 1, 0, 1, 0]

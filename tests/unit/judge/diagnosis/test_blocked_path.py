@@ -84,7 +84,7 @@ def test_of_several_closed_passages_the_tightest_is_told():
     assert "1.00 m between `west wall`" in line
 
 
-def test_three_centimetres_are_not_nothing():
+def test_three_centimeters_are_not_nothing():
     (line,) = why("result", box(1, "crate", 5, 0, 0.6, 0.94, "crate falls"))
     assert "0.03 m are left" in line
 
@@ -134,7 +134,7 @@ def test_a_long_robot_needs_more_room_to_turn():
     assert "0.45 m are left" in line
 
 
-def test_two_centimetres_are_not_nothing_and_room_is_looked_for_up_to_the_very_end():
+def test_two_centimeters_are_not_nothing_and_room_is_looked_for_up_to_the_very_end():
     assert "0.02 m are left" in why("result", box(1, "crate", 5, 0, 0.6, 0.95))[0]
     assert "0.10 m are left" in why("result", box(1, "crate", 5, -0.3, 0.6, 1.4))[0]
 
@@ -165,12 +165,12 @@ def test_a_robot_that_just_fits_is_not_shut_in_and_one_that_can_just_turn_not_ha
     assert said(("fog", 0.2), footprint=[]) == ""
 
 
-def test_two_centimetres_that_are_left_are_told_and_less_is_nothing():
+def test_two_centimeters_that_are_left_are_told_and_less_is_nothing():
     assert "the shortest way: 0.02 m are left" in told(("fog", 0.01))
     assert "the shortest way: nothing is left" in told(("fog", 0.0099))
 
 
-def test_two_centimetres_less_than_the_passage_has_are_no_change():
+def test_two_centimeters_less_than_the_passage_has_are_no_change():
     assert said(("fog", 0.49), footprint=[[0.6, 0.8]]) == ""
     assert said(("fog", 0.48), footprint=[[0.6, 0.8]]) == "fog narrows"
 

@@ -74,7 +74,7 @@ def test_what_was_there_from_the_start_is_told_beside_what_else_was():
     assert [line.split()[1] for line in why("result", events, case=case)] == ["door", "bin"]
 
 
-def test_what_is_further_than_thirty_centimetres_holds_nobody():
+def test_what_is_further_than_thirty_centimeters_holds_nobody():
     assert why("stuck", box(1, "crate", 4.75, 0, 0.4, 0.4, "falls"), case={**CASE, "passages": []}) == []
 
 
@@ -119,7 +119,7 @@ def test_a_thing_that_the_robot_on_its_goal_would_just_touch_does_not_stand_on_i
     assert why("stuck", box(0, "crate", 8, 0.75, 1, 1), case={**CASE, "inscribed_radius": 0.25}) == []
 
 
-def test_what_is_thirty_centimetres_away_may_hold_the_robot():
+def test_what_is_thirty_centimeters_away_may_hold_the_robot():
     (line,) = why("stuck", box(0, "crate", 4.7, 0, 0.4, 0.4), case={**CASE, "passages": []})
     assert line == "why: crate was 0.30 m from the robot"
 

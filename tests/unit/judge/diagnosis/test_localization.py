@@ -36,7 +36,7 @@ def test_a_fault_that_came_between_localizer_and_navigator_leads_astray_and_a_li
     assert why("localization_error", scaled, **lost) == ["why: odom.scale falsified its odometry from t = 1.50 s on"]
 
 
-def test_lost_is_half_a_metre_in_any_direction():
+def test_lost_is_half_a_meter_in_any_direction():
     case = {"goals": [GOAL]}
     at_one = {"seconds": 10, "truth": [[0, 0, 1]]}
     half = why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0.5, 0, 0]})

@@ -137,7 +137,7 @@ def test_points_nearer_than_30_cm_have_no_say_in_curvature():
 
 
 def test_turning_through_pi_is_a_small_change_of_heading():
-    """Arena's get_metrics.py does not wrap it, and adds yaw to metres in the norm of the way."""
+    """Arena's get_metrics.py does not wrap it, and adds yaw to meters in the norm of the way."""
     truth = [[0, 0, 0, 3.1], [1, 0, 0, 3.2], [2, 0, 0, 3.1]]
     metrics = measured({"seconds": 2, "truth": truth})
     assert metrics["heading_change"] == pytest.approx(0.2)

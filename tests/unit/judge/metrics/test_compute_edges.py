@@ -75,7 +75,7 @@ def test_only_plans_for_another_reason_than_a_goal_are_replans():
     assert measures([*plans, [4, "plan.made", "", {}]]).values["replans"] == 3.0
 
 
-def test_ways_of_half_a_metre_have_a_score_too():
+def test_ways_of_half_a_meter_have_a_score_too():
     assert barn_score(True, 1.0, 0.5) == pytest.approx(0.25)
 
 
@@ -86,7 +86,7 @@ def with_speeds(speeds, ticks=None):
     return compute_metrics(replace(trace, velocity=velocity), sketch_case({}))
 
 
-def test_a_centimetre_a_second_is_motion():
+def test_a_centimeter_a_second_is_motion():
     assert with_speeds(np.full(81, 0.01)).values["sparc"] < 0
     assert with_speeds(np.full(81, 0.0099)).undefined["sparc"] == "the robot never moved"
 

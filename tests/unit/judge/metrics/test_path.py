@@ -38,7 +38,7 @@ def accepted(sample=0, name="a"):
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_a_right_angle_of_two_metres(side):
+def test_a_right_angle_of_two_meters(side):
     metrics = shape((5, 7), (6, 7), (6, 7 + side, side * math.pi / 2))
     assert metrics["max_curvature"] == pytest.approx(math.sqrt(2))
     assert metrics["norm_curvature"] == pytest.approx(2 * math.sqrt(2))
@@ -62,7 +62,7 @@ def test_of_several_bends_the_sum_and_the_greatest_are_told():
     assert metrics["aol"] == pytest.approx(math.pi / 4)
 
 
-def test_curvature_is_of_points_thirty_centimetres_from_the_one_before():
+def test_curvature_is_of_points_thirty_centimeters_from_the_one_before():
     assert shape((0, 0), (0.3, 0), (0.3, 0.3))["max_curvature"] == pytest.approx(math.sqrt(2) / 0.3)
     shaky = shape((5, 7), (5.2, 7.1), (5.4, 7), (5.4, 7.2), (5.4, 7.4), (5.41, 7.41))
     assert shaky["max_curvature"] == pytest.approx(math.sqrt(2) / 0.4)
@@ -94,7 +94,7 @@ def test_the_pieces_are_those_between_being_set_down():
     ]
 
 
-def test_a_way_of_eighths_of_a_metre_is_one_piece():
+def test_a_way_of_eighths_of_a_meter_is_one_piece():
     metrics = shape((0, 0), (0.125, 0), (0.125, 0.125))
     assert metrics["aol"] == pytest.approx(math.pi / 2 / 0.25)
 

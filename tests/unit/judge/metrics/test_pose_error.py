@@ -18,7 +18,7 @@ def located(ticks, true, told, believed):
     return replace(trace, truth=truth, belief=Samples(np.array(told), beliefs))
 
 
-def test_relative_errors_are_over_each_metre_from_where_the_last_one_ended():
+def test_relative_errors_are_over_each_meter_from_where_the_last_one_ended():
     steps = [0.5, 0.4375, 0.0625] * 3
     ways = np.concatenate(([0.0], np.cumsum(steps)))
     believed = np.add(ways, [0, 5, 7, 0.2, -9, 8, 0.1, 6, -5, 0.5])

@@ -24,7 +24,7 @@ def test_rates_are_of_all_runs_and_means_of_those_that_have_the_number():
     assert figures.success_interval == pytest.approx((0.15, 0.85), abs=0.01)
     assert (figures.spl, figures.soft_spl, figures.spl_runs) == (pytest.approx(0.45), pytest.approx(0.7), 2)
     assert (figures.collisions_per_km, figures.collisions_per_hour) == (1.5, 2.0)
-    assert (figures.runs, figures.measured_runs, figures.kilometres, figures.hours) == (4, 3, 2.0, 1.5)
+    assert (figures.runs, figures.measured_runs, figures.kilometers, figures.hours) == (4, 3, 2.0, 1.5)
 
 
 def test_the_order_of_the_runs_changes_nothing():
@@ -72,4 +72,4 @@ def test_each_of_several_robots_drives_and_collides_and_a_run_succeeds_where_all
     figures = summarize_session([two])
     assert (figures.runs, figures.measured_runs, figures.success_rate) == (1, 1, 0.0)
     assert (figures.spl, figures.spl_runs) == (0.5, 1)
-    assert (figures.collisions, figures.kilometres, figures.hours) == (3, 2.0, 1.0)
+    assert (figures.collisions, figures.kilometers, figures.hours) == (3, 2.0, 1.0)

@@ -82,7 +82,7 @@ def test_a_byte_that_is_not_utf8_is_told_with_its_place(tmp_path: Path) -> None:
     assert (problem.line, problem.col, problem.message) == (2, 10, "not valid UTF-8 at byte 14")
 
 
-def test_utf16_is_recognised(tmp_path: Path) -> None:
+def test_utf16_is_recognized(tmp_path: Path) -> None:
     problem = _problem(_written(tmp_path / "utf16.yaml", "a: 1".encode("utf-16")))
     assert "not valid UTF-8" in problem.message
     assert "UTF-16" in problem.hint

@@ -8,4 +8,4 @@ for step in peer:
         peer.goals.reached()
     step.drive(0.0 if there or not goal else 0.4, 0.0)
 """
-"""Drives the metre to the desk."""
+"""Drives the meter to the desk."""

@@ -53,7 +53,7 @@ def log_of(answer) -> bytes:
 
 
 @pytest.mark.slow
-def test_each_fault_is_the_error_of_its_run_alone_and_the_neighbours_log_stays_the_same(session) -> None:
+def test_each_fault_is_the_error_of_its_run_alone_and_the_neighbors_log_stays_the_same(session) -> None:
     answers = session("out", BROKEN)
     alone = session("alone", {"fine": GOOD})["fine"]
     assert {name: answer.result.error.kind for name, answer in answers.items() if answer.result.error} == KINDS
@@ -83,7 +83,7 @@ def test_a_stack_has_the_limits_of_the_caller_and_not_those_of_the_engines_worke
 
 @pytest.fixture
 def processes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    """Gives the processes that have the environment of this test's stacks, and of no neighbour's."""
+    """Gives the processes that have the environment of this test's stacks, and of no neighbor's."""
     monkeypatch.setenv("SIMSCEN_TEST", str(tmp_path))
     own = f"SIMSCEN_TEST={tmp_path}\0".encode()
 

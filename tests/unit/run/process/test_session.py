@@ -71,7 +71,7 @@ def test_a_run_that_ends_well_is_answered_with_its_result(session):
         ("prepare-memory", "out-of-memory", "more memory than it may"),
     ],
 )
-def test_a_fault_is_an_error_that_says_what_happened_and_leaves_its_neighbours_alone(session, fault, kind, told):
+def test_a_fault_is_an_error_that_says_what_happened_and_leaves_its_neighbors_alone(session, fault, kind, told):
     answers, _ = session(fault, "fine", workers=2)
     assert answers[fault].outcome is Outcome.ERROR
     assert answers[fault].result.error.kind == kind
@@ -119,14 +119,14 @@ def test_when_the_warm_process_dies_its_runs_are_errors_and_the_rest_still_runs(
     assert answers["fine"].outcome is Outcome.PASSED
 
 
-def test_a_neighbour_of_a_run_that_kills_the_warm_process_runs_again_by_itself(session):
+def test_a_neighbor_of_a_run_that_kills_the_warm_process_runs_again_by_itself(session):
     answers, _ = session("kill-parent", "long", "fine", workers=2)
     assert [name for name, answer in answers.items() if answer.outcome is Outcome.PASSED] == ["long", "fine"]
     assert answers["kill-parent"].result.error.kind == "crashed"
     assert "that prepares runs was killed (SIGKILL) while" in answers["kill-parent"].result.error.message
 
 
-def test_neighbours_of_a_world_whose_preparation_crashes_are_answered_once_and_pass(session):
+def test_neighbors_of_a_world_whose_preparation_crashes_are_answered_once_and_pass(session):
     events = []
     answers, _ = session("long", "prepare-segfault", "fine", workers=2, events=events)
     assert [name for name, answer in answers.items() if answer.outcome is Outcome.PASSED] == ["fine", "long"]

@@ -20,7 +20,7 @@ def test_a_description_read_again_gives_the_same_robot(tmp_path, name):
     assert [(w.x, w.y, w.radius) for w in again.wheels] == [
         pytest.approx((w.x, w.y, w.radius), abs=1e-6) for w in body.wheels
     ]
-    assert again.chassis.centre == pytest.approx(body.chassis.centre, abs=1e-6)
+    assert again.chassis.center == pytest.approx(body.chassis.center, abs=1e-6)
     assert again.footprint == pytest.approx(np.array(body.footprint), abs=1e-6)
     for ours, theirs in zip(body.hull, again.hull, strict=False):
         there = theirs.pose.apply(extremes(theirs.shape))

@@ -93,7 +93,7 @@ def test_the_base_frame_is_on_the_ground_under_the_middle_of_the_axle(load):
         ("right_joint", pytest.approx(0), pytest.approx(-0.2), 0.05),
     ]
     assert body.mass == pytest.approx(4.6)
-    assert body.chassis.centre == pytest.approx([-0.05, 0.0, 0.1])
+    assert body.chassis.center == pytest.approx([-0.05, 0.0, 0.1])
 
 
 def test_a_mass_in_the_specification_rules(load):
@@ -336,7 +336,7 @@ def drive_until(simulation, done, command, seconds):
     pytest.fail(f"not there after {seconds} s: {simulation.truth().pose.plane}")
 
 
-def test_the_jackal_drives_a_square_of_two_metres(jackal):
+def test_the_jackal_drives_a_square_of_two_meters(jackal):
     """With feedback from the true pose, as a controller would: four sides, four turns in place."""
     corners, odometer = [], jackal.encoders()
     for side in range(4):

@@ -53,7 +53,7 @@ def test_where_a_velocity_leads(case: dict[str, Any]) -> None:
     base = kinematics(given.get("acceleration", AT_ONCE), given.get("deceleration", -AT_ONCE))
     pose, now = Pose2(*given.get("pose", (0, 0, 0))), Twist(*given.get("now", (0, 0, 0)))
     velocities = np.array([given["velocity"]])
-    found = trajectories(pose, now, velocities, base, given["seconds"], given["metres"], given["radians"])
+    found = trajectories(pose, now, velocities, base, given["seconds"], given["meters"], given["radians"])
     assert found.poses(np.array([0]))[:, 0] == pytest.approx(np.array(case["expect"]), abs=1e-9)
 
 

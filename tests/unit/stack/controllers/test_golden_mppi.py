@@ -12,7 +12,7 @@ from simscen.core.geometry import Pose2
 from simscen.model.mppi import Mppi
 from simscen.stack.controllers.limits import Limits
 from simscen.stack.controllers.local_plan import LocalPlan
-from simscen.stack.controllers.mppi.judgement import Judgement
+from simscen.stack.controllers.mppi.judgment import Judgment
 from simscen.stack.controllers.mppi.rollouts import integrated, predicted
 from simscen.stack.controllers.mppi.scene import Scene
 from simscen.stack.controllers.mppi.sequence import smoothed, weights, within_limits
@@ -65,7 +65,7 @@ def test_rollouts_critics_weights_and_the_sequence_that_comes_out_are_those_of_t
     parts = {name: {"cost_power": given.get("power", 1), **own.get(name, {})} for name in names}
     total = np.zeros(3)
     for name in names:
-        said, _ = Judgement(Mppi.model_validate({"type": "mppi", "critics": [name], **parts}), axes == 3).costs(seen)
+        said, _ = Judgment(Mppi.model_validate({"type": "mppi", "critics": [name], **parts}), axes == 3).costs(seen)
         assert said == pytest.approx(np.array(case["costs"].get(name, [0.0] * 3)), rel=2e-4, abs=2e-5), name
         total += said
     mean = sampled.mean(axis=2)

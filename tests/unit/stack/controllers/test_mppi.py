@@ -145,7 +145,7 @@ def along(*speeds: float, steps: int = 10, turn: float = 0.0) -> np.ndarray:
     return np.stack((vx, np.full_like(vx, turn)))
 
 
-def test_constraint_critic_counts_metres_per_second_too_many_over_time() -> None:
+def test_constraint_critic_counts_meters_per_second_too_many_over_time() -> None:
     said = critics.constraint(model.MppiConstraintCritic(), scene(along(0.5, 0.8, -0.45)))
     assert said == pytest.approx([0.0, 4.0 * 0.3, 4.0 * 0.1], abs=1e-5)
 
@@ -217,7 +217,7 @@ def test_the_furthest_point_of_the_plan_is_the_nearest_to_the_end_of_a_rollout()
     assert scene(along(0.2, 0.5)).furthest == 10 - 1
 
 
-def test_path_align_critic_compares_with_the_plan_after_as_many_metres() -> None:
+def test_path_align_critic_compares_with_the_plan_after_as_many_meters() -> None:
     beside = along(1.0, steps=17, turn=0.0)
     seen = scene(beside)
     offset = Scene(
@@ -225,7 +225,7 @@ def test_path_align_critic_compares_with_the_plan_after_as_many_metres() -> None
         *(getattr(seen, name) for name in ("plan", "pose", "goal_yaw", "costmap", "footprint", "limits", "dt")), 0.25,
     )  # fmt: skip
     said = path_critics.path_align(model.MppiPathAlignCritic(), offset)
-    # Metres are counted from the first pose looked at, 0.1 m from the plan's first point: so it is 0.1 m ahead, too;
+    # Meters are counted from the first pose looked at, 0.1 m from the plan's first point: so it is 0.1 m ahead, too;
     # the last is compared with the point before the furthest.
     mean = (3 * math.hypot(0.3, 0.1) + math.hypot(0.3, 0.15)) / 4
     assert said == pytest.approx([14.0 * mean], rel=1e-3)
@@ -252,7 +252,7 @@ def test_path_angle_critic_lets_a_robot_that_may_reverse_look_back(mode: int, we
     assert said is None if weighed is None else said == pytest.approx([2.0 * weighed], rel=1e-5)
 
 
-def test_prefer_forward_critic_counts_metres_driven_backward() -> None:
+def test_prefer_forward_critic_counts_meters_driven_backward() -> None:
     said = critics.prefer_forward(model.MppiPreferForwardCritic(), scene(along(0.3, -0.2)))
     assert said == pytest.approx([0.0, 5.0 * 0.2], abs=1e-6)
 

@@ -76,9 +76,9 @@ def test_the_bend_of_a_circle_is_that_of_its_radius(radius: float) -> None:
     track = PathTracker(Path(bent(radius)))
     track.locate(Pose2(0.0, 0.0, 0.0))
     track.index = int(np.searchsorted(track.along, 3.2))
-    metres, places, bends = zip(*track.stations(0.1, radius * math.pi / 2 - 0.6), strict=True)
+    meters, places, bends = zip(*track.stations(0.1, radius * math.pi / 2 - 0.6), strict=True)
     assert bends == pytest.approx([1.0 / radius] * len(bends), rel=0.03)
-    assert np.diff(metres) == pytest.approx(0.1, abs=0.051)
+    assert np.diff(meters) == pytest.approx(0.1, abs=0.051)
     assert [abs(place - complex(3.0, radius)) for place in places] == pytest.approx([radius] * len(places))
 
 

@@ -37,7 +37,7 @@ there when the robot is; and one that stands."""
 
 
 def among(*discs: tuple[float, float, float, float], deviation: float = 0.0) -> CostmapView:
-    """A costmap with these on it and nothing else, all of whose places are known to so many metres."""
+    """A costmap with these on it and nothing else, all of whose places are known to so many meters."""
     known = np.array(discs)
     sure = np.tile(np.diag((deviation**2, deviation**2, 0.0, 0.0)), (len(discs), 1, 1))
     return replace(OPEN, moving=MovingObstacles(known[:, :2], known[:, 2:], np.full(len(discs), 0.2), sure, 0.0))

@@ -43,7 +43,7 @@ def full(lethal: np.ndarray) -> np.ndarray:
     return np.minimum(distance_transform_edt(~lethal) * 0.05, REACH)
 
 
-def test_distances_of_the_map_are_those_between_cell_centres() -> None:
+def test_distances_of_the_map_are_those_between_cell_centers() -> None:
     view = costmap(Flatland().room(8, 6)).view
     lethal = view.costs == 254
     cells, here = np.argwhere(lethal), np.array([60, 80])
@@ -85,7 +85,7 @@ def test_a_turned_map_is_sampled_into_an_unturned_costmap() -> None:
     grid = OccupancyGrid(cells, 0.05, Pose2(1.0, 2.0, math.pi / 2))
     view = Costmap(Spec(), Surroundings(ROBOT, grid, RATE)).view
     row, column = np.argwhere(view.costs == 254)[0]
-    x, y = grid.centre_of(np.array([[10, 50]]))[0]
+    x, y = grid.center_of(np.array([[10, 50]]))[0]
     assert view.origin[0] + (column + 0.5) * 0.05 == pytest.approx(x, abs=0.051)
     assert view.origin[1] + (row + 0.5) * 0.05 == pytest.approx(y, abs=0.051)
 

@@ -68,7 +68,7 @@ def test_the_ground_that_rises_where_a_slope_ends_is_ground(mount: Pose3) -> Non
 
 
 def nodding(degrees: float, down: float) -> Ground:
-    """What a robot that nods sees of ground that leads down by so many degrees, and is level from a metre on."""
+    """What a robot that nods sees of ground that leads down by so many degrees, and is level from a meter on."""
     nod = math.radians(degrees)
     bend = math.tan(nod - math.radians(down))
     return ((-1.0, 0.0), (0.0, 0.0), (1.0, bend), (9.0, bend + 8.0 * math.tan(nod)))

@@ -13,7 +13,7 @@ FRAME = Frame((-4.0, -4.0), 0.05, (160, 160))
 
 
 def walked(scan: Scan, base: Pose2, spec: Spec) -> set[tuple[int, int]]:
-    """The cells that beams pass through, by walking along each in steps of a millimetre."""
+    """The cells that beams pass through, by walking along each in steps of a millimeter."""
     lidar = base.compose(scan.mount)
     cells: set[tuple[int, int]] = set()
     for angle, length in zip(scan.angles() + lidar.yaw, scan.ranges, strict=True):
@@ -29,14 +29,14 @@ def test_crossed_cells_are_those_a_walk_along_the_beams_comes_through(beams: int
     step = 2 * math.pi / beams
     scan = Scan("l", 0, 2.0 + np.sin(3 * np.arange(beams) * step), -math.pi, step, 0.05, 12.0, Pose2(0.1, 0.05, 0.2))
     cells = np.argwhere(np.ones(FRAME.shape, dtype=bool))
-    centres = FRAME.points(np.arange(len(cells)))
-    found = {tuple(cell) for cell in cells[crossed(centres, FRAME.resolution, scan, base, spec)[0]].tolist()}
+    centers = FRAME.points(np.arange(len(cells)))
+    found = {tuple(cell) for cell in cells[crossed(centers, FRAME.resolution, scan, base, spec)[0]].tolist()}
     truth = walked(scan, base, spec)
     points, _ = hits(scan, base, 0.0, 99.0)
     ends = {tuple(cell) for cell in FRAME.cells(np.column_stack((points.real, points.imag))).tolist()}
     # Cells at a beam's end may go either way: marking comes after clearing. Near the lidar many beams share a cell.
     lidar = base.compose(scan.mount)
-    far = {c for c in truth if np.hypot(*(FRAME.centres(np.array([c]))[0] - lidar[:2])) > 0.3}
+    far = {c for c in truth if np.hypot(*(FRAME.centers(np.array([c]))[0] - lidar[:2])) > 0.3}
     assert len(found - truth) <= 0.01 * len(truth)
     missed = {c for c in far - found if all(max(abs(c[0] - e[0]), abs(c[1] - e[1])) > 1 for e in ends)}
     assert len(missed) <= 0.03 * len(far)

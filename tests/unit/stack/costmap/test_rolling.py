@@ -23,8 +23,8 @@ def test_marks_stay_where_they_are_in_the_plane_and_are_lost_outside() -> None:
     marks = np.zeros(before.shape, dtype=bool)
     cells = before.cells(np.array([[2.0, 1.0], [-3.0, 0.0]]))
     marks[cells[:, 0], cells[:, 1]] = True
-    found = now.centres(np.argwhere(carried(marks, before, now, False)))
-    assert found == pytest.approx(before.centres(cells[:1]))
+    found = now.centers(np.argwhere(carried(marks, before, now, False)))
+    assert found == pytest.approx(before.centers(cells[:1]))
 
 
 @pytest.mark.parametrize("to", [Pose2(9, 0), Pose2(-9, 0), Pose2(0, 20), Pose2(-8, -8)])

@@ -15,7 +15,7 @@ from estimate_drives import CIRCUMSTANCES, Case, case
 
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers import particle_filter
-from simscen.stack.localizers.clusters import clusters, errors_about, summarise
+from simscen.stack.localizers.clusters import clusters, errors_about, summarize
 from simscen.stack.localizers.kld import bins
 from simscen.stack.localizers.particles import Particles
 
@@ -28,10 +28,10 @@ def near_the_best(particles: Particles) -> Pose2:
     """The mean of the particles within 0.25 m and 10° of the best one of the heaviest cluster (Rekleitis 2004)."""
     labels = clusters(bins(particles.poses))
     heaviest = labels == np.bincount(labels, weights=particles.weights).argmax()
-    centre = particles.poses[np.where(heaviest, particles.weights, -1.0).argmax()]
-    near = errors_about(centre, particles.poses)
+    center = particles.poses[np.where(heaviest, particles.weights, -1.0).argmax()]
+    near = errors_about(center, particles.poses)
     kept = heaviest & (np.hypot(near[:, 0], near[:, 1]) <= 0.25) & (np.abs(near[:, 2]) <= np.deg2rad(10))
-    return Pose2(*(centre + particles.weights[kept] @ near[kept] / particles.weights[kept].sum()))
+    return Pose2(*(center + particles.weights[kept] @ near[kept] / particles.weights[kept].sum()))
 
 
 def heaviest_mean(power: float) -> Estimator:
@@ -50,7 +50,7 @@ def heaviest_mean(power: float) -> Estimator:
 
 def both(peak: float) -> Estimator:
     """The shipped one."""
-    return lambda particles: summarise(particles, peak)[0]
+    return lambda particles: summarize(particles, peak)[0]
 
 
 ESTIMATORS: Mapping[str, Estimator] = {
@@ -71,11 +71,11 @@ def beliefs(drive: Case, estimators: Mapping[str, Estimator]) -> dict[str, Array
     def summed_up(particles: Particles, peak: float) -> tuple[Pose2, Array]:
         nonlocal corrected, latest
         corrected, latest = True, {name: estimate(particles) for name, estimate in estimators.items()}
-        return summarise(particles, peak)
+        return summarize(particles, peak)
 
     found: dict[str, list[Pose2]] = {name: [] for name in estimators}
     anchors: dict[str, Pose2] = {}
-    with mock.patch.object(particle_filter, "summarise", summed_up):
+    with mock.patch.object(particle_filter, "summarize", summed_up):
         for odometry, scan in drive.readings():
             subject.on_odometry(odometry)
             subject.on_scan(scan)
@@ -88,7 +88,7 @@ def beliefs(drive: Case, estimators: Mapping[str, Estimator]) -> dict[str, Array
 
 
 def figures(believed: Array, truth: Array) -> tuple[float, float, float]:
-    """RMSE, largest error, and how often the belief jumped by more than a metre between two beats."""
+    """RMSE, largest error, and how often the belief jumped by more than a meter between two beats."""
     off = np.hypot(*(believed - truth)[:, :2].T)
     jumps = np.hypot(*np.diff(believed[:, :2], axis=0).T) > 1
     return float(np.sqrt(np.mean(off**2))), float(off.max()), float(jumps.sum())

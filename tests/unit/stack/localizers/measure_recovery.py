@@ -17,7 +17,7 @@ from simscen.stack.localizers import recovery
 RECOVERING = {"max_particles": 5000, "recovery_alpha_slow": 0.001, "recovery_alpha_fast": 0.1}
 THRESHOLDS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4)
 FOUND_WITHIN, LAST = 0.5, 50
-"""Metres, and how many tenths of a second at the end of a drive."""
+"""Meters, and how many tenths of a second at the end of a drive."""
 
 
 def off(drive: Case) -> Array:

@@ -1,4 +1,4 @@
-"""AMCL with Nav2's defaults knows where it is within centimetres; a few seeds here, fifty in measure_localizers.py."""
+"""AMCL with Nav2's defaults knows where it is within centimeters; a few seeds here, fifty in measure_localizers.py."""
 
 import measure_localizers as measure
 import numpy as np
@@ -13,7 +13,7 @@ SEEDS_AMONG_PEOPLE = (5, 7)
 
 
 @pytest.mark.parametrize("spec", [measure.SUM, measure.PROB, measure.BEAM], ids=lambda spec: spec.laser_model_type)
-def test_the_way_round_the_room_is_tracked_to_five_centimetres(spec: Amcl) -> None:
+def test_the_way_round_the_room_is_tracked_to_five_centimeters(spec: Amcl) -> None:
     seconds = 15.0 if spec is measure.BEAM else 30.0
     assert measure.tracking(spec, SEEDS[:2], seconds).rmse.max() <= 0.05
 
@@ -22,7 +22,7 @@ def test_the_way_round_the_room_is_tracked_to_five_centimetres(spec: Amcl) -> No
     ("world", "circumstance", "seed"),
     [("warehouse", "short", 3), ("office", "crowded", 1), ("house coarse", "crowded", 3)],
 )
-def test_a_robot_that_knows_its_start_is_not_believed_a_metre_off_where_the_best_particle_was(
+def test_a_robot_that_knows_its_start_is_not_believed_a_meter_off_where_the_best_particle_was(
     world: str, circumstance: str, seed: int
 ) -> None:
     """1.45, 1.51 and 2.32 m with the mean of the particles near the best one, for a beat or two each time."""
@@ -31,7 +31,7 @@ def test_a_robot_that_knows_its_start_is_not_believed_a_metre_off_where_the_best
     assert np.sqrt(np.mean(wrong**2)) < 0.2
 
 
-def test_an_estimate_half_a_metre_and_twenty_degrees_off_is_corrected() -> None:
+def test_an_estimate_half_a_meter_and_twenty_degrees_off_is_corrected() -> None:
     assert measure.wrong_start(measure.SUM, SEEDS).found.all()
     assert measure.wrong_start(measure.PROB, SEEDS).found.all()
 

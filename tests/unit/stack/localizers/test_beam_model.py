@@ -15,7 +15,7 @@ MOUNT = Pose2(0.15, -0.1, 0.5)
 
 
 def stepped(room: OccupancyGrid, pose: Pose2, angle: float, limit: float) -> float:
-    """A ray followed in steps of a millimetre until its cell is not free."""
+    """A ray followed in steps of a millimeter until its cell is not free."""
     reach = np.arange(0, limit, 0.001)
     points = np.column_stack((pose.x + reach * math.cos(angle), pose.y + reach * math.sin(angle)))
     hit = np.flatnonzero(room.values_at(points) != FREE)
@@ -23,7 +23,7 @@ def stepped(room: OccupancyGrid, pose: Pose2, angle: float, limit: float) -> flo
 
 
 @pytest.mark.parametrize("limit", [12.0, 2.0])
-def test_rays_end_where_steps_of_a_millimetre_end(limit: float) -> None:
+def test_rays_end_where_steps_of_a_millimeter_end(limit: float) -> None:
     field = opaque_field(grid(), 100.0)
     beams = select_beams(scan(np.full(BEAMS, 1.0), mount=MOUNT), 40, -1, limit)
     poses = drive(60.0).truth[::400]

@@ -6,7 +6,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.clusters import clusters, spread, summarise
+from simscen.stack.localizers.clusters import clusters, spread, summarize
 from simscen.stack.localizers.kld import bins, split
 from simscen.stack.localizers.particles import Particles
 
@@ -35,7 +35,7 @@ def test_a_narrow_group_is_summed_up_as_any_other(yaw: float) -> None:
     poses[:, 2] = (poses[:, 2] + np.pi) % (2 * np.pi) - np.pi
     weights = np.random.default_rng(6).uniform(0, 1, 500)
     weights /= weights.sum()
-    pose, covariance = summarise(Particles(poses, weights))
+    pose, covariance = summarize(Particles(poses, weights))
     on_the_circle = float(np.angle(weights @ np.exp(1j * poses[:, 2])))
     assert pose[:2] == pytest.approx((weights @ poses[:, :2]).tolist(), abs=1e-9)
     assert abs(np.exp(1j * pose.yaw) - np.exp(1j * on_the_circle)) < 1e-6
@@ -47,7 +47,7 @@ def test_a_narrow_group_is_summed_up_as_any_other(yaw: float) -> None:
 def test_the_pose_is_that_of_the_heavier_group_and_the_covariance_shows_the_other() -> None:
     poses = np.concatenate((group(Pose2(0, 0, 1), 0.02, 300, 1), group(Pose2(4, 0, 1), 0.02, 700, 2)))
     weights = np.concatenate((np.full(300, 0.6 / 300), np.full(700, 0.4 / 700)))
-    pose, covariance = summarise(Particles(poses, weights))
+    pose, covariance = summarize(Particles(poses, weights))
     assert pose == pytest.approx((0, 0, 1), abs=0.01)
     assert covariance[0, 0] == pytest.approx(0.4 * 16, rel=0.01)
 
@@ -55,7 +55,7 @@ def test_the_pose_is_that_of_the_heavier_group_and_the_covariance_shows_the_othe
 def test_a_pose_is_not_averaged_across_the_cut_of_the_circle_to_its_opposite() -> None:
     poses = group(Pose2(1, 2, np.pi), 0.03, 400, 3)
     poses[:, 2] = (poses[:, 2] + np.pi) % (2 * np.pi) - np.pi
-    pose, covariance = summarise(Particles.equal(poses))
+    pose, covariance = summarize(Particles.equal(poses))
     assert abs(abs(pose.yaw) - np.pi) < 0.01
     assert covariance[2, 2] == pytest.approx(0.03**2, rel=0.15)
 
@@ -85,7 +85,7 @@ def between_two(far: float, heavier: float, peak: float, inside: tuple[float, fl
 def test_a_tail_of_lighter_particles_draws_the_pose_as_far_as_the_power_of_their_weights(peak: float) -> None:
     poses = np.concatenate((group(Pose2(0, 0, 0), 0.03, 300, 6), group(Pose2(0.6, 0, 0), 0.1, 300, 7)))
     weights = np.repeat([1.3, 1.0], 300)
-    pose, _ = summarise(Particles(poses, weights / weights.sum()), peak)
+    pose, _ = summarize(Particles(poses, weights / weights.sum()), peak)
     assert pose.x == pytest.approx(between_two(0.6, 1.3, peak, (0.0018, 0.02)), abs=0.01)
 
 
@@ -100,7 +100,7 @@ def test_of_a_wide_even_cloud_the_middle_is_the_answer_whichever_particle_is_bes
     for best in (3, 1500):
         weights = np.ones(len(poses))
         weights[best] += 1e-6
-        pose, covariance = summarise(Particles(poses, weights / weights.sum()), 16.0)
+        pose, covariance = summarize(Particles(poses, weights / weights.sum()), 16.0)
         assert pose == pytest.approx(tuple(poses.mean(axis=0)), abs=1e-3)
         assert np.sqrt(covariance[0, 0]) == pytest.approx(3 / np.sqrt(3), rel=0.05)
 
@@ -110,9 +110,9 @@ def test_weights_that_change_by_a_thousandth_move_the_pose_by_that_much_of_the_c
     """So there is no jump without a scan that says so."""
     poses, chance = wide(), np.random.default_rng(9)
     weights = chance.uniform(1, 3, len(poses))
-    before, _ = summarise(Particles(poses, weights / weights.sum()), peak)
+    before, _ = summarize(Particles(poses, weights / weights.sum()), peak)
     changed = weights * chance.choice([1, 1.001], len(poses))
-    after, _ = summarise(Particles(poses, changed / changed.sum()), peak)
+    after, _ = summarize(Particles(poses, changed / changed.sum()), peak)
     assert before.distance(after) < 0.001 * peak * 3
 
 
@@ -121,7 +121,7 @@ def test_of_two_groups_in_one_cluster_the_pose_goes_from_one_to_the_other_withou
     found, heavier = [], np.geomspace(0.6, 1.7, 81)
     for times in heavier:
         weights = np.repeat([times, 1.0], 500)
-        found.append(summarise(Particles(poses, weights / weights.sum()), 16.0)[0].x)
+        found.append(summarize(Particles(poses, weights / weights.sum()), 16.0)[0].x)
     assert found == pytest.approx([between_two(0.7, times, 16.0, (0.005, 0.005)) for times in heavier], abs=0.01)
     assert found[0] > 0.6
     assert found[-1] < 0.1
@@ -133,11 +133,11 @@ def test_of_a_narrow_cloud_the_pose_is_where_its_weights_are_highest(peak: float
     """Weights fall off as a normal distribution does, which any power leaves where it is."""
     poses = np.random.default_rng(12).uniform((-0.2, -0.2, -0.1), (0.2, 0.2, 0.1), (4000, 3))
     weights = np.exp(-0.5 * (np.square(poses - (0.05, -0.03, 0.02)) / 0.03**2).sum(axis=1))
-    pose, _ = summarise(Particles(poses, weights / weights.sum()), peak)
+    pose, _ = summarize(Particles(poses, weights / weights.sum()), peak)
     assert pose == pytest.approx((0.05, -0.03, 0.02), abs=0.005)
 
 
 def test_a_single_particle_is_the_answer() -> None:
-    pose, covariance = summarise(Particles.equal(np.array([[1.0, 2.0, 3.0]])))
+    pose, covariance = summarize(Particles.equal(np.array([[1.0, 2.0, 3.0]])))
     assert pose == pytest.approx((1, 2, 3))
     assert not covariance.any()

@@ -16,7 +16,7 @@ def some_grid(seed: int, origin: Pose2 = Pose2(-1.3, 0.4, 0.0)) -> OccupancyGrid
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_distances_are_those_between_cell_centres(seed: int) -> None:
+def test_distances_are_those_between_cell_centers(seed: int) -> None:
     grid = some_grid(seed)
     field = DistanceField(grid, grid.cells == OCCUPIED, 0.5, walled=False)
     rows, columns = np.indices(grid.shape).reshape(2, -1)

@@ -28,13 +28,13 @@ def beams_at(pose: Pose2, mount: Pose2 = Pose2(0.1, 0.05, 0.3)) -> Beams:
 
 def probabilities(room: OccupancyGrid, pose: Pose2, beams: Beams) -> list[float]:
     """Table 6.3, one beam after the other, with distances searched by hand."""
-    centres = room.centre_of(np.argwhere(surfaces(room.cells == OCCUPIED)))
+    centers = room.center_of(np.argwhere(surfaces(room.cells == OCCUPIED)))
     result = []
     for end in pose.apply(beams.ends.view(np.float64).reshape(-1, 2)):
         cell = room.cell_of(end[None])
         distance = 2.0
         if room.inside(cell)[0]:
-            distance = min(2.0, float(np.hypot(*(centres - room.centre_of(cell)).T).min()))
+            distance = min(2.0, float(np.hypot(*(centers - room.center_of(cell)).T).min()))
         result.append(Z_HIT * math.exp(-(distance**2) / (2 * SIGMA**2)) + Z_RAND / beams.range_max)
     return result
 

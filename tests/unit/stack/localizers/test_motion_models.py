@@ -42,7 +42,7 @@ def test_driving_backward_is_as_noisy_as_driving_forward() -> None:
     assert np.allclose(forward.std(axis=0), backward.std(axis=0), rtol=0.02)
 
 
-def test_a_translation_below_a_centimetre_has_no_bearing() -> None:
+def test_a_translation_below_a_centimeter_has_no_bearing() -> None:
     """Else odometry that rattles while the robot turns on the spot would look like two large turns."""
     poses = moved(Differential((0.01, 0, 0, 0)), Pose2(0.0, 0.009, 0.0))
     assert poses[:, 2].std() < 1e-12

@@ -37,7 +37,7 @@ def view_of(world: Flatland, robot: RobotModel = ROBOT, size: tuple[float, float
 
 
 def shortest(view: CostmapView, start: Pose2, goal: Pose2, radius: float) -> float:
-    """Length of the shortest way of a disc, by Dijkstra on all cells with 16 neighbours: at most 2.8 % too long."""
+    """Length of the shortest way of a disc, by Dijkstra on all cells with 16 neighbors: at most 2.8 % too long."""
     free = view.distance > radius
     number = np.arange(free.size).reshape(free.shape)
     a, b, w = [], [], []
@@ -74,7 +74,7 @@ def test_plans_are_within_five_percent_of_the_shortest_way() -> None:
     assert max(ratios) < 1.12
 
 
-def test_a_plan_keeps_ten_centimetres_more_than_it_must_where_there_is_room() -> None:
+def test_a_plan_keeps_ten_centimeters_more_than_it_must_where_there_is_room() -> None:
     view = view_of(house())
     path = planner().plan(view, Pose2(1, 1), Pose2(13, 9), 1)
     columns, rows = ((path.points[:, i] - view.origin[i]) / view.resolution for i in (0, 1))
@@ -134,7 +134,7 @@ def test_it_squeezes_through_when_there_is_no_other_way() -> None:
 
 
 @pytest.mark.slow
-def test_a_way_of_hundreds_of_metres_through_many_doors_is_found() -> None:
+def test_a_way_of_hundreds_of_meters_through_many_doors_is_found() -> None:
     world = Flatland().room(60, 20)
     for k in range(1, 15):  # a serpentine: doors at the one end and at the other in turn
         low, high = (0.0, 18.6) if k % 2 else (1.4, 20.0)

@@ -35,7 +35,7 @@ def test_every_shape_is_a_closed_surface_with_outward_normals_and_the_right_volu
 
 
 @pytest.mark.parametrize("radius", [0.05, 0.2, 0.5, 1.0, 2.0])
-def test_facets_stay_within_a_millimetre_of_the_circle(radius):
+def test_facets_stay_within_a_millimeter_of_the_circle(radius):
     assert radius * (1 - math.cos(math.pi / facet_count(radius))) <= 0.001
     ball = triangulate(Sphere(radius))
     middles = ball.vertices[ball.faces].mean(axis=1)

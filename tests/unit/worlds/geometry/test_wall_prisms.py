@@ -20,11 +20,11 @@ def plan(solid):
         [(0, 0), (2, 0.5), (3, 2), (5, 2.2), (5, 2.2), (4.5, 4)],
     ],
 )
-def test_a_wall_is_its_centre_line_thickened_with_mitred_corners(points):
+def test_a_wall_is_its_center_line_thickened_with_mitered_corners(points):
     pieces = [plan(solid) for solid in wall_solids(points, 0.2, 1.0, "w")]
     closed = points[0] == points[-1]
     line = shapely.LinearRing(points) if closed else shapely.LineString(points)
-    expected = line.buffer(0.1, cap_style="flat", join_style="mitre")
+    expected = line.buffer(0.1, cap_style="flat", join_style="miter")
     union = shapely.union_all(pieces)
     assert union.symmetric_difference(expected).area < 1e-9
     assert sum(piece.area for piece in pieces) == pytest.approx(union.area)  # nothing overlaps

@@ -57,10 +57,10 @@ def test_a_cell_is_occupied_exactly_if_a_solid_is_in_it(seed):
 def test_walls_on_cell_edges_fill_just_their_own_cells():
     grid = grid_of(Solid(Box((0.2, 0.1, 1.0)), Pose3(1.1, 2.05, 0.5)))
     rows, columns = np.nonzero(grid.cells == OCCUPIED)
-    centres = grid.centre_of(np.column_stack((rows, columns)))
-    assert len(centres) == 8
-    assert centres.min(axis=0) == pytest.approx([1.025, 2.025])
-    assert centres.max(axis=0) == pytest.approx([1.175, 2.075])
+    centers = grid.center_of(np.column_stack((rows, columns)))
+    assert len(centers) == 8
+    assert centers.min(axis=0) == pytest.approx([1.025, 2.025])
+    assert centers.max(axis=0) == pytest.approx([1.175, 2.075])
 
 
 def test_a_wall_thinner_than_a_cell_is_not_lost():
@@ -107,7 +107,7 @@ def test_an_open_mesh_leaves_only_its_outline():
     assert 40 < (grid.cells == OCCUPIED).sum() < 200
 
 
-def test_a_room_modelled_from_within_keeps_its_floor_free():
+def test_a_room_modeled_from_within_keeps_its_floor_free():
     box = triangulate(Box((3.0, 3.0, 2.0)))
     grid = grid_of(Solid(Mesh(box.vertices, box.faces[:, ::-1]), Pose3(z=1.0)))
     assert grid.values_at(np.array([[0.0, 0.0], [1.5, 0.0]])).tolist() == [FREE, OCCUPIED]
@@ -116,7 +116,7 @@ def test_a_room_modelled_from_within_keeps_its_floor_free():
 def test_what_is_added_to_a_ros_map_is_drawn_into_it_under_its_yaw():
     own = OccupancyGrid(np.full((40, 40), UNKNOWN, np.int8), 0.1, Pose2(1.0, 2.0, math.pi / 6))
     own.cells[5:30, 5:30] = FREE
-    place = own.centre_of(np.array([[20, 10]]))[0]
+    place = own.center_of(np.array([[20, 10]]))[0]
     grid = grid_of(Solid(Box((0.05, 0.05, 1.0)), Pose3(place[0], place[1], 0.5)), grid=own)
     assert np.argwhere(grid.cells == OCCUPIED).tolist() == [[20, 10]]
     assert (grid.cells == UNKNOWN).sum() == (own.cells == UNKNOWN).sum()

@@ -56,11 +56,11 @@ def test_thresholds_are_compared_in_single_precision_and_include_their_own_value
 
 def test_trinary_knows_free_occupied_and_unknown():
     table = cell_values(spec())
-    assert [int(table[grey]) for grey in (0, 89, 90, 205, 206, 255)] == [100, 100, -1, -1, 0, 0]
+    assert [int(table[gray]) for gray in (0, 89, 90, 205, 206, 255)] == [100, 100, -1, -1, 0, 0]
     assert [int(v) for v in cell_values(spec(negate=1))[[0, 49, 50, 165, 166, 255]]] == [0, 0, -1, -1, 100, 100]
 
 
-def test_scale_grades_the_greys_between_the_thresholds():
+def test_scale_grades_the_grays_between_the_thresholds():
     table = cell_values(spec(mode="scale", occupied_thresh=0.9, free_thresh=0.1))
     occupancy = 1 - np.arange(256) / 255
     between = (occupancy > 0.1) & (occupancy < 0.9)
@@ -84,32 +84,32 @@ def test_pixels_that_are_not_opaque_are_unknown_except_in_raw_mode(tmp_path):
     assert load_grid(spec(mode="raw"), tmp_path / "a.png")[0].cells.tolist() == [[0, 0, -1]]
 
 
-def test_colours_count_by_their_luma(tmp_path):
+def test_colors_count_by_their_luma(tmp_path):
     Image.fromarray(np.array([[[255, 0, 0], [0, 255, 0], [0, 0, 255]]], np.uint8)).save(tmp_path / "c.png")
     raw = load_grid(spec(mode="raw"), tmp_path / "c.png")[0].cells.tolist()
     assert raw == [[76, -1, 29]]  # 0.299, 0.587 and 0.114 of 255, rounded down
 
 
 def test_all_formats_and_depths_of_the_same_map_agree(tmp_path):
-    greys = np.random.default_rng(1).integers(0, 256, (7, 5)).astype(np.uint8)
-    image = Image.fromarray(greys)
+    grays = np.random.default_rng(1).integers(0, 256, (7, 5)).astype(np.uint8)
+    image = Image.fromarray(grays)
     for name in ("a.png", "a.bmp", "a.pgm"):
         image.save(tmp_path / name)
     image.convert("RGB").save(tmp_path / "rgb.png")
-    Image.fromarray(greys.astype(np.uint16) * 257).save(tmp_path / "deep.png")
-    pgm(tmp_path / "deep.pgm", b"P5 5 7\n65535\n", (greys.astype(">u2") * 257).tobytes())
-    text = "# a comment\n".join(" ".join(map(str, row)) + "\n" for row in greys)
+    Image.fromarray(grays.astype(np.uint16) * 257).save(tmp_path / "deep.png")
+    pgm(tmp_path / "deep.pgm", b"P5 5 7\n65535\n", (grays.astype(">u2") * 257).tobytes())
+    text = "# a comment\n".join(" ".join(map(str, row)) + "\n" for row in grays)
     pgm(tmp_path / "text.pgm", b"P2\n# made by hand\n5 7 # size\n255\n", text.encode())
-    expected = cell_values(spec())[greys][::-1]
+    expected = cell_values(spec())[grays][::-1]
     for path in sorted(tmp_path.iterdir()):
         assert np.array_equal(load_grid(spec(), path)[0].cells, expected), path.name
 
 
-def test_grey_205_that_counts_as_free_is_worth_a_warning(tmp_path):
+def test_gray_205_that_counts_as_free_is_worth_a_warning(tmp_path):
     path = pgm(tmp_path / "m.pgm", b"P5 2 1 255\n", bytes([205, 0]))
     assert load_grid(spec(free_thresh=0.196), path)[1] == ()
     (note,) = load_grid(spec(free_thresh=0.25), path)[1]
-    assert "1 pixels of grey 205" in note
+    assert "1 pixels of gray 205" in note
     assert load_grid(spec(free_thresh=0.25, mode="raw"), path)[1] == ()
 
 

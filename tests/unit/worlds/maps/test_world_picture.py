@@ -12,14 +12,14 @@ from simscen.worlds.maps.map_walls import walls_of
 from simscen.worlds.maps.world_picture import BODY, FINER, FREE_GROUND, MAPPED_WALL, _view, picture
 
 
-def colour_at(image, built, x, y):
+def color_at(image, built, x, y):
     view = _view(built.map)
     ((column, row),) = view.pixels(np.array([[x, y]]))
     return image.getpixel((int(column / FINER), int(row / FINER)))
 
 
-def near(colour, expected):
-    return all(abs(a - b) < 40 for a, b in zip(colour, expected[:3], strict=True))
+def near(color, expected):
+    return all(abs(a - b) < 40 for a, b in zip(color, expected[:3], strict=True))
 
 
 def test_the_picture_shows_walls_ground_and_bodies_where_they_are():
@@ -29,9 +29,9 @@ def test_the_picture_shows_walls_ground_and_bodies_where_they_are():
     image = picture(built, 0.3)
     assert max(image.size) == 1200
     assert image.size[0] / image.size[1] == pytest.approx(8 / 6, rel=0.01)
-    assert near(colour_at(image, built, 2, 1), MAPPED_WALL)
-    assert near(colour_at(image, built, 0, -1), FREE_GROUND)
-    assert near(colour_at(image, built, -1.5, 0.2), BODY)
+    assert near(color_at(image, built, 2, 1), MAPPED_WALL)
+    assert near(color_at(image, built, 0, -1), FREE_GROUND)
+    assert near(color_at(image, built, -1.5, 0.2), BODY)
 
 
 def test_a_map_with_a_yaw_is_drawn_turned_over_its_own_walls():
@@ -40,9 +40,9 @@ def test_a_map_with_a_yaw_is_drawn_turned_over_its_own_walls():
     grid = OccupancyGrid(cells, 0.1, Pose2(1.0, 2.0, math.pi / 5))
     built = build(World("w", tuple(walls_of(grid, 1.0)), grid=grid), 0.3)
     image = picture(built, 0.3)
-    middle, beside = grid.centre_of(np.array([[15, 45], [5, 45]]))
-    assert near(colour_at(image, built, *middle), MAPPED_WALL)
-    assert near(colour_at(image, built, *beside), FREE_GROUND)
+    middle, beside = grid.center_of(np.array([[15, 45], [5, 45]]))
+    assert near(color_at(image, built, *middle), MAPPED_WALL)
+    assert near(color_at(image, built, *beside), FREE_GROUND)
 
 
 def test_an_empty_world_has_a_picture_too():

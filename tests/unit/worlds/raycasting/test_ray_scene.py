@@ -96,7 +96,7 @@ def test_ten_thousand_random_rays_agree_with_pybullet_moving_bodies_included(bul
         assert_agree(ours, theirs)
 
 
-def test_a_world_ten_kilometres_away_is_as_exact_as_one_at_the_origin():
+def test_a_world_ten_kilometers_away_is_as_exact_as_one_at_the_origin():
     shift = (9900.0, -9900.0, 0.0)
     far = [Solid(s.shape, Pose3(s.pose.x + shift[0], s.pose.y + shift[1], *s.pose[2:]), s.name) for s in ROOM]
     origins, directions = random_rays(2000, 2, (-4.5, -4.5, 0.05), (4.5, 4.5, 1.9))

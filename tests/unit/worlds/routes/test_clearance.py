@@ -41,7 +41,7 @@ def test_clearance_agrees_with_shapely_outside_and_is_negative_inside(seed):
 def test_free_cells_are_those_whose_middle_keeps_the_distance(seed, distance):
     mesh, _ = scattered(seed)
     field = clearance_field(mesh, empty_grid(BOUNDS, 0.05, "w"), BODY)
-    middles = field.grid.centre_of(np.argwhere(np.ones(field.grid.shape, dtype=bool)))
+    middles = field.grid.center_of(np.argwhere(np.ones(field.grid.shape, dtype=bool)))
     expected = (field.exact(middles) >= distance).reshape(field.grid.shape)
     assert np.array_equal(field.free_cells(distance), expected)
 

@@ -139,7 +139,7 @@ def test_lengths_are_given_from_stop_to_stop_also_beyond_the_bounds():
     assert [leg.length for leg in legs] == pytest.approx([5.0, 9.0, math.inf])
 
 
-def test_a_house_of_twenty_metres_takes_a_fraction_of_a_second():
+def test_a_house_of_twenty_meters_takes_a_fraction_of_a_second():
     rng = np.random.default_rng(1)
     walls = [box(x, y, *((3.0, 0.1) if k % 2 else (0.1, 3.0))) for k, (x, y) in enumerate(rng.uniform(-9, 9, (60, 2)))]
     begin = time.process_time()

@@ -147,7 +147,7 @@ def _matrix(pose):
     return result
 
 
-def test_quaternions_are_read_as_xyzw_and_normalised(load):
+def test_quaternions_are_read_as_xyzw_and_normalized(load):
     world = load(model(f"<link name='a'><pose rotation_format='quat_xyzw'>1 2 3 0 0 2 2</pose>{BOX}</link>"))
     np.testing.assert_allclose(world.solids[0].pose, (1, 2, 3, 0, 0, math.sqrt(0.5), math.sqrt(0.5)))
 

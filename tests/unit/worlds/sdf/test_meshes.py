@@ -78,7 +78,7 @@ class TestCollada:
         shape = mesh(dae(geometry("g", [(0, 0, 0), (100, 0, 0), (0, 0, 50)]), unit='<unit meter="0.01"/>', up="Y_UP"))
         np.testing.assert_allclose(corners(shape), [(0, 0, 0), (1, 0, 0), (0, 0, 0.5)], atol=1e-12)
 
-    def test_a_missing_unit_is_a_metre(self, mesh):
+    def test_a_missing_unit_is_a_meter(self, mesh):
         np.testing.assert_allclose(corners(mesh(dae(unit="")))[1], (1, 0, 0))
 
     def test_nodes_move_what_they_hold(self, mesh):
@@ -100,13 +100,13 @@ class TestCollada:
         a, b, c = corners(mesh(dae(nodes=node("part", transform="<scale>1 1 -1</scale>"))))
         assert np.cross(b - a, c - a)[2] < 0
 
-    def test_a_submesh_is_chosen_by_the_name_of_its_node_and_centred(self, mesh):
+    def test_a_submesh_is_chosen_by_the_name_of_its_node_and_centered(self, mesh):
         nodes = node("left") + node("right", "h")
         both = geometry("g") + geometry("h", [(10, 0, 0), (14, 0, 0), (10, 2, 0)])
         chosen = mesh(dae(both, nodes), "<submesh><name>right</name></submesh>")
         assert chosen.vertices[:, 0].min() == 10
-        centred = mesh(dae(both, nodes), "<submesh><name>right</name><center>true</center></submesh>")
-        np.testing.assert_allclose(centred.vertices.min(axis=0), (-2, -1, 0))
+        centered = mesh(dae(both, nodes), "<submesh><name>right</name><center>true</center></submesh>")
+        np.testing.assert_allclose(centered.vertices.min(axis=0), (-2, -1, 0))
         assert len(mesh(dae(both, nodes)).faces) == 2
 
     def test_an_unknown_submesh_is_refused_with_those_there_are(self, broken):

@@ -1,4 +1,4 @@
-"""Worlds as they are published: addresses of Fuel, neighbours of missing files, things parked far away."""
+"""Worlds as they are published: addresses of Fuel, neighbors of missing files, things parked far away."""
 
 import pytest
 

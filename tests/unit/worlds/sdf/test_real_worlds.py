@@ -70,7 +70,7 @@ def test_concave_walls_are_not_filled(data: Path) -> None:
     scene = RayScene(fuse(walls))
     ways = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
     distances = scene.cast(np.tile([[0.0, 0.0, 1.0]], (4, 1)), ways)
-    # The inner faces, in centimetres, as they stand in the DAE: 685.14, 686.14, 1032.08, 1032.08.
+    # The inner faces, in centimeters, as they stand in the DAE: 685.14, 686.14, 1032.08, 1032.08.
     np.testing.assert_allclose(distances, [6.8514, 6.8614, 10.3208, 10.3208], atol=0.001)
 
 
@@ -88,7 +88,7 @@ def test_the_warehouse_map_lies_on_the_warehouse(data: Path) -> None:
     assert np.mean(away[cells[:, 0], cells[:, 1]] < 0.15) >= 0.95
 
 
-def test_units_are_honoured_and_up_axis_is_not_as_in_gazebo(data: Path) -> None:
+def test_units_are_honored_and_up_axis_is_not_as_in_gazebo(data: Path) -> None:
     """The hexagon says inches and Y_UP and stands upright along z: 0.55 x 1.4 m wide, up to 1.4 m high."""
     world = _sandbox(data)
     hand = next(solid for solid in world.solids if solid.name.endswith("left_hand"))

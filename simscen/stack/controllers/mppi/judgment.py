@@ -22,7 +22,7 @@ NAV2: tuple[CriticName, ...] = (
 )
 
 
-class Judgement:
+class Judgment:
     """Adds up what the enabled critics of a specification say."""
 
     def __init__(self, spec: MppiSpec, omni: bool) -> None:

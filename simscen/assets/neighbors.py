@@ -5,21 +5,21 @@ from pathlib import Path, PurePath
 MESHES = (".dae", ".stl", ".obj")
 
 
-def neighbour(folder: Path, path: Path) -> str | None:
+def neighbor(folder: Path, path: Path) -> str | None:
     """The file or folder below `folder` that `path` probably means, relative to it; None when nothing comes near.
 
     Symbolic links are not followed: they may lead to where nobody is to be told what there is.
     """
     here, parts = folder, path.relative_to(folder).parts if path.is_relative_to(folder) else ("..",)
     for part in parts:
-        found = None if part == ".." else _spelt(here, part)
+        found = None if part == ".." else _spelled(here, part)
         if found is None or (here / found).is_symlink():
             return None
         here /= found
     return here.relative_to(folder).as_posix()
 
 
-def _spelt(folder: Path, name: str) -> str | None:
+def _spelled(folder: Path, name: str) -> str | None:
     """The entry of a folder with this name; else in another case, else the mesh of this name in another format."""
     try:
         entries = sorted(entry.name for entry in folder.iterdir())
