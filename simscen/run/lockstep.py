@@ -58,8 +58,10 @@ class RobotUnderTest:
         """Sample the true state if a sample is due, and report new collisions."""
         self.is_due = tick == self.next_tick
         if self.is_due:
-            self.next_tick += self.schedule.until_next(tick)
-        is_sampled = tick % self.truth_period == 0
+            self.next_tick = tick + self.schedule.until_next(tick)
+            if tick < self.end_condition.limit < self.next_tick:
+                self.next_tick = self.end_condition.limit
+        is_sampled = tick % self.truth_period == 0 or tick == self.end_condition.limit
         if self.stage.is_observed:
             self._truth = truth = self.robot.truth() if is_sampled else None
             self.stage.begin_beat(truth, self.is_due)
@@ -110,6 +112,7 @@ class RunSetup:
 def run_lockstep(setup: RunSetup) -> Event:
     """Simulate a run to its end and return the event that ended it; each beat goes to the logs of its robot."""
     simulation, robots, directors = setup.simulation, setup.robots, setup.directors
+    time_limit = robots[0].end_condition.limit
     while True:
         tick = simulation.tick
         for robot in robots:
@@ -117,7 +120,7 @@ def run_lockstep(setup: RunSetup) -> Event:
         for director in directors:
             director.direct()
 
-        may_end = tick % setup.truth_period == 0
+        may_end = tick % setup.truth_period == 0 or tick == time_limit
         for robot in robots:
             if robot.is_due:
                 robot.decide(tick)

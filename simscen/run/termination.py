@@ -12,13 +12,14 @@ TIME_LIMIT = "time limit"
 class EndCondition:
     """Condition that ends a robot's part of a run: some time after its navigation task, or at the time limit.
 
-    A goal that an event sends in the meantime withdraws the end. A run ends at a truth sample, so that all samples are
-    evenly spaced.
+    A goal that an event sends in the meantime withdraws the end. A run ends at a regular sample of the truth, or
+    exactly at the time limit, where an additional sample is taken.
     """
 
     def __init__(self, clock: Clock, time_limit: float, linger: float, idle: bool = False) -> None:
         """`time_limit` and `linger` in seconds. An `idle` robot has no task at first and does not delay the end."""
-        self._limit = clock.ticks(time_limit)
+        self.limit = clock.ticks(time_limit)
+        """Tick of the time limit."""
         self._linger = clock.ticks(linger)
         self._over: int | None = 0 if idle else None
         self.earliest_tick = self._earliest()
@@ -34,13 +35,13 @@ class EndCondition:
         self.earliest_tick = self._earliest()
 
     def _earliest(self) -> int:
-        return self._limit if self._over is None else min(self._over, self._limit)
+        return self.limit if self._over is None else min(self._over, self.limit)
 
     def reached(self, tick: int) -> Event | None:
         """Return the event that ends the robot's part at this tick, or None. The tick must have a truth sample."""
         if self._over is not None and tick >= self._over:
             return Event(tick, EventKind.RUN_ENDED, "navigation ended")
-        if tick >= self._limit:
+        if tick >= self.limit:
             return Event(tick, EventKind.RUN_ENDED, TIME_LIMIT)
         return None
 

@@ -10,6 +10,10 @@ from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, Sequen
 from simscen.spec.choice import Choice
 from simscen.spec.places import PoseSpec
 
+HINTS_FOR_BOUNDS: dict[tuple[Key, ...], str] = {
+    ("physics", "truth_rate"): "criteria are judged at these samples; lower rates miss short violations",
+}
+"""Reasons for bounds that a user may not expect, by the path of the value."""
 MAX_SEARCH_DEPTH = 3
 """Levels below a mapping in which a misplaced key is searched."""
 

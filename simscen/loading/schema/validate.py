@@ -101,6 +101,8 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
     message = messages.translate_error(kind, error.get("ctx", {}), node, error["msg"])
     if not message.hint and kind in ("model_type", "model_attributes_type", "list_type"):
         message = message._replace(hint=common_mistakes.hint_for_wrong_type(kind, model, loc, node))
+    elif not message.hint and message.code == "SC013":
+        message = message._replace(hint=common_mistakes.HINTS_FOR_BOUNDS.get(loc, ""))
     return _problem(value_position(tree, loc), *message)
 
 

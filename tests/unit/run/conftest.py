@@ -30,6 +30,8 @@ def play(tmp_path_factory: pytest.TempPathFactory):
         folder = tmp_path_factory.mktemp("play")
         lines = {line.split(":")[0]: line for line in SCENARIO.splitlines()}
         lines |= {key: f"{key}: {value}" for key, value in instead.items()}
+        if "robots" in instead:
+            del lines["robot"], lines["goals"]
         (folder / "room.world.yaml").write_text(room)
         (folder / "a.scenario.yaml").write_text("\n".join(lines.values()) + "\n" + extra)
         return simulate(prepare(load_scenario(folder / "a.scenario.yaml", folder)), seed).trace
