@@ -79,11 +79,15 @@ def _travel(stage: Stage, name: str, target: Pose2, duration: float, state: str)
     if motion is not None and _share(motion[0].poses[-1], target, closed, opened) < SHUT:
         return Effect(False, f"{name} {verb} {state} already")
     lasts = duration if left > 1 - SHUT else duration * left
-    steps = STEPS if verb == "swings" else 1
-    parts = [step / steps for step in range(steps + 1)]
-    poses = tuple(_between(here, target, part) for part in parts)
-    stage.move(name, MotionPath(tuple(part * lasts for part in parts), poses))
+    stage.move(name, panel_path(here, target, lasts))
     return Effect(True, f"{name} {verb} {state}")
+
+
+def panel_path(here: Pose2, target: Pose2, seconds: float) -> MotionPath:
+    """Return the path of a door's panel from one pose to another."""
+    steps = STEPS if wrap(target.yaw - here.yaw) else 1
+    parts = [step / steps for step in range(steps + 1)]
+    return MotionPath(tuple(part * seconds for part in parts), tuple(_between(here, target, part) for part in parts))
 
 
 def _share(here: Pose2, there: Pose2, closed: Pose2, opened: Pose2) -> float:

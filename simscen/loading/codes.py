@@ -50,6 +50,7 @@ CODES = {
     "SC302": "No way leads to a goal: a room is sealed, or a gap is narrower than the robot.",
     "SC303": "A bound cannot be kept: the way to the goals takes longer, or is longer, than it allows.",
     "SC304": "Something would appear inside something else, or on the robot.",
+    "SC305": "Something would move so fast that contact with the robot could be missed between two physics ticks.",
     "SC310": "Something in an SDF file cannot be used.",
     "SC311": "Something in a world or map deserves a look; with --lenient, also what was left out of it.",
     "SC312": "A world holds more than one world file of our own can.",

@@ -13,8 +13,6 @@ from simscen.sim.inertia import GRAVITY
 
 FALLING = 0.1 * GRAVITY
 """m/s that what rests may gain within a tenth of a second."""
-JUMP = 50.0
-"""A script that asks for more m/s than this sets its body down elsewhere, rather than hurl it through the world."""
 
 Vector = tuple[float, float, float]
 Placing = tuple[Vector, tuple[float, float, float, float]]
@@ -92,8 +90,6 @@ class Actor:
         """The velocity in m/s and rad/s that leads along its path to the next tick."""
         here, there = self.at(tick, rate), self.at(tick + 1, rate)
         vx, vy = (there.x - here.x) * rate, (there.y - here.y) * rate
-        if math.hypot(vx, vy) > JUMP:
-            return (0.0, 0.0, 0.0), 0.0
         return (vx, vy, 0.0), wrap(there.yaw - here.yaw) * rate
 
     def width(self, pose: Pose3) -> float:

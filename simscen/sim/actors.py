@@ -7,8 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 
+from simscen.core.errors import RunError
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.geometry.motion_paths import SweptSegment, swept_segments, top_speed
+from simscen.core.geometry.motion_paths import (
+    MAX_STEP_M,
+    SweptSegment,
+    largest_step,
+    swept_segments,
+    too_fast,
+    top_speed,
+)
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.sim import engine
 from simscen.sim.about import About, look_about
@@ -80,6 +88,8 @@ class Actors:
 
     def _made(self, body: Body, tick: int, led: bool = False) -> Actor:
         radius, height = reach(body.solids)
+        if body.path is not None and (step := largest_step(body.path, 1 / self._rate, radius)) > MAX_STEP_M:
+            raise RunError("invalid", too_fast(body.name, step))
         stays = (SweptSegment(body.pose.x, body.pose.y, body.pose.x, body.pose.y),)
         on, speed = (stays, 0.0) if body.path is None else (swept_segments(body.path), top_speed(body.path, radius))
         hollow = engine.hollow(body.solids, body.mass > 0 and body.path is None)

@@ -1,7 +1,9 @@
 """Where something on a scripted path is at a time."""
 
+import itertools
 import math
 from bisect import bisect_right
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from simscen.core.geometry import Pose2, Pose3, wrap
@@ -9,6 +11,12 @@ from simscen.core.geometry.shapes import MotionPath
 
 SMOOTH_PEAK_SPEED_RATIO = 1.5
 """How much faster than evenly something is in the middle of a way that it is eased along."""
+MAX_STEP_M = 0.1
+"""Longest way that any part of a scripted body may move in a tick.
+
+Contact is found once a tick, so that a faster body could pass through a robot unnoticed. All robots are wider than
+this.
+"""
 Step = tuple[float, float, float]
 _made = tuple.__new__  # a pose without the calls of its class
 
@@ -105,6 +113,48 @@ def top_speed(path: MotionPath, reach: float = 0.0) -> float:
     if path.mode == "loop" and _meters(_step(path.poses[-1], path.poses[0]), reach) > 0:
         return math.inf
     return max(speeds, default=0.0)
+
+
+def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
+    """Return the longest way in m that anything within `reach` of the origin moves within `seconds`, at most."""
+    legs = list(zip(_steps(path), itertools.pairwise(path.times), range(len(path.times)), strict=False))
+    lengths = [
+        _speed(path, leg, reach) * (end - begin) if end > begin else _meters(step, reach)
+        for step, (begin, end), leg in legs
+    ]
+    durations = [end - begin for _, (begin, end), _ in legs]
+    if path.mode == "loop":
+        lengths, durations = [*lengths, _meters(_step(path.poses[-1], path.poses[0]), reach)], [*durations, 0.0]
+    if path.mode == "back_and_forth":
+        lengths, durations = lengths + lengths[::-1], durations + durations[::-1]
+    if path.mode != "once" and (lap := sum(durations)) > 0:  # repeated, so that steps across the end count
+        laps = 2 + int(seconds / lap)
+        lengths, durations = lengths * laps, durations * laps
+    times = list(itertools.accumulate(durations, initial=0.0))
+    ways = list(itertools.accumulate(lengths, initial=0.0))
+    after = (_interpolate(time + seconds, times, ways) - way for time, way in zip(times, ways, strict=True))
+    before = (way - _interpolate(time - seconds, times, ways) for time, way in zip(times, ways, strict=True))
+    return max(*after, *before)
+
+
+def too_fast(name: str, step: float) -> str:
+    """Return the message about a scripted body that moves `step` meters in one tick."""
+    return (
+        f"`{name}` moves up to {step:.2g} m in one physics tick; contact with the robot can be missed if it moves more "
+        f"than {MAX_STEP_M:g} m"
+    )
+
+
+def _steps(path: MotionPath) -> list[Step]:
+    return [_step(begin, end) for begin, end in itertools.pairwise(path.poses)]
+
+
+def _interpolate(time: float, times: Sequence[float], values: Sequence[float]) -> float:
+    if time <= times[0] or time >= times[-1]:
+        return values[0] if time <= times[0] else values[-1]
+    k = bisect_right(times, time)
+    part = (time - times[k - 1]) / (times[k] - times[k - 1])
+    return values[k - 1] + part * (values[k] - values[k - 1])
 
 
 class SweptSegment(NamedTuple):

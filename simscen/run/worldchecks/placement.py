@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations, product
 
+from simscen.actions.doors import CloseDoor, OpenDoor, panel_path
 from simscen.actions.move import Move
 from simscen.actions.pedestrian import Pedestrian
 from simscen.actions.robot import Kidnap
@@ -12,11 +13,14 @@ from simscen.actions.teleport import Teleport
 from simscen.core.environment.world_model import Polygon
 from simscen.core.errors import Problem
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.geometry.shapes import Solid
+from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast
+from simscen.core.geometry.shapes import MotionPath, Solid
 from simscen.core.messages.navigation import Goal
 from simscen.loading.checks.registry import Finding, Keys
+from simscen.loading.yaml.tree import MappingNode
 from simscen.run.worldchecks.expected_failures import expects_start_failure
 from simscen.run.worldchecks.scene import SILL_M, START, TOUCH_M, WORLD, Scene
+from simscen.sim.outline import reach
 from simscen.spec.motions import Motion
 from simscen.triggers.time import Time
 from simscen.triggers.trigger import Trigger
@@ -166,6 +170,37 @@ def check_motions(scene: Scene) -> Iterator[Finding]:
             if solid := first_blocking(scene.world.solids, (x, y), TOUCH_M, scene.z_range):
                 message = f'{what} ({x:g}, {y:g}) is inside obstacle "{solid}"'
                 yield Finding((*keys, *below), message, "move it to free space: walls do not stop scripted motions")
+
+
+@WORLD.check("SC305")
+def check_motion_speeds(scene: Scene) -> Iterator[Finding]:
+    """Find scripted motions so fast that contact with the robot could be missed between two ticks."""
+    tick = 1 / scene.loaded.spec.physics.tick_rate
+    for keys, tree, name, path, solids in _motions(scene):
+        step = largest_step(path, tick, reach(solids)[0] if solids else 0.0)
+        if step > MAX_STEP_M:
+            hint = f"make it {math.ceil(10 * step / MAX_STEP_M) / 10:g} times slower, or raise `physics.tick_rate`"
+            yield Finding(keys, too_fast(name, step), hint, tree=tree)
+
+
+def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, MotionPath, Sequence[Solid]]]:
+    """Yield keys, their tree, name, path and solids of all scripted motions, as far as they are known before a run."""
+    bodies = {body.name: body for body in scene.world.bodies}
+    file = scene.loaded.world
+    for index, thing in enumerate(file.spec.objects if file.spec is not None else ()):
+        if thing.move is not None and (path := bodies[thing.name].path) is not None:
+            yield ("objects", index, "move"), file.tree, thing.name, path, bodies[thing.name].solids
+    spawned = {action.name: action for _, _, action in scene.actions if isinstance(action, Spawn)}
+    for keys, _, action in scene.actions:
+        if isinstance(action, OpenDoor | CloseDoor) and action.name in scene.world.doors:
+            path = panel_path(*scene.world.doors[action.name], action.duration)
+            key = "duration" if "duration" in action.model_fields_set else "name"
+            yield (*keys, key), None, action.name, path, bodies[action.name].solids
+        elif isinstance(action, Move) and action.name in bodies:
+            body = bodies[action.name]
+            yield (*keys, "name"), None, action.name, action.path(body.pose.plane), body.solids
+        elif isinstance(action, Move) and (spawn := spawned.get(action.name)) is not None and spawn.pose is not None:
+            yield (*keys, "name"), None, action.name, action.path(spawn.pose.pose), (spawn.solid(action.name),)
 
 
 def motion_stops(motion: Motion) -> list[MotionStop]:

@@ -1,12 +1,15 @@
 """Who hit whom, when and how hard."""
 
+import math
 import random
 
 import pytest
 from playground import box
 
+from simscen.core.errors import RunError
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.motion_paths import MAX_STEP_M
 from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
 
 RADIUS = 0.22
@@ -124,3 +127,32 @@ def test_no_contact_is_missed_compared_with_asking_after_every_tick(simulate, mo
     always = run()
     assert started(always[0])
     assert gated == always
+
+
+THIN = (box("plate", 0, 0, 1.0, 0.01, 0.5),)
+FAST_M_S = 0.95 * MAX_STEP_M * 240
+
+
+@pytest.mark.parametrize("offset_ticks", [0.0, 0.25, 0.5, 0.75])
+def test_a_thin_plate_at_the_greatest_speed_does_not_pass_through_the_robot_unnoticed(simulate, offset_ticks):
+    start = offset_ticks / 240
+    path = MotionPath((0.0, 4 / FAST_M_S), (Pose2(0, -2, 0), Pose2(0, 2, 0)), start=start)
+    simulation = simulate(bodies=[Body("plate", THIN, Pose3(0.0, -2.0), path=path)])
+    assert [hit.name for hit in started(collisions(simulation, 120))] == ["plate"]
+
+
+@pytest.mark.parametrize("offset_ticks", [0.0, 0.25, 0.5, 0.75])
+def test_a_thin_plate_that_turns_at_the_greatest_speed_does_not_pass_the_robot_unnoticed(simulate, offset_ticks):
+    seconds = math.pi / 2 * 0.51 / FAST_M_S
+    path = MotionPath((0.0, seconds), (Pose2(0, -0.55, 0), Pose2(0, -0.55, math.pi / 2)), start=offset_ticks / 240)
+    simulation = simulate(bodies=[Body("plate", THIN, Pose3(0.0, -0.55), path=path)])
+    assert [hit.name for hit in started(collisions(simulation, 120))] == ["plate"]
+
+
+def test_a_scripted_body_that_could_pass_through_the_robot_between_two_ticks_is_an_error(simulate):
+    turn = MotionPath((0.0, 0.004), (Pose2(0.5, -0.5, 0), Pose2(0.5, -0.5, math.pi / 2)))
+    with pytest.raises(RunError, match="`plate` moves up to 0.79 m in one physics tick"):
+        simulate(bodies=[Body("plate", THIN, Pose3(0.5, -0.5), path=turn)])
+    simulation = simulate(bodies=[Body("plate", THIN, Pose3(0.5, -0.5))])
+    with pytest.raises(RunError, match="`plate` moves up to"):
+        simulation.move("plate", turn)

@@ -26,11 +26,14 @@ NAMES = [f"thing {number}" for number in range(10)]
 def wild_path(chance, start, wide):
     """At up to 5 m/s, from a place."""
     places = [(start[0] + chance.gauss(0, wide), start[1] + chance.gauss(0, wide)) for _ in range(3)]
+    mode = chance.choice(["once", "loop", "back_and_forth"])
     poses = [Pose2(*start), *(Pose2(*place, chance.uniform(-3, 3)) for place in places)]
+    if mode == "loop":
+        poses[-1] = poses[0]
     times = [0.0]
     for here, there in pairwise(poses):
-        times.append(times[-1] + math.dist(here[:2], there[:2]) / chance.choice([0.5, 2.0, 5.0]) + 0.05)
-    mode, ease = chance.choice(["once", "loop", "back_and_forth"]), chance.choice(["linear", "smooth", "spline"])
+        times.append(times[-1] + math.dist(here[:2], there[:2]) / chance.choice([0.5, 2.0, 5.0]) + 0.3)
+    ease = chance.choice(["linear", "smooth", "spline"])
     return MotionPath(tuple(times), tuple(poses), mode, chance.choice([0.0, 1.0]), ease)
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from simscen.core.geometry import Pose2, Pose3, wrap
-from simscen.core.geometry.motion_paths import PathSampler, pose_at, swept_segments, top_speed
+from simscen.core.geometry.motion_paths import PathSampler, largest_step, pose_at, swept_segments, top_speed
 from simscen.core.geometry.shapes import MotionPath
 
 THERE = (Pose2(0, 0, 0), Pose2(2, 0, 0), Pose2(2, 1, math.pi / 2))
@@ -150,3 +150,34 @@ def beside(x, y, way):
     start, along = complex(way.x, way.y), complex(way.to_x - way.x, way.to_y - way.y)
     share = (complex(x, y) - start) / along
     return abs(complex(x, y) - start - min(max(share.real, 0.0), 1.0) * along)
+
+
+def swept(path, begin, end, reach):
+    """How far the fastest of some points moves along its path from one time to another, by small steps."""
+    poses = [pose_at(path, begin + (end - begin) * k / 50) for k in range(51)]
+    points = [(reach * math.cos(a), reach * math.sin(a)) for a in np.linspace(0, 2 * math.pi, 12)] + [(0.0, 0.0)]
+    tracks = [[pose.compose(Pose2(*point, 0.0)) for pose in poses] for point in points]
+    return max(sum(a.distance(b) for a, b in itertools.pairwise(track)) for track in tracks)
+
+
+@pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
+@pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
+def test_no_part_ever_moves_farther_than_the_largest_step(mode, ease):
+    chance = random.Random(f"{mode} {ease}")
+    for _ in range(40):
+        count, reach = chance.randint(2, 6), chance.uniform(0, 1)
+        times = tuple(itertools.accumulate((chance.choice([0.01, 0.3, 1.0]) for _ in range(count - 1)), initial=0.0))
+        poses = [Pose2(*(chance.uniform(-2, 2) for _ in range(3))) for _ in range(count)]
+        poses[-1] = poses[0] if mode == "loop" else poses[-1]
+        path, step = MotionPath(times, tuple(poses), mode, 0.0, ease), chance.choice([0.005, 0.1, 2.0])
+        most = largest_step(path, step, reach)
+        for _ in range(20):
+            begin = chance.uniform(-step, 2 * times[-1])
+            assert swept(path, begin, begin + step, reach) <= most + 1e-9
+
+
+def test_the_largest_step_of_even_motion_is_speed_times_time():
+    assert largest_step(MotionPath((0.0, 2.0, 3.0), THERE), 0.1) == pytest.approx(0.1)
+    turn = MotionPath((0.0, 0.004), (Pose2(0, 0, 0), Pose2(0, 0, math.pi / 2)))
+    assert largest_step(turn, 1 / 240, 0.5) == pytest.approx(math.pi / 4)
+    assert largest_step(MotionPath((0.0,), THERE[:1]), 1.0) == 0.0
