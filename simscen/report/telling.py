@@ -13,9 +13,10 @@ from simscen.core.records.session_events import (
     SessionStarted,
 )
 from simscen.report.compared import compared
-from simscen.report.line import Line
+from simscen.report.line import Line, Piece
 from simscen.report.lines import Naming, closing, finished, opening
 from simscen.report.recap import again, equal_logs, interrupted, slowest
+from simscen.report.text import one_line
 from simscen.report.wrap import wrapped
 
 UNDER_WAY, NOT_BEGUN = "interrupted", "not-run"
@@ -32,6 +33,7 @@ class Telling:
         self.naming = Naming()
         self._slow, self._columns = slow, columns
         self._runs: list[RunFinished] = []
+        self._warned: set[str] = set()
 
     def __call__(self, event: SessionEvent) -> list[Line]:
         """What the event is worth."""
@@ -46,10 +48,18 @@ class Telling:
                 self._runs.append(event)
                 if _kind(event) not in (UNDER_WAY, NOT_BEGUN):
                     yield from finished(event, self.naming)
+                    yield from self._new_warnings(event)
             case SessionFinished():
                 yield from self._end(event)
             case RunStarted() | RunProgress():
                 pass
+
+    def _new_warnings(self, run: RunFinished) -> Iterator[Line]:
+        """Warnings of the external stack, each once in a session."""
+        for text in run.warnings:
+            if text not in self._warned:
+                self._warned.add(text)
+                yield (Piece(f"      warning: {one_line(text)}", "odd"),)
 
     def _end(self, event: SessionFinished) -> Iterator[Line]:
         kinds = Counter(_kind(run) for run in self._runs)

@@ -1,5 +1,5 @@
-"""The adapter between the stack protocol and a ROS 2 graph: it runs under the user's own ROS Python, 3.8 or newer.
+"""Adapter between the stack protocol and a ROS 2 graph. It runs under the user's own ROS Python, 3.8 or newer.
 
-Nothing here imports anything of simscen but `simscen.peer`, nor any package but rclpy and messages. `start.py` is what
-is run; it makes this folder importable without the rest of simscen.
+Modules in this folder import nothing of simscen except `simscen.peer`, and no packages except rclpy and message
+packages. `start.py` is the program; it makes this folder importable without the rest of simscen.
 """

@@ -1,257 +1,354 @@
-"""The stack that simscen talks to: a ROS graph behind the calls of the stack protocol."""
+"""The ROS graph as a stack: gets the graph ready, publishes sensor data, sends goals, returns commands.
+
+**Getting ready.** Nodes such as Nav2's become active only while time advances and sensor data arrive: a costmap waits
+for odom -> base_link, a planner for the pose on the map. The first step brings the readings of the robot at its start.
+If the graph is not complete by then, the adapter publishes these readings again and again with advancing time while the
+simulation waits, until nothing is missing. So the time of the graph is ahead of the run's time (`Graph.offset_ns`).
+"""
 
 import math
 import os
+import sys
 import time
 from importlib.metadata import version
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 
 from simscen.peer.goals import Goal, Goals
-from simscen.ros2 import cdr, interfaces
-from simscen.ros2.beat import CLOCK, Lockstep, Message, Paced
-from simscen.ros2.belief import PLAN, Belief
-from simscen.ros2.failure import Failure
-from simscen.ros2.goals import Door, Doors, Failed, Now
-from simscen.ros2.graph import Graph, Heard, Topic
-from simscen.ros2.launched import Launched
-from simscen.ros2.names import Names
-from simscen.ros2.options import Options
+from simscen.ros2.goal_sender import ACTIONS, Failed, GoalSender, GoalSenders, StackState
+from simscen.ros2.graph import CLOCK, LATCHED, Graph, Received, Topic
+from simscen.ros2.launch import LaunchedCommand
+from simscen.ros2.lockstep import Lockstep, Message, Paced
+from simscen.ros2.messages import NANOSECONDS, find_type, read_twist, write_twist
+from simscen.ros2.node_barrier import NodeBarrier
+from simscen.ros2.options import AdapterError, Options, TopicNames
+from simscen.ros2.pose_estimate import PLAN, PoseEstimate
 from simscen.ros2.readiness import COMMAND, TWIST_STAMPED, Readiness
-from simscen.ros2.rest import Rest
 
-HEARD = {
+SUBSCRIPTIONS = {
     "/plan": "nav_msgs/msg/Path",
     "/amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
     "/particle_cloud": "nav2_msgs/msg/ParticleCloud",
     "/tf": "tf2_msgs/msg/TFMessage",
 }
-"""What is heard of the stack besides its commands."""
-THROUGH = "navigate_through_poses"
-BASE, INITIAL_POSE = "base_link", "/initialpose"
-ZERO = (0.0,) * 6
+"""Topics of the stack besides its commands."""
+THROUGH_POSES = "navigate_through_poses"
+BASE_FRAME, INITIAL_POSE = "base_link", "/initialpose"
+STOP = (0.0,) * 6
+PREPARE_S = 10.0
+"""Longest wait for a graph without sensor data."""
+PREPARE_SETTLE_S = 2.0
+"""Additional time without new nodes after which an incomplete graph probably needs sensor data."""
+STEP_SHARE = 0.8
+"""Part of a step's wall time that waiting may take, so that the error arrives in time."""
 
 
 class Adapter:
-    """One run: made with the topics that simscen has, then asked at every step. `mode` is the scenario's."""
+    """One run: created with the topics of simscen, then called at every step. `mode` is the scenario's."""
 
-    def __init__(self, options: Options, topics: Sequence[Topic], goals: Goals, launched: Optional[Launched]) -> None:
+    def __init__(
+        self,
+        options: Options,
+        topics: Sequence[Topic],
+        goals: Goals,
+        launched: Optional[LaunchedCommand],
+        period_s: float,
+    ) -> None:
+        """`period_s` is the control period."""
         if not rclpy.ok():
             rclpy.init(args=[])
-        self._options, self._goals, self._launched = options, goals, launched
-        self._graph = Graph(Names(options.namespace, options.remap), self._watch)
-        self._belief = Belief()
-        self._doors = Doors(self._graph, options.goals)
-        self._rest = Rest(self._graph, time.monotonic, options.answer)
-        self._door: Optional[Door] = None
-        self._velocity: Tuple[float, ...] = ZERO
-        self._ready, self._go_on = False, True
+        self._options, self._goals, self._launched, self._period = options, goals, launched, period_s
+        self._graph = Graph(TopicNames(options.namespace, options.remap), self._check_launched)
+        self._estimate = PoseEstimate()
+        self._senders = GoalSenders(self._graph, options.goals)
+        self._sender: Optional[GoalSender] = None
+        self._barrier = NodeBarrier(self._graph, options.answer)
+        self._velocity: Tuple[float, ...] = STOP
+        self._started_at = time.monotonic()
+        self._complete = self._ready = False
+        self._continue_after_failure = True
         self.mode, self._sent = "", 0
-        self._planned_for: Optional[Goal] = None
-        self._unsaid: List[Message] = []
-        self.left_out: List[str] = []
-        given = [Topic(CLOCK, "rosgraph_msgs/msg/Clock"), *topics]
-        for topic in given:
-            if topic.name not in options.without and not self._graph.offer(topic.name, topic.type):
-                self.left_out.append(f"{topic.name} ({topic.type})")
-        given = [topic for topic in given if topic.name in self._graph.offered]
-        self._readiness = Readiness(self._graph, self._rest, given, self._doors, options)
-        self._lockstep = Lockstep(self._graph, self._rest, time.monotonic, options.rounds, options.wait)
-        self._paced = Paced(self._graph, time.monotonic, options.factor)
+        self._planned_goal: Optional[Goal] = None
+        self._initial_pose: Optional[Message] = None
+        self._latest: Dict[str, bytes] = {}
+        offered = [Topic(CLOCK, "rosgraph_msgs/msg/Clock"), *topics]
+        offered = [topic for topic in offered if topic.name not in options.without]
+        self._unavailable = [topic for topic in offered if not self._graph.advertise(topic.name, topic.type)]
+        published = [topic for topic in offered if topic.name in self._graph.publishers]
+        self._readiness = Readiness(self._graph, self._barrier, published, self._senders, options)
+        self._lockstep = Lockstep(self._graph, self._barrier, options.rounds, options.wait)
+        self._paced = Paced(self._graph, options.factor)
 
     @property
-    def offered(self) -> Dict[str, Any]:
-        """Topic of the protocol → its publisher."""
-        return self._graph.offered
+    def advertised(self) -> Dict[str, Any]:
+        """Publishers by topic of the protocol."""
+        return self._graph.publishers
 
-    def _watch(self) -> None:
-        """Raise Failure when what was launched has ended."""
+    def _check_launched(self) -> None:
+        """Raise AdapterError when the launched command has ended."""
         if self._launched is not None and self._launched.ended is not None:
-            raise Failure(f"what was launched {self._launched.ended}: {self._launched.command}")
+            raise AdapterError(f"what was launched {self._launched.ended}: {self._launched.command}")
 
     def about(self) -> Dict[str, Any]:
-        """What is worth knowing of this run, for its log and run.json."""
+        """Return facts about this run for its log and stack.json."""
         synchronized: Any = self._lockstep if self._options.sync == "lockstep" else self._paced
         about = {
             "sync": self._options.sync,
             "rclpy": version("rclpy"),
             "distribution": os.environ.get("ROS_DISTRO", "unknown"),
             "rmw": rclpy.get_rmw_implementation_identifier(),
-            "nodes": self._rest.nodes,
-            **synchronized.counted,
+            "nodes": self._barrier.nodes,
+            **synchronized.counters,
         }
         if self._options.sync == "paced":
             about["factor"] = self._options.factor
-        if self._rest.silent:
-            about["not_in_step"] = self._rest.silent
-        if self._door is not None:
-            about["goals"] = self._door.name
-        if self.left_out:
-            about["not_published"] = self.left_out
+        if self._barrier.not_in_step:
+            about["not_in_step"] = self._barrier.not_in_step
+        if self._ready and self._barrier.left_out:
+            about["warnings"] = [
+                f"{node} does not answer, so lockstep does not wait for it" for node in sorted(self._barrier.left_out)
+            ]
+        if self._sender is not None:
+            about["goals"] = self._sender.name
+        if self._unavailable:
+            about["not_published"] = [f"{topic.name} ({topic.type})" for topic in self._unavailable]
         return about
 
-    def get_ready(self) -> None:
-        """Before the first step: wait until the graph is what a run needs, or at least there if it is to warm up."""
-        if self._options.warm_up:
-            self._wait_until(self._readiness.nobody)
-        else:
-            self._wait_until(self._readiness.missing)
+    def prepare(self) -> None:
+        """Wait before the first step until the graph is complete, or until it probably needs sensor data.
+
+        Raises AdapterError when the launched command ends, or when a node needs a topic that cannot be published.
+        """
+        changed_at = incomplete_at = time.monotonic()
+        nodes = self._graph.nodes()
+        settle = self._options.settle
+        patience = settle if self._options.nav2 or self._options.warm_up else settle + PREPARE_SETTLE_S
+
+        def settled() -> bool:
+            nonlocal changed_at, incomplete_at, nodes
+            missing = self._readiness.no_nodes() if self._options.warm_up else self._readiness.missing()
+            self._check_unavailable()
+            now = time.monotonic()
+            if nodes != self._graph.nodes():
+                changed_at, nodes = now, self._graph.nodes()
+            if missing:
+                incomplete_at = now
+                return bool(nodes) and now - changed_at >= patience
+            self._complete = now - max(changed_at, incomplete_at) >= settle and not self._options.warm_up
+            return now - max(changed_at, incomplete_at) >= settle
+
+        self._graph.spin_until(settled, min(self._options.ready, PREPARE_S))
+        if self._complete:
             self._begin()
 
-    def start(self, goals: Sequence[Goal], go_on: bool) -> None:
-        """The goals of the run; `go_on` with the others when one fails."""
+    def _wait_until_ready(self, now: int, limit_s: float) -> None:
+        """Publish the latest readings with advancing time until nothing is missing.
+
+        Raises AdapterError with what is missing after `limit_s` seconds.
+        """
+        for topic in LATCHED.intersection(self._latest):
+            self._graph.publish(topic, self._latest.pop(topic))
+
+        def publish() -> None:
+            self._graph.offset_ns += round(self._period * NANOSECONDS)
+            self._graph.publish_clock(now)
+            for topic, data in [*self._latest.items(), *self._due_initial_pose()]:
+                self._graph.publish(topic, data)
+
+        pace = self._options.factor if self._options.sync == "paced" else 1.0
+        wall_clock = Clock(clock_type=ClockType.STEADY_TIME)
+        timer = self._graph.node.create_timer(self._period / pace, publish, clock=wall_clock)
+        missing: List[str] = []
+        changed_at, nodes = time.monotonic(), self._graph.nodes()
+
+        def complete() -> bool:
+            nonlocal changed_at, nodes
+            missing[:] = self._readiness.missing()
+            self._check_unavailable()
+            if missing or nodes != self._graph.nodes():
+                changed_at, nodes = time.monotonic(), self._graph.nodes()
+            return time.monotonic() - changed_at >= self._options.settle
+
+        try:
+            if not self._graph.spin_until(complete, limit_s):
+                waited = time.monotonic() - self._started_at
+                reasons = "; ".join(missing) or "nodes come and go"
+                raise AdapterError(f"the graph is not ready after {waited:.0f} s: {reasons}")
+        finally:
+            self._graph.node.destroy_timer(timer)
+        self._graph.offset_ns += round(self._period * NANOSECONDS)
+        waited, ahead = time.monotonic() - self._started_at, self._graph.offset_ns / NANOSECONDS
+        print(f"simscen ros2: ready after {waited:.1f} s; ROS time = time of the run + {ahead:g} s", file=sys.stderr)
+
+    def _check_unavailable(self) -> None:
+        """Raise AdapterError if a node subscribes to a topic whose message type this Python does not have."""
+        for topic in self._unavailable:
+            for end in self._graph.subscribers_of(self._graph.names(topic.name)):
+                package = topic.type.partition("/")[0]
+                raise AdapterError(
+                    f"{end.node} subscribes to {self._graph.names(topic.name)}, which cannot be published: "
+                    f"{sys.executable} has no {package}; install it, or tell simscen not to publish the topic: "
+                    f"--without {topic.name}"
+                )
+
+    def start(self, goals: Sequence[Goal], continue_after_failure: bool) -> None:
+        """Take the goals of the run."""
         self._goals.start(goals)
-        self._go_on = go_on
+        self._continue_after_failure = continue_after_failure
 
     def preempt(self, now: int, goal: Goal) -> None:
-        """Another goal comes first."""
+        """Send another goal first."""
         self._goals.preempted(goal)
         self._send(now)
 
     def cancel(self, now: int, everything: bool) -> None:
         """Drop the current goal, or all."""
-        if self._door is not None and self._goals.current is not None:
-            self._door.cancel(self._now(now), self._rest)
+        if self._sender is not None and self._goals.current is not None:
+            self._sender.cancel(self._state(now), self._barrier)
         self._goals.canceled(everything)
 
-    def step(self, now: int, messages: Sequence[Message], due: bool) -> List[Message]:
-        """One step at `now` nanoseconds: what the stack says. Raises Failure when the graph has become unfit."""
-        self._watch()
+    def step(self, now: int, messages: Sequence[Message], due: bool, limit_s: float) -> List[Message]:
+        """Take one step at `now` nanoseconds within `limit_s` of wall time; return the messages of the stack.
+
+        Raises AdapterError when the graph is not ready or no longer usable.
+        """
+        self._check_launched()
         for topic, data in messages:
-            self._belief.given(topic, data)
+            self._estimate.take_published(topic, data)
         messages = [(topic, self._with_base_frame(topic, data)) for topic, data in messages]
-        messages = self._with_initial_pose(messages)
-        warming_up = now < self._options.warm_up * cdr.NANOSECONDS
+        self._initial_pose = next((m for m in messages if m[0] == INITIAL_POSE), self._initial_pose)
+        messages = [message for message in messages if message[0] != INITIAL_POSE]
+        warming_up = now < self._options.warm_up * NANOSECONDS
+        if not self._ready:
+            self._latest.update(messages)
         if not warming_up and not self._ready:
-            # Who came late has not heard the time yet.
-            self._wait_until(self._readiness.missing, lambda: self._graph.publish(CLOCK, cdr.time(now)))
+            left = self._options.ready - (0.0 if self._options.warm_up else time.monotonic() - self._started_at)
+            self._wait_until_ready(now, max(0.5, min(left, STEP_SHARE * limit_s)))
+            messages = [message for message in messages if message[0] not in LATCHED]
             self._begin()
+        messages = [*messages, *self._due_initial_pose()]
         synchronized: Any = self._lockstep if self._options.sync == "lockstep" and not warming_up else self._paced
         if not warming_up and self._goals.current is None:
             self._send(now)
-        heard = synchronized.beat(now, messages, due, self._goals.current is not None)
-        commanded = any(message.topic == COMMAND for message in heard)
-        # Topics have an order of their own each; which of two came first is chance.
-        said = sorted((out for message in heard for out in self._taken(message)), key=lambda out: out[0])
+        received = synchronized.step(now, messages, due, self._goals.current is not None)
+        commanded = any(message.topic == COMMAND for message in received)
+        # The order of messages on different topics is random.
+        answers = sorted((answer for message in received for answer in self._answers(message)), key=lambda a: a[0])
         if due or commanded:
-            said.append((COMMAND, cdr.twist(self._velocity)))
+            answers.append((COMMAND, write_twist(self._velocity)))
         if self._ready:
-            self._settle(now)
-        return said
-
-    def _wait_until(self, lacks: Callable[[], List[str]], meanwhile: Callable[[], Any] = lambda: None) -> None:
-        missing: List[str] = []
-        since, there = time.monotonic(), self._graph.nodes()
-
-        def complete() -> bool:
-            """Nothing is missing, and no node has come or gone for a while."""
-            nonlocal since, there
-            meanwhile()
-            missing[:] = lacks()
-            if missing or there != self._graph.nodes():
-                since, there = time.monotonic(), self._graph.nodes()
-            return time.monotonic() - since >= self._options.settle
-
-        if not self._graph.until(complete, self._options.ready, time.monotonic):
-            told = "; ".join(missing) or "nodes come and go"
-            raise Failure(f"the graph is not ready after {self._options.ready:g} s: {told}")
+            self._report_outcomes(now)
+        return answers
 
     def _begin(self) -> None:
-        """The graph is what a run needs: hear what it says from now on."""
+        """Subscribe to the topics of the ready graph."""
         self._ready = True
-        self._graph.hear(COMMAND, self._readiness.command_type())
-        for topic, type_ in HEARD.items():
-            if topic == "/tf" or self._graph.publishers(self._graph.names(topic)):
-                self._graph.hear(topic, type_)
-        self._door = self._doors.door
+        self._latest.clear()
+        self._barrier.begin()
+        self._graph.subscribe(COMMAND, self._readiness.command_type())
+        for topic, type_name in SUBSCRIPTIONS.items():
+            if topic == "/tf" or self._graph.publishers_of(self._graph.names(topic)):
+                self._graph.subscribe(topic, type_name)
+        self._sender = self._senders.usable
 
     def _send(self, now: int) -> None:
-        """Send the goals that are left; what is rejected has failed."""
-        while self._door is not None and self._goals.accept() is not None:
-            assert self._goals.current is not None
-            drive = self._drive()
-            self._sent = 1 if self._door.one_by_one else len(drive)
-            failed = self._door.send(drive, now, self._rest)
+        """Send the remaining goals; a rejected goal has failed."""
+        while self._sender is not None and self._goals.accept() is not None:
+            batch = self._next_batch()
+            self._sent = 1 if self._sender.one_by_one else len(batch)
+            failed = self._sender.send(batch, now, self._barrier)
             if failed is None:
                 return
-            self._goals.failed(failed.code, failed.message, go_on=self._go_on)
+            self._goals.failed(failed.code, failed.message, go_on=self._continue_after_failure)
 
-    def _drive(self) -> List[Goal]:
-        """What goes into one action: all goals that are left, or up to where the scenario has the robot stop or wait.
+    def _next_batch(self) -> List[Goal]:
+        """Return the goals for one action: all remaining ones, or up to where the robot must stop or wait.
 
-        How long a waypoint follower waits is its own parameter; so it is sent on anew after each wait.
+        The waiting time of a waypoint follower is its own parameter; so it gets a new action after each wait.
         """
         assert self._goals.current is not None
         left = [self._goals.current, *self._goals.waiting]
-        stops = (k for k, goal in enumerate(left) if goal.wait or (self.mode == THROUGH and not goal.via))
+        stops = (k for k, goal in enumerate(left) if goal.wait or (self.mode == THROUGH_POSES and not goal.via))
         return left[: next(stops, len(left)) + 1]
 
-    def _settle(self, now: int) -> None:
-        """Tell what became of the goals."""
-        assert self._door is not None
-        for outcome in self._door.outcomes(self._now(now)) if self._goals.current is not None else ():
+    def _report_outcomes(self, now: int) -> None:
+        """Report reached and failed goals."""
+        assert self._sender is not None
+        for outcome in self._sender.outcomes(self._state(now)) if self._goals.current is not None else ():
             if self._goals.current is None:
                 return
             self._sent -= 1
             if isinstance(outcome, Failed):
                 self._sent -= len(self._goals.ahead)
-                self._goals.failed(outcome.code, outcome.message, go_on=self._go_on)
+                self._goals.failed(outcome.code, outcome.message, go_on=self._continue_after_failure)
             else:
                 self._goals.reached()
             if self._sent <= 0:
                 return
             self._goals.accept()
 
-    def _now(self, now: int) -> Now:
-        still = all(abs(number) < 1e-3 for number in self._velocity)
-        return Now(now, still, self._belief.pose)
+    def _state(self, now: int) -> StackState:
+        stopped = all(abs(number) < 1e-3 for number in self._velocity)
+        return StackState(now, stopped, self._estimate.pose)
 
-    def _taken(self, message: Heard) -> List[Message]:
-        """A message of the stack as the protocol has it; none for a command, or for what does not concern it."""
+    def _answers(self, message: Received) -> List[Message]:
+        """Return a message of the stack for the protocol; none for a command or an irrelevant message."""
         if message.topic == COMMAND:
-            self._velocity = cdr.velocity(message.data, message.type == TWIST_STAMPED)
+            self._velocity = read_twist(message.data, message.type == TWIST_STAMPED)
             return []
-        concerns = self._belief.heard(message)
+        relevant = self._estimate.take_received(message)
         if message.topic == PLAN:
-            self._tell_plan()
-        return [(message.topic, message.data)] if concerns else []
+            self._report_plan()
+        return [(message.topic, message.data)] if relevant else []
 
-    def _tell_plan(self) -> None:
-        """Every plan is an event. Why it was made, a graph does not say: for a new goal, or because it was time."""
-        goal, plan = self._goals.current, self._belief.plan
+    def _report_plan(self) -> None:
+        """Report each plan as an event; the graph does not tell why it was made."""
+        goal, plan = self._goals.current, self._estimate.plan
         if goal is None or not plan:
             return
         length = sum(math.dist(a, b) for a, b in zip(plan, plan[1:]))
-        reason = "rate" if self._planned_for is goal else "goal"
-        self._planned_for = goal
+        reason = "rate" if self._planned_goal is goal else "goal"
+        self._planned_goal = goal
         self._goals.say("plan.made", goal.name, reason=reason, length=round(length, 6))
 
-    def _with_initial_pose(self, messages: Sequence[Message]) -> List[Message]:
-        """/initialpose is said once: not before anybody hears it."""
-        self._unsaid += [message for message in messages if message[0] == INITIAL_POSE]
-        messages = [message for message in messages if message[0] != INITIAL_POSE]
-        if self._unsaid and self._graph.subscribers(self._graph.names(INITIAL_POSE)):
-            messages, self._unsaid = [*messages, *self._unsaid], []
-        return messages
+    def _due_initial_pose(self) -> List[Message]:
+        """Return the initial pose once, as soon as there is a subscriber."""
+        if self._initial_pose is None or not self._graph.subscribers_of(self._graph.names(INITIAL_POSE)):
+            return []
+        message, self._initial_pose = self._initial_pose, None
+        return [message]
 
     def _with_base_frame(self, topic: str, data: bytes) -> bytes:
-        """What the topic says; on /tf_static with the robot's base under a second name where nodes call it so."""
-        if topic != "/tf_static" or self._options.base_frame in (None, BASE):
+        """Return the message; /tf_static also with the base frame under the name that the nodes use."""
+        if topic != "/tf_static" or self._options.base_frame in (None, BASE_FRAME):
             return data
         from rclpy.serialization import deserialize_message, serialize_message
 
-        kind: Any = interfaces.find("tf2_msgs/msg/TFMessage")
-        link_kind: Any = interfaces.find("geometry_msgs/msg/TransformStamped")
-        if kind is None:
-            return data
-        message, link = deserialize_message(data, kind), link_kind()
-        link.header.frame_id, link.child_frame_id, link.transform.rotation.w = BASE, self._options.base_frame, 1.0
+        message_type: Any = find_type("tf2_msgs/msg/TFMessage")
+        link_type: Any = find_type("geometry_msgs/msg/TransformStamped")
+        message, link = deserialize_message(data, message_type), link_type()
+        link.header.frame_id, link.child_frame_id = BASE_FRAME, self._options.base_frame
+        link.transform.rotation.w = 1.0
         message.transforms.append(link)
         return bytes(serialize_message(message))
 
     def end(self) -> None:
-        """Leave the graph, and end what was launched."""
+        """Leave the graph and end what was launched."""
         self._graph.close()
         if self._launched is not None:
             self._launched.end()
+
+
+def require_packages(options: Options) -> None:
+    """Raise AdapterError if this Python lacks message packages without which Nav2 cannot run."""
+    needed = ["lifecycle_msgs/srv/GetState"]
+    needed += [] if {"/tf", "/tf_static"} <= set(options.without) else ["tf2_msgs/msg/TFMessage"]
+    needed += [] if options.goals == "goal_pose" else [ACTIONS["navigate_to_pose"]]
+    lacking = [name.partition("/")[0] for name in needed if find_type(name) is None]
+    if lacking:
+        raise AdapterError(
+            f"{sys.executable} has no {', '.join(lacking)}, which Nav2 needs: install the packages "
+            "(ros-$ROS_DISTRO-… of apt), or name another Python with --python"
+        )

@@ -1,17 +1,31 @@
-"""The graph as simscen sees it: one node that publishes and keeps bytes, and who else is there."""
+"""simscen's node in the ROS graph: it publishes and receives CDR bytes, and sees which other nodes there are.
 
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
+Time in the graph may be ahead of the time of the run, because it advances while the run waits for the graph to become
+ready. `Graph.offset_ns` is the difference; stamps are converted in both directions here.
+"""
+
+import time
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from simscen.ros2 import interfaces, quality
-from simscen.ros2.names import Names
+from simscen.ros2.messages import find_type, shift_stamps, write_clock
+from simscen.ros2.options import TopicNames
 
 NODE = "simscen"
+CLOCK = "/clock"
+LATCHED = frozenset({"/map", "/tf_static", "/robot_description", "/keepout_filter_mask", "/speed_filter_mask"})
+"""Topics with transient local durability: nodes that subscribe later receive the last message."""
+DEPTH = {"/tf": 100, "/imu": 100}
+"""Queue lengths for slow subscribers."""
+DEFAULT_DEPTH = 10
+Node = Tuple[str, str]
+"""Name and namespace of a node."""
 
 
-class Heard(NamedTuple):
+class Received(NamedTuple):
     """A message of the stack: topic of the protocol, type, CDR."""
 
     topic: str
@@ -26,117 +40,115 @@ class Topic(NamedTuple):
     type: str
 
 
-class End(NamedTuple):
-    """A publisher or a subscriber of somebody else."""
+class Endpoint(NamedTuple):
+    """A publisher or a subscription of another node."""
 
     node: str
     type: str
-    quality: Any
+    qos: Any
 
 
 class Graph:
-    """One node in one ROS domain."""
+    """One node in one ROS domain. `watch` is called while waiting and may raise."""
 
-    def __init__(self, names: Names, watch: Callable[[], None]) -> None:
+    def __init__(self, names: TopicNames, watch: Callable[[], None]) -> None:
         self.names, self._watch = names, watch
         self.node = rclpy.create_node(NODE, namespace=names.namespace or None, use_global_arguments=False)
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
-        self._publishers: Dict[str, Any] = {}
+        self.publishers: Dict[str, Any] = {}
+        """Publishers by topic of the protocol."""
+        self.types: Dict[str, str] = {}
         self._subscriptions: Dict[str, Tuple[str, Any]] = {}
-        self.inbox: List[Heard] = []
+        self.inbox: List[Received] = []
+        self.offset_ns = 0
 
-    @property
-    def offered(self) -> Dict[str, Any]:
-        """The publishers, by topic of the protocol."""
-        return self._publishers
-
-    def offer(self, topic: str, type_: str) -> bool:
-        """Make a publisher; False where the distribution has no such type."""
-        kind = interfaces.find(type_)
-        if kind is None:
+    def advertise(self, topic: str, type_name: str) -> bool:
+        """Create a publisher; return False if the type is not installed."""
+        message_type = find_type(type_name)
+        if message_type is None:
             return False
-        if topic not in self._publishers:
-            self._publishers[topic] = self.node.create_publisher(kind, self.names(topic), quality.offered(topic))
+        if topic not in self.publishers:
+            self.publishers[topic] = self.node.create_publisher(message_type, self.names(topic), publisher_qos(topic))
+            self.types[topic] = type_name
         return True
 
     def publish(self, topic: str, data: bytes) -> bool:
-        """Publish CDR on a topic that was offered; whether anybody subscribes to it."""
-        publisher = self._publishers.get(topic)
+        """Publish CDR on an advertised topic; return whether anyone subscribes to it."""
+        publisher = self.publishers.get(topic)
         if publisher is None:
             return False
-        publisher.publish(data)
+        publisher.publish(shift_stamps(self.types[topic], data, self.offset_ns))
         return bool(publisher.get_subscription_count())
 
-    def hear(self, topic: str, type_: str) -> None:
-        """Keep all that comes on a topic, with a quality of service that its publishers have."""
+    def publish_clock(self, now: int) -> None:
+        """Publish the time of the run, in nanoseconds."""
+        self.publish(CLOCK, write_clock(now + self.offset_ns))
+
+    def subscribe(self, topic: str, type_name: str) -> None:
+        """Keep all messages of a topic in `inbox`, with a quality of service that its publishers offer."""
+        message_type = find_type(type_name)
         known = self._subscriptions.get(topic)
-        kind = interfaces.find(type_)
-        if kind is None or (known is not None and known[0] == type_):
+        if message_type is None or (known is not None and known[0] == type_name):
             return
         if known is not None:
             self.node.destroy_subscription(known[1])
         publishers = self.node.get_publishers_info_by_topic(self.names(topic))
 
         def keep(data: bytes) -> None:
-            self.inbox.append(Heard(topic, type_, bytes(data)))
+            self.inbox.append(Received(topic, type_name, shift_stamps(type_name, bytes(data), -self.offset_ns)))
 
-        profile = quality.heard([end for end in publishers if end.node_name != NODE])
-        made = self.node.create_subscription(kind, self.names(topic), keep, profile, raw=True)
-        self._subscriptions[topic] = (type_, made)
+        profile = subscription_qos([end for end in publishers if end.node_name != NODE])
+        made = self.node.create_subscription(message_type, self.names(topic), keep, profile, raw=True)
+        self._subscriptions[topic] = (type_name, made)
 
-    def turn(self, seconds: float = 0.0) -> None:
-        """Take what has come; wait at most so long for something to come."""
+    def spin_once(self, seconds: float = 0.0) -> None:
+        """Handle one event; wait at most this long for it."""
         self.executor.spin_once(timeout_sec=seconds)
 
     def take_all(self) -> None:
-        """Take all that has come, and wait for nothing."""
+        """Take all messages that have arrived, without waiting."""
         while True:
             before = len(self.inbox)
-            self.turn()
+            self.spin_once()
             if len(self.inbox) == before:
                 return
 
-    def until(self, done: Callable[[], bool], seconds: float, clock: Callable[[], float]) -> bool:
-        """Take what comes until `done`; False when that took longer than `seconds` of `clock`.
-
-        `watch` is called all the while, and may raise.
-        """
-        end = clock() + seconds
+    def spin_until(self, done: Callable[[], bool], seconds: float) -> bool:
+        """Handle events until `done`; return False if that takes longer than `seconds` of wall time."""
+        end = time.monotonic() + seconds
         while not done():
-            left = end - clock()
+            left = end - time.monotonic()
             if left <= 0:
                 return False
-            self.turn(min(left, 0.1))
+            self.spin_once(min(left, 0.1))
             self._watch()
         return True
 
-    # Who else is there
+    def nodes(self) -> List[Node]:
+        """Return the other nodes, without hidden ones, sorted."""
+        found = self.node.get_node_names_and_namespaces()
+        return sorted({(n, s) for n, s in found if n != NODE and not n.startswith("_")})
 
-    def nodes(self) -> List[Tuple[str, str]]:
-        """(name, namespace) of all nodes but this one and hidden ones, sorted."""
-        there = self.node.get_node_names_and_namespaces()
-        return sorted({(n, s) for n, s in there if n != NODE and not n.startswith("_")})
+    def publishers_of(self, name: str) -> List[Endpoint]:
+        """Return the publishers of a topic of the graph in other nodes."""
+        return _endpoints(self.node.get_publishers_info_by_topic(name))
 
-    def publishers(self, name: str) -> List[End]:
-        """Who publishes on a topic of the graph."""
-        return _ends(self.node.get_publishers_info_by_topic(name))
-
-    def subscribers(self, name: str) -> List[End]:
-        """Who subscribes to a topic of the graph."""
-        return _ends(self.node.get_subscriptions_info_by_topic(name))
+    def subscribers_of(self, name: str) -> List[Endpoint]:
+        """Return the subscriptions of a topic of the graph in other nodes."""
+        return _endpoints(self.node.get_subscriptions_info_by_topic(name))
 
     def topics(self) -> Dict[str, List[str]]:
-        """All topics of the graph and their types."""
+        """Return all topics of the graph and their types."""
         return dict(self.node.get_topic_names_and_types())
 
-    def service(self, node: Tuple[str, str], name: str) -> Optional[str]:
-        """The type of a node's service `~/name`; None where it has none."""
+    def service_type(self, node: Node, name: str) -> Optional[str]:
+        """Return the type of a node's service `~/name`; None if it has no such service."""
         try:
             services = self.node.get_service_names_and_types_by_node(*node)
         except rclpy.node.NodeNameNonExistentError:
             return None
-        wanted = f"{full(node)}/{name}"
+        wanted = f"{full_name(node)}/{name}"
         return next((types[0] for found, types in services if found == wanted), None)
 
     def close(self) -> None:
@@ -145,17 +157,49 @@ class Graph:
         self.node.destroy_node()
 
 
-def full(node: Tuple[str, str]) -> str:
-    """`/namespace/name` of (name, namespace)."""
+def full_name(node: Node) -> str:
+    """Return `/namespace/name`."""
     return f"{node[1].rstrip('/')}/{node[0]}"
 
 
-def _ends(infos: List[Any]) -> List[End]:
-    found = {
-        (full((info.node_name, info.node_namespace)), info.topic_type): End(
-            full((info.node_name, info.node_namespace)), info.topic_type, info.qos_profile
-        )
-        for info in infos
-        if info.node_name != NODE
-    }
+def _endpoints(infos: List[Any]) -> List[Endpoint]:
+    found = {}
+    for info in infos:
+        if info.node_name != NODE:
+            node = full_name((info.node_name, info.node_namespace))
+            found[node, info.topic_type] = Endpoint(node, info.topic_type, info.qos_profile)
     return [found[key] for key in sorted(found)]
+
+
+def publisher_qos(topic: str) -> QoSProfile:
+    """Return the profile of a topic of simscen: reliable, which every subscription accepts."""
+    latched = topic in LATCHED
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=1 if latched else DEPTH.get(topic, DEFAULT_DEPTH),
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def subscription_qos(publishers: Sequence[Any]) -> QoSProfile:
+    """Return a profile that matches all publishers: reliable or transient local only if all of them are."""
+    profiles = [publisher.qos_profile for publisher in publishers]
+    reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in profiles)
+    latched = bool(profiles) and all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in profiles)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=100,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def incompatible_policies(offered: QoSProfile, requested: QoSProfile) -> List[Tuple[str, str, str]]:
+    """Return the policies by which a subscription receives nothing: (policy, offered, requested)."""
+    found = []
+    if requested.reliability == ReliabilityPolicy.RELIABLE and offered.reliability == ReliabilityPolicy.BEST_EFFORT:
+        found.append(("reliability", "best effort", "reliable"))
+    if requested.durability == DurabilityPolicy.TRANSIENT_LOCAL and offered.durability == DurabilityPolicy.VOLATILE:
+        found.append(("durability", "volatile", "transient local"))
+    return found

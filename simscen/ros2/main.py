@@ -1,76 +1,103 @@
-"""The adapter's side of the stack protocol: hello, get the graph ready, answer steps until the run ends."""
+"""The adapter's side of the stack protocol: handshake, get the graph ready, answer steps until the run ends."""
 
+import json
 import os
 import shutil
 import signal
 import sys
 import tempfile
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
-from simscen.peer import wire
+from simscen.peer import messages, wire
 from simscen.peer.connection import Connection, Gone
 from simscen.peer.goals import Goal, Goals
-from simscen.ros2.domain import Domain, claim, surroundings
-from simscen.ros2.failure import Failure
-from simscen.ros2.launched import Launched
-from simscen.ros2.options import Options
+from simscen.ros2.domain import Domain, claim, ros_environment
+from simscen.ros2.launch import LaunchedCommand
+from simscen.ros2.options import AdapterError, Options
 
 EVENTS = "/simscen/events"
 DEFAULT_MODE = "navigate_to_pose"
 MODES = (DEFAULT_MODE, "navigate_through_poses", "follow_waypoints")
+READY_MARGIN_S = 15.0
+"""Time that the first answer may take beyond `--ready`: the check that is running, and the first period."""
 
 
 def main(values: Dict[str, Any]) -> int:
-    """Serve one run. Exit code 0; 1 when it ended in an error, which simscen was told."""
+    """Serve one run. Return 0, or 1 if it ended in an error that simscen has received."""
     connection = Connection.inherited()
-    # What is told to end must end what it has started.
-    signal.signal(signal.SIGTERM, _leave)
+    # Exceptions unwind, so that the adapter ends what it started.
+    signal.signal(signal.SIGTERM, _terminate)
     try:
-        with Run(Options(**values)) as run:
+        with AdapterRun(Options(**values)) as run:
             run.serve(connection)
-    except Failure as failure:
-        print(f"simscen ros2: {failure}", file=sys.stderr)
-        connection.send_json(wire.ERROR, {"message": str(failure)})
+    except AdapterError as error:
+        print(f"simscen ros2: {error}", file=sys.stderr)
+        connection.send_json(wire.ERROR, {"message": str(error)})
         return 1
     except Gone:
         return 1
     return 0
 
 
-class Run:
-    """A domain, its nodes and the adapter between them and simscen; left behind as it was found."""
+class Hello(NamedTuple):
+    """What the adapter uses of HELLO."""
+
+    topics: Dict[int, Tuple[str, str]]
+    """Name and type of the topics of a robot, by number."""
+    answers: Dict[str, int]
+    """Numbers of the topics of the stack."""
+    period_s: float
+    """Control period."""
+    mode: str
+
+    @classmethod
+    def receive(cls, connection: Connection) -> "Hello":
+        """Receive HELLO. Raises AdapterError for another frame or protocol."""
+        kind, body = connection.receive()
+        if kind != wire.HELLO:
+            raise AdapterError(f"a frame of kind {kind} where HELLO was to come")
+        hello = wire.from_json(body)
+        if wire.PROTOCOL not in hello["protocols"]:
+            raise AdapterError(f"simscen ros2 speaks version {wire.PROTOCOL} of the stack protocol")
+        return cls(
+            {one["number"]: (one["topic"], one["type"]) for one in hello["says"] if _is_robot_topic(one)},
+            {one["topic"]: one["number"] for one in hello["hears"]},
+            hello["control_period"] / hello["tick_rate"],
+            hello.get("mode", DEFAULT_MODE),
+        )
+
+
+class AdapterRun:
+    """The domain, nodes and adapter of one run; everything is ended and removed on exit."""
 
     def __init__(self, options: Options) -> None:
         self._options = options
-        self._ends: List[Callable[[], None]] = []
+        self._cleanup: List[Callable[[], None]] = []
         self.goals = Goals()
 
-    def __enter__(self) -> "Run":
+    def __enter__(self) -> "AdapterRun":
         return self
 
     def __exit__(self, *_: Any) -> None:
-        for end in reversed(self._ends):
-            end()
+        # simscen sends SIGTERM if nodes take long to end; that must not interrupt ending them.
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        for function in reversed(self._cleanup):
+            function()
 
     def serve(self, connection: Connection) -> None:
-        """From HELLO to END. Raises Failure, and Gone when simscen hangs up."""
-        from simscen.ros2.adapter import Adapter
+        """Serve from HELLO to END. Raises AdapterError, and Gone when simscen hangs up."""
+        from simscen.ros2.adapter import Adapter, require_packages
         from simscen.ros2.graph import Topic
 
-        kind, body = connection.receive()
-        if kind != wire.HELLO:
-            raise Failure(f"a frame of kind {kind} where HELLO was to come")
-        hello = wire.from_json(body)
-        if wire.PROTOCOL not in hello["protocols"]:
-            raise Failure(f"simscen ros2 speaks version {wire.PROTOCOL} of the stack protocol")
-        launched = self._prepare()
-        said = {one["number"]: Topic(one["topic"], one["type"]) for one in hello["says"] if _in_the_graph(one)}
-        options = self._with_action_of(hello.get("mode", DEFAULT_MODE))
-        if options.warm_up:  # what is missing then must be said before simscen gives up the answer to that step
-            options = options._replace(ready=min(options.ready, 0.8 * hello["answer_limit"]))
-        adapter = Adapter(options, list(said.values()), self.goals, launched)
-        self._ends.append(adapter.end)
-        adapter.get_ready()
+        hello = Hello.receive(connection)
+        options = self._options_for(hello.mode)
+        if options.nav2:
+            require_packages(options)
+        launched = self._start_nodes()
+        topics = [Topic(*topic) for topic in hello.topics.values()]
+        adapter = Adapter(options, topics, self.goals, launched, hello.period_s)
+        self._cleanup.append(adapter.end)
+        adapter.prepare()
         about = adapter.about()
         welcome = {
             "protocol": wire.PROTOCOL,
@@ -78,36 +105,38 @@ class Run:
             "version": about["rclpy"],
             "step": "control",
             "modes": [*MODES],
+            "first_answer_limit": options.ready + READY_MARGIN_S,
+            "topics": [topic.name for topic in topics if topic.name in adapter.advertised],
+            "about": about,
         }
-        topics = [topic.name for topic in said.values() if topic.name in adapter.offered]
-        connection.send_json(wire.WELCOME, {**welcome, "topics": topics, "about": about})
-        hears = {one["topic"]: one["number"] for one in hello["hears"]}
-        self._answer_all(connection, adapter, said, hears)
+        connection.send_json(wire.WELCOME, welcome)
+        self._answer_steps(connection, adapter, hello)
 
-    def _answer_all(self, connection: Connection, adapter: Any, said: Dict[int, Any], hears: Dict[str, int]) -> None:
+    def _answer_steps(self, connection: Connection, adapter: Any, hello: Hello) -> None:
         now = 0
         while True:
             kind, body = connection.receive()
             if kind == wire.STEP:
-                header, messages = wire.from_step(body)
+                header, content = wire.from_step(body)
                 now = header.sec * 10**9 + header.nanosec
                 self.goals.now = now * 1e-9
+                published = [(hello.topics[number][0], data) for number, data in content]
                 due = bool(header.flags & wire.COMMAND_DUE)
-                heard = adapter.step(now, [(said[number].name, data) for number, data in messages], due)
-                connection.send(wire.answer_frame(header.tick, self._numbered(heard, hears)))
+                received = adapter.step(now, published, due, header.deadline * 1e-3)
+                connection.send(wire.answer_frame(header.tick, self._numbered(received, hello.answers)))
             elif kind == wire.END:
                 connection.send_json(wire.BYE, {"about": adapter.about()})
                 return
             else:
                 self._take(kind, wire.from_json(body), adapter, now)
 
-    def _with_action_of(self, mode: str) -> Options:
-        """The options with the action of the scenario's mode; Failure where `--goals` says another one."""
+    def _options_for(self, mode: str) -> Options:
+        """Return the options with the scenario's action. Raises AdapterError if `--goals` names another one."""
         wanted = self._options.goals
         if mode in (DEFAULT_MODE, wanted):
             return self._options
         if wanted != "auto":
-            raise Failure(f"the scenario sends goals by {mode}, and --goals says {wanted}")
+            raise AdapterError(f"the scenario sends goals by {mode}, and --goals says {wanted}")
         return self._options._replace(goals=mode)
 
     def _take(self, kind: int, content: Dict[str, Any], adapter: Any, now: int) -> None:
@@ -119,45 +148,37 @@ class Run:
         elif kind == wire.CANCEL:
             adapter.cancel(now, content["all"])
 
-    def _numbered(self, heard: Sequence[Tuple[str, bytes]], hears: Dict[str, int]) -> "List[Tuple[int, bytes]]":
-        """What the stack says as the protocol has it, and what became of its goals."""
-        from simscen.peer import messages
+    def _numbered(self, received: Sequence[Tuple[str, bytes]], answers: Dict[str, int]) -> "List[Tuple[int, bytes]]":
+        """Return the messages of the stack and the events of its goals with the numbers of their topics."""
+        out = [(answers[topic], data) for topic, data in received if topic in answers]
+        events = (json.dumps(event, allow_nan=False) for event in self.goals.take())
+        return out + [(answers[EVENTS], messages.string(event)) for event in events]
 
-        out = [(hears[topic], data) for topic, data in heard if topic in hears]
-        return out + [(hears[EVENTS], messages.string(_json(event))) for event in self.goals.take()]
-
-    def _prepare(self) -> Optional[Launched]:
-        """Claim a domain, set the environment of all that is ROS here, and start the user's nodes."""
+    def _start_nodes(self) -> Optional[LaunchedCommand]:
+        """Claim a domain, set the environment, and start the user's command."""
         options, environment = self._options, dict(os.environ)
-        domain = self._domain(options, environment)
-        self._ends.append(domain.release)
+        domain = self._claim_domain(options, environment)
+        self._cleanup.append(domain.release)
         logs = tempfile.mkdtemp(prefix="simscen-ros-logs-")
-        self._ends.append(lambda: shutil.rmtree(logs, ignore_errors=True))
+        self._cleanup.append(lambda: shutil.rmtree(logs, ignore_errors=True))
         os.environ.clear()
-        os.environ.update(surroundings(domain.number, logs, environment))
-        # Nodes need not know of the socket to simscen.
-        os.environ.pop(wire.DESCRIPTOR, None)
-        return Launched(options.launch, os.environ) if options.launch else None
+        os.environ.update(ros_environment(domain.number, logs, environment))
+        os.environ.pop(wire.DESCRIPTOR, None)  # nodes must not use the socket to simscen
+        return LaunchedCommand(options.launch, os.environ) if options.launch else None
 
     @staticmethod
-    def _domain(options: Options, environment: Dict[str, str]) -> Domain:
-        """One of its own for nodes that are started for this run; else the one that the user's nodes are in."""
+    def _claim_domain(options: Options, environment: Dict[str, str]) -> Domain:
+        """Claim a free domain for launched nodes, or the domain of nodes that the user started."""
         if options.domain is not None or options.launch:
             return claim(options.domain, environment)
         return claim(int(environment.get("ROS_DOMAIN_ID") or 0), environment)
 
 
-def _in_the_graph(topic: Dict[str, Any]) -> bool:
-    """Whether a topic that simscen has belongs to a robot: not the truth, nor what only the protocol knows."""
+def _is_robot_topic(topic: Dict[str, Any]) -> bool:
+    """Return whether a robot has this topic; ground truth and topics of the protocol are not published."""
     name: str = topic["topic"]
     return not name.startswith(("/simscen", "/ground_truth")) and not topic.get("exact", False) and name != "/clock"
 
 
-def _json(event: Dict[str, Any]) -> str:
-    import json
-
-    return json.dumps(event, allow_nan=False)
-
-
-def _leave(*_: Any) -> None:
-    raise Gone("told to end")
+def _terminate(*_: Any) -> None:
+    raise Gone("terminated by simscen")

@@ -1,64 +1,75 @@
-"""Whether the graph is what a run needs, and in words what is missing."""
+"""Checks of the graph before a run: what is missing, what does not match, which nodes are not active yet."""
 
-from typing import Any, Iterable, List, Sequence, Tuple
+from typing import Any, Dict, Iterable, List, Sequence, Set, Tuple
 
-from simscen.ros2 import interfaces, quality
-from simscen.ros2.goals import Doors
-from simscen.ros2.graph import End, Graph, Topic, full
-from simscen.ros2.livenav2 import LiveNav2
+from simscen.ros2 import nav2_parameters
+from simscen.ros2.goal_sender import GOAL_POSE, GoalPoseSender, GoalSenders
+from simscen.ros2.graph import Endpoint, Graph, Topic, full_name, incompatible_policies
+from simscen.ros2.messages import find_type
+from simscen.ros2.node_barrier import POLL_S, NodeBarrier, ServicePoll
 from simscen.ros2.options import Options
-from simscen.ros2.rest import Rest
 
 COMMAND = "/cmd_vel"
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
+SCAN, ODOMETRY = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
+STATE_SERVICE = "lifecycle_msgs/srv/GetState"
 ACTIVE = 3
 """lifecycle_msgs/msg/State.PRIMARY_STATE_ACTIVE."""
-
-
-SHARED = ("/tf", "/tf_static", "/initialpose", "/goal_pose")
+SHARED_TOPICS = ("/tf", "/tf_static", "/initialpose", GOAL_POSE)
 """Topics that several nodes may publish."""
 
 
 class Readiness:
-    """Looks at the graph again and again until nothing is missing.
+    """Checks the graph again and again until nothing is missing. `topics` are those that simscen publishes."""
 
-    `sensors` are the topics of which one at least must be heard. `wall_time` allows nodes that do not use sim time.
-    """
-
-    def __init__(self, graph: Graph, rest: Rest, given: Sequence[Topic], doors: Doors, options: Options) -> None:
-        self._graph, self._rest, self._given, self._doors = graph, rest, list(given), doors
+    def __init__(
+        self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], senders: GoalSenders, options: Options
+    ) -> None:
+        self._graph, self._barrier, self._topics, self._senders = graph, barrier, list(topics), senders
         self._options = options
-        self._nav2 = LiveNav2(graph, rest, given, options)
+        self._states = ServicePoll(graph, STATE_SERVICE, "get_state") if find_type(STATE_SERVICE) else None
+        self._nav2 = Nav2Readiness(graph, barrier, topics, options)
+        barrier.required = self.required_nodes
 
-    def nobody(self) -> List[str]:
-        """What is missing as long as there is no node at all."""
+    def no_nodes(self) -> List[str]:
+        """Return what is missing if there is no other node."""
         return [] if self._graph.nodes() else ["there is no other node in this ROS domain"]
 
     def missing(self) -> List[str]:
-        """What is missing now, one sentence each."""
-        self._rest.look_round()
-        if self.nobody():
-            return self.nobody()
-        found = self._commands() + self._doors.missing()
-        for topic in self._given:
-            found += self._heard(topic) + self._also_published(topic)
-        found += self._unheard()
-        if not found and self._options.nav2:
-            found += self._nav2.missing()
-        if not found:
-            found += self._simulated_time() + self._lifecycles()
-        return found
+        """Return what is missing now, one sentence each."""
+        if self.no_nodes():
+            return self.no_nodes()
+        busy = self._barrier.poll()
+        found = self._commands() + self._senders.missing()
+        for topic in self._topics:
+            found += self._subscribers(topic) + self._other_publishers(topic)
+        found += self._unused_sensors()
+        if self._options.nav2:
+            found += self._nav2.missing_nodes()
+            found += [] if found else self._nav2.wrong_parameters()
+        return busy + found + self._wall_time() + self._inactive()
+
+    def required_nodes(self) -> Set[str]:
+        """Return the full names of nodes without which the run cannot continue.
+
+        These are lifecycle nodes, publishers of commands, and subscribers of goals.
+        """
+        names = {end.node for end in self._graph.publishers_of(self._graph.names(COMMAND))}
+        if isinstance(self._senders.usable, GoalPoseSender):
+            names |= {end.node for end in self._graph.subscribers_of(self._graph.names(GOAL_POSE))}
+        if self._options.nav2:
+            names |= {full_name(node) for node in self._graph.nodes() if node[0] in nav2_parameters.NODES}
+        return names | {full_name(node) for node in self._lifecycle_nodes()}
 
     def command_type(self) -> str:
-        """Twist or TwistStamped, as the stack publishes it."""
-        return next(end.type for end in self._graph.publishers(self._graph.names(COMMAND)))
+        """Return the type of the commands, Twist or TwistStamped."""
+        return next(end.type for end in self._graph.publishers_of(self._graph.names(COMMAND)))
 
     def _commands(self) -> List[str]:
         name = self._graph.names(COMMAND)
-        ends = self._graph.publishers(name)
-        types = sorted({end.type for end in ends})
+        ends = self._graph.publishers_of(name)
         if not ends:
-            others = self._elsewhere((TWIST, TWIST_STAMPED), self._graph.publishers)
+            others = self._on_other_topics((TWIST, TWIST_STAMPED), self._graph.publishers_of)
             hints = [
                 f"; {end.node} publishes {topic} ({end.type}): --remap {COMMAND}:={topic}" for topic, end in others
             ]
@@ -66,89 +77,145 @@ class Readiness:
         wrong = [end for end in ends if end.type not in (TWIST, TWIST_STAMPED)]
         if wrong:
             return [f"{end.node} publishes {name} as {end.type}, not {TWIST} or {TWIST_STAMPED}" for end in wrong]
-        if len(types) > 1:
-            return [f"{name} is published both as Twist and as TwistStamped: {_listed(ends)}"]
+        if len({end.type for end in ends}) > 1:
+            listed = ", ".join(f"{end.node} ({end.type})" for end in ends)
+            return [f"{name} is published both as Twist and as TwistStamped: {listed}"]
         return []
 
-    def _heard(self, topic: Topic) -> List[str]:
-        """What keeps those from hearing who subscribe to a topic of ours."""
+    def _subscribers(self, topic: Topic) -> List[str]:
+        """Return why subscribers of a topic of simscen receive nothing."""
         name, found = self._graph.names(topic.name), []
-        for end in self._graph.subscribers(name):
+        for end in self._graph.subscribers_of(name):
             if end.type != topic.type:
                 found.append(f"{end.node} subscribes to {name} as {end.type}; it is {topic.type}")
                 continue
-            publisher = self._graph.offered.get(topic.name)
+            publisher = self._graph.publishers.get(topic.name)
             if publisher is not None:
-                for policy, offer, wanted in quality.misfits(publisher.qos_profile, end.quality):
-                    found.append(f"{end.node} hears nothing of {name}: it asks for {policy} {wanted}, which is {offer}")
+                for policy, offered, requested in incompatible_policies(publisher.qos_profile, end.qos):
+                    found.append(
+                        f"{end.node} hears nothing of {name}: it asks for {policy} {requested}, which is {offered}"
+                    )
         return found
 
-    def _also_published(self, topic: Topic) -> List[str]:
-        """Others who publish what only simscen should."""
-        if topic.name in SHARED:
+    def _other_publishers(self, topic: Topic) -> List[str]:
+        """Return other nodes that publish a topic which only simscen should publish."""
+        if topic.name in SHARED_TOPICS:
             return []
         name = self._graph.names(topic.name)
         return [
             f"{end.node} publishes {name}, too: leave that node out, or tell simscen to: --without {topic.name}"
-            for end in self._graph.publishers(name)
+            for end in self._graph.publishers_of(name)
         ]
 
-    def _unheard(self) -> List[str]:
-        """Sensors that nobody hears while somebody waits for one of that type under another name."""
+    def _unused_sensors(self) -> List[str]:
+        """Return sensors without a subscriber while a node waits for the same type under another name."""
         found = []
-        sensors = [topic for topic in self._given if topic.type.startswith(("sensor_msgs/", "nav_msgs/msg/Odometry"))]
+        sensors = [topic for topic in self._topics if topic.type.startswith(("sensor_msgs/", ODOMETRY))]
         for topic in sensors:
             name = self._graph.names(topic.name)
-            if self._graph.subscribers(name):
+            if self._graph.subscribers_of(name):
                 continue
-            for other, end in self._elsewhere((topic.type,), self._graph.subscribers):
+            for other, end in self._on_other_topics((topic.type,), self._graph.subscribers_of):
                 if not self._graph.node.get_publishers_info_by_topic(other):
                     found.append(
                         f"nobody subscribes to {name}; {end.node} waits for {other} ({end.type}), which nobody "
                         f"publishes: --remap {topic.name}:={other}"
                     )
         names = [self._graph.names(topic.name) for topic in sensors]
-        if names and not found and not any(self._graph.subscribers(name) for name in names):
+        if names and not found and not any(self._graph.subscribers_of(name) for name in names):
             found.append(f"nobody subscribes to any sensor: {', '.join(names)}")
         return found
 
-    def _elsewhere(self, types: Iterable[str], ends_of: Any) -> List[Tuple[str, End]]:
-        """Ends of these types on topics that are not simscen's."""
-        mine = {self._graph.names(topic.name) for topic in self._given} | {self._graph.names(COMMAND)}
+    def _on_other_topics(self, types: Iterable[str], endpoints_of: Any) -> List[Tuple[str, Endpoint]]:
+        """Return the endpoints of these types on topics that are not simscen's."""
+        own = {self._graph.names(topic.name) for topic in self._topics} | {self._graph.names(COMMAND)}
         found = []
-        for name, there in sorted(self._graph.topics().items()):
-            if name not in mine and set(there) & set(types):
-                found += [(name, end) for end in ends_of(name) if end.type in types]
+        for name, existing in sorted(self._graph.topics().items()):
+            if name not in own and set(existing) & set(types):
+                found += [(name, end) for end in endpoints_of(name) if end.type in types]
         return found
 
-    def _simulated_time(self) -> List[str]:
+    def _wall_time(self) -> List[str]:
         if self._options.wall_time:
             return []
-        values = self._rest.ask("use_sim_time")
         return [
             f"{node} lives on wall time: start it with use_sim_time true (--ros-args -p use_sim_time:=true)"
-            for node, value in sorted(values.items())
-            if not value.bool_value
+            for node, sim_time in sorted(self._barrier.sim_time.items())
+            if not sim_time
         ]
 
-    def _lifecycles(self) -> List[str]:
-        """Lifecycle nodes that are not active."""
-        kind: Any = interfaces.find("lifecycle_msgs/srv/GetState")
+    def _lifecycle_nodes(self) -> List[Tuple[str, str]]:
+        return [node for node in self._graph.nodes() if self._graph.service_type(node, "get_state") == STATE_SERVICE]
+
+    def _inactive(self) -> List[str]:
+        """Return the lifecycle nodes that are not active; nodes that do not answer are reported by the barrier."""
+        if self._states is None:
+            return []
+        self._states.track(self._lifecycle_nodes())
+        self._states.ask(POLL_S)
         found = []
-        for node in self._graph.nodes() if kind is not None else ():
-            if self._graph.service(node, "get_state") != "lifecycle_msgs/srv/GetState":
-                continue
-            client = self._graph.node.create_client(kind, f"{full(node)}/get_state")
-            try:
-                state = self._rest.call(client, kind.Request())
-            finally:
-                self._graph.node.destroy_client(client)
-            if state is None:
-                found.append(f"the lifecycle node {full(node)} does not say its state")
-            elif state.current_state.id != ACTIVE:
-                found.append(f"the lifecycle node {full(node)} is {state.current_state.label}, not active")
+        for node in sorted(self._states.clients):
+            answer = self._states.answers.get(node)
+            if answer is None:
+                found.append(f"the lifecycle node {full_name(node)} does not say its state")
+            elif answer.current_state.id != ACTIVE:
+                found.append(f"the lifecycle node {full_name(node)} is {answer.current_state.label}, not active")
         return found
 
 
-def _listed(ends: Sequence[End]) -> str:
-    return ", ".join(f"{end.node} ({end.type})" for end in ends)
+class Nav2Readiness:
+    """Checks the nodes of a running Nav2 and their parameters, and the parameter file if there is one."""
+
+    def __init__(self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], options: Options) -> None:
+        self._graph, self._barrier, self._options = graph, barrier, options
+        odometry = [graph.names(topic.name) for topic in topics if topic.type == ODOMETRY]
+        self._offer = nav2_parameters.Offer(
+            [graph.names(topic.name) for topic in topics if topic.type == SCAN],
+            odometry[0] if odometry else "",
+            list(dict.fromkeys(("base_link", options.base_frame or "base_link"))),
+        )
+
+    def missing_nodes(self) -> List[str]:
+        """Return the problems of the parameter file, and Nav2's nodes that do not exist."""
+        found = self._findings(self._options.parameters or {}, f"{self._options.parameter_file}: ")
+        names = {name for name, _ in self._graph.nodes()}
+        for name in nav2_parameters.NODES:
+            # Another localizer may publish map -> odom.
+            localized = name == "amcl" and self._graph.publishers_of(self._graph.names("/tf"))
+            if name not in names and not localized:
+                found.append(f"there is no node {name}")
+        return found
+
+    def wrong_parameters(self) -> List[str]:
+        """Return parameters of the running nodes that do not match what simscen publishes."""
+        nodes = [node for node in self._graph.nodes() if node[0] in nav2_parameters.RULES]
+        return self._findings({node[0]: self._parameters(full_name(node), node[0]) for node in nodes}, "")
+
+    def _findings(self, nodes: Dict[str, Dict[str, Any]], prefix: str) -> List[str]:
+        found = nav2_parameters.check(nodes, self._offer)
+        return [f"{prefix}{finding.node}: {finding.message}" for finding in found if finding.severe]
+
+    def _parameters(self, path: str, name: str) -> Dict[str, Any]:
+        """Return the parameters of a node that the rules use; none if it does not answer."""
+        list_type: Any = find_type("rcl_interfaces/srv/ListParameters")
+        known = self._call(list_type, f"{path}/list_parameters", list_type.Request())
+        if known is None:
+            return {}
+        names = nav2_parameters.wanted(name, known.result.names)
+        get_type: Any = find_type("rcl_interfaces/srv/GetParameters")
+        got = self._call(get_type, f"{path}/get_parameters", get_type.Request(names=names))
+        return {} if got is None else {key: _parameter_value(value) for key, value in zip(names, got.values)}
+
+    def _call(self, service_type: Any, name: str, request: Any) -> Any:
+        client = self._graph.node.create_client(service_type, name)
+        try:
+            return self._barrier.call(client, request)
+        finally:
+            self._graph.node.destroy_client(client)
+
+
+def _parameter_value(value: Any) -> Any:
+    """Return the content of a rcl_interfaces/msg/ParameterValue."""
+    fields = ("", "bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array", "double_array")
+    names = (*fields, "string_array")
+    return getattr(value, f"{names[value.type]}_value") if value.type else None

@@ -1,6 +1,6 @@
-"""What the ROS Python runs, by its path: `python start.py OPTIONS`, with the options as JSON.
+"""Program that the user's ROS Python runs: `python start.py OPTIONS`, with the options as JSON.
 
-simscen is not installed there, and need not be: its folder stands in for the package, whose own `__init__` is not run.
+simscen is not installed there. Its folder is made importable as the package `simscen`, without running `__init__.py`.
 """
 
 import json
@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 def start() -> int:
-    """Run the adapter; its exit code."""
+    """Run the adapter; return its exit code."""
     here = Path(__file__).resolve().parent
     sys.path[:] = [entry for entry in sys.path if Path(entry or ".").resolve() != here]
     package = types.ModuleType("simscen")

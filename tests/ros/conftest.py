@@ -119,3 +119,22 @@ def run(ros: Ros, tmp_path: Path) -> Run:
         return Ended(done.returncode, re.sub(r"\s+", " ", done.stdout + done.stderr), out)
 
     return call
+
+
+@pytest.fixture
+def alive() -> Callable[..., list[int]]:
+    """Return a function that lists the processes whose command line has `word` and begins with `program`."""
+
+    def find(word: str, program: str = "") -> list[int]:
+        found = []
+        for process in Path("/proc").iterdir():
+            if process.name.isdigit():
+                try:
+                    words = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+                except OSError:
+                    continue
+                if word in words and words.startswith(program):
+                    found.append(int(process.name))
+        return sorted(found)
+
+    return find

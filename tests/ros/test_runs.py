@@ -30,20 +30,6 @@ def digest(log: Path) -> str:
     return hashlib.sha256(log.read_bytes()).hexdigest()
 
 
-def alive(word: str, program: str = "") -> list[int]:
-    """The processes whose command line has `word`, and begins with `program`."""
-    found = []
-    for process in Path("/proc").iterdir():
-        if process.name.isdigit():
-            try:
-                words = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
-            except OSError:
-                continue
-            if word in words and words.startswith(program):
-                found.append(int(process.name))
-    return sorted(found)
-
-
 @pytest.mark.parametrize("stamped", [pytest.param(False, marks=pytest.mark.slow), True], ids=["Twist", "TwistStamped"])
 def test_it_reaches_a_goal_by_goal_pose_in_a_namespace_with_remappings(ros, run, stamped: bool) -> None:
     names = ["-r", "__ns:=/robot1", "-r", "/tf:=tf", "-r", "/tf_static:=tf_static", "-r", "scan:=/front/scan"]
@@ -122,7 +108,7 @@ def test_paced_runs_say_so(ros, run) -> None:
     assert (told["sync"], told["factor"]) == ("paced", 4.0)
 
 
-def test_killing_the_node_is_an_error_of_that_run_only_and_nothing_is_left(ros, run, tmp_path: Path) -> None:
+def test_killing_the_node_is_an_error_of_that_run_only_and_nothing_is_left(ros, run, alive, tmp_path: Path) -> None:
     (tmp_path / "other.scenario.yaml").write_text((tmp_path / "short.scenario.yaml").read_text())
     tag = f"run{os.getpid()}"
     with ThreadPoolExecutor(1) as pool:
@@ -140,15 +126,25 @@ def test_killing_the_node_is_an_error_of_that_run_only_and_nothing_is_left(ros, 
     assert alive(tag) == []
 
 
-@pytest.mark.slow
-def test_a_ros_without_tf2_msgs_and_nav2_msgs_is_driven_by_goal_pose(ros, run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_ros_without_tf2_msgs_can_drive_nodes_that_do_not_need_tf(ros, run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(NODES.with_name("without")))
     ended = run("--launch", ros.node("navigator"), scenario="short.scenario.yaml")
     assert ended.code == 0, ended.said
     assert ended.about["not_published"] == ["/tf (tf2_msgs/msg/TFMessage)", "/tf_static (tf2_msgs/msg/TFMessage)"]
 
 
-def test_a_node_that_hangs_is_named_and_ended(ros, run) -> None:
+def test_a_node_that_needs_tf_is_named_if_the_adapter_has_no_tf2_msgs(
+    with_interfaces, run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    launch = f"env -u PYTHONPATH {with_interfaces.node('navigator')}"
+    monkeypatch.setenv("PYTHONPATH", str(NODES.with_name("without")))
+    ended = run("--launch", launch)
+    assert ended.code == 3
+    assert "/navigator subscribes to /tf_static, which cannot be published: " in ended.said
+    assert "has no tf2_msgs; install it" in ended.said
+
+
+def test_a_node_that_hangs_is_named_and_ended(ros, run, alive) -> None:
     tag = f"hangs{os.getpid()}"
     launch = ros.node("navigator", "-p", f"tag:={tag}", hangs_at=1.0)
     ended = run("--answer", "2", "--launch", launch, scenario="short.scenario.yaml")

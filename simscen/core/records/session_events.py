@@ -71,6 +71,7 @@ class RunFinished:
 
     `wall` is in seconds. `again` is the command that repeats the run from the working folder, and `file` the scenario
     as seen from there, for people to open; "" = the result's own. `tags` are the scenario's.
+    `warnings` are those of the external stack.
     """
 
     result: RunResult
@@ -79,6 +80,7 @@ class RunFinished:
     again: str = ""
     file: str = ""
     tags: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def key(self) -> RunKey:

@@ -9,7 +9,7 @@ from simscen.core.errors import Problem
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.textfile import read_text
 from simscen.loading.yaml.tree import MappingNode, Node, Position
-from simscen.ros2.nav2 import Offer, check
+from simscen.ros2.nav2_parameters import Offer, check
 
 PARAMETERS = "ros__parameters"
 EVERY_NODE = "**"

@@ -136,6 +136,7 @@ def _polygon(corners: Any) -> list[list[float]]:
 
 MAX_NAME_LENGTH = 200
 MAX_ABOUT_LENGTH = 65_536
+MAX_FIRST_ANSWER_S = 3700
 
 
 @dataclass(frozen=True)
@@ -147,6 +148,8 @@ class Welcome:
     topics: tuple[str, ...] = ()
     every_beat: bool = False
     about: dict[str, Any] = field(default_factory=dict)
+    first_answer_limit: float = 0.0
+    """Wall time that the first answer may take, if the stack asks for more than the usual limit."""
 
     @classmethod
     def of(cls, kind: int, body: bytes, offer: TopicTable, mode: Mode = "navigate_to_pose") -> "Welcome":
@@ -174,7 +177,11 @@ class Welcome:
             raise ProtocolViolation(
                 f"it wants `{unknown[0][:80]}`, which there is not; there are {', '.join(offer.says)}"
             )
-        return cls(_text(told, "name"), _text(told, "version"), tuple(topics), step == "beat", _about(told))
+        limit = told.get("first_answer_limit", 0.0)
+        if not isinstance(limit, int | float) or not 0 <= limit <= MAX_FIRST_ANSWER_S:
+            raise ProtocolViolation(f"`first_answer_limit` is no number of seconds from 0 to {MAX_FIRST_ANSWER_S}")
+        every_beat = step == "beat"
+        return cls(_text(told, "name"), _text(told, "version"), tuple(topics), every_beat, _about(told), float(limit))
 
     def with_farewell(self, body: bytes) -> "Welcome":
         """Add the information of its BYE. An invalid BYE is ignored, since the run is over."""

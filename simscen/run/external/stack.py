@@ -58,6 +58,7 @@ class ExternalStack:
         self._welcome = Welcome()
         self._plan: Path | None = None
         self._held = Decision(STOP)
+        self._first = True
         self._told, self._canceling = False, False
         self._correction: Pose2 | None = None
         self._odometry: Odometry | None = None
@@ -163,6 +164,8 @@ class ExternalStack:
         """Send a step and return the answer."""
         assert self._process is not None
         limit = self._command.answer_limit
+        if self._first:
+            limit, self._first = max(limit, self._welcome.first_answer_limit), False
         sec, nanosec = self._time.stamp(tick)
         flags = wire.COMMAND_DUE if due else 0
         header = wire.StepHeader(tick, sec, nanosec, round(limit * 1e3), flags)

@@ -1,5 +1,6 @@
 """Build the result of a run from the end of its process, and the command that repeats it."""
 
+import json
 import os
 import shlex
 import signal
@@ -38,6 +39,7 @@ def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
         again=repeat_command(job.scenario, job.key.seed),
         file=shown(job.scenario.file),
         tags=tuple(job.scenario.spec.tags),
+        warnings=_stack_warnings(job.folder),
     )
 
 
@@ -73,6 +75,15 @@ def _artifacts(folder: Path) -> Artifacts:
         return str(folder / name) if (folder / name).exists() else ""
 
     return Artifacts(str(folder), path("run.mcap"), path("map.png"), path("result.json"), path("replay.html"))
+
+
+def _stack_warnings(folder: Path) -> tuple[str, ...]:
+    """Return the `warnings` that external stacks gave about themselves."""
+    warnings: dict[str, None] = {}
+    for file in sorted(folder.glob("stack*.json")):
+        said = json.loads(file.read_text(encoding="utf-8")).get("about", {}).get("warnings", [])
+        warnings.update(dict.fromkeys(text for text in said if isinstance(text, str)) if isinstance(said, list) else {})
+    return tuple(warnings)
 
 
 def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simscen.cli.main import app
-from simscen.ros2.nav2 import Finding, Offer, check, wanted
+from simscen.ros2.nav2_parameters import Finding, Offer, check, wanted
 
 OFFER = Offer(["/scan", "/rear/scan"], "/odom", ["base_link"])
 FITS = """\
@@ -131,7 +131,7 @@ def test_a_second_name_of_the_base_makes_a_file_fit(tmp_path: Path) -> None:
 def test_a_file_without_parameters_of_nodes_is_refused(tmp_path: Path) -> None:
     code, said = called(tmp_path, "amcl: {alpha1: 0.2}\n")
     assert code == 2
-    assert "there is no key ros__parameters in it" in said
+    assert "it has no key ros__parameters" in said
 
 
 def test_called_by_hand_it_says_what_it_is_for() -> None:

@@ -13,10 +13,9 @@ import pytest
 import simscen.ros2
 from simscen.core.geometry.kinematics import Twist
 from simscen.record import pack
-from simscen.ros2 import cdr
-from simscen.ros2.domain import claim, surroundings
-from simscen.ros2.failure import Failure
-from simscen.ros2.names import Names
+from simscen.ros2 import messages
+from simscen.ros2.domain import claim, ros_environment
+from simscen.ros2.options import AdapterError, TopicNames
 
 FOLDER = Path(simscen.ros2.__file__).parent
 
@@ -46,13 +45,13 @@ def test_the_adapter_is_python_3_8_and_imports_nothing_of_simscen_but_itself_and
 def test_topics_are_in_the_namespace_and_are_remapped_as_in_ros(
     namespace: str, remappings: list[str], topic: str, name: str
 ) -> None:
-    assert Names(namespace, remappings)(topic) == name
+    assert TopicNames(namespace, remappings)(topic) == name
 
 
 @pytest.mark.parametrize("text", ["/scan=/front", ":=/front", "/scan:="])
 def test_a_remapping_that_is_none_is_refused(text: str) -> None:
-    with pytest.raises(Failure, match="not of the form /from:=/to"):
-        Names("", [text])
+    with pytest.raises(AdapterError, match="not of the form /from:=/to"):
+        TopicNames("", [text])
 
 
 def test_two_runs_never_have_the_same_domain(tmp_path: Path) -> None:
@@ -66,9 +65,9 @@ def test_two_runs_never_have_the_same_domain(tmp_path: Path) -> None:
 def test_a_domain_that_another_run_uses_cannot_be_had_by_number(tmp_path: Path) -> None:
     environment = {"XDG_RUNTIME_DIR": str(tmp_path)}
     held = claim(42, environment)
-    with pytest.raises(Failure, match=r"another run is using ROS domain 42: .* --jobs 1"):
+    with pytest.raises(AdapterError, match=r"another run is using ROS domain 42: .* --jobs 1"):
         claim(42, environment)
-    with pytest.raises(Failure, match=r"another robot or run is using ROS domain 42: with several robots"):
+    with pytest.raises(AdapterError, match=r"another robot or run is using ROS domain 42: with several robots"):
         claim(42, {**environment, "SIMSCEN_ROBOT": "b"})
     held.release()
     assert claim(42, environment).number == 42
@@ -84,7 +83,7 @@ def test_the_lock_of_a_domain_goes_with_the_process_that_held_it(tmp_path: Path)
     )
     assert holder.stdout is not None
     holder.stdout.readline()
-    with pytest.raises(Failure):
+    with pytest.raises(AdapterError):
         claim(7, environment)
     holder.kill()
     holder.wait()
@@ -93,7 +92,7 @@ def test_the_lock_of_a_domain_goes_with_the_process_that_held_it(tmp_path: Path)
 
 @pytest.mark.parametrize(("distro", "old"), [("humble", "1"), ("jazzy", None), ("", None)])
 def test_nodes_are_told_to_stay_on_this_machine_as_their_distribution_understands(distro: str, old: str | None) -> None:
-    told = surroundings(5, "/tmp/logs", {"ROS_DISTRO": distro, "ROS_LOCALHOST_ONLY": "0"})
+    told = ros_environment(5, "/tmp/logs", {"ROS_DISTRO": distro, "ROS_LOCALHOST_ONLY": "0"})
     assert told["ROS_DOMAIN_ID"] == "5"
     assert told["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
     assert told.get("ROS_LOCALHOST_ONLY") == old
@@ -104,17 +103,17 @@ def test_a_stamped_velocity_is_read_whatever_the_length_of_its_frame() -> None:
     for frame in ("", "b", "base_link", "base_footprint", "robot_1/base_link"):
         text = frame.encode() + b"\0"
         body = struct.pack("<iII", 12, 500_000_000, len(text)) + text
-        stamped = cdr.LITTLE_ENDIAN + body + b"\0" * (-len(body) % 8) + struct.pack("<6d", *numbers)
-        assert cdr.velocity(stamped, stamped=True) == numbers
-        assert cdr.header(stamped) == (12_500_000_000, frame)
+        stamped = messages.LITTLE_ENDIAN + body + b"\0" * (-len(body) % 8) + struct.pack("<6d", *numbers)
+        assert messages.read_twist(stamped, stamped=True) == numbers
+        assert messages.read_header(stamped) == (12_500_000_000, frame)
 
 
 def test_a_velocity_of_another_byte_order_is_read_too() -> None:
-    assert cdr.velocity(b"\0\0\0\0" + struct.pack(">6d", 1, 2, 3, 4, 5, 6), stamped=False) == (1, 2, 3, 4, 5, 6)
+    assert messages.read_twist(b"\0\0\0\0" + struct.pack(">6d", 1, 2, 3, 4, 5, 6), stamped=False) == (1, 2, 3, 4, 5, 6)
 
 
 def test_a_twist_is_written_as_in_the_log() -> None:
-    assert cdr.twist((0.3, 0.1, 0, 0, 0, -0.7)) == pack.twist().packer()(Twist(0.3, 0.1, -0.7))
+    assert messages.write_twist((0.3, 0.1, 0, 0, 0, -0.7)) == pack.twist().packer()(Twist(0.3, 0.1, -0.7))
 
 
 def _alive(pid: int) -> bool:
@@ -135,7 +134,7 @@ def test_all_that_was_launched_is_ended_when_the_adapter_goes_even_what_slipped_
     command = f"setsid sh -c '{deaf}echo $$ > {note}; while :; do sleep 0.05; done' & sleep 600"
     if stubborn:
         command = f'setsid sh -c "{deaf}echo \\$\\$ > {note}; while :; do sleep 0.05; done" & sleep 600'
-    keeper = subprocess.Popen([sys.executable, str(FOLDER / "keeper.py"), command], stdin=subprocess.PIPE)
+    keeper = subprocess.Popen([sys.executable, str(FOLDER / "launch.py"), command], stdin=subprocess.PIPE)
     while not note.exists() or not note.read_text():
         time.sleep(0.02)
     pid = int(note.read_text())
@@ -148,9 +147,9 @@ def test_all_that_was_launched_is_ended_when_the_adapter_goes_even_what_slipped_
 
 def test_the_keeper_ends_as_what_it_kept() -> None:
     for command, code in (("exit 3", 3), ("kill -9 $$", 137)):
-        keeper = subprocess.Popen([sys.executable, str(FOLDER / "keeper.py"), command], stdin=subprocess.PIPE)
+        keeper = subprocess.Popen([sys.executable, str(FOLDER / "launch.py"), command], stdin=subprocess.PIPE)
         assert keeper.wait(30) == code
 
 
 def test_an_estimate_is_made_of_map_odom_and_odometry() -> None:
-    assert cdr.compose((1.0, 2.0, 0.0), (0.5, 0.0, 0.1)) == pytest.approx((1.5, 2.0, 0.1))
+    assert messages.compose((1.0, 2.0, 0.0), (0.5, 0.0, 0.1)) == pytest.approx((1.5, 2.0, 0.1))

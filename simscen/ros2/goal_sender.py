@@ -1,0 +1,254 @@
+"""Ways to send goals to a stack: Nav2's actions, or a pose on /goal_pose."""
+
+import math
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Union
+
+from rclpy.action import ActionClient
+
+from simscen.peer.goals import Goal
+from simscen.ros2.graph import Graph
+from simscen.ros2.messages import NANOSECONDS, Pose, find_type, wrap_angle
+from simscen.ros2.node_barrier import NodeBarrier
+from simscen.ros2.options import AdapterError
+
+POSE_TYPE = "geometry_msgs/msg/PoseStamped"
+GOAL_POSE = "/goal_pose"
+ACTIONS = {
+    "navigate_to_pose": "nav2_msgs/action/NavigateToPose",
+    "navigate_through_poses": "nav2_msgs/action/NavigateThroughPoses",
+    "follow_waypoints": "nav2_msgs/action/FollowWaypoints",
+}
+STANDSTILL_NS = NANOSECONDS
+"""Simulated time of a zero command after which a goal on /goal_pose counts as reached."""
+REJECTED, UNKNOWN = 1, 9000
+"""Error codes of Nav2."""
+SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
+"""action_msgs/msg/GoalStatus."""
+
+
+class Reached(NamedTuple):
+    """The first of the goals that were sent is reached."""
+
+
+class Failed(NamedTuple):
+    """The first of the goals that were sent has failed."""
+
+    code: int
+    message: str
+
+
+Outcome = Union[Reached, Failed]
+
+
+class StackState(NamedTuple):
+    """Time of the run in nanoseconds, whether the command is zero, and the stack's own pose estimate."""
+
+    now: int
+    stopped: bool
+    pose: Optional[Pose]
+
+
+class GoalPoseSender:
+    """Publishes a pose on /goal_pose, as RViz does.
+
+    The stack does not report the end of such a goal. It counts as reported reached when the command has been zero for
+    STANDSTILL_NS while the stack's own estimate is within the tolerances of the goal. Standing elsewhere means nothing;
+    the timeout of the goal ends that.
+    """
+
+    one_by_one = True
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self._goal: Optional[Goal] = None
+        self._stopped_since: Optional[int] = None
+        graph.advertise(GOAL_POSE, POSE_TYPE)
+
+    @property
+    def name(self) -> str:
+        """The topic in the graph."""
+        return self._graph.names(GOAL_POSE)
+
+    def missing(self) -> List[str]:
+        """Return why goals cannot be sent: nothing subscribes to the topic."""
+        found = self._graph.subscribers_of(self.name)
+        return [] if found else [f"nobody takes goals: no subscriber of {self.name} ({POSE_TYPE})"]
+
+    def send(self, goals: Sequence[Goal], now: int, barrier: NodeBarrier) -> Optional[Failed]:
+        """Send the first goal."""
+        from rclpy.serialization import serialize_message
+
+        self._goal, self._stopped_since = goals[0], None
+        self._graph.publish(GOAL_POSE, serialize_message(pose_stamped(goals[0], now)))
+        return None
+
+    def outcomes(self, state: StackState) -> List[Outcome]:
+        """Return whether the robot stands at the goal."""
+        if self._goal is None:
+            return []
+        if not (state.stopped and state.pose is not None and _within_tolerance(self._goal, state.pose)):
+            self._stopped_since = None
+            return []
+        if self._stopped_since is None:
+            self._stopped_since = state.now
+        if state.now - self._stopped_since < STANDSTILL_NS:
+            return []
+        self._goal = None
+        return [Reached()]
+
+    def cancel(self, state: StackState, barrier: NodeBarrier) -> None:
+        """Send the current pose as the goal, because a pose cannot be canceled."""
+        if self._goal is not None and state.pose is not None:
+            x, y, yaw = state.pose
+            self.send([self._goal._replace(x=x, y=y, yaw=yaw)], state.now, barrier)
+        self._goal = None
+
+
+class ActionSender:
+    """Client of one of Nav2's actions. Raises AdapterError if the action type is not installed."""
+
+    def __init__(self, graph: Graph, action: str) -> None:
+        self._graph, self.action, self.name = graph, action, graph.names("/" + action)
+        self.type = ACTIONS[action]
+        action_type = find_type(self.type)
+        if action_type is None:
+            raise AdapterError(
+                f"this ROS has no {self.type}: install nav2_msgs, or take goals by /goal_pose (--goals goal_pose)"
+            )
+        self._type: Any = action_type
+        self._client = ActionClient(graph.node, action_type, self.name)
+        self._handle: Any = None
+        self._result: Any = None
+        self._goals: Sequence[Goal] = ()
+        self._passed = self._reported = 0
+
+    @property
+    def one_by_one(self) -> bool:
+        """Whether the action takes one goal at a time."""
+        return self.action == "navigate_to_pose"
+
+    def missing(self) -> List[str]:
+        """Return why goals cannot be sent: there is no server."""
+        if self._client.server_is_ready():
+            return []
+        return [f"nobody takes goals: no action server {self.name} ({self.type})"]
+
+    def send(self, goals: Sequence[Goal], now: int, barrier: NodeBarrier) -> Optional[Failed]:
+        """Send the goals and wait until they are accepted; return Failed if they are rejected."""
+        request = self._type.Goal()
+        poses = [pose_stamped(goal, now + self._graph.offset_ns) for goal in goals]
+        if self.one_by_one:
+            request.pose, goals = poses[0], goals[:1]
+        elif hasattr(request.poses, "goals"):  # nav_msgs/Goals since Kilted, a plain list before
+            request.poses.goals = poses
+            request.poses.header = poses[0].header
+        else:
+            request.poses = poses
+        self._goals, self._passed, self._reported = goals, 0, 0
+        self._result = None
+        answer = self._client.send_goal_async(request, feedback_callback=self._take_feedback)
+        barrier.wait(answer, f"{self.name} has not accepted or rejected the goal")
+        self._handle = answer.result()
+        if not self._handle.accepted:
+            self._handle = None
+            return Failed(REJECTED, f"{self.name} rejected the goal")
+        self._result = self._handle.get_result_async()
+        return None
+
+    def _take_feedback(self, message: Any) -> None:
+        feedback = message.feedback
+        if self.action == "navigate_through_poses":
+            remaining = feedback.number_of_poses_remaining
+            # A server that does not count reports 0.
+            self._passed = max(self._passed, len(self._goals) - remaining) if remaining else self._passed
+        elif self.action == "follow_waypoints":
+            self._passed = max(self._passed, min(feedback.current_waypoint, len(self._goals) - 1))
+
+    def outcomes(self, state: StackState) -> List[Outcome]:
+        """Return the new outcomes of the goals that were sent, in order."""
+        if self._handle is None:
+            return []
+        if not self._result.done():
+            return self._passed_goals(state)
+        answer = self._result.result()
+        self._handle = None
+        result = answer.result
+        if answer.status == SUCCEEDED:
+            missed = self._missed_waypoints(result)
+            return [missed.get(index, Reached()) for index in range(self._reported, len(self._goals))]
+        said = {CANCELED: "was canceled by the stack", ABORTED: "was aborted"}.get(answer.status, "ended")
+        code = getattr(result, "error_code", 0) or UNKNOWN
+        message = getattr(result, "error_msg", "") or f"{self.name} {said}"
+        # Goals that were not attempted fail with the current one.
+        return [*self._passed_goals(state), *[Failed(code, message)] * (len(self._goals) - self._passed)]
+
+    def _missed_waypoints(self, result: Any) -> Dict[int, Failed]:
+        missed: Dict[int, Failed] = {}
+        for waypoint in getattr(result, "missed_waypoints", ()):
+            index = waypoint.waypoint_index if hasattr(waypoint, "waypoint_index") else waypoint.index
+            code, message = getattr(waypoint, "error_code", 0) or UNKNOWN, getattr(waypoint, "error_msg", "")
+            missed[index] = Failed(code, message or f"{self.name} missed it")
+        return missed
+
+    def _passed_goals(self, state: StackState) -> List[Outcome]:
+        """Return the outcomes of the goals that the feedback has left behind since the last call.
+
+        The feedback of FollowWaypoints does not distinguish reached goals from missed ones.
+        """
+        found: List[Outcome] = []
+        for goal in self._goals[self._reported : self._passed]:
+            arrived = state.pose is not None and _within_tolerance(goal, state.pose)
+            if arrived or self.action == "navigate_through_poses":
+                found.append(Reached())
+            else:
+                found.append(Failed(UNKNOWN, f"{self.name} continued without having been there"))
+        self._reported = self._passed
+        return found
+
+    def cancel(self, state: StackState, barrier: NodeBarrier) -> None:
+        """Cancel what was sent."""
+        if self._handle is not None:
+            barrier.wait(self._handle.cancel_goal_async(), f"{self.name} has not answered to a cancel")
+            self._handle = None
+
+
+GoalSender = Union[GoalPoseSender, ActionSender]
+
+
+class GoalSenders:
+    """The requested way to send goals, or the first usable one for `auto`."""
+
+    def __init__(self, graph: Graph, requested: str) -> None:
+        self._senders: List[GoalSender] = []
+        action = "navigate_to_pose" if requested == "auto" else requested
+        if action in ACTIONS and (requested != "auto" or find_type(ACTIONS[action]) is not None):
+            self._senders.append(ActionSender(graph, action))
+        if requested in ("auto", "goal_pose"):
+            self._senders.append(GoalPoseSender(graph))
+
+    @property
+    def usable(self) -> Optional[GoalSender]:
+        """The first way for which there is a server or a subscriber."""
+        return next((sender for sender in self._senders if not sender.missing()), None)
+
+    def missing(self) -> List[str]:
+        """Return why goals cannot be sent."""
+        if self.usable is not None:
+            return []
+        reasons = [sender.missing()[0] for sender in self._senders]
+        return [reasons[0] + "".join(", and " + reason.partition(": ")[2] for reason in reasons[1:])]
+
+
+def pose_stamped(goal: Goal, now: int) -> Any:
+    """Return the goal as geometry_msgs/msg/PoseStamped in the map frame."""
+    message: Any = find_type(POSE_TYPE)()  # type: ignore[misc]
+    message.header.frame_id = "map"
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(now, NANOSECONDS)
+    message.pose.position.x, message.pose.position.y = goal.x, goal.y
+    message.pose.orientation.z, message.pose.orientation.w = math.sin(goal.yaw / 2), math.cos(goal.yaw / 2)
+    return message
+
+
+def _within_tolerance(goal: Goal, pose: Pose) -> bool:
+    near = math.hypot(pose[0] - goal.x, pose[1] - goal.y) <= goal.xy_tolerance
+    return near and abs(wrap_angle(pose[2] - goal.yaw)) <= goal.yaw_tolerance

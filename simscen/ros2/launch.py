@@ -1,0 +1,95 @@
+"""The user's launch command: runs it, and ends everything that it started even if the adapter is killed.
+
+As a program, `python launch.py COMMAND` runs the command in a shell and a process group of its own. When standard input
+closes or the command ends, all of its descendants get SIGINT, as from Ctrl-C, then SIGTERM, then SIGKILL.
+"""
+
+import contextlib
+import ctypes
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Dict, List, Mapping, Optional
+
+PR_SET_CHILD_SUBREAPER = 36
+GRACE_S = ((signal.SIGINT, 4.0), (signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))
+"""Signals, and how long to wait after each."""
+
+
+class LaunchedCommand:
+    """A running launch command."""
+
+    def __init__(self, command: str, environment: Mapping[str, str]) -> None:
+        self.command = command
+        program = [sys.executable, str(Path(__file__).resolve()), command]
+        self._process = subprocess.Popen(
+            program, stdin=subprocess.PIPE, stdout=2, env=environment, start_new_session=True
+        )
+
+    @property
+    def ended(self) -> Optional[str]:
+        """How the command ended; None while it runs."""
+        code = self._process.poll()
+        if code is None:
+            return None
+        return f"ended by signal {code - 128}" if code > 128 else f"ended with exit code {code}"
+
+    def end(self) -> None:
+        """End the command and everything that it started."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
+
+
+def descendants(parent: int) -> List[int]:
+    """Return all descendants of a process, children before grandchildren."""
+    children: Dict[int, List[int]] = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with contextlib.suppress(OSError):
+                state, above = (entry / "stat").read_text().rpartition(")")[2].split()[:2]
+                if state != "Z":
+                    children.setdefault(int(above), []).append(int(entry.name))
+    found, new = [], [parent]
+    while new:
+        new = [child for one in new for child in children.get(one, ())]
+        found += new
+    return found
+
+
+def end_descendants() -> None:
+    """End all descendants of this process."""
+    for number, seconds in GRACE_S:
+        for child in descendants(os.getpid()):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(child, number)
+        end = time.monotonic() + seconds
+        while descendants(os.getpid()):
+            if time.monotonic() > end:
+                break
+            time.sleep(0.02)
+        else:
+            return
+
+
+def main() -> int:
+    """Run the command until it ends or standard input closes; return its exit code."""
+    # A process that loses its parent becomes a child of this one.
+    ctypes.CDLL(None, use_errno=True).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: None)
+    started = subprocess.Popen(sys.argv[1], shell=True, stdin=subprocess.DEVNULL, start_new_session=True)
+    while started.poll() is None:
+        if select.select([0], [], [], 0.05)[0] and not os.read(0, 1):
+            break
+    end_descendants()
+    code = started.wait()
+    return code if code >= 0 else 128 - code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,92 @@
+"""The stack's own estimate of the robot's pose, and its newest plan."""
+
+from typing import Any, List, Optional, Tuple
+
+from simscen.ros2 import messages
+from simscen.ros2.graph import Received
+from simscen.ros2.messages import Pose
+from simscen.ros2.options import AdapterError
+
+MAP_FRAME, ODOM_FRAME = "map", "odom"
+PLAN = "/plan"
+
+
+class PoseEstimate:
+    """Estimate from what the stack publishes.
+
+    Sources, in this order: map -> odom of /tf composed with odometry; /amcl_pose; the initial pose composed with
+    odometry.
+    """
+
+    def __init__(self) -> None:
+        self.plan: List[Tuple[float, float]] = []
+        """Points of the newest plan."""
+        self._map_from_odom: Optional[Pose] = None
+        self._amcl_pose: Optional[Pose] = None
+        self._initial: Optional[Pose] = None
+        self._odometry: Optional[Pose] = None
+
+    @property
+    def pose(self) -> Optional[Pose]:
+        """x, y, yaw on the map; None if unknown."""
+        if self._map_from_odom is not None and self._odometry is not None:
+            return messages.compose(self._map_from_odom, self._odometry)
+        if self._amcl_pose is not None:
+            return self._amcl_pose
+        if self._initial is not None and self._odometry is not None:
+            return messages.compose(self._initial, self._odometry)
+        return None
+
+    def take_published(self, topic: str, data: bytes) -> None:
+        """Take a message that simscen publishes."""
+        if topic == "/odom":
+            self._odometry = _pose(_read("nav_msgs/msg/Odometry", data).pose.pose)
+        elif topic == "/initialpose":
+            self._initial = _pose(_read("geometry_msgs/msg/PoseWithCovarianceStamped", data).pose.pose)
+
+    def take_received(self, message: Received) -> bool:
+        """Take a message of the stack; return False for a /tf without map -> odom.
+
+        Raises AdapterError for a pose or plan in another frame than `map`.
+        """
+        if message.topic == "/amcl_pose":
+            _require_map_frame(message)
+            self._amcl_pose = _pose(_read(message.type, message.data).pose.pose)
+        elif message.topic == PLAN:
+            _require_map_frame(message)
+            poses = _read(message.type, message.data).poses
+            self.plan = [(stamped.pose.position.x, stamped.pose.position.y) for stamped in poses]
+        elif message.topic == "/tf":
+            return self._take_transforms(message)
+        return True
+
+    def _take_transforms(self, message: Received) -> bool:
+        found = False
+        for link in _read(message.type, message.data).transforms:
+            if link.child_frame_id.lstrip("/") != ODOM_FRAME:
+                continue
+            if link.header.frame_id.lstrip("/") != MAP_FRAME:
+                raise AdapterError(
+                    f"/tf: the stack publishes {ODOM_FRAME!r} in {link.header.frame_id!r}, not in {MAP_FRAME!r}"
+                )
+            origin, q = link.transform.translation, link.transform.rotation
+            self._map_from_odom = (origin.x, origin.y, messages.quaternion_yaw(q.x, q.y, q.z, q.w))
+            found = True
+        return found
+
+
+def _require_map_frame(message: Received) -> None:
+    frame = messages.read_header(message.data)[1]
+    if frame.lstrip("/") != MAP_FRAME:
+        raise AdapterError(f"{message.topic} is in the frame {frame!r}; simscen's map frame is {MAP_FRAME!r}")
+
+
+def _read(type_name: str, data: bytes) -> Any:
+    from rclpy.serialization import deserialize_message
+
+    return deserialize_message(data, messages.find_type(type_name))
+
+
+def _pose(pose: Any) -> Pose:
+    q = pose.orientation
+    return pose.position.x, pose.position.y, messages.quaternion_yaw(q.x, q.y, q.z, q.w)
