@@ -14,7 +14,7 @@ LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loadin
 
 ROS := .venv-ros
 
-.PHONY: help setup run test test-lowest test-all test-ros served library planners check lint types layers schemas docs site mutation screenshots bench campaign fuzz build clean
+.PHONY: help setup run test test-lowest test-all test-ros test-nav2 served library planners check lint types layers schemas docs site mutation screenshots bench campaign fuzz build clean
 
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -49,6 +49,9 @@ test-all: setup  ## Run all tests, also the slow ones that `make test` skips
 test-ros: setup  ## Test with a real ROS 2 (rclpy on Fast DDS, from wheels into .venv-ros)
 	@$(BIN)/python tests/ros/rig.py $(ROS)
 	@$(BIN)/python -m pytest tests/ros -n 2 --durations=10
+
+test-nav2: setup  ## Test with a real Nav2: an installed one, or built from SIMSCEN_NAV2_SOURCES into .nav2
+	@$(BIN)/python tests/nav2/rig.py .nav2 || exit 0; $(BIN)/python -m pytest tests/nav2 -n 0 --durations=10
 
 test-lowest:  ## Test with the oldest packages that pyproject.toml allows, in .venv-lowest
 	@test -x $(LOWEST)/bin/python || $(PYTHON) -m venv $(LOWEST)
