@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from os import PathLike
 
-    from simscen.core.records.run import Run
+    from simscen.core.records.case import Run
 
 __all__ = ["__version__", "simulate", "variations"]
 

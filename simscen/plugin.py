@@ -21,15 +21,13 @@ if TYPE_CHECKING:
     from simscen.core.geometry.kinematics import STOP, Twist
     from simscen.core.geometry.polygons import distance_to_polygon
     from simscen.core.geometry.shapes import Body, MotionPath
-    from simscen.core.messages.localization import Belief, Estimate
-    from simscen.core.messages.navigation import ErrorCode, Goal, Path, TaskResult
+    from simscen.core.messages.navigation import Belief, ErrorCode, Estimate, Goal, Path, TaskResult
     from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Readings, Scan
     from simscen.core.random_streams import Streams
     from simscen.core.records.case import Case
     from simscen.core.records.events import Event, EventKind
-    from simscen.core.records.evidence import Evidence
     from simscen.core.records.trace import CostGrid, Decision, Samples, Trace
-    from simscen.core.records.verdict import Finding, Status
+    from simscen.core.records.verdict import Evidence, Finding, Status
     from simscen.core.stage import Effect, Situation, Stage
     from simscen.criteria.base import Criterion
     from simscen.criteria.findings import at_least, at_most, counted, held, missed, undecided
@@ -317,17 +315,12 @@ _WHERE = {
         "turn_rate",
     ),
     # The words that all speak.
-    "simscen.core.messages.localization": (
-        "Belief",
-        "Estimate",
-    ),
     "simscen.core.records.case": ("Case",),
     "simscen.core.random_streams": ("Streams",),
     "simscen.core.records.events": (
         "Event",
         "EventKind",
     ),
-    "simscen.core.records.evidence": ("Evidence",),
     "simscen.core.geometry": (
         "Array",
         "Pose2",
@@ -340,7 +333,9 @@ _WHERE = {
         "Twist",
     ),
     "simscen.core.messages.navigation": (
+        "Belief",
         "ErrorCode",
+        "Estimate",
         "Goal",
         "Path",
         "TaskResult",
@@ -372,6 +367,7 @@ _WHERE = {
         "Trace",
     ),
     "simscen.core.records.verdict": (
+        "Evidence",
         "Finding",
         "Status",
     ),

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from simscen.actions.base import Action
-from simscen.core.environment.pedestrians import Behavior, Unseen, WalkingPedestrian
-from simscen.core.environment.world_model import Polygon
+from simscen.core.environment.world_model import Behavior, Polygon, Unseen, WalkingPedestrian
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.stage import Effect, Stage

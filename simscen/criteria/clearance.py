@@ -1,4 +1,4 @@
-"""`clearance`: how near the robot came to things."""
+"""Distance to the robot: `clearance` from obstacles, and `personal_space` of pedestrians."""
 
 from __future__ import annotations
 
@@ -6,17 +6,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.records.evidence import Evidence
-from simscen.core.records.verdict import Finding
+from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, undecided
-from simscen.criteria.trace_signals.ground_truth import clearance
+from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, pedestrian_gap
+from simscen.criteria.trace_signals.ground_truth import clearance, speed
+from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.spec.base import Spec
 from simscen.spec.quantities import NonNegativeLength
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
     from simscen.core.records.trace import Trace
+
 
 SEARCH_MARGIN_M = 0.5
 """Meters beyond its bound."""
@@ -58,3 +60,48 @@ class Clearance(Spec, Criterion):
             return [undecided("clearance", because, f"≥ {self.min:.2f} m")]
         at = (trace, int(trace.clearance.ticks[k]))
         return [at_least("clearance", float(distances[k]), self.min, "m", at=at)]
+
+
+DRIVING_SPEED_M_S = 0.1
+"""m/s; a slower robot stands, and people come up to it as they like."""
+
+
+class PersonalSpace(Spec, Criterion):
+    """The robot kept its distance from people.
+
+    What is measured: the smallest true gap between the robot's footprint and the body of a pedestrian, over the whole
+        run.
+    When it fails: it is below `min`.
+    Why this: people feel a robot that passes close by as a threat long before it touches them; 0.45 m is where Hall's
+        intimate space begins.
+    Source: Hall 1966; the space intrusions of HuNavSim and of Francis et al. 2023, by the gap between surfaces.
+
+    Inconclusive when nobody was ever there: then nothing was tested.
+
+    Example: `personal_space: {min: 0.3 m, while_driving: true}`
+    """
+
+    min: NonNegativeLength = INTIMATE_SPACE_M
+    """Of the gap."""
+    while_driving: bool = False
+    """Only moments at which the robot drives, faster than 0.1 m/s: people come up to one that stands as they like."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY}
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """The nearest moment."""
+        limit = f"≥ {self.min:.2f} m"
+        try:
+            gaps = pedestrian_gap(trace, case)
+        except SignalUnavailable as why:
+            return [undecided("distance to people", str(why), limit)]
+        if self.while_driving:
+            gaps = np.where(speed(trace).at(trace.truth.ticks)[:, 0] > DRIVING_SPEED_M_S, gaps, np.inf)
+        nearest = int(np.argmin(gaps))
+        if np.isinf(gaps[nearest]):
+            return [undecided("distance to people", "nobody was there while the robot drove", limit)]
+        at = (trace, int(trace.truth.ticks[nearest]))
+        return [at_least("distance to people", float(gaps[nearest]), self.min, "m", at=at)]

@@ -9,8 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.records.events import Event, EventKind
-from simscen.core.records.evidence import Evidence
-from simscen.core.records.verdict import Finding
+from simscen.core.records.verdict import Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import InvalidTrace, MissingEvidence, at_most, counted, undecided
 from simscen.criteria.trace_signals.distances import pedestrian_radii

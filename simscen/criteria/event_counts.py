@@ -9,8 +9,7 @@ from pydantic import Field, model_validator
 
 from simscen.core.messages.navigation import ReplanReason
 from simscen.core.records.events import Event, EventKind
-from simscen.core.records.evidence import Evidence
-from simscen.core.records.verdict import Finding, Status
+from simscen.core.records.verdict import Evidence, Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import counted, undecided
 from simscen.criteria.timeline import has_ended

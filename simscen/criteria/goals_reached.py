@@ -10,8 +10,7 @@ from pydantic import Field
 
 from simscen.core.geometry import wrap
 from simscen.core.messages.goal_names import FAILED, matches_goal_name
-from simscen.core.records.evidence import POSITION, Evidence
-from simscen.core.records.verdict import Finding
+from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, held, missed, undecided
 from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_outcomes, outcome_start

@@ -11,8 +11,7 @@ from pydantic import model_validator
 from simscen.core.geometry.polygons import polygon_defect
 from simscen.core.geometry.separation import separation, separation_from_boxes
 from simscen.core.records.events import EventKind
-from simscen.core.records.evidence import POSITION, Evidence
-from simscen.core.records.verdict import Finding
+from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import InvalidTrace, at_least, undecided
 from simscen.criteria.timeline import NEVER_SWITCHED, clip_samples, enabled_spans

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
-from simscen.core.records.evidence import POSITION, Evidence
 from simscen.core.records.trace import Samples
-from simscen.core.records.verdict import Finding
+from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.core.statistics import chi2_quantile, nees_mean_bounds
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, missed, undecided
-from simscen.criteria.trace_signals.nees import DIMENSIONS, nees_samples
+from simscen.criteria.trace_signals.ground_truth import DIMENSIONS, nees_samples
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, PositiveDuration, Quantity
 

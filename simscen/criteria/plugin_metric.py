@@ -9,8 +9,8 @@ from simscen.spec.choice import Choice
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
-    from simscen.core.records.evidence import Evidence
     from simscen.core.records.trace import Trace
+    from simscen.core.records.verdict import Evidence
 
 
 class Measure(ABC):

@@ -27,23 +27,21 @@ class AnyCriterion(Choice):
     goals_reached: Annotated[Criterion | None, LazySpec("simscen.criteria.goals_reached", "GoalsReached")] = None
     result: Annotated[Criterion | None, LazySpec("simscen.criteria.result", "Result")] = None
     error_code: Annotated[Criterion | None, LazySpec("simscen.criteria.result", "ErrorCodeIs")] = None
-    no_false_success: Annotated[Criterion | None, LazySpec("simscen.criteria.no_false_success", "NoFalseSuccess")] = (
-        None
-    )
+    no_false_success: Annotated[Criterion | None, LazySpec("simscen.criteria.result", "NoFalseSuccess")] = None
     collisions: Annotated[Criterion | None, LazySpec("simscen.criteria.collisions", "Collisions")] = None
     clearance: Annotated[Criterion | None, LazySpec("simscen.criteria.clearance", "Clearance")] = None
-    personal_space: Annotated[Criterion | None, LazySpec("simscen.criteria.personal_space", "PersonalSpace")] = None
+    personal_space: Annotated[Criterion | None, LazySpec("simscen.criteria.clearance", "PersonalSpace")] = None
     keepout: Annotated[Criterion | None, LazySpec("simscen.criteria.keepout", "Keepout")] = None
-    time_to_goal: Annotated[Criterion | None, LazySpec("simscen.criteria.time_to_goal", "TimeToGoal")] = None
-    path_length: Annotated[Criterion | None, LazySpec("simscen.criteria.path_length", "PathLength")] = None
+    time_to_goal: Annotated[Criterion | None, LazySpec("simscen.criteria.efficiency", "TimeToGoal")] = None
+    path_length: Annotated[Criterion | None, LazySpec("simscen.criteria.efficiency", "PathLength")] = None
     speed: Annotated[Criterion | None, LazySpec("simscen.criteria.speed", "Speed")] = None
-    stopped_within: Annotated[Criterion | None, LazySpec("simscen.criteria.stopped_within", "StoppedWithin")] = None
-    stuck: Annotated[Criterion | None, LazySpec("simscen.criteria.stuck", "Stuck")] = None
+    stopped_within: Annotated[Criterion | None, LazySpec("simscen.criteria.stopping", "StoppedWithin")] = None
+    stuck: Annotated[Criterion | None, LazySpec("simscen.criteria.stopping", "Stuck")] = None
     localization_error: Annotated[
         Criterion | None, LazySpec("simscen.criteria.localization_error", "LocalizationError")
     ] = None
     relocalized_within: Annotated[
-        Criterion | None, LazySpec("simscen.criteria.relocalized_within", "RelocalizedWithin")
+        Criterion | None, LazySpec("simscen.criteria.localization_error", "RelocalizedWithin")
     ] = None
     localization_consistency: Annotated[
         Criterion | None, LazySpec("simscen.criteria.localization_consistency", "LocalizationConsistency")
@@ -51,10 +49,10 @@ class AnyCriterion(Choice):
     smoothness: Annotated[Criterion | None, LazySpec("simscen.criteria.smoothness", "Smoothness")] = None
     replans: Annotated[Criterion | None, LazySpec("simscen.criteria.event_counts", "Replans")] = None
     recoveries: Annotated[Criterion | None, LazySpec("simscen.criteria.event_counts", "Recoveries")] = None
-    always: Annotated[Criterion | None, LazySpec("simscen.criteria.always_eventually", "Always")] = None
-    eventually: Annotated[Criterion | None, LazySpec("simscen.criteria.always_eventually", "Eventually")] = None
-    until: Annotated[Criterion | None, LazySpec("simscen.criteria.until", "Until")] = None
-    whenever: Annotated[BaseModel | None, LazySpec("simscen.criteria.whenever", "Whenever")] = None
+    always: Annotated[Criterion | None, LazySpec("simscen.criteria.temporal", "Always")] = None
+    eventually: Annotated[Criterion | None, LazySpec("simscen.criteria.temporal", "Eventually")] = None
+    until: Annotated[Criterion | None, LazySpec("simscen.criteria.temporal", "Until")] = None
+    whenever: Annotated[BaseModel | None, LazySpec("simscen.criteria.temporal", "Whenever")] = None
 
     @model_validator(mode="after")
     def _whenever_then(self) -> "AnyCriterion":
@@ -67,7 +65,7 @@ class AnyCriterion(Choice):
         """The criterion; of `whenever` the two halves in one."""
         if self.whenever is None:
             return super().chosen
-        from simscen.criteria.whenever import Response
+        from simscen.criteria.temporal import Response
 
         return Response.of(self.whenever, self.then)
 

@@ -8,8 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.core.geometry import Array
-from simscen.core.records.evidence import Evidence
-from simscen.core.records.verdict import Finding
+from simscen.core.records.verdict import Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, undecided
 from simscen.criteria.trace_signals.catalog import SignalName, read_signal

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field, model_validator
 
-from simscen.core.records.evidence import POSITION, Evidence
-from simscen.core.records.verdict import Finding
+from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
 from simscen.criteria.timeline import NEVER_SWITCHED, enabled_spans

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from simscen.core.geometry import Pose2
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 
 
 def with_correction(belief: Belief, correction: Pose2) -> Belief:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from simscen.core.clock import Clock
-from simscen.core.records.disturbances import FAULT_TARGET_KINDS
+from simscen.core.records.events import FAULT_TARGET_KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from simscen.core.environment.occupancy_grid import OccupancyGrid
     from simscen.core.geometry import Array, Pose3
     from simscen.core.geometry.kinematics import Twist
-    from simscen.core.messages.localization import Belief
+    from simscen.core.messages.navigation import Belief
     from simscen.core.messages.sensor_data import Image, Reading, Scan
 
 

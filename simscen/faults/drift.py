@@ -10,7 +10,7 @@ import numpy as np
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Imu, Reading
 from simscen.faults._keys import misplaced_key
 from simscen.faults._odometry import OdometryDistortion

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Length

@@ -11,7 +11,7 @@ import numpy as np
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Reading, Scan
 from simscen.faults._keys import misplaced_key
 from simscen.faults._odometry import OdometryDistortion

@@ -8,7 +8,7 @@ import numpy as np
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Reading
 from simscen.faults._belief import with_correction
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance

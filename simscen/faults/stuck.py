@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Reading
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec

@@ -6,7 +6,7 @@ from dataclasses import replace
 import yaml
 
 from simscen.core.errors import InvalidInput
-from simscen.core.records.disturbances import Disturbance
+from simscen.core.records.events import Disturbance
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.multirobot import split_by_robot

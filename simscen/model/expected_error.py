@@ -1,6 +1,6 @@
 """A failure that a scenario expects of a goal."""
 
-from simscen.criteria.error_codes import Code
+from simscen.criteria.goal_outcomes import Code
 from simscen.spec.base import Spec
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from simscen.core.geometry import Pose2
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import LARGEST_SEED
 from simscen.criteria.registry import AnyCriterion
 from simscen.model.anystack import AnyStack

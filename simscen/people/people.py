@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.environment.pedestrians import PedestrianAction, WalkingPedestrian
+from simscen.core.environment.world_model import PedestrianAction, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2
 from simscen.people import forces
 from simscen.people.forces import RELAXATION_TIME, Numbers

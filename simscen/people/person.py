@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from simscen.core.environment.pedestrians import PedestrianAction, WalkingPedestrian
+from simscen.core.environment.world_model import PedestrianAction, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.people.forces import MOST_OF_SPEED, RELAXATION_TIME
 from simscen.people.seen import SeenRobot

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import simscen
-from simscen.core.records.run import Run
+from simscen.core.records.case import Run
 
 
 class Simscen:

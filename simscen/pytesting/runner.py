@@ -12,8 +12,8 @@ from simscen.core.records.session_events import RunFinished
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
 from simscen.pytesting.names import OUT
+from simscen.run.process.isolation import plugin_path_arguments
 from simscen.run.process.jobs import Job, ReplayMode
-from simscen.run.process.plugin_path import plugin_path_arguments
 from simscen.run.process.supervisor import OnDemandRunner
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER, run_folder
 from simscen.run.sessions.results import finished_run

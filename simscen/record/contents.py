@@ -8,8 +8,8 @@ from mcap import records
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.records.evidence import LogCoverage
 from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import LogCoverage
 from simscen.record import event_text, frames, header, topics, unpack
 from simscen.record.header import LogHeader
 from simscen.record.message_counts import MessageCounts

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from simscen.core.records.evidence import Evidence, LogCoverage
+from simscen.core.records.verdict import Evidence, LogCoverage
 from simscen.record import header, topics
 
 NO_COUNTS = "the log does not say how many messages were recorded: an older simscen wrote it, or its end was edited"

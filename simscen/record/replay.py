@@ -10,8 +10,8 @@ from mcap.exceptions import McapError
 from zstandard import ZstdError
 
 from simscen.core.errors import InvalidInput, Problem
-from simscen.core.records.evidence import COMPLETE_COVERAGE, LogCoverage
 from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import COMPLETE_COVERAGE, LogCoverage
 from simscen.record.contents import Contents, Foreign
 from simscen.record.header import LogHeader
 from simscen.record.logfile import PARTIAL_SUFFIX

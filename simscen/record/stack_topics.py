@@ -1,7 +1,7 @@
 """What the stack made of it: /amcl_pose, its particles, /plan, /local_plan, both costmaps and /cmd_vel."""
 
 from simscen.core.geometry import Pose3
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.core.records.trace import Decision
 from simscen.record import frames, pack, pack_many, pack_rare, topics
 from simscen.record.frames import RobotFrames

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from simscen.core.records.stack_comparison import BaselineComparison, Comparison, MetricDifference, OutcomeCounts
+from simscen.core.records.session_events import BaselineComparison, Comparison, MetricDifference, OutcomeCounts
 from simscen.report.line import Line, Piece
 from simscen.report.text import one_line
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from html import escape
 
-from simscen.core.records.stack_comparison import BaselineComparison, Comparison, MetricDifference, OutcomeCounts
+from simscen.core.records.session_events import BaselineComparison, Comparison, MetricDifference, OutcomeCounts
 from simscen.report.compared import MOST_FLIPS, counted, headline, left_out, numbers, parted
 from simscen.report.text import one_line
 

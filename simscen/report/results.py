@@ -6,8 +6,7 @@ from pathlib import PurePath
 from typing import Any
 
 from simscen.core.records.run_result import Outcome
-from simscen.core.records.session_events import RunFinished
-from simscen.core.records.stack_comparison import Comparison
+from simscen.core.records.session_events import Comparison, RunFinished
 from simscen.judge.metrics.session_summary import session_summary_data, summarize_session
 from simscen.judge.metrics.stack_comparison import comparison_data
 from simscen.judge.result_json import result_data

@@ -5,25 +5,29 @@ from pathlib import Path
 
 from simscen.core.clock import Clock
 from simscen.core.environment.world_model import Patch
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Odometry
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event, EventKind
 from simscen.model.anystack import ExternalStackSpec
 from simscen.run.external.build import build_external_stack
-from simscen.run.faults.channels import CommandLink, LocalizerWithFaults
-from simscen.run.faults.context import FaultContexts
 from simscen.run.faults.injector import FaultInjector
+from simscen.run.faults.interfaces import CommandLink, FaultContexts, LocalizerWithFaults
 from simscen.run.live_world.costmap_filters import CostmapFilters
 from simscen.run.live_world.director import Director
 from simscen.run.live_world.pedestrians import PedestrianSimulation
 from simscen.run.live_world.ray_caster import LiveRayCaster
 from simscen.run.live_world.stage import LiveStage, body_data
-from simscen.run.lockstep import RobotUnderTest, RunSetup
+from simscen.run.lockstep import EndCondition, RobotUnderTest, RunSetup
 from simscen.run.preparation.scenario import PreparedScenario
-from simscen.run.robot_interface import command_latencies, robot_model, sensor_latencies, with_robot_latency
-from simscen.run.sensing import SensorSuite, TickSchedule
-from simscen.run.termination import EndCondition
+from simscen.run.robot_interface import (
+    SensorSuite,
+    TickSchedule,
+    command_latencies,
+    robot_model,
+    sensor_latencies,
+    with_robot_latency,
+)
 from simscen.sensors.build import build_sensors
 from simscen.sensors.sensor import Sensor
 from simscen.sim.robot import Robot

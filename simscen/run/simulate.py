@@ -1,5 +1,8 @@
 """Simulate a prepared scenario: assemble, run in lockstep, record, and judge."""
 
+import gc
+import hashlib
+import json
 import traceback
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack
@@ -9,17 +12,17 @@ from typing import Any
 
 from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput, RunError
-from simscen.core.records.run import Run
+from simscen.core.records.case import Run
 from simscen.core.records.trace import Trace
-from simscen.judge.multi_robot import combine_robots
 from simscen.judge.result_json import to_json
-from simscen.judge.run_result import judge_run
+from simscen.judge.run_result import combine_robots, judge_run
 from simscen.loading.files.discovery import default_root
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import WAITS, Backlog, Log
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.assembly import assemble
+from simscen.run.external.build import robot_file
 from simscen.run.external.stack import ExternalStack
 from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
@@ -173,3 +176,35 @@ def _nearest(module: str, plugins: Sequence[Entry]) -> Entry:
     package = module.partition(".")[0]
     same = [entry for entry in plugins if entry.value.partition(":")[0].partition(".")[0] == package]
     return next((entry for entry in same if entry.value.partition(":")[0] == module), same[0])
+
+
+GC_THRESHOLD = 20_000
+"""Threshold of garbage collection in a worker. Runs create hardly any cycles; the default of 700 wastes time.
+"""
+
+WriteExtras = Callable[[PreparedScenario, Run, Path], None]
+"""Writes further files of a run, for example a picture."""
+
+
+def execute_run(
+    prepared: PreparedScenario, seed: int, folder: Path, logs: tuple[Log, ...], finish: WriteExtras
+) -> dict[str, Any]:
+    """Execute a run and write run.mcap, result.json, scenario.yaml, and the files of `finish` to `folder`.
+
+    The output of an external stack goes to stack.log and its description to stack.json; with several robots, to
+    stack.ROBOT.log and stack.ROBOT.json.
+
+    Returns the end record for the supervisor: the outcome and the SHA-256 of the log.
+    """
+    if not prepared.plugins:  # plug-ins can create any amount of garbage
+        gc.set_threshold(GC_THRESHOLD)
+    log = folder / "run.mcap"
+    (folder / "scenario.yaml").write_text(log_header(prepared, seed).scenario, encoding="utf-8")
+    run = simulate(prepared, seed, log=log, attach=lambda *_: logs, printed=folder / "stack.log")
+    (folder / "result.json").write_text(to_json(run.result), encoding="utf-8")
+    for name, one in (run.robots or {NAMELESS: run}).items():
+        if one.stack:
+            file = robot_file(folder / "stack.json", name)
+            file.write_text(json.dumps(one.stack, indent=1) + "\n", encoding="utf-8")
+    finish(prepared, run, folder)
+    return {"outcome": run.result.outcome.value, "sha256": hashlib.sha256(log.read_bytes()).hexdigest()}

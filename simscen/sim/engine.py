@@ -6,9 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 
-from simscen.core.environment.drivable_surfaces import FLOOR_HEIGHT_M
 from simscen.core.geometry import Array, Pose3
-from simscen.core.geometry.meshes import submesh
+from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, submesh
 from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
 from simscen.sim.hull import few_corners
 from simscen.sim.inertia import GRAVITY

@@ -15,9 +15,8 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 
-from simscen.core.environment.drivable_surfaces import FLOOR_HEIGHT_M
 from simscen.core.geometry import Array, Pose3
-from simscen.core.geometry.meshes import is_convex, submesh
+from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, is_convex, submesh
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.sim import engine, outline
 from simscen.sim.clients import CLIENTS

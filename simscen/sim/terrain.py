@@ -11,9 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 
-from simscen.core.environment.drivable_surfaces import Owners, drivable_solids
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.geometry.meshes import is_convex, submesh
+from simscen.core.geometry.meshes import Owners, drivable_solids, is_convex, submesh
 from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.sim import engine
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.messages.localization import Belief
-from simscen.core.messages.navigation import Path
+from simscen.core.messages.navigation import Belief, Path
 from simscen.core.records.trace import CostGrid
 from simscen.stack.arcs import SHOWN, arc
 from simscen.stack.costmap.costmaps import Costmaps

@@ -6,8 +6,7 @@ from typing import Any
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.localization import Estimate
-from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.navigation import ErrorCode, Estimate, Goal, Path
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readings, Scan
 from simscen.core.records.events import Event
 from simscen.core.records.trace import Decision

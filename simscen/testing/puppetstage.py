@@ -7,13 +7,11 @@ import numpy as np
 
 from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import ZoneSwitch
-from simscen.core.environment.pedestrians import WalkingPedestrian
-from simscen.core.environment.world_model import Patch, Polygon
+from simscen.core.environment.world_model import Patch, Polygon, WalkingPedestrian
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.geometry.shapes import Body, MotionPath
-from simscen.core.messages.localization import Belief
-from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.navigation import Belief, Goal, Path
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event
 

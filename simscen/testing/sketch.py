@@ -9,8 +9,7 @@ from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.messages.navigation import Goal, Path
 from simscen.core.records.case import CLEARANCE_RANGE, Case, Passage
-from simscen.core.records.disturbances import Disturbance
-from simscen.core.records.events import Event, EventKind
+from simscen.core.records.events import Disturbance, Event, EventKind
 from simscen.core.records.trace import Samples, Ticks, Trace
 
 TICK_RATE, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24

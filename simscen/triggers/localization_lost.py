@@ -3,7 +3,7 @@
 import math
 
 from simscen.core.geometry import wrap
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngle, PositiveLength

@@ -6,7 +6,7 @@ import pytest
 from simscen.advanced.localizers.spec import ScanMatchingAmcl, SlipEkf
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import Amcl, Ekf, GroundTruth, LocalizerSpec, OdometryOnly
 from simscen.testing import Promise, promises_of

@@ -14,28 +14,50 @@ EVERY_CRITERION = ["tests/unit/criteria/test_every_criterion.py", "tests/unit/cr
 TEMPORAL = ["golden", "always", "eventually", "until", "whenever"]
 _STL, _SIGNALS, _METRICS = "tests/unit/criteria/stl", "tests/unit/criteria/trace_signals", "tests/unit/judge/metrics"
 CONCERNED = {
-    "criteria/always_eventually": [
-        ["golden", "always", "eventually"],
+    "criteria/clearance": [["golden", "clearance"], ["golden", "personal_space"], EVERY_CRITERION],
+    "criteria/localization_error": [
+        ["golden", "localization_error"],
+        ["golden", "relocalized_within"],
+        EVERY_CRITERION,
+    ],
+    "criteria/stopping": [
+        ["golden", "stopped_within"],
+        ["golden", "stuck"],
+        ["tests/unit/criteria/test_stopped_within.py", *EVERY_CRITERION],
+    ],
+    "criteria/efficiency": [
+        ["golden", "time_to_goal"],
+        ["golden", "path_length"],
+        ["tests/unit/criteria/test_path_length.py", *EVERY_CRITERION],
+    ],
+    "criteria/temporal": [
+        TEMPORAL,
         [f"{_STL}/test_criterion.py", f"{_STL}/test_decision_horizon.py", *EVERY_CRITERION],
     ],
     "criteria/event_counts": [["golden", "replans", "recoveries"], EVERY_CRITERION],
-    "criteria/result": [["golden", "result"], ["golden", "error_code"], EVERY_CRITERION],
+    "criteria/result": [
+        ["golden", "result"],
+        ["golden", "error_code"],
+        ["golden", "no_false_success"],
+        EVERY_CRITERION,
+    ],
     "criteria/localization_consistency": [
         ["golden", "localization_consistency"],
         ["tests/unit/criteria/test_smoothness_and_consistency.py", *EVERY_CRITERION],
     ],
     "criteria/stl/condition": [[f"{_STL}/test_condition.py"], [f"{_STL}/test_decision_horizon.py"], TEMPORAL],
-    "criteria/stl/description": [[f"{_STL}/test_description.py"], TEMPORAL],
     "criteria/stl/robustness": [TEMPORAL, [f"{_STL}/test_robustness.py"]],
     "criteria/stl/operators": [TEMPORAL, [f"{_STL}/test_operators.py"]],
-    "criteria/stl/criterion": [TEMPORAL, [f"{_STL}/test_criterion.py"]],
-    "criteria/trace_signals/nees": [["golden", "localization_consistency"], [f"{_SIGNALS}/test_nees.py"]],
+    "criteria/stl/criterion": [TEMPORAL, [f"{_STL}/test_criterion.py", f"{_STL}/test_description.py"]],
     "criteria/trace_signals/distances": [[f"{_SIGNALS}/test_readers.py"], TEMPORAL, ["golden", "personal_space"]],
     "criteria/trace_signals/catalog": [
         [f"{_SIGNALS}/test_catalog.py", f"{_STL}/test_condition.py", f"{_STL}/test_criterion.py"]
     ],
     "criteria/trace_signals/readers": [[f"{_SIGNALS}/test_readers.py"], TEMPORAL],
-    "criteria/trace_signals/ground_truth": [[f"{_SIGNALS}/test_ground_truth.py"], ["golden"]],
+    "criteria/trace_signals/ground_truth": [
+        [f"{_SIGNALS}/test_ground_truth.py", f"{_SIGNALS}/test_nees.py"],
+        ["golden"],
+    ],
     "criteria/trace_signals/sparc_ldlj": [
         [f"{_SIGNALS}/test_sparc_ldlj.py"],
         ["tests/unit/criteria/test_smoothness_and_consistency.py"],
@@ -43,19 +65,19 @@ CONCERNED = {
     "judge/run_result": [["tests/unit/judge/test_run_result.py", "tests/unit/judge/test_disturbances.py"]],
     "judge/result_json": [[f"tests/unit/judge/test_{of}.py" for of in ("result_json", "run_result", "disturbances")]],
     "judge/evaluation": [
-        [f"tests/unit/judge/test_{of}.py" for of in ("required_evidence", "required_evidence_of_signals", "evaluation")]
+        [
+            f"tests/unit/judge/test_{of}.py"
+            for of in ("required_evidence", "required_evidence_of_signals", "evaluation", "expected_failure")
+        ]
     ],
     **{f"judge/{of}": [[f"tests/unit/judge/test_{of}.py"]] for of in ("finding_text", "disturbances")},
-    **{
-        f"judge/metrics/{of}": [[f"{_METRICS}/test_{of}.py"], [f"{_METRICS}/test_compute.py"]]
-        for of in ("path", "pose_error")
-    },
+    "judge/metrics/trajectory": [
+        [f"{_METRICS}/test_path.py", f"{_METRICS}/test_pose_error.py"],
+        [f"{_METRICS}/test_compute.py"],
+    ],
     "judge/metrics/compute": [[_METRICS], ["tests/unit/judge"]],
     **{f"judge/metrics/{of}": [[f"{_METRICS}/test_{of}.py"]] for of in ("session_summary", "stack_comparison")},
-    **{
-        f"judge/diagnosis/{of}": [DIAGNOSIS]
-        for of in ("causes", "objects", "blocked_path", "goal_failure", "collision", "localization")
-    },
+    **{f"judge/diagnosis/{of}": [DIAGNOSIS] for of in ("causes", "objects", "goal_failure")},
 }
 """Tests of a module that many others use, or that a criterion shares: those of the module itself come first."""
 IDLE = {"__init__.py"}

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from simscen.run.process.plugin_path import plugin_path_arguments
+from simscen.run.process.isolation import plugin_path_arguments
 from simscen.spec.registry import Entry, installed
 
 ROOT = Path(__file__).parents[2]
 ISOLATED = (
     f"import sys; sys.path.insert(0, {str(ROOT)!r});"
-    "from simscen.run.process.plugin_path import apply_plugin_path; apply_plugin_path(sys.argv[1]);"
+    "from simscen.run.process.isolation import apply_plugin_path; apply_plugin_path(sys.argv[1]);"
     "from simscen.spec.registry import installed;"
     "print([(entry.version, entry.load().__module__) for entry in installed('criterion')], sys.path.index({0!r}))"
 )

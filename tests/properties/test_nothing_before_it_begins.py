@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from simscen.actions.action import AnyAction
-from simscen.core.records.disturbances import KIND_BY_INSTANCE, MAP
-from simscen.core.records.events import EventKind
+from simscen.core.records.events import KIND_BY_INSTANCE, MAP, EventKind
 from simscen.core.records.trace import Moment
 from simscen.faults.fault import AnyFault
 from simscen.loading.checks.faults import instances, unfit_faults, unknown_sensors

@@ -11,9 +11,8 @@ from rosbags.typesys import Stores, get_typestore
 from simscen.core.records.events import EventKind
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import Status
-from simscen.judge.multi_robot import combine_robots
 from simscen.judge.result_json import from_json, to_json
-from simscen.judge.run_result import judge_run
+from simscen.judge.run_result import combine_robots, judge_run
 from simscen.loading.resolved import criteria_of_text
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log

@@ -10,7 +10,7 @@ from simscen.advanced.localizers.scan_matcher import Step, moved
 from simscen.advanced.localizers.scan_memory import METERS_A_RAD
 from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.clusters import in_touch, summarize
 from simscen.stack.localizers.likelihood_field import SensorModel

@@ -10,7 +10,7 @@ from simscen.advanced.localizers.map_trust import MapTrust
 from simscen.advanced.localizers.pose_prior import AROUND, ObservedMotion, PosePrior
 from simscen.advanced.localizers.scan_memory import ScanMemory, travelled
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane
 from simscen.stack.localizers.clusters import errors_about

@@ -12,7 +12,7 @@ from simscen.advanced.localizers.relocalization import UNSEEN, Relocalizer
 from simscen.advanced.localizers.scan_matcher import ScanMatcher, Step
 from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.amcl import AmclLocalizer, Correction
 from simscen.stack.localizers.clusters import spread

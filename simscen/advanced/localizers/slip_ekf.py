@@ -13,7 +13,7 @@ from simscen.advanced.localizers.slip_detector import SlipDetector
 from simscen.advanced.localizers.slip_model import AHEAD, BIAS, LEVER, PUSHED, RATE, Model, Step, motion, moved, rates
 from simscen.advanced.localizers.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2, wrap
-from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.stack.localizers.dead_reckoning import start_of
 from simscen.stack.odometry_history import believable

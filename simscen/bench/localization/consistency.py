@@ -13,8 +13,8 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.core.records.trace import Trace
 from simscen.core.statistics import chi2_quantile, nees_mean_bounds
-from simscen.criteria.trace_signals.nees import DIMENSIONS, nees_samples
-from simscen.criteria.trace_signals.nees import nees as squared_errors
+from simscen.criteria.trace_signals.ground_truth import DIMENSIONS, nees_samples
+from simscen.criteria.trace_signals.ground_truth import nees as squared_errors
 
 FEWEST = 3
 """Buildings from which on they say how much they differ."""

@@ -12,7 +12,7 @@ from simscen.bench.localization.trajectory import CLEAN, STEP, ShutIn, Wheels, d
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.model.robot import Lidar, WheelOdometry

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.model.stack import StackSpec

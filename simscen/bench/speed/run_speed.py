@@ -19,8 +19,7 @@ from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import Log
 from simscen.run.lockstep import RunSetup
 from simscen.run.preparation.scenario import PreparedScenario, lidar_height, prepare
-from simscen.run.sessions.execute_run import GC_THRESHOLD
-from simscen.run.simulate import simulate
+from simscen.run.simulate import GC_THRESHOLD, simulate
 from simscen.sim.bare import BareWorld
 from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.reference import ReferenceStack

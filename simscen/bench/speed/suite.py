@@ -13,8 +13,8 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation.scenario import prepare
+from simscen.run.process.isolation import plugin_path_arguments
 from simscen.run.process.jobs import ProcessEnd
-from simscen.run.process.plugin_path import plugin_path_arguments
 from simscen.run.process.supervisor import Ended, supervise
 from simscen.run.sessions.results import finished_run
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs

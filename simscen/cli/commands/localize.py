@@ -13,7 +13,7 @@ from simscen.cli.session.output_files import save
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.geometry import Pose2
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import LARGEST_SEED
 from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root

@@ -11,12 +11,11 @@ from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose2
 from simscen.core.records.case import Case
-from simscen.core.records.evidence import Evidence, LogCoverage
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult, error_result, skipped_result
 from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.core.records.trace import Trace
-from simscen.judge.multi_robot import combine_robots
-from simscen.judge.run_result import judge_run
+from simscen.core.records.verdict import Evidence, LogCoverage
+from simscen.judge.run_result import combine_robots, judge_run
 from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
 from simscen.loading.resolved import criteria_of_text

@@ -15,8 +15,7 @@ from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
 from simscen.core.files import require_not_input, require_regular_file
 from simscen.core.records.run_result import Outcome
-from simscen.core.records.session_events import RunFinished, SessionFinished
-from simscen.core.records.stack_comparison import Comparison
+from simscen.core.records.session_events import Comparison, RunFinished, SessionFinished
 from simscen.report.journaldata import NAME
 from simscen.report.junit import Family, to_xml
 from simscen.report.results import to_json

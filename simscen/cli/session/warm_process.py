@@ -12,22 +12,20 @@ from PIL import Image
 
 import simscen.sim.simulation
 import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
-from simscen.core.records.run import Run
+from simscen.core.records.case import Run
 from simscen.record.replay import read_run
 from simscen.report.picture.compose import write_picture
 from simscen.report.picture.scene import Scene, with_robots
 from simscen.run.caching.disk_cache import DiskCache, cache_folder
 from simscen.run.caching.scenario_cache import CachedWorldBuilder, ScenarioCache
-from simscen.run.log_header import log_header
+from simscen.run.log_header import log_header, world_scenery
 from simscen.run.preparation.scenario import PreparedScenario
-from simscen.run.preparation.scenery import world_scenery
 from simscen.run.preparation.warm_up import import_components, precompute
 from simscen.run.process.fork_server import ForkServer
-from simscen.run.process.isolation import MAX_MEMORY_BYTES
+from simscen.run.process.isolation import MAX_MEMORY_BYTES, apply_plugin_path
 from simscen.run.process.jobs import Job, ReplayMode
-from simscen.run.process.plugin_path import apply_plugin_path
 from simscen.run.process.worker import ProgressReporter
-from simscen.run.sessions.execute_run import execute_run
+from simscen.run.simulate import execute_run
 from simscen.sim.clients import CLIENTS
 
 _PREPARED = ScenarioCache(CachedWorldBuilder(DiskCache(cache_folder(os.environ))))

@@ -12,12 +12,9 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGri
 from simscen.core.geometry import Array, Pose2
 
 if TYPE_CHECKING:
-    from simscen.core.environment.world_model import Polygon
-if TYPE_CHECKING:
     import numpy.typing as npt
 
-if TYPE_CHECKING:
-    import numpy.typing as npt
+    from simscen.core.environment.world_model import Polygon
 
 
 @dataclass(frozen=True, eq=False)

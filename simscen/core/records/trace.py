@@ -17,8 +17,7 @@ from simscen.core.decorators import fast_dataclass
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief
-from simscen.core.messages.navigation import Path
+from simscen.core.messages.navigation import Belief, Path
 from simscen.core.messages.sensor_data import Readings
 from simscen.core.records.events import Event, EventKind
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from simscen.core.geometry import Array
-from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Evidence
 from simscen.criteria.trace_signals import distances, readers
 from simscen.criteria.trace_signals.ground_truth import BELIEF_TIMEOUT_S
 from simscen.criteria.trace_signals.sampling import SignalArguments, SignalQuery

@@ -17,6 +17,7 @@ from simscen.criteria.trace_signals.ground_truth import (
     Flags,
     check_samples,
     drive,
+    nees_samples,
     pose_error,
     speed,
     teleport_samples,
@@ -24,7 +25,6 @@ from simscen.criteria.trace_signals.ground_truth import (
 )
 from simscen.criteria.trace_signals.ground_truth import clearance as hull_clearance
 from simscen.criteria.trace_signals.ground_truth import turn_rate as unsigned_turn_rate
-from simscen.criteria.trace_signals.nees import nees_samples
 from simscen.criteria.trace_signals.sampling import (
     SignalArguments,
     SignalQuery,

@@ -5,16 +5,18 @@ the robot, a robot that was set down elsewhere. "meanwhile" is said of what was 
 Where nothing is known, nothing is said.
 """
 
+import math
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import replace
+
+import numpy as np
 
 from simscen.core.records.case import Case
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.judge.diagnosis.collision import diagnose_collision
 from simscen.judge.diagnosis.goal_failure import diagnose_goal_failure
-from simscen.judge.diagnosis.localization import diagnose_localization
+from simscen.judge.diagnosis.objects import MovableObject, movable_objects
 
 GOAL_CRITERIA = frozenset({"goals_reached", "result", "error_code", "time_to_goal", "stuck"})
 """Criteria that fail when something keeps the robot from its goal."""
@@ -98,3 +100,96 @@ def _events(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
         told = [str(one["what"]) for one in effects if isinstance(one, dict) and one["happened"]]
         if told:
             yield event.name, f"event `{event.name}` came {ago:.2f} s before: {', '.join(told)}"
+
+
+OBJECT_MOVING_SPEED_M_S = 0.0625
+"""m/s from which a thing moves."""
+OBJECT_SPEED_WINDOW_S = 0.25
+"""Seconds over which its speed is taken."""
+
+
+def diagnose_collision(trace: Trace, tick: int) -> tuple[list[str], set[str]]:
+    """A sentence for each thing that can move and was touched at `tick`; and the events that brought it there."""
+    hits = {hit.name: hit for hit in trace.of_kind(EventKind.COLLISION_STARTED) if hit.tick == tick}
+    touched = [thing for thing in movable_objects(trace, tick) if thing.name in hits]
+    told = [(thing, _told(trace, thing, hits[thing.name])) for thing in touched]
+    return [text for _, text in told if text], {thing.event for thing, text in told if text}
+
+
+def _told(trace: Trace, thing: MovableObject, hit: Event) -> str:
+    ago = f"{trace.seconds(hit.tick - thing.since):.2f} s before"
+    parts = []
+    if thing.event:
+        did = "moved it" if thing.moved else f"put it {_away(trace, thing):.2f} m from the robot's middle"
+        parts.append(f"event `{thing.event}` had {did} {ago}")
+    if (speed := _speed(trace, thing.name, hit.tick)) >= OBJECT_MOVING_SPEED_M_S:
+        parts.append(f"it moved at {speed:.2f} m/s")
+    if hit.data.get("robot_caused") is False and parts:
+        parts.append("and ran into the robot")
+    return f"{thing.name}: {', '.join(parts)}" if parts else ""
+
+
+def _away(trace: Trace, thing: MovableObject) -> float:
+    """How far from the robot's middle it was put; nothing has moved it since."""
+    return float(thing.distance(np.array([trace.place(thing.since)]))[0])
+
+
+def _speed(trace: Trace, name: str, tick: int) -> float:
+    samples = trace.objects.get(name)
+    if samples is None:
+        return 0.0
+    before = tick - round(OBJECT_SPEED_WINDOW_S * trace.tick_rate)
+    (x0, y0), (x1, y1) = samples.at(np.array([before, tick]))[:, :2].tolist()
+    return float(np.hypot(x1 - x0, y1 - y0)) / OBJECT_SPEED_WINDOW_S
+
+
+ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
+"""Faults whose error stays in the odometry when they are over."""
+WHEELS, BELIEF = frozenset({"Odometry", "Wheels"}), "Belief"
+"""What such faults affect, and those that come between the localizer and the navigator."""
+LOST_DISTANCE_M = 0.5
+"""Meters between belief and truth from which a robot is lost: two radii of a small one."""
+
+
+def diagnose_localization(trace: Trace, tick: int, known: bool = False) -> tuple[list[str], set[str]]:
+    """How far off it was, if far and not `known`; how that came about; and which events and faults did it."""
+    off = _off(trace, tick)
+    if not off >= LOST_DISTANCE_M:  # nan, too: not known
+        return [], set()
+    lines = [] if known else [f"it believed itself {off:.2f} m from where it was"]
+    named: set[str] = set()
+    doing = ""
+    for event in trace.events:
+        if event.tick > tick:
+            continue
+        if event.kind == EventKind.EVENT_STARTED:
+            doing = event.name
+        elif event.kind == EventKind.EVENT_ENDED:
+            doing = ""
+        elif event.kind == EventKind.ROBOT_PLACED:
+            ago = trace.seconds(tick - event.tick)
+            lines.append(f"event `{doing}` had set it down elsewhere {ago:.2f} s before")
+            named.add(doing)
+        elif event.kind == EventKind.FAULT_TOOK_EFFECT and (what := _falsified(trace, event.name)):
+            lines.append(f"{event.name} falsified {what} from t = {trace.seconds(event.tick):.2f} s on")
+            named.add(event.name)
+    return lines, named
+
+
+def _off(trace: Trace, tick: int) -> float:
+    if not len(trace.belief) or not len(trace.truth):
+        return math.nan
+    bx, by = trace.belief.at(np.array([tick]))[0, :2].tolist()
+    x, y = trace.place(tick)
+    return float(np.hypot(bx - x, by - y))
+
+
+def _falsified(trace: Trace, label: str) -> str:
+    """Which of its ideas of where it is a fault falsified; "" for none."""
+    starts = [event.data for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == label]
+    if not starts:
+        return ""
+    affects = starts[0].get("affects", "Odometry")  # logs from before lidars had a bias do not say
+    if affects == BELIEF:
+        return "its belief"
+    return "its odometry" if affects in WHEELS and starts[0].get("fault") in ODOMETRY_FAULTS else ""

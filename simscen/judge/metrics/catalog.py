@@ -3,7 +3,7 @@
 from collections.abc import Set
 from dataclasses import dataclass
 
-from simscen.core.records.evidence import POSITION, Evidence
+from simscen.core.records.verdict import POSITION, Evidence
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,13 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.core.records.case import CLEARANCE_RANGE, Case
 from simscen.core.records.events import EventKind
-from simscen.core.records.evidence import COMPLETE_COVERAGE, LogCoverage
 from simscen.core.records.trace import Trace
-from simscen.core.records.verdict import Status
+from simscen.core.records.verdict import COMPLETE_COVERAGE, Evidence, LogCoverage, Status
+from simscen.criteria.efficiency import shortest_way
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
 from simscen.criteria.goal_outcomes import goal_outcomes
 from simscen.criteria.goals_reached import GoalsReached
-from simscen.criteria.path_length import shortest_way
+from simscen.criteria.plugin_metric import AnyMeasure
 from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M, pedestrian_gap
 from simscen.criteria.trace_signals.ground_truth import clearance, drive, speed, truth, turn_rate
@@ -25,8 +25,7 @@ from simscen.criteria.trace_signals.readers import evenly_sampled_speed
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.criteria.trace_signals.sparc_ldlj import MOVED_SPEED_M_S, ldlj, sparc
 from simscen.judge.metrics.catalog import METRICS
-from simscen.judge.metrics.path import PATH_METRICS, Values, path_metrics
-from simscen.judge.metrics.pose_error import POSE_METRICS, pose_metrics
+from simscen.judge.metrics.trajectory import PATH_METRICS, POSE_METRICS, Values, path_metrics, pose_metrics
 
 STANDING_SPEED_M_S, STANDING_TURN_RATE_RAD_S = 0.01, 0.02
 """A slower robot does not move (HuNavSim, which takes the turn rate with its sign)."""
@@ -221,3 +220,38 @@ def person_metrics(trace: Trace, case: Case) -> Values:
     nearest = float(gaps.min())
     least: float | str = nearest if np.isfinite(nearest) else "no pedestrian was there at a sample of the truth"
     return dict(zip(_PEOPLE, (least, *shares), strict=True))
+
+
+def add_plugin_metrics(
+    computed: MetricValues, metrics: Sequence[AnyMeasure], trace: Trace, case: Case, coverage: LogCoverage
+) -> MetricValues:
+    """Return the metrics with those that a scenario asks for added.
+
+    Raises InvalidTrace if one fails or is not a finite number: the scenario asked for it, and studies compare it.
+    """
+    values, undefined = dict(computed.values), dict(computed.undefined)
+    for entry in metrics:
+        found = _value(entry, trace, case, coverage)
+        values[entry.kind] = None if isinstance(found, str) else found
+        if isinstance(found, str):
+            undefined[entry.kind] = found
+    return MetricValues(values, undefined)
+
+
+def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: LogCoverage) -> float | str:
+    """Return the value, or why there is none."""
+    wanted = entry.measure.evidence
+    lacking = coverage.lacking(frozenset(Evidence) if wanted is None else wanted)
+    if lacking:
+        return f"the log does not say {' nor '.join(one.value for one in lacking)}"
+    try:
+        found = entry.measure.measure(trace, case)
+    except MissingEvidence as missing:
+        return str(missing)
+    except Exception as error:  # the boundary to plug-ins, which can raise anything
+        raise InvalidTrace(f"metric {entry.kind}: {type(error).__name__}: {error}{entry.added_by}") from error
+    if isinstance(found, str) and found:
+        return found
+    if isinstance(found, bool) or not isinstance(found, int | float) or not math.isfinite(found):
+        raise InvalidTrace(f"metric {entry.kind} is no number: {found!r}{entry.added_by}")
+    return float(found)

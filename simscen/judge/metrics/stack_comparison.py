@@ -7,10 +7,10 @@ from typing import Any
 
 from simscen.core.random_streams import Streams
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
-from simscen.core.records.stack_comparison import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
+from simscen.core.records.session_events import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
 from simscen.core.records.verdict import Status
 from simscen.core.statistics import bootstrap_mean_interval, sign_test
-from simscen.judge.expected_failure import EXPECTED
+from simscen.judge.evaluation import EXPECTED
 from simscen.judge.finding_text import sentence, violations
 from simscen.judge.metrics.catalog import METRICS
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from simscen.core.records.disturbances import BELIEF, COMMAND, KIND_BY_INSTANCE, MAP, WHEELS
+from simscen.core.records.events import BELIEF, COMMAND, KIND_BY_INSTANCE, MAP, WHEELS
 from simscen.faults.base import Instance
 from simscen.loading.checks.registry import MEANING, NAMES, Finding, NameScope
 from simscen.loading.loaded import LoadedScenario

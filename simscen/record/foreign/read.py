@@ -10,8 +10,8 @@ import numpy as np
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.records.events import Event, EventKind
-from simscen.core.records.evidence import LogCoverage
 from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import LogCoverage
 from simscen.record.foreign.bagfolder import messages_of
 from simscen.record.foreign.collected import collect, roles_of
 from simscen.record.foreign.reading import Reading

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.records.evidence import Evidence
 from simscen.core.records.trace import Ticks
+from simscen.core.records.verdict import Evidence
 from simscen.record.foreign.collected import Collected
 from simscen.record.foreign.goals import events_of
 from simscen.record.foreign.messages import POSES

@@ -6,7 +6,7 @@ from typing import Any
 
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
-from simscen.judge.multi_robot import OF_ALL
+from simscen.judge.run_result import OF_ALL
 from simscen.report.replay.lines import Lines
 from simscen.report.text import one_line
 

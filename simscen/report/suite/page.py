@@ -9,8 +9,7 @@ from importlib.resources import files
 from itertools import groupby
 
 from simscen.core.records.run_result import Outcome, RunKey
-from simscen.core.records.session_events import RunFinished
-from simscen.core.records.stack_comparison import Comparison
+from simscen.core.records.session_events import Comparison, RunFinished
 from simscen.report.comparedpage import as_html
 from simscen.report.picture.palette import variables
 from simscen.report.suite import controls, pictures

@@ -14,8 +14,7 @@ import numpy as np
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief
-from simscen.core.messages.navigation import Path
+from simscen.core.messages.navigation import Belief, Path
 from simscen.core.records.trace import CostGrid, LogLine
 from simscen.peer import wire
 from simscen.peer.cdr import Reader

@@ -11,7 +11,7 @@ import numpy as np
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Reading, Readings, Scan
 from simscen.peer import messages
 from simscen.record import frames, pack, pack_many, pack_rare, topics

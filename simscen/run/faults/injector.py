@@ -14,14 +14,13 @@ import numpy as np
 
 from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Odometry, Reading, Readings
 from simscen.core.random_streams import Streams
-from simscen.core.records.disturbances import BELIEF, COMMAND, WHEELS
-from simscen.core.records.events import Event, EventKind
+from simscen.core.records.events import BELIEF, COMMAND, WHEELS, Event, EventKind
 from simscen.faults.base import Disturbance, FaultSetting
 from simscen.model.disturbances import FaultEntry
-from simscen.run.faults.channels import CommandLink
+from simscen.run.faults.interfaces import CommandLink
 from simscen.run.live_world.random_streams import stream_names
 from simscen.stack.localizers.ground_truth import TRUTH
 

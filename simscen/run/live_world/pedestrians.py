@@ -6,8 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from simscen.core.clock import Clock
-from simscen.core.environment.pedestrians import PedestrianAction, WalkingPedestrian
-from simscen.core.environment.world_model import BuiltWorld
+from simscen.core.environment.world_model import BuiltWorld, PedestrianAction, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.polygons import distance_to_polygon
 from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid

@@ -11,8 +11,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import TriangleMesh
-from simscen.core.messages.localization import Estimate
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.navigation import Estimate, Goal
 from simscen.core.records.case import CLEARANCE_RANGE, Case
 from simscen.criteria.base import Criterion
 from simscen.loading.loaded import LoadedScenario

@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
-from simscen.core.errors import Exit, UsageError
+from simscen.core.errors import Exit, InvalidInput, UsageError
 from simscen.core.random_streams import LARGEST_SEED
-from simscen.core.records.run_result import Outcome, RunFailure, RunKey
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.session_events import Listener, RunFinished, RunProgress, RunStarted
+from simscen.judge.result_json import from_json
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
+from simscen.run.process.isolation import plugin_path_arguments
 from simscen.run.process.jobs import Job, ReplayMode
-from simscen.run.process.plugin_path import plugin_path_arguments
 from simscen.run.process.supervisor import Ended, Interrupted, Progressed, Started, supervise
-from simscen.run.reproducibility.comparison import compare_with_session
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.results import finished_run, skipped_run, unfinished_run
 
@@ -148,3 +148,52 @@ def _why_not_done(begun: bool, stopped: Exit | None) -> RunFailure:
     if begun:
         return RunFailure("interrupted", "interrupted before it was finished")
     return RunFailure("not-run", "interrupted" if stopped else "another run did not pass (--fail-fast)")
+
+
+def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
+    """Return the run, or an error if it differs from the same run of the session in the folder `earlier`.
+
+    Logs that are equal byte for byte agree. Other logs agree if verdicts and trajectories do (see record.agreement),
+    because the last bits differ between machines. A run that is missing in the earlier session is an error.
+    """
+    if run.result.outcome is Outcome.ERROR or not run.artifacts.mcap:
+        return run
+    there = _folder(run, earlier) / "run.mcap"
+    try:
+        if there.read_bytes() == Path(run.artifacts.mcap).read_bytes():
+            return run
+        why = _disagreement(Path(run.artifacts.mcap), there)
+    except OSError as error:
+        why = f"{there}: {error.strerror}"
+    except InvalidInput as error:
+        why = str(error)
+    if why is None:
+        return run
+    failure = RunFailure("nondeterministic", f"not as in {earlier}: {why}")
+    return replace(run, result=replace(run.result, outcome=Outcome.ERROR, error=failure))
+
+
+def _folder(run: RunFinished, earlier: Path) -> Path:
+    """Return the folder of the run in the earlier session, which may have used several stacks."""
+    stack = run.result.stack.partition("=")[0]
+    labeled = run_folder(earlier, replace(run.key.first, stack_name=stack))
+    return labeled if not run.key.first.stack_name and labeled.is_dir() else run_folder(earlier, run.key.first)
+
+
+def _disagreement(here: Path, there: Path) -> str | None:
+    """Describe the first difference of two logs, or return None. Raises InvalidInput for an unreadable log."""
+    from simscen.record.agreement import first_disagreement
+    from simscen.record.replay import read_log
+
+    now, then = read_log(here), read_log(there)
+    if not then.result or not now.result:
+        return f"{there}: the run broke off"
+    said, was = (_statuses(from_json(log.result)) for log in (now, then))
+    changed = [name for name in {**was, **said} if said.get(name) != was.get(name)]
+    told = [f"{name}: {said.get(name, 'absent')} instead of {was.get(name, 'absent')}" for name in changed]
+    pairs = zip(now.traces, then.traces, strict=False)
+    return "; ".join(told) or next((parts for pair in pairs if (parts := first_disagreement(*pair))), None)
+
+
+def _statuses(result: RunResult) -> dict[str, str]:
+    return {verdict.id: verdict.status.value for verdict in result.verdicts}

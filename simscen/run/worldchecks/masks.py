@@ -15,8 +15,7 @@ from simscen.criteria.speed import Speed
 from simscen.loading.checks.registry import Finding, Keys
 from simscen.loading.schema.messages import quoted
 from simscen.run.preparation.filter_masks import KEEPOUT_KEYS, SPEED_KEYS, load_criterion_masks, load_masks
-from simscen.run.worldchecks.expected_failures import expects_start_failure
-from simscen.run.worldchecks.scene import WORLD, Scene
+from simscen.run.worldchecks.scene import WORLD, Scene, expects_start_failure
 
 Forbids = Callable[[Pose2, float], bool]
 """Whether a zone contains a pose and everything around it within a distance in m."""

@@ -18,8 +18,7 @@ from simscen.core.geometry.shapes import MotionPath, Solid
 from simscen.core.messages.navigation import Goal
 from simscen.loading.checks.registry import Finding, Keys
 from simscen.loading.yaml.tree import MappingNode
-from simscen.run.worldchecks.expected_failures import expects_start_failure
-from simscen.run.worldchecks.scene import SILL_M, START, TOUCH_M, WORLD, Scene
+from simscen.run.worldchecks.scene import SILL_M, START, TOUCH_M, WORLD, Scene, expects_start_failure
 from simscen.sim.outline import reach
 from simscen.spec.motions import Motion
 from simscen.triggers.time import Time

@@ -11,9 +11,8 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.loading.checks.registry import Finding
 from simscen.model.robot import RobotSpec
 from simscen.run.preparation.goals import scenario_goals
-from simscen.run.worldchecks.expected_failures import expects_failure
 from simscen.run.worldchecks.regions import robot_routes
-from simscen.run.worldchecks.scene import TIMING, Scene
+from simscen.run.worldchecks.scene import TIMING, Scene, expects_failure
 
 MIN_PATH_SHARE = 0.97
 """Share of the shortest path that a robot drives at least: lengths are exact to 1 %, and its hull may cut corners."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import LocalizerSpec
 from simscen.stack.installed.watched import Watched, all_finite

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import AmclParameters
 from simscen.stack.localizers.clusters import spread, summarize

@@ -3,7 +3,7 @@
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
 from simscen.stack.localizers.planar_motion import grown

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap
-from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
 from simscen.stack.localizers.dead_reckoning import start_of

@@ -3,7 +3,7 @@
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.stack.localizers.dead_reckoning import start_of
 from simscen.stack.odometry_history import believable

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.localizers import AmclParameters
 from simscen.stack.localizers.beams import Beams, select_beams

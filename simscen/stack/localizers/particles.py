@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 
 
 @dataclass(frozen=True, eq=False)

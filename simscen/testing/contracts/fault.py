@@ -12,10 +12,10 @@ import numpy as np
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Scan
-from simscen.core.records.disturbances import BELIEF, COMMAND, MAP, WHEELS
-from simscen.core.records.disturbances import FAULT_TARGET_KINDS as EVERY
+from simscen.core.records.events import BELIEF, COMMAND, MAP, WHEELS
+from simscen.core.records.events import FAULT_TARGET_KINDS as EVERY
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.testing.contracts.component import heard
 from simscen.testing.promise import Contract, demand, promise

@@ -10,7 +10,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.stack.protocols import Localizer
 from simscen.testing.contracts.component import heard

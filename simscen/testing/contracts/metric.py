@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Evidence
 from simscen.testing.contracts.component import heard
 from simscen.testing.contracts.criterion import CASE, DRIVE, STANDS, TRACES
 from simscen.testing.promise import Contract, demand, promise

@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.environment.drivable_surfaces import Owners, drivable_solids, face_normals
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.geometry.meshes import is_convex, submesh
+from simscen.core.geometry.meshes import Owners, drivable_solids, face_normals, is_convex, submesh
 from simscen.core.geometry.shapes import Box, Mesh, Solid, TriangleMesh
 from simscen.worlds.geometry.prisms import is_flat
 from simscen.worlds.geometry.triangulation import fuse

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.model.localizers import OdometryOnly
 from tests.contracts.broken.cases import Wrapper, breaks
 

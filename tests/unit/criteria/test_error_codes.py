@@ -3,7 +3,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from simscen.core.messages.navigation import ErrorCode
 from simscen.core.records.events import Event
-from simscen.criteria.error_codes import Code, code_of
+from simscen.criteria.goal_outcomes import Code, code_of
 
 ADAPTER = TypeAdapter(Code)
 

@@ -7,7 +7,7 @@ import numpy as np
 from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Odometry, Scan
 from simscen.faults.base import FaultSetting, Instance
 from simscen.faults.fault import AnyFault

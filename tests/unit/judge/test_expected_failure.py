@@ -4,8 +4,7 @@ import pytest
 
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import ExpectedFailure, Finding, Status, Verdict
-from simscen.judge.evaluation import outcome_of_verdicts
-from simscen.judge.expected_failure import apply_expectation
+from simscen.judge.evaluation import apply_expectation, outcome_of_verdicts
 from simscen.judge.finding_text import DISTURBANCE
 
 PASS, FAIL, UNCLEAR, ERROR = Status.PASS, Status.FAIL, Status.INCONCLUSIVE, Status.ERROR

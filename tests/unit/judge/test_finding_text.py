@@ -1,6 +1,6 @@
 import pytest
 
-from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
+from simscen.core.records.events import Disturbance, DisturbanceOutcome
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.finding_text import disturbance_line, disturbance_times, sentence, tightest_margin, violations
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.core.records.evidence import Evidence, LogCoverage
+from simscen.core.records.verdict import Evidence, LogCoverage
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import partial_evidence_reason, required_evidence
 from simscen.judge.metrics.catalog import METRICS

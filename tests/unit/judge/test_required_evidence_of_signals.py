@@ -2,8 +2,7 @@
 
 import pytest
 
-from simscen.core.records.evidence import Evidence, LogCoverage
-from simscen.core.records.verdict import Status
+from simscen.core.records.verdict import Evidence, LogCoverage, Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.trace_signals.catalog import SIGNALS, signal_evidence
 from simscen.judge.evaluation import judge, required_evidence

@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.core.records.evidence import COMPLETE_COVERAGE, Evidence, LogCoverage
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.trace import Samples
-from simscen.core.records.verdict import Status
+from simscen.core.records.verdict import COMPLETE_COVERAGE, Evidence, LogCoverage, Status
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.registry import AnyCriterion
-from simscen.criteria.trace_signals.coverage import check_recorded_signals, time_gaps
+from simscen.criteria.trace_signals.sampling import check_recorded_signals, time_gaps
 from simscen.criteria.trace_signals.sparc_ldlj import sparc
 from simscen.judge.evaluation import judge
 from simscen.judge.run_result import judge_run

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from simscen.core.environment.pedestrians import PedestrianAction, WalkingPedestrian
+from simscen.core.environment.world_model import PedestrianAction, WalkingPedestrian
 from simscen.core.geometry import Pose2
 from simscen.people.people import People
 from simscen.people.seen import SeenRobot, Surroundings

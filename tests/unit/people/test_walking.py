@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from simscen.core.environment.pedestrians import WalkingPedestrian
+from simscen.core.environment.world_model import WalkingPedestrian
 from simscen.people import forces
 from tests.unit.people.rig import STEP, corridor, people, walk, walker, walls
 

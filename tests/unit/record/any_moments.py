@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief
-from simscen.core.messages.navigation import Path
+from simscen.core.messages.navigation import Belief, Path
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Decision, Moment, Truth

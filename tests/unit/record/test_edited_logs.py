@@ -12,10 +12,9 @@ from moments import CLOCK, about, moments
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.records.events import Event, EventKind
-from simscen.core.records.evidence import Evidence
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.trace import Decision, Moment
-from simscen.core.records.verdict import Status
+from simscen.core.records.verdict import Evidence, Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
 from simscen.record.recorder import Recorder

@@ -29,7 +29,7 @@ from rosbags.rosbag2 import StoragePlugin
 
 from simscen.core.errors import InvalidInput
 from simscen.core.records.events import EventKind
-from simscen.core.records.evidence import Evidence
+from simscen.core.records.verdict import Evidence
 from simscen.record.foreign.read import ForeignLog, read_foreign
 from simscen.record.foreign.wanted import Wanted
 

@@ -25,8 +25,7 @@ from simscen.cli.main import main
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Goal
 from simscen.core.records.case import Case
-from simscen.core.records.evidence import Evidence, LogCoverage
-from simscen.core.records.verdict import Status
+from simscen.core.records.verdict import Evidence, LogCoverage, Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge, required_evidence
 from simscen.loading.yaml.parser import parse_yaml

@@ -6,8 +6,15 @@ import re
 
 import pytest
 
-from simscen.core.records.session_events import SessionFinished, SessionStarted
-from simscen.core.records.stack_comparison import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
+from simscen.core.records.session_events import (
+    BaselineComparison,
+    Comparison,
+    Flip,
+    MetricDifference,
+    OutcomeCounts,
+    SessionFinished,
+    SessionStarted,
+)
 from simscen.report.compared import compared, numbers, shortened
 from simscen.report.console import text_reporter
 from simscen.report.github import markdown

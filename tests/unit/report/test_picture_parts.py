@@ -20,8 +20,8 @@ from simscen.report.picture import compose, sidebar
 from simscen.report.picture.canvas import COARSE
 from simscen.report.picture.compose import draw, parts
 from simscen.report.picture.scene import Scene, with_robots
+from simscen.run.log_header import world_scenery as scenery_in
 from simscen.run.preparation.scenario import prepare
-from simscen.run.preparation.scenery import world_scenery as scenery_in
 from simscen.run.simulate import simulate
 from simscen.testing.sketch import sketch, sketch_case
 

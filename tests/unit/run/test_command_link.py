@@ -1,7 +1,7 @@
 """What a base drives while commands come late or get lost."""
 
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.run.faults.channels import CommandLink
+from simscen.run.faults.interfaces import CommandLink
 
 GO, FAST = Twist(0.3), Twist(0.5)
 

@@ -10,7 +10,7 @@ from simscen.core.records.trace import Decision
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.run.termination import EndCondition
+from simscen.run.lockstep import EndCondition
 from simscen.testing.sketch import sketch_case
 
 RATES = [

@@ -7,7 +7,7 @@ import pytest
 from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.run.live_world.trigger_state import ConditionState, TriggerState
+from simscen.run.live_world.director import ConditionState, TriggerState
 from simscen.testing.puppetstage import PuppetStage
 from simscen.triggers.trigger import Trigger
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from simscen.loading.scenario import load_scenario
+from simscen.run import simulate
 from simscen.run.preparation.scenario import prepare
-from simscen.run.sessions import execute_run
 from simscen.spec.registry import Entry
 
 SCENARIO = """\
@@ -36,15 +36,15 @@ def thresholds():
 def test_garbage_is_looked_for_as_ever_where_code_of_others_runs(
     thresholds: tuple[int, int, int], others: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def simulate(*_: object, **__: object) -> None:
+    def stop(*_: object, **__: object) -> None:
         raise Begun(gc.get_threshold()[0])
 
-    monkeypatch.setattr(execute_run, "simulate", simulate)
+    monkeypatch.setattr(simulate, "simulate", stop)
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     package = Entry("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")
     prepared = replace(
         prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path)), plugins=(package,) if others else ()
     )
     with pytest.raises(Begun) as begun:
-        execute_run.execute_run(prepared, 1, tmp_path, (), lambda *_: None)
-    assert begun.value.args == ((thresholds[0] if others else execute_run.GC_THRESHOLD),)
+        simulate.execute_run(prepared, 1, tmp_path, (), lambda *_: None)
+    assert begun.value.args == ((thresholds[0] if others else simulate.GC_THRESHOLD),)

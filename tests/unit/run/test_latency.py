@@ -9,7 +9,7 @@ from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.loading.scenario import load_scenario
 from simscen.run.assembly import assemble
 from simscen.run.preparation.scenario import prepare
-from simscen.run.sensing import SensorSuite
+from simscen.run.robot_interface import SensorSuite
 
 SCENARIO = """\
 simscen: 1

@@ -9,8 +9,8 @@ from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
 from simscen.record.sceneryfile import NAME, scenery_of
+from simscen.run.log_header import world_scenery as scenery_in
 from simscen.run.preparation.scenario import prepare
-from simscen.run.preparation.scenery import world_scenery as scenery_in
 from simscen.run.simulate import simulate
 
 ROOT = Path(__file__).parents[3]

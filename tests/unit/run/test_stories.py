@@ -4,7 +4,7 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.records.events import EventKind
-from simscen.run.live_world.trigger_state import RelativeSituation
+from simscen.run.live_world.director import RelativeSituation
 from simscen.testing.puppetstage import PuppetStage
 from simscen.triggers.trigger import Trigger
 

@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.run.sensing import TickSchedule
+from simscen.run.robot_interface import TickSchedule
 
 
 @given(st.lists(st.sampled_from([1, 2, 3, 4, 6, 8, 12, 24, 48, 7]), min_size=1, max_size=4))

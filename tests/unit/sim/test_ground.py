@@ -148,7 +148,7 @@ def test_a_base_that_never_leaves_the_plane_is_stopped_by_a_ramp(on_ground):
 
 def test_walls_leave_the_ground_flat(simulate):
     """Wheels touch nothing of a world of walls, so that its runs are what they were."""
-    from simscen.core.environment.drivable_surfaces import drivable_solids
+    from simscen.core.geometry.meshes import drivable_solids
 
     mesh = fuse([box("wall", 1, 0, 0.1, 4), box("crate", -1, 0, 0.5, 0.5, 0.4), box("line", 0, 1, 1, 1, 0.004)])
     assert drivable_solids(mesh, 0.1) == frozenset()

@@ -28,7 +28,7 @@ import math
 
 import numpy as np
 
-from simscen.core.messages.localization import Belief
+from simscen.core.messages.navigation import Belief
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import Path
 from simscen.core.records.trace import Decision

@@ -9,8 +9,7 @@ from pydantic import ValidationError
 from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.navigation import Belief, Goal
 from simscen.core.records.events import Event, EventKind
 from simscen.triggers.trigger import Trigger
 

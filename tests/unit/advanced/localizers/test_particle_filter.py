@@ -7,7 +7,7 @@ from simscen.advanced.localizers.particle_filter import ODOMETRY_SHARE, ScanMatc
 from simscen.advanced.localizers.scan_matcher import Step
 from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.stack.localizers.motion_models import Differential
 from simscen.testing.room import grid
 

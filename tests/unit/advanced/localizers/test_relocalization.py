@@ -11,7 +11,7 @@ from simscen.advanced.localizers.scan_matcher import Step
 from simscen.advanced.localizers.tempered_likelihood import beyond_the_map
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.stack.localizers.likelihood_field import obstacle_field
 from simscen.testing.room import BEAMS, cast, grid, scan
 

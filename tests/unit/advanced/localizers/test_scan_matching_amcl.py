@@ -12,7 +12,7 @@ from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.environment.occupancy_grid import UNKNOWN
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.stack.localizers.particle_filter import ParticleFilter

@@ -7,7 +7,7 @@ from scipy import stats
 from simscen.advanced.localizers.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.stack.protocols import Localizer
 from simscen.testing.room import Noise, drive, errors, localizer, nees, run

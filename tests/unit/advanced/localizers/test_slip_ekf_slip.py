@@ -9,7 +9,7 @@ from scipy import stats
 from simscen.advanced.localizers.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Belief, Estimate
+from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.testing.room import localizer, nees
 

@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from simscen.core.records.evidence import Evidence
-from simscen.core.records.verdict import Status
+from simscen.core.records.verdict import Evidence, Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.stl.criterion import TemporalCriterion
 from simscen.judge.evaluation import judge

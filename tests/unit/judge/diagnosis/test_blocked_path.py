@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import CASE, DOOR, STANDS, box, by, why
 
-from simscen.judge.diagnosis.blocked_path import diagnose_blocked_path
+from simscen.judge.diagnosis.goal_failure import diagnose_blocked_path
 from simscen.judge.diagnosis.objects import MovableObject, movable_objects
 from simscen.testing.sketch import sketch, sketch_case
 

@@ -9,7 +9,7 @@ import pytest
 from simscen.core.messages.navigation import Path
 from simscen.core.records.trace import Samples
 from simscen.criteria.trace_signals.ground_truth import drive
-from simscen.judge.metrics.path import path_metrics, path_segments
+from simscen.judge.metrics.trajectory import path_metrics, path_segments
 from simscen.testing.sketch import sketch
 
 TICKS = 6

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simscen.core.records.trace import Samples
-from simscen.judge.metrics.pose_error import pose_metrics
+from simscen.judge.metrics.trajectory import pose_metrics
 from simscen.testing.sketch import sketch
 
 

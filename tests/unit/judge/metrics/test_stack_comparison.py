@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
-from simscen.core.records.stack_comparison import OutcomeCounts
+from simscen.core.records.session_events import OutcomeCounts
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.stack_comparison import COMPARED_METRICS, compare_stacks, comparison_data

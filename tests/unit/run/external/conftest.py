@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.external_command import ExternalCommand
-from simscen.core.records.run import Run
+from simscen.core.records.case import Run
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation.scenario import prepare

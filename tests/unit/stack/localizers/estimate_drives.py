@@ -12,7 +12,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.loading.files.worldfile import load_world_file

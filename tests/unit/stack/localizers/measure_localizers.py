@@ -13,7 +13,7 @@ from hard_drives import crowded, kidnapped
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import Amcl, Ekf
 from simscen.model.localizers import Localizer as Spec

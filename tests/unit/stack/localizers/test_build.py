@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import Streams
 from simscen.model import localizers as model
 from simscen.stack.localizers.amcl import AmclLocalizer

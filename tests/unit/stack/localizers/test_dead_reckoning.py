@@ -5,7 +5,7 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import OdometryOnly
 from simscen.testing.room import Noise, drive, errors, localizer, run

@@ -6,7 +6,7 @@ from scipy import stats
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.model.localizers import Ekf
 from simscen.stack.protocols import Localizer

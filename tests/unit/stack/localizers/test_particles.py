@@ -6,7 +6,7 @@ from scipy import stats
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.messages.localization import Estimate
+from simscen.core.messages.navigation import Estimate
 from simscen.stack.localizers.particles import FreeSpace, Particles
 
 GRID = OccupancyGrid(

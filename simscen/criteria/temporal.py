@@ -1,0 +1,159 @@
+"""Temporal criteria: `always`, `eventually`, `until` and `whenever … then`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from pydantic import BaseModel
+
+from simscen.criteria.stl.condition import Condition, Release, Windowed, until_horizon, window_horizon
+from simscen.criteria.stl.criterion import TemporalCriterion, describe_response, describe_until, describe_windowed
+from simscen.criteria.stl.robustness import (
+    EvaluationContext,
+    response_robustness,
+    until_robustness,
+    windowed_robustness,
+)
+from simscen.spec.base import Spec
+
+if TYPE_CHECKING:
+    from simscen.criteria.stl.robustness import Robustness
+
+
+class WindowedCriterion(Windowed, TemporalCriterion):
+    """A condition at every moment, or at some moment, of a window, as the `operator` says."""
+
+    operator: ClassVar[Literal["always", "eventually"]]
+
+    def compared(self) -> list[Condition]:
+        """Return every comparison in the condition."""
+        return list(self.comparisons())
+
+    def formula(self) -> str:
+        """Return the condition in words."""
+        return describe_windowed(self.operator, self, self)
+
+    @property
+    def horizon(self) -> float:
+        """Seconds of the run it needs: the whole window, or its first moment."""
+        return window_horizon(self.operator, self, self)
+
+    def evaluate(self, context: EvaluationContext) -> Robustness:
+        """Return the robustness, decided by the worst moment of `always` or the best of `eventually`."""
+        return windowed_robustness(self.operator, self, self, context)
+
+
+class Always(WindowedCriterion):
+    """A condition is true at every moment of the run, or of a window of it.
+
+    What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the
+        moment at which the whole condition was nearest to being false.
+    When it fails: the condition was false at some sample.
+    Why this: the other criteria cover most tests; this one covers anything that has a signal.
+    Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.
+
+    Inconclusive if the window goes on after the end of the run and the condition was not false before.
+
+    Example: `always: {signal: clearance, op: ">=", value: 10 cm}`
+    """
+
+    operator: ClassVar[Literal["always", "eventually"]] = "always"
+
+
+class Eventually(WindowedCriterion):
+    """A condition is true at some moment of the run, or of a window of it.
+
+    What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the
+        moment at which the whole condition held best, or was nearest to holding.
+    When it fails: the condition was true at no sample.
+    Why this: that a robot arrived, or that a disturbance had an effect at all, is decided by a single moment.
+    Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.
+
+    Inconclusive if the window goes on after the end of the run and the condition was not true before.
+
+    Example: `eventually: {signal: goal_distance, op: "<=", value: 0.25 m, within: 60 s}`
+    """
+
+    operator: ClassVar[Literal["always", "eventually"]] = "eventually"
+
+
+class Until(Release, TemporalCriterion):
+    """A condition was true from the start until another one became true, and that happened in time.
+
+    What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the best
+        release: the lesser of the margins of `release` there and of `hold` at every sample before it.
+    When it fails: `release` was not true in the window, or `hold` was false before it was.
+    Why this: order matters. Not to move before the map is there can be said neither with always nor with eventually.
+    Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.
+
+    Inconclusive if the window goes on after the end of the run, with `hold` true so far and no release.
+
+    Example: `until: {hold: {signal: speed, op: "<=", value: 0.01 m/s}, release: {signal: localized}, within: 5 s}`
+    """
+
+    def compared(self) -> list[Condition]:
+        """Return every comparison in both conditions."""
+        return [*self.hold.comparisons(), *self.release.comparisons()]
+
+    def formula(self) -> str:
+        """Return the condition in words."""
+        return describe_until(self.hold, self.release, self)
+
+    @property
+    def horizon(self) -> float:
+        """Seconds until the first moment at which the release counts."""
+        return until_horizon(self.release, self)
+
+    def evaluate(self, context: EvaluationContext) -> Robustness:
+        """Return the robustness, decided by the best release or by what broke `hold` before it."""
+        return until_robustness(self.hold, self.release, self, context)
+
+
+class Whenever(Windowed):
+    """At every moment at which one condition was true, another one was; it may look ahead: `then: {eventually: …}`.
+
+    What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the
+        worst answer among the moments at which the premise was true.
+    When it fails: the premise was true at some sample, and the answer was not.
+    Why this: a robot that is lost, blind or too near must react, each time and in time.
+    Source: the bounded response pattern of Dwyer, Avrunin and Corbett 1999; robust semantics of Donzé and Maler 2010.
+
+    Inconclusive if the premise was never known to be true, because then nothing was tested (unless `required: false`),
+    and if the window of an answer goes on after the end of the run.
+
+    Example: `{whenever: {signal: scan_age, op: ">", value: 0.3 s}, then: {eventually: {signal: speed, op: "<", value: 1 cm/s, within: 1 s}}}`
+    """  # noqa: E501 (an example stands on one line)
+
+    required: bool = True
+    """Whether the premise must be true at least once. With `false`, a run in which it never was passes."""
+
+
+class Response(Spec, TemporalCriterion):
+    """A premise with its answer, which are separate keys of a scenario."""
+
+    premise: Whenever
+    answer: Condition
+
+    @classmethod
+    def of(cls, premise: BaseModel | None, answer: BaseModel | None) -> Response:
+        """Return the criterion of two parts that are validated already."""
+        assert isinstance(premise, Whenever) and isinstance(answer, Condition)
+        return cls.model_construct(premise=premise, answer=answer)
+
+    def compared(self) -> list[Condition]:
+        """Return every comparison in both conditions."""
+        return [*self.premise.comparisons(), *self.answer.comparisons()]
+
+    def formula(self) -> str:
+        """Return the condition in words."""
+        return describe_response(self.premise, self.answer)
+
+    @property
+    def horizon(self) -> float:
+        """Seconds until the window ends in which the premise counts, and the last answer is due."""
+        return window_horizon("always", self.answer, self.premise)
+
+    def evaluate(self, context: EvaluationContext) -> Robustness:
+        """Return the robustness, decided by the worst answer; undecided if the premise never was true."""
+        premise, required = self.premise, self.premise.required
+        return response_robustness(premise, self.answer, premise, context, required=required)
