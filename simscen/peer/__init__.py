@@ -1,6 +1,6 @@
-"""The client of the stack protocol, for a navigation stack that simscen runs as a process of its own.
+"""Client of the stack protocol, for a navigation stack that runs in a process of its own.
 
-It needs Python 3.8 or later and nothing else: no numpy, nothing of simscen. A stack begins so:
+It needs Python 3.8 or later and nothing else, neither numpy nor simscen. A minimal stack:
 
     from simscen.peer import Peer
 
@@ -12,7 +12,7 @@ It needs Python 3.8 or later and nothing else: no numpy, nothing of simscen. A s
         step.drive(0.2, 0.0)
 
 Where simscen is not installed beside it, `sys.path.append(os.environ["SIMSCEN_PEER_PATH"])` and `import simscen_peer`
-do the same: simscen sets that variable. docs/reference/stack-protocol.md is what both sides go by.
+do the same; simscen sets that variable. docs/reference/stack-protocol.md defines the protocol.
 """
 
 from .client import Message, Peer, Step

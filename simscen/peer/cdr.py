@@ -17,7 +17,7 @@ HEADER = b"\x00\x01\x00\x00"
 
 
 class Writer:
-    """Builds a message field by field, in the order of its definition."""
+    """Serializes a message field by field, in the order of its definition."""
 
     def __init__(self) -> None:
         self._data = bytearray(HEADER)
@@ -36,7 +36,7 @@ class Writer:
         return self
 
     def numbers(self, code: str, values: Sequence[float]) -> Writer:
-        """Append a sequence of numbers: how many, then each."""
+        """Append a sequence: the number of elements, then the elements."""
         numbers = array(code, values)
         if sys.byteorder == "big":
             numbers.byteswap()
@@ -47,7 +47,7 @@ class Writer:
         return self
 
     def done(self) -> bytes:
-        """The message."""
+        """Return the message."""
         return bytes(self._data)
 
     def _align(self, width: int) -> None:
@@ -55,7 +55,7 @@ class Writer:
 
 
 class Reader:
-    """Reads a message field by field, in the order of its definition. Raises ValueError for one that does not fit."""
+    """Reads a message field by field, in the order of its definition. Raises ValueError if the message is too short."""
 
     def __init__(self, data: bytes) -> None:
         if data[:2] != HEADER[:2]:
@@ -63,7 +63,7 @@ class Reader:
         self._data, self._offset = data, len(HEADER)
 
     def take(self, codes: str) -> tuple[Any, ...]:
-        """The next values of one width, e.g. "7d"."""
+        """Return the next values of one width, e.g. "7d"."""
         layout = struct.Struct("<" + codes)
         self._align(struct.calcsize("<" + codes[-1]))
         self._need(layout.size)
@@ -72,18 +72,18 @@ class Reader:
         return values
 
     def string(self) -> str:
-        """The next string, without its closing NUL."""
+        """Return the next string, without its closing NUL."""
         (size,) = self.take("I")
         return self.blob(size)[:-1].decode()
 
     def blob(self, size: int) -> bytes:
-        """The next bytes as they are."""
+        """Return the next bytes."""
         self._need(size)
         self._offset += size
         return self._data[self._offset - size : self._offset]
 
     def numbers(self, code: str) -> array[Any]:
-        """The next sequence of numbers, e.g. of code "f"."""
+        """Return the next sequence of numbers, e.g. of code "f"."""
         (count,) = self.take("I")
         values: array[Any] = array(code)
         if count:

@@ -1,4 +1,4 @@
-"""A stack's side of the protocol: say hello, then answer steps until simscen ends the run."""
+"""The stack's side of the protocol: the handshake, then answers to steps until simscen ends the run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COMMAND, EVENTS, LOG = "/cmd_vel", "/simscen/events", "/rosout"
 
 
 class Message(NamedTuple):
-    """A message on a topic: its CDR bytes as they came, and what they say."""
+    """A message on a topic: CDR bytes, and their content."""
 
     topic: str
     type: str
@@ -24,18 +24,18 @@ class Message(NamedTuple):
 
     @property
     def content(self) -> Any:
-        """As simscen.peer.messages reads it."""
+        """The message as a class of simscen.peer.messages."""
         return messages.read(self.type, self.raw)
 
 
 class Step:
-    """One step: what the sensors said, and the answer in the making. It is sent when the loop goes on."""
+    """One step: the sensor messages, and the answer, which is sent when the loop continues."""
 
-    def __init__(self, peer: Peer, header: wire.StepHeader, heard: list[Message], canceled: bool) -> None:
+    def __init__(self, peer: Peer, header: wire.StepHeader, received: list[Message], canceled: bool) -> None:
         self._peer, self._header = peer, header
-        self.messages = heard
+        self.messages = received
         self.canceled = canceled
-        self._said: wire.Messages = []
+        self._published: wire.Messages = []
         self._commanded = False
 
     @property
@@ -55,22 +55,22 @@ class Step:
 
     @property
     def command_due(self) -> bool:
-        """Whether a command is asked for."""
+        """Whether a command is required."""
         return bool(self._header.flags & wire.COMMAND_DUE)
 
     def get(self, topic: str) -> Any:
-        """What the newest message on a topic says; None when there is none in this step."""
+        """Return the content of the newest message on a topic; None if there is none in this step."""
         found = [message for message in self.messages if message.topic == topic]
         return found[-1].content if found else None
 
     def drive(self, vx: float, wz: float, vy: float = 0.0) -> None:
-        """Command a velocity: m/s forward, rad/s anticlockwise, m/s to the left. It holds until the next one."""
+        """Command a velocity: m/s forward, rad/s counterclockwise, m/s to the left. It holds until the next command."""
         self._peer.command = (float(vx), float(vy), float(wz))
         self._commanded = True
 
     def publish(self, topic: str, data: bytes) -> None:
-        """Say a message on one of the topics that simscen hears; see simscen.peer.messages. Raises KeyError."""
-        self._said.append((self._peer.hears[topic], data))
+        """Publish a message on a topic that simscen accepts; see simscen.peer.messages. Raises KeyError for others."""
+        self._published.append((self._peer.hears[topic], data))
 
     def log(self, text: str, level: int = 20) -> None:
         """Write a line to /rosout of the run's log; 10 debug, 20 info, 30 warning, 40 error."""
@@ -81,17 +81,18 @@ class Step:
             self.publish(COMMAND, messages.twist(*self._peer.command))
         for event in self._peer.goals.take():
             self.publish(EVENTS, messages.string(json.dumps(event, allow_nan=False)))
-        return wire.answer_frame(self.tick, self._said)
+        return wire.answer_frame(self.tick, self._published)
 
 
 class Peer:
-    """A stack as simscen sees it. Iterating gives one Step after another until the run ends.
+    """Connection of a stack to simscen. Iterating gives one Step after another until the run ends.
 
-    `topics` are those it wants to hear, None = all that there are; `every_beat` asks for a step whenever a sensor
-    speaks, where otherwise there is one for each command and the readings since the last come with it. `modes` are the
-    ways of taking goals that it knows, by the names of Nav2's actions: who knows navigate_through_poses passes goals
-    with `via` without a stop. `about` is kept in the run's log.
-    Raises wire.Malformed or Refused when the two sides do not understand each other, Gone when simscen hung up.
+    `topics` are the topics to receive, None = all. With `every_beat` there is a step whenever a sensor publishes;
+    otherwise one for each command, with the readings since the last. `modes` are the supported ways to take goals, by
+    the names of Nav2's actions; a stack with navigate_through_poses passes goals with `via` without stopping. `about`
+    is kept in the run's log.
+
+    Raises wire.Malformed or Refused for protocol errors, Gone when simscen closes the connection.
     """
 
     def __init__(
@@ -131,18 +132,18 @@ class Peer:
 
     @property
     def robot(self) -> dict[str, Any]:
-        """The robot's datasheet, see HELLO in the protocol."""
+        """Properties of the robot, see HELLO in the protocol."""
         robot: dict[str, Any] = self.hello["robot"]
         return robot
 
     @property
     def robot_name(self) -> str:
-        """What the robot is called, where the scenario has several; else ""."""
+        """The robot's name if the scenario has several robots, else ""."""
         name: str = self.hello.get("robot_name", "")
         return name
 
     def __iter__(self) -> Iterator[Step]:
-        """Steps until the run ends; each is answered when the next one is asked for."""
+        """Yield steps until the run ends; each is answered when the next one is requested."""
         while True:
             kind, body = self._connection.receive()
             if kind == wire.STEP:
@@ -160,11 +161,11 @@ class Peer:
                 self._take(kind, wire.from_json(body))
 
     def add(self, **about: Any) -> None:
-        """Tell more about this stack at the end, for the run's log."""
+        """Add facts about this stack for the run's log; they are sent at the end."""
         self._farewell.update(about)
 
     def give_up(self, message: str) -> None:
-        """End the run with an error that says this. Raises Refused, with the same message."""
+        """End the run with this error message. Raises Refused with the same message."""
         self._connection.send_json(wire.ERROR, {"message": message})
         self._connection.close()
         raise Refused(message)
@@ -179,7 +180,7 @@ class Peer:
             self._canceled = True
             self.goals.canceled(content["all"])
         else:
-            raise wire.Malformed(f"a frame of kind {kind} is not for a peer")
+            raise wire.Malformed(f"a stack cannot receive a frame of kind {kind}")
 
     def _message(self, number: int, data: bytes) -> Message:
         return Message(*self._topics[number], data)
@@ -187,7 +188,7 @@ class Peer:
     def _expect(self, kind: int) -> dict[str, Any]:
         got, body = self._connection.receive()
         if got != kind:
-            raise wire.Malformed(f"a frame of kind {got} where {wire.KINDS[kind]} was to come")
+            raise wire.Malformed(f"a frame of kind {got} instead of {wire.KINDS[kind]}")
         return wire.from_json(body)
 
 

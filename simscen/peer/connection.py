@@ -1,4 +1,4 @@
-"""The socket of a peer: whole frames in, whole frames out."""
+"""Socket between simscen and a stack, which transfers whole frames."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from . import wire
 
 
 class Gone(ConnectionError):
-    """The other side has hung up."""
+    """The other side has closed the connection."""
 
 
 class Refused(RuntimeError):
-    """simscen ends the run for what this peer said; the message tells why."""
+    """simscen ends the run because of something that this stack sent; the message gives the reason."""
 
 
 class Connection:
-    """A stream socket that carries frames of the protocol. It blocks: the simulation waits for this side anyway."""
+    """A stream socket for frames of the protocol. It blocks, because the simulation waits for this side anyway."""
 
     def __init__(self, stream: socket.socket) -> None:
         self._stream = stream
 
     @classmethod
     def inherited(cls) -> Connection:
-        """The socket that simscen left open for this process.
+        """Return the connection that this process inherited from simscen.
 
-        Raises RuntimeError when it was not simscen that started it.
+        Raises RuntimeError if simscen did not start this process.
         """
         number = os.environ.get(wire.DESCRIPTOR, "")
         if not number.isdigit():
@@ -42,11 +42,11 @@ class Connection:
             raise Gone(str(error)) from error
 
     def send_json(self, kind: int, content: dict[str, Any]) -> None:
-        """Send a frame with an object in JSON."""
+        """Send a frame with a JSON object."""
         self.send(wire.json_frame(kind, content))
 
     def receive(self) -> tuple[int, bytes]:
-        """The kind and the body of the next frame. Raises Gone, and Refused for an ERROR."""
+        """Return kind and body of the next frame. Raises Gone, and Refused for an ERROR."""
         (size,) = wire.SIZE.unpack(self._exactly(wire.SIZE.size))
         if not 1 <= size <= wire.LONGEST:
             raise wire.Malformed(f"a frame of {size} bytes")
@@ -57,7 +57,7 @@ class Connection:
         return kind, body
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._stream.close()
 
     def _exactly(self, size: int) -> bytes:

@@ -1,6 +1,6 @@
-"""The ROS 2 messages of the stack protocol, as plain Python; each type is read and written by its name.
+"""ROS 2 messages of the stack protocol as plain Python classes, read by type name.
 
-Definitions: ROS 2 Humble's common_interfaces, nav2_msgs and tf2_msgs. Poses of the ground are x, y and yaw.
+Definitions: common_interfaces, nav2_msgs and tf2_msgs of ROS 2 Humble. Planar poses are x, y and yaw.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class LaserScan(NamedTuple):
 
 
 class Odometry(NamedTuple):
-    """nav_msgs/msg/Odometry on the ground: the pose of `child` in `frame`, and its velocity in its own frame."""
+    """nav_msgs/msg/Odometry in the plane: the pose of `child` in `frame`, and its velocity in its own frame."""
 
     stamp: Stamp
     frame: str
@@ -89,7 +89,7 @@ class OccupancyGrid(NamedTuple):
 
 
 class PoseWithCovariance(NamedTuple):
-    """geometry_msgs/msg/PoseWithCovarianceStamped on the ground; the covariance has 36 numbers."""
+    """geometry_msgs/msg/PoseWithCovarianceStamped in the plane; the covariance has 36 numbers."""
 
     stamp: Stamp
     frame: str
@@ -98,7 +98,7 @@ class PoseWithCovariance(NamedTuple):
 
 
 class Transform(NamedTuple):
-    """A link of tf2_msgs/msg/TFMessage: where `child` is in `frame`, x, y, z and a quaternion."""
+    """A transform of tf2_msgs/msg/TFMessage: the pose of `child` in `frame`, x, y, z and a quaternion."""
 
     stamp: Stamp
     frame: str
@@ -107,16 +107,16 @@ class Transform(NamedTuple):
 
     @property
     def pose2d(self) -> Pose2D:
-        """The same on the ground."""
-        return _on_the_ground(self.pose)
+        """The planar pose."""
+        return _planar(self.pose)
 
 
 def quaternion(yaw: float) -> tuple[float, float, float, float]:
-    """x, y, z, w of a heading."""
+    """Return x, y, z, w of the quaternion of a yaw angle."""
     return 0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)
 
 
-def _on_the_ground(pose: Sequence[float]) -> Pose2D:
+def _planar(pose: Sequence[float]) -> Pose2D:
     x, y, _, qx, qy, qz, qw = pose
     return Pose2D(x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz)))
 
@@ -138,7 +138,7 @@ def _odometry(reader: Reader) -> Odometry:
     pose = reader.take("7d")
     reader.take("36d")
     twist = reader.take("6d")
-    return Odometry(stamp, frame, child, _on_the_ground(pose), twist[0], twist[1], twist[5])
+    return Odometry(stamp, frame, child, _planar(pose), twist[0], twist[1], twist[5])
 
 
 def _imu(reader: Reader) -> Imu:
@@ -163,13 +163,13 @@ def _occupancy_grid(reader: Reader) -> OccupancyGrid:
     reader.take("iI")
     (resolution,) = reader.take("f")
     width, height = reader.take("2I")
-    origin = _on_the_ground(reader.take("7d"))
+    origin = _planar(reader.take("7d"))
     return OccupancyGrid(stamp, frame, resolution, width, height, origin, reader.numbers("b"))
 
 
 def _pose_with_covariance(reader: Reader) -> PoseWithCovariance:
     stamp, frame = _header(reader)
-    return PoseWithCovariance(stamp, frame, _on_the_ground(reader.take("7d")), reader.take("36d"))
+    return PoseWithCovariance(stamp, frame, _planar(reader.take("7d")), reader.take("36d"))
 
 
 def _transforms(reader: Reader) -> list[Transform]:
@@ -203,36 +203,39 @@ READERS: dict[str, Callable[[Reader], Any]] = {
     "geometry_msgs/msg/Pose2D": lambda reader: Pose2D(*reader.take("3d")),
     "tf2_msgs/msg/TFMessage": _transforms,
 }
-"""Type → what reads it."""
+"""Reader functions by type."""
 
 
 def read(kind: str, data: bytes) -> Any:
-    """A message of a type that `READERS` has. Raises ValueError for one that does not fit."""
+    """Return a message of a type in `READERS`. Raises ValueError if the data are too short."""
     return READERS[kind](Reader(data))
 
 
 def twist(vx: float, vy: float, wz: float) -> bytes:
-    """geometry_msgs/msg/Twist of the ground."""
+    """Return a planar geometry_msgs/msg/Twist."""
     return Writer().put("6d", vx, vy, 0.0, 0.0, 0.0, wz).done()
 
 
 def string(text: str) -> bytes:
-    """std_msgs/msg/String."""
+    """Return a std_msgs/msg/String."""
     return Writer().string(text).done()
 
 
 def pose2d(x: float, y: float, yaw: float) -> bytes:
-    """geometry_msgs/msg/Pose2D."""
+    """Return a geometry_msgs/msg/Pose2D."""
     return Writer().put("3d", x, y, yaw).done()
 
 
 def float64_array(values: Sequence[float]) -> bytes:
-    """std_msgs/msg/Float64MultiArray without a layout."""
+    """Return a std_msgs/msg/Float64MultiArray without a layout."""
     return Writer().put("2I", 0, 0).numbers("d", values).done()
 
 
 def pose_with_covariance(stamp: Stamp, pose: Sequence[float], covariance: Sequence[float]) -> bytes:
-    """geometry_msgs/msg/PoseWithCovarianceStamped in the map; `covariance` has 36 numbers, or 9 over x, y, yaw."""
+    """Return a geometry_msgs/msg/PoseWithCovarianceStamped in the map frame.
+
+    `covariance` has 36 numbers, or 9 for x, y, yaw.
+    """
     if len(covariance) == 9:
         c, full = covariance, [0.0] * 36
         for row, start in enumerate((0, 6, 30)):
@@ -245,7 +248,7 @@ def pose_with_covariance(stamp: Stamp, pose: Sequence[float], covariance: Sequen
 
 
 def path(stamp: Stamp, poses: Sequence[Sequence[float]]) -> bytes:
-    """nav_msgs/msg/Path of poses x, y, yaw in the map."""
+    """Return a nav_msgs/msg/Path of poses x, y, yaw in the map frame."""
     message = Writer().put("iI", *stamp).string("map").put("I", len(poses))
     for x, y, yaw in poses:
         message.put("iI", *stamp).string("map").put("7d", x, y, 0.0, *quaternion(yaw))
@@ -255,7 +258,10 @@ def path(stamp: Stamp, poses: Sequence[Sequence[float]]) -> bytes:
 def occupancy_grid(
     stamp: Stamp, frame: str, resolution: float, width: int, origin: Sequence[float], cells: Sequence[int]
 ) -> bytes:
-    """nav_msgs/msg/OccupancyGrid of rows of `width` cells, 0 … 100 or -1, the lowest first; `origin` is x, y, yaw."""
+    """Return a nav_msgs/msg/OccupancyGrid of rows of `width` cells, 0 … 100 or -1, lowest y first.
+
+    `origin` is x, y, yaw.
+    """
     x, y, yaw = origin
     message = Writer().put("iI", *stamp).string(frame).put("iI", *stamp).put("f", resolution)
     message.put("2I", width, len(cells) // width if width else 0).put("7d", x, y, 0.0, *quaternion(yaw))
@@ -263,7 +269,7 @@ def occupancy_grid(
 
 
 def transforms(links: Sequence[tuple[Stamp, str, str, Sequence[float]]]) -> bytes:
-    """tf2_msgs/msg/TFMessage; each link is stamp, frame, child frame, and the child's x, y, yaw in the frame."""
+    """Return a tf2_msgs/msg/TFMessage; a link is stamp, frame, child frame, and the child's x, y, yaw."""
     message = Writer().put("I", len(links))
     for stamp, frame, child, (x, y, yaw) in links:
         message.put("iI", *stamp).string(frame).string(child).put("7d", x, y, 0.0, *quaternion(yaw))
@@ -271,7 +277,7 @@ def transforms(links: Sequence[tuple[Stamp, str, str, Sequence[float]]]) -> byte
 
 
 def particle_cloud(stamp: Stamp, particles: Sequence[Sequence[float]]) -> bytes:
-    """nav2_msgs/msg/ParticleCloud in the map; each particle is x, y, yaw, weight."""
+    """Return a nav2_msgs/msg/ParticleCloud in the map frame; each particle is x, y, yaw, weight."""
     message = Writer().put("iI", *stamp).string("map").put("I", len(particles))
     for x, y, yaw, weight in particles:
         message.put("8d", x, y, 0.0, *quaternion(yaw), weight)
@@ -279,7 +285,7 @@ def particle_cloud(stamp: Stamp, particles: Sequence[Sequence[float]]) -> bytes:
 
 
 def log(stamp: Stamp, level: int, name: str, text: str) -> bytes:
-    """rcl_interfaces/msg/Log."""
+    """Return a rcl_interfaces/msg/Log."""
     message = Writer().put("iI", *stamp).put("B", level)
     for field in (name, text, "", ""):
         message.string(field)

@@ -1,6 +1,6 @@
-"""Frames of the stack protocol: what simscen and a stack that runs as a process of its own send each other.
+"""Frames of the stack protocol between simscen and a stack in a process of its own.
 
-docs/reference/stack-protocol.md is its definition. This file is read by both sides, on Python 3.8 and later.
+docs/reference/stack-protocol.md defines the protocol. Both sides use this module, on Python 3.8 and later.
 """
 
 from __future__ import annotations
@@ -10,21 +10,21 @@ import struct
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 PROTOCOL = 1
-"""The version of the protocol."""
+"""Version of the protocol."""
 DESCRIPTOR = "SIMSCEN_STACK_FD"
-"""The environment variable with the number of the inherited socket."""
+"""Environment variable with the file descriptor of the inherited socket."""
 
 HELLO, WELCOME, GOAL, STEP, ANSWER, PREEMPT, CANCEL, END, ERROR, BYE = range(1, 11)
-"""The kinds of frames."""
+"""Kinds of frames."""
 KINDS = ("", "HELLO", "WELCOME", "GOAL", "STEP", "ANSWER", "PREEMPT", "CANCEL", "END", "ERROR", "BYE")
 
 COMMAND_DUE = 1
-"""Flag of a STEP: its answer must hold a command."""
+"""Flag of a STEP: its answer must contain a command."""
 LONGEST = 256 << 20
-"""Bytes of the longest frame."""
+"""Largest frame in bytes."""
 
 DEEPEST = 32
-"""How deep JSON may be nested."""
+"""Largest nesting depth of JSON."""
 
 SIZE = struct.Struct("<I")
 _STEP = struct.Struct("<QiIIII")
@@ -36,13 +36,13 @@ if TYPE_CHECKING:
 
 
 class Malformed(ValueError):
-    """A frame that is not what the protocol says."""
+    """A frame that violates the protocol."""
 
 
 class StepHeader(NamedTuple):
-    """When it is: the tick, and the simulated time in whole seconds and nanoseconds.
+    """Time of a step: the tick, and the simulated time in whole seconds and nanoseconds.
 
-    `deadline` is how many milliseconds of wall time the answer may take.
+    `deadline` is the wall time in milliseconds that the answer may take.
     """
 
     tick: int
@@ -53,17 +53,17 @@ class StepHeader(NamedTuple):
 
 
 def frame(kind: int, body: bytes) -> bytes:
-    """A frame: its size, its kind, its body."""
+    """Return a frame: size, kind, body."""
     return SIZE.pack(len(body) + 1) + bytes((kind,)) + body
 
 
 def json_frame(kind: int, content: dict[str, Any]) -> bytes:
-    """A frame with an object in JSON."""
+    """Return a frame with a JSON object."""
     return frame(kind, json.dumps(content, separators=(",", ":"), allow_nan=False).encode())
 
 
 def from_json(body: bytes) -> dict[str, Any]:
-    """The object of a JSON frame: strict JSON, not too deep, of text that UTF-8 can hold. Raises Malformed."""
+    """Return the object of a JSON frame. Raises Malformed for invalid or too deeply nested JSON."""
     try:
         content = json.loads(body.decode(), parse_constant=_refused)
         json.dumps(content, ensure_ascii=False).encode()
@@ -77,7 +77,7 @@ def from_json(body: bytes) -> dict[str, Any]:
 
 
 def _refused(word: str) -> None:
-    raise ValueError(f"{word} is no number of JSON")
+    raise ValueError(f"{word} is not a JSON number")
 
 
 def _deep(content: Any, left: int) -> bool:
@@ -86,23 +86,23 @@ def _deep(content: Any, left: int) -> bool:
 
 
 def step_frame(header: StepHeader, messages: Messages) -> bytes:
-    """A STEP."""
+    """Return a STEP."""
     return frame(STEP, _STEP.pack(*header, len(messages)) + _packed(messages))
 
 
 def answer_frame(tick: int, messages: Messages) -> bytes:
-    """An ANSWER to the STEP of that tick."""
+    """Return an ANSWER to the STEP of that tick."""
     return frame(ANSWER, _ANSWER.pack(tick, len(messages)) + _packed(messages))
 
 
 def from_step(body: bytes) -> tuple[StepHeader, Messages]:
-    """What a STEP says. Raises Malformed."""
+    """Return header and messages of a STEP. Raises Malformed."""
     *header, count = _taken(_STEP, body, 0)
     return StepHeader(*header), _unpacked(body, _STEP.size, count)
 
 
 def from_answer(body: bytes) -> tuple[int, Messages]:
-    """The tick that is answered, and the messages. Raises Malformed."""
+    """Return tick and messages of an ANSWER. Raises Malformed."""
     tick, count = _taken(_ANSWER, body, 0)
     return tick, _unpacked(body, _ANSWER.size, count)
 

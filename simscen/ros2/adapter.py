@@ -89,7 +89,7 @@ class Adapter:
     def _check_launched(self) -> None:
         """Raise AdapterError when the launched command has ended."""
         if self._launched is not None and self._launched.ended is not None:
-            raise AdapterError(f"what was launched {self._launched.ended}: {self._launched.command}")
+            raise AdapterError(f"the launched command {self._launched.ended}: {self._launched.command}")
 
     def about(self) -> Dict[str, Any]:
         """Return facts about this run for its log and stack.json."""
@@ -174,7 +174,7 @@ class Adapter:
         try:
             if not self._graph.spin_until(complete, limit_s):
                 waited = time.monotonic() - self._started_at
-                reasons = "; ".join(missing) or "nodes come and go"
+                reasons = "; ".join(missing) or "nodes keep appearing and disappearing"
                 raise AdapterError(f"the graph is not ready after {waited:.0f} s: {reasons}")
         finally:
             self._graph.node.destroy_timer(timer)

@@ -72,7 +72,7 @@ class GoalPoseSender:
     def missing(self) -> List[str]:
         """Return why goals cannot be sent: nothing subscribes to the topic."""
         found = self._graph.subscribers_of(self.name)
-        return [] if found else [f"nobody takes goals: no subscriber of {self.name} ({POSE_TYPE})"]
+        return [] if found else [f"no node takes goals: no subscriber of {self.name} ({POSE_TYPE})"]
 
     def send(self, goals: Sequence[Goal], now: int, barrier: NodeBarrier) -> Optional[Failed]:
         """Send the first goal."""
@@ -131,7 +131,7 @@ class ActionSender:
         """Return why goals cannot be sent: there is no server."""
         if self._client.server_is_ready():
             return []
-        return [f"nobody takes goals: no action server {self.name} ({self.type})"]
+        return [f"no node takes goals: no action server {self.name} ({self.type})"]
 
     def send(self, goals: Sequence[Goal], now: int, barrier: NodeBarrier) -> Optional[Failed]:
         """Send the goals and wait until they are accepted; return Failed if they are rejected."""

@@ -55,7 +55,7 @@ class Hello(NamedTuple):
         """Receive HELLO. Raises AdapterError for another frame or protocol."""
         kind, body = connection.receive()
         if kind != wire.HELLO:
-            raise AdapterError(f"a frame of kind {kind} where HELLO was to come")
+            raise AdapterError(f"a frame of kind {kind} instead of HELLO")
         hello = wire.from_json(body)
         if wire.PROTOCOL not in hello["protocols"]:
             raise AdapterError(f"simscen ros2 speaks version {wire.PROTOCOL} of the stack protocol")

@@ -1,4 +1,4 @@
-"""What Nav2's parameters must say to fit what simscen publishes: rules for a parameter file and for a running graph.
+"""Rules for Nav2's parameters, so that they match what simscen publishes; for parameter files and running nodes.
 
 Names and defaults are those of Nav2's configuration guide (https://docs.nav2.org/configuration/).
 """
@@ -9,7 +9,7 @@ MAP, ODOM = "map", "odom"
 
 
 class Finding(NamedTuple):
-    """A parameter that does not fit: of which node, which one, and why. `severe` ones keep Nav2 from working."""
+    """A wrong parameter of a node, and why. `severe` findings prevent Nav2 from working."""
 
     node: str
     parameter: str
@@ -18,7 +18,7 @@ class Finding(NamedTuple):
 
 
 class Offer(NamedTuple):
-    """What simscen has: topics of scans and of odometry in the user's graph, and the names of the robot's base."""
+    """Topics of scans and odometry in the user's graph, and the names of the robot's base frame."""
 
     scans: Sequence[str]
     odometry: str
@@ -26,25 +26,25 @@ class Offer(NamedTuple):
 
 
 Parameters = Mapping[str, Any]
-"""`obstacle_layer.scan.topic` → value: the parameters of one node."""
+"""Parameters of one node by dotted name, e.g. `obstacle_layer.scan.topic`."""
 COSTMAPS = {"local_costmap": ODOM, "global_costmap": MAP}
-"""Costmap → the frame that it usually is in."""
+"""Costmaps and their usual frames."""
 
 
 def check(nodes: Mapping[str, Parameters], offer: Offer) -> List[Finding]:
-    """Everything in the parameters of Nav2's nodes that does not fit; `nodes` by their names without a namespace."""
+    """Return all findings in the parameters of Nav2's nodes; keys of `nodes` are node names without namespace."""
     found: List[Finding] = []
     for name in sorted(nodes):
         node = _Node(name, nodes[name], offer, found)
         if node.get("use_sim_time") is False:
-            node.note("use_sim_time", "is false: the node would live on wall time", severe=False)
+            node.note("use_sim_time", "is false: the node would use wall time", severe=False)
         if name in RULES:
             RULES[name](node)
     return found
 
 
 def wanted(name: str, known: Iterable[str]) -> List[str]:
-    """The parameters of a node that the rules look at, to ask a running one for; `known` are those it has."""
+    """Return those of the `known` parameters of a node that the rules use."""
     if name in COSTMAPS:
         ends: Tuple[str, ...] = (".observation_sources", ".topic", ".data_type", ".enabled")
         return [key for key in known if key in _FRAMES or key == "plugins" or key.endswith(ends)]
@@ -61,7 +61,7 @@ _FRAMES = frozenset(
 
 
 class _Node:
-    """The parameters of a node, and where to say what is wrong with them."""
+    """The parameters of one node, with functions that check them and add findings."""
 
     def __init__(self, name: str, parameters: Parameters, offer: Offer, found: List[Finding]) -> None:
         self.name, self.offer = name, offer
@@ -74,7 +74,7 @@ class _Node:
         self._found.append(Finding(self.name, key, f"{key} {message}", severe))
 
     def base(self, key: str) -> None:
-        """A frame that must be the robot's base."""
+        """Check a frame that must be the robot's base."""
         value = self.get(key)
         if value is not None and value not in self.offer.bases:
             hint = f"--base-frame {value} gives it that name, too"
@@ -83,13 +83,13 @@ class _Node:
     def frame(self, key: str, *frames: str) -> None:
         value = self.get(key)
         if value is not None and value not in frames:
-            self.note(key, f"is {value!r}; simscen knows {' and '.join(map(repr, frames))}")
+            self.note(key, f"is {value!r}; expected {' or '.join(map(repr, frames))}")
 
     def topic(self, key: str, topics: Sequence[str], what: str) -> None:
         value = self.get(key)
         if isinstance(value, str) and "/" + value.lstrip("/") not in topics:
             there = ", ".join(topics) or "none"
-            self.note(key, f"is {value!r}, which nobody publishes; {what} of simscen: {there}")
+            self.note(key, f"is {value!r}, which no node publishes; simscen's {what}: {there}")
 
 
 def _amcl(node: _Node) -> None:
@@ -109,7 +109,7 @@ def _costmap(node: _Node) -> None:
 
 
 def _source(node: _Node, source: str) -> None:
-    """A sensor that a layer listens to."""
+    """Check an observation source of a layer."""
     kind = node.get(f"{source}.data_type") or node.get(f"{source}.type") or "LaserScan"
     if kind in ("LaserScan", "scan"):
         node.topic(f"{source}.topic", node.offer.scans, "scans")
@@ -152,11 +152,11 @@ RULES: Dict[str, Any] = {
     "collision_monitor": _monitor,
 }
 NODES = ("amcl", "bt_navigator", "controller_server", "planner_server", "behavior_server", *sorted(COSTMAPS))
-"""The nodes that a run needs; `amcl` may be another localizer that publishes map→odom."""
+"""The nodes that a run needs; another localizer that publishes map -> odom may replace `amcl`."""
 
 
 def flat(tree: Mapping[str, Any], prefix: str = "") -> Dict[str, Any]:
-    """Nested parameters with dots between their keys."""
+    """Return nested parameters with dotted keys."""
     found: Dict[str, Any] = {}
     for key, value in tree.items():
         if isinstance(value, Mapping):

@@ -73,7 +73,7 @@ class Readiness:
             hints = [
                 f"; {end.node} publishes {topic} ({end.type}): --remap {COMMAND}:={topic}" for topic, end in others
             ]
-            return [f"nobody publishes {name} ({TWIST} or {TWIST_STAMPED}){''.join(hints[:2])}"]
+            return [f"no node publishes {name} ({TWIST} or {TWIST_STAMPED}){''.join(hints[:2])}"]
         wrong = [end for end in ends if end.type not in (TWIST, TWIST_STAMPED)]
         if wrong:
             return [f"{end.node} publishes {name} as {end.type}, not {TWIST} or {TWIST_STAMPED}" for end in wrong]
@@ -92,9 +92,8 @@ class Readiness:
             publisher = self._graph.publishers.get(topic.name)
             if publisher is not None:
                 for policy, offered, requested in incompatible_policies(publisher.qos_profile, end.qos):
-                    found.append(
-                        f"{end.node} hears nothing of {name}: it asks for {policy} {requested}, which is {offered}"
-                    )
+                    reason = f"it requests {policy} {requested}, simscen offers {offered}"
+                    found.append(f"{end.node} receives nothing on {name}: {reason}")
         return found
 
     def _other_publishers(self, topic: Topic) -> List[str]:
@@ -103,7 +102,7 @@ class Readiness:
             return []
         name = self._graph.names(topic.name)
         return [
-            f"{end.node} publishes {name}, too: leave that node out, or tell simscen to: --without {topic.name}"
+            f"{end.node} publishes {name} as well: do not start that node, or use --without {topic.name}"
             for end in self._graph.publishers_of(name)
         ]
 
@@ -118,12 +117,12 @@ class Readiness:
             for other, end in self._on_other_topics((topic.type,), self._graph.subscribers_of):
                 if not self._graph.node.get_publishers_info_by_topic(other):
                     found.append(
-                        f"nobody subscribes to {name}; {end.node} waits for {other} ({end.type}), which nobody "
+                        f"no node subscribes to {name}; {end.node} waits for {other} ({end.type}), which no node "
                         f"publishes: --remap {topic.name}:={other}"
                     )
         names = [self._graph.names(topic.name) for topic in sensors]
         if names and not found and not any(self._graph.subscribers_of(name) for name in names):
-            found.append(f"nobody subscribes to any sensor: {', '.join(names)}")
+            found.append(f"no node subscribes to any sensor: {', '.join(names)}")
         return found
 
     def _on_other_topics(self, types: Iterable[str], endpoints_of: Any) -> List[Tuple[str, Endpoint]]:
@@ -139,7 +138,7 @@ class Readiness:
         if self._options.wall_time:
             return []
         return [
-            f"{node} lives on wall time: start it with use_sim_time true (--ros-args -p use_sim_time:=true)"
+            f"{node} uses wall time: start it with use_sim_time true (--ros-args -p use_sim_time:=true)"
             for node, sim_time in sorted(self._barrier.sim_time.items())
             if not sim_time
         ]
@@ -157,7 +156,7 @@ class Readiness:
         for node in sorted(self._states.clients):
             answer = self._states.answers.get(node)
             if answer is None:
-                found.append(f"the lifecycle node {full_name(node)} does not say its state")
+                found.append(f"the lifecycle node {full_name(node)} does not report its state")
             elif answer.current_state.id != ACTIVE:
                 found.append(f"the lifecycle node {full_name(node)} is {answer.current_state.label}, not active")
         return found

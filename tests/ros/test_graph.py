@@ -46,21 +46,21 @@ def test_topics_types_qos_and_frames_are_what_nav2_asks_for(with_interfaces, run
     "flaws",
     [
         {
-            "no command": "nobody publishes /cmd_vel (geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped)",
-            "no goals": "nobody takes goals: no ",
+            "no command": "no node publishes /cmd_vel (geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped)",
+            "no goals": "no node takes goals: no ",
             "scan type": "/flawed subscribes to /scan as nav_msgs/msg/Odometry; it is sensor_msgs/msg/LaserScan",
         },
         pytest.param(
             {
-                "deaf to scans": "/flawed hears nothing of /scan: it asks for durability transient local, which",
-                "another odometry": "/flawed publishes /odom, too: leave that node out, or tell simscen to: --without",
+                "deaf to scans": "/flawed receives nothing on /scan: it requests durability transient local, simscen",
+                "another odometry": "/flawed publishes /odom as well: do not start that node, or use --without",
             },
             marks=pytest.mark.slow,
         ),
         pytest.param(
             {
                 "command type": "/flawed publishes /cmd_vel as geometry_msgs/msg/Vector3, not geometry_msgs/msg/Twist",
-                "no sensors": "nobody subscribes to any sensor: /",
+                "no sensors": "no node subscribes to any sensor: /",
             },
             marks=pytest.mark.slow,
         ),
@@ -86,7 +86,7 @@ def test_nodes_on_wall_time_and_lifecycle_nodes_that_sleep_are_named(ros, run) -
     awake = ros.node("flawed", "-r", "cmd_vel:=other", sim_time=False)
     ended = run("--ready", READY, "--launch", f"{awake} & {ros.node('sleeper')}")
     assert ended.code == 3
-    assert "/flawed lives on wall time: start it with use_sim_time true" in ended.said
+    assert "/flawed uses wall time: start it with use_sim_time true" in ended.said
     assert "the lifecycle node /sleeper is unconfigured, not active" in ended.said
 
 
@@ -100,5 +100,5 @@ def test_a_topic_of_another_name_is_found_and_its_remapping_shown(ros, run) -> N
 def test_a_command_that_ends_at_once_is_said_with_what_it_printed(ros, run) -> None:
     ended = run("--launch", "echo no such package: nav >&2; exit 7")
     assert ended.code == 3
-    assert "what was launched ended with exit code 7" in ended.said
+    assert "the launched command ended with exit code 7" in ended.said
     assert "no such package: nav" in ended.said

@@ -122,7 +122,7 @@ def test_killing_the_node_is_an_error_of_that_run_only_and_nothing_is_left(ros, 
     assert ended.code == 3, ended.said
     results = json.loads((ended.out / "results.json").read_text())
     assert sorted(one["outcome"] for one in results["runs"]) == ["error", "passed"]
-    assert "what was launched ended by signal 9" in ended.said, ended.said
+    assert "the launched command ended by signal 9" in ended.said, ended.said
     assert alive(tag) == []
 
 

@@ -37,11 +37,11 @@ def test_a_command_of_the_tutorial_does_what_it_says(ros, tmp_path: Path, comman
     [
         (
             ('"cmd_vel"', '"speed"'),
-            "nobody publishes /cmd_vel (geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped)",
+            "no node publishes /cmd_vel (geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped)",
         ),
         pytest.param(
             ('"scan"', '"front"'),
-            "nobody subscribes to /scan; /drive waits for /front (sensor_msgs/msg/LaserScan), which",
+            "no node subscribes to /scan; /drive waits for /front (sensor_msgs/msg/LaserScan), which",
             marks=pytest.mark.slow,
         ),
     ],

@@ -1,4 +1,4 @@
-"""simscen.peer for a Python in which simscen is not installed: `import simscen_peer` with this folder on the path."""
+"""simscen.peer for a Python without simscen: `import simscen_peer` with this folder on the path."""
 
 import importlib.util
 import sys
