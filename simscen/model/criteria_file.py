@@ -1,9 +1,8 @@
 """What must hold, without all of the scenario around it."""
 
-from typing import Literal
-
 from simscen.core.records.verdict import ExpectedFailure
 from simscen.model.scenario import RobotEntry, ScenarioSpec, WorldOrFile
+from simscen.spec.base import LanguageVersion
 
 
 def expectation_of(spec: ScenarioSpec) -> ExpectedFailure | None:
@@ -14,7 +13,7 @@ def expectation_of(spec: ScenarioSpec) -> ExpectedFailure | None:
 class CriteriaSpec(ScenarioSpec):
     """A scenario of which only `pass` need be there: enough to judge a log that exists already."""
 
-    simscen: Literal[1] = 1
+    simscen: LanguageVersion = 1
     """Version of this language."""
     world: WorldOrFile | None = None  # type: ignore[assignment]
     """Whose places and regions are meant; only a log that is not simscen's own needs it."""

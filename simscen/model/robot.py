@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.kinematics import MecanumWheels
 from simscen.core.records.events import READING_KINDS
 from simscen.model.latency import RobotLatency
-from simscen.spec.base import Ranged, Spec, by_default
+from simscen.spec.base import LanguageVersion, Ranged, Spec, by_default
 from simscen.spec.choice import Choice
 from simscen.spec.component import Component
 from simscen.spec.objects import Shaped
@@ -339,7 +339,7 @@ class Part(Shaped):
 class RobotSpec(Spec):
     """A robot: shape, drive, limits, sensors. Its base frame is on the ground under the middle of its axle."""
 
-    simscen: Literal[1]
+    simscen: LanguageVersion
     """Version of this language."""
     name: Name
     """What reports call it."""

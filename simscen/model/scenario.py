@@ -12,7 +12,7 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.model.anystack import AnyStack
 from simscen.model.navigation import Expectation, Navigation, OnReached
 from simscen.model.world import WorldSpec
-from simscen.spec.base import Spec, by_default
+from simscen.spec.base import LanguageVersion, Spec, by_default
 from simscen.spec.lazy import LazySpec
 from simscen.spec.named_places import OrPlace, PlaceAlone, PlaceOrPose
 from simscen.spec.places import Name, PlaceName, PoseSpec, RobotName
@@ -213,7 +213,7 @@ def _once(measures: list[AnyMeasure]) -> list[AnyMeasure]:
 class ScenarioSpec(Spec):
     """One navigation test: a world, a robot, goals, disturbances, and what must hold."""
 
-    simscen: Literal[1]
+    simscen: LanguageVersion
     """Version of this language."""
     name: Name | None = None
     """For people; default: the file's name."""

@@ -1,11 +1,11 @@
 """The parameters of a stack, without a scenario around them."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
 from simscen.model.anystack import AnyStack
-from simscen.spec.base import Spec
+from simscen.spec.base import LanguageVersion, Spec
 from simscen.spec.places import Name
 
 
@@ -17,7 +17,7 @@ class StackFileSpec(Spec):
     goals where it gives them.
     """
 
-    simscen: Literal[1]
+    simscen: LanguageVersion
     """Version of this language."""
     name: Name | None = None
     """For people."""

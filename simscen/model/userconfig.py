@@ -1,12 +1,12 @@
 """What a user says once for all sessions on their machine."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import AfterValidator, Field, StringConstraints
 
 from simscen.core.external_command import ANSWER_TIMEOUT_S, START_TIMEOUT_S, split_command
 from simscen.model.anystack import StackName
-from simscen.spec.base import Spec
+from simscen.spec.base import LanguageVersion, Spec
 from simscen.spec.quantities import PositiveDuration
 
 
@@ -48,7 +48,7 @@ class StackCommandSpec(Spec):
 class UserConfigSpec(Spec):
     """The user's own configuration, `$XDG_CONFIG_HOME/simscen/config.yaml` (`~/.config/simscen/config.yaml`)."""
 
-    simscen: Literal[1] = 1
+    simscen: LanguageVersion = 1
     """Version of this language."""
     stacks: Annotated[dict[StackName, StackCommandSpec], Field(max_length=100)] = {}
     """What the names of external stacks run, unless `--stack` says so on the command line."""

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from simscen.spec.base import Spec
+from simscen.spec.base import LanguageVersion, Spec
 from simscen.spec.motions import Motion
 from simscen.spec.named_places import PlaceOrPoint, PlaceOrPose
 from simscen.spec.objects import Shaped
@@ -106,7 +106,7 @@ class Door(Spec):
 class WorldSpec(Spec):
     """Walls, obstacles, things that move, named places and regions. Meters, in the map frame."""
 
-    simscen: Literal[1]
+    simscen: LanguageVersion
     """Version of this language."""
     name: Name | None = None
     """Default: the file's name."""

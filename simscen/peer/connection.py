@@ -30,7 +30,7 @@ class Connection:
         Raises RuntimeError if simscen did not start this process.
         """
         number = os.environ.get(wire.DESCRIPTOR, "")
-        if not number.isdigit():
+        if not (number.isascii() and number.isdecimal()):
             raise RuntimeError(f"{wire.DESCRIPTOR} is not set: this program is started by simscen (run --stack)")
         return cls(socket.socket(fileno=int(number)))
 

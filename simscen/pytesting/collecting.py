@@ -115,7 +115,7 @@ def _seed(config: pytest.Config) -> int | None:
     written = config.getini("simscen_seed")
     if given is not None or not written:
         return None if given is None else int(given)
-    if not written.isdecimal():
+    if not (written.isascii() and written.isdecimal()):
         raise UsageError(f"simscen_seed: {written!r} is not a whole number")
     return int(written)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import pybullet
 
 from simscen.core.geometry import Pose3, wrap
-from simscen.core.geometry.motion_paths import PathSampler, SweptSegment
+from simscen.core.geometry.motion_paths import MAX_STEP_M, PathSampler, SweptSegment
 from simscen.core.geometry.shapes import Body, Mesh, MotionPath
 from simscen.sim.inertia import GRAVITY
 
@@ -90,6 +90,8 @@ class Actor:
         """The velocity in m/s and rad/s that leads along its path to the next tick."""
         here, there = self.at(tick, rate), self.at(tick + 1, rate)
         vx, vy = (there.x - here.x) * rate, (there.y - here.y) * rate
+        if math.hypot(vx, vy) > MAX_STEP_M * rate:  # a path that jumps sets its body down elsewhere
+            return (0.0, 0.0, 0.0), 0.0
         return (vx, vy, 0.0), wrap(there.yaw - here.yaw) * rate
 
     def width(self, pose: Pose3) -> float:

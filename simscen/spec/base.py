@@ -5,10 +5,11 @@ import inspect
 import sys
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     GetJsonSchemaHandler,
@@ -16,7 +17,7 @@ from pydantic import (
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, PydanticCustomError
 
 
 class Spec(BaseModel):
@@ -41,6 +42,15 @@ class Spec(BaseModel):
                 schema["properties"][field.alias or name]["description"] = docs[name]
         return schema
 
+
+def _no_boolean(value: Any) -> Any:
+    if isinstance(value, bool):  # `True == 1`, so that a Literal would take it
+        raise PydanticCustomError("literal_error", "expected 1", {"expected": "1"})
+    return value
+
+
+LanguageVersion = Annotated[Literal[1], BeforeValidator(_no_boolean)]
+"""The version of the language that a file is written for."""
 
 T = TypeVar("T")
 

@@ -82,7 +82,7 @@ def select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> 
 def shard_of(text: str) -> tuple[int, int]:
     """Parse `i/n`. Raises UsageError."""
     number, slash, count = text.partition("/")
-    if slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count):
+    if slash and text.isascii() and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count):
         return int(number), int(count)
     raise UsageError(f"cannot read --shard {escaped(text)}: expected i/n with 1 <= i <= n, e.g. 2/4")
 

@@ -116,15 +116,12 @@ def top_speed(path: MotionPath, reach: float = 0.0) -> float:
 
 
 def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
-    """Return the longest way in m that anything within `reach` of the origin moves within `seconds`, at most."""
-    legs = list(zip(_steps(path), itertools.pairwise(path.times), range(len(path.times)), strict=False))
-    lengths = [
-        _speed(path, leg, reach) * (end - begin) if end > begin else _meters(step, reach)
-        for step, (begin, end), leg in legs
-    ]
-    durations = [end - begin for _, (begin, end), _ in legs]
-    if path.mode == "loop":
-        lengths, durations = [*lengths, _meters(_step(path.poses[-1], path.poses[0]), reach)], [*durations, 0.0]
+    """Return the longest way in m that anything within `reach` of the origin moves within `seconds`, at most.
+
+    A jump does not count, as in worlds of Gazebo: a leg that takes no time, or a loop that does not close.
+    """
+    durations = [end - begin for begin, end in itertools.pairwise(path.times)]
+    lengths = [_speed(path, leg, reach) * lasts if lasts > 0 else 0.0 for leg, lasts in enumerate(durations)]
     if path.mode == "back_and_forth":
         lengths, durations = lengths + lengths[::-1], durations + durations[::-1]
     if path.mode != "once" and (lap := sum(durations)) > 0:  # repeated, so that steps across the end count
@@ -143,10 +140,6 @@ def too_fast(name: str, step: float) -> str:
         f"`{name}` moves up to {step:.2g} m in one physics tick; contact with the robot can be missed if it moves more "
         f"than {MAX_STEP_M:g} m"
     )
-
-
-def _steps(path: MotionPath) -> list[Step]:
-    return [_step(begin, end) for begin, end in itertools.pairwise(path.poses)]
 
 
 def _interpolate(time: float, times: Sequence[float], values: Sequence[float]) -> float:

@@ -88,9 +88,14 @@ def _files(path: Path, suffixes: tuple[str, ...], problems: list[Problem]) -> It
     def unsearchable(error: OSError) -> None:
         problems.append(Problem(str(error.filename), 0, 0, "SC001", os_error_reason(error)))
 
+    is_empty = True
     for folder, below, names in os.walk(path, onerror=unsearchable):
         below[:] = sorted(name for name in below if not name.startswith("."))
-        yield from (Path(folder) / name for name in sorted(names) if name.endswith(suffixes))
+        files = [Path(folder) / name for name in sorted(names) if name.endswith(suffixes)]
+        is_empty = is_empty and not files
+        yield from files
+    if is_empty and path.name.endswith(suffixes):
+        problems.append(Problem(str(path), 0, 0, "SC001", "is a folder, but has the name of a file", "rename it"))
 
 
 def _folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]:

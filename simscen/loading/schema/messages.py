@@ -27,13 +27,14 @@ _BOUNDS = {
     "less_than_equal": ("at most", "le"),
 }
 MAX_LISTED_CHOICES = 40
-_NUMBER = re.compile(r"[-+]?\d+(\.\d*)?")
-_LEADING_ZERO = re.compile(r"[-+]?0\d")
+_NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?")
+_LEADING_ZERO = re.compile(r"[-+]?0[0-9]")
 _TEXTS = {
     "finite_number": ("SC013", "must be a finite number"),
     "too_short": ("SC017", "expected {min_length} or more values, got {actual_length}"),
     "too_long": ("SC017", "expected no more than {max_length} values"),
     "string_too_short": ("SC017", "must not be empty"),
+    "path_name": ("SC017", "a name must not be a path"),
     "string_too_long": ("SC017", "longer than {max_length} characters"),
 }
 

@@ -104,7 +104,7 @@ def _keys(path: str, parts: list[str], tree: MappingNode) -> tuple[Key, ...]:
 def _item(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list[str]) -> list[Key]:
     """Return the keys of an item of a list; for an item given by its kind, also that kind."""
     holder = dotted_path(keys)
-    if part.isdecimal():
+    if part.isascii() and part.isdecimal():
         if int(part) >= len(items.items):
             count = f"{len(items.items)} item{'' if len(items.items) == 1 else 's'}"
             raise PathError(f"{quoted(path)} leads to nothing: `{holder}` has {count}", "the first item is [0]")

@@ -186,9 +186,12 @@ def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, Moti
     """Yield keys, their tree, name, path and solids of all scripted motions, as far as they are known before a run."""
     bodies = {body.name: body for body in scene.world.bodies}
     file = scene.loaded.world
-    for index, thing in enumerate(file.spec.objects if file.spec is not None else ()):
-        if thing.move is not None and (path := bodies[thing.name].path) is not None:
-            yield ("objects", index, "move"), file.tree, thing.name, path, bodies[thing.name].solids
+    own = [thing.name for thing in file.spec.objects] if file.spec is not None else []
+    for body in scene.world.bodies:
+        if body.path is not None and body.name in own:
+            yield ("objects", own.index(body.name), "move"), file.tree, body.name, body.path, body.solids
+        elif body.path is not None:  # an actor of a Gazebo world
+            yield ("world",), None, body.name, body.path, body.solids
     spawned = {action.name: action for _, _, action in scene.actions if isinstance(action, Spawn)}
     for keys, _, action in scene.actions:
         if isinstance(action, OpenDoor | CloseDoor) and action.name in scene.world.doors:

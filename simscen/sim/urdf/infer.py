@@ -45,7 +45,12 @@ def spec_of_urdf(path: Path, roots: Sequence[Path] = (), read_mesh: MeshReader |
     wheels = found(tree)
     drive = _drive(tree, wheels)
     draft = RobotSpec(
-        simscen=1, name=tree.name or path.stem, urdf=path.name, drive=drive, limits=_limits(wheels, drive), sensors={}
+        simscen=1,
+        name=tree.name.lstrip("/") or path.stem,
+        urdf=path.name,
+        drive=drive,
+        limits=_limits(wheels, drive),
+        sensors={},
     )
     sensors = {
         "lidar": Sensor(lidar=Lidar(mount=_lidar_mount(tree, draft, wheels))),

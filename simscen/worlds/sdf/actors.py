@@ -20,8 +20,6 @@ from simscen.worlds.sdf.tree import Model
 
 PERSON = Cylinder(0.3, 1.8)
 """Stands in for a skin, which has no collision geometry."""
-JUMP = 1e-3
-"""Seconds that an actor takes from the end of one trajectory to the start of the next somewhere else."""
 
 Waypoint = tuple[float, Pose3]
 
@@ -74,19 +72,17 @@ def _waypoints(script: Element) -> list[Waypoint]:
 
 
 def _ascending(waypoints: list[Waypoint]) -> list[Waypoint]:
-    """Without two at the same time: the same place once, another place a moment later."""
+    """Without repeated ones; two places at the same time are a jump."""
     result = waypoints[:1]
     for time, pose in waypoints[1:]:
-        if time > result[-1][0]:
+        if time > result[-1][0] or pose != result[-1][1]:
             result.append((time, pose))
-        elif pose != result[-1][1]:
-            result.append((result[-1][0] + JUMP, pose))
     return result
 
 
 def _id(trajectory: Element) -> int:
     text = trajectory.attributes.get("id", "0")
-    if not text.strip().isdecimal():
+    if not (text.isascii() and text.strip().isdecimal()):
         raise trajectory.unusable(f"the id must be a whole number, got {text[:40]!r}")
     return int(text)
 

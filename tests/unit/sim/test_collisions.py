@@ -151,7 +151,7 @@ def test_a_thin_plate_that_turns_at_the_greatest_speed_does_not_pass_the_robot_u
 
 def test_a_scripted_body_that_could_pass_through_the_robot_between_two_ticks_is_an_error(simulate):
     turn = MotionPath((0.0, 0.004), (Pose2(0.5, -0.5, 0), Pose2(0.5, -0.5, math.pi / 2)))
-    with pytest.raises(RunError, match="`plate` moves up to 0.79 m in one physics tick"):
+    with pytest.raises(RunError, match=r"`plate` moves up to 0\.79 m in one physics tick"):
         simulate(bodies=[Body("plate", THIN, Pose3(0.5, -0.5), path=turn)])
     simulation = simulate(bodies=[Body("plate", THIN, Pose3(0.5, -0.5))])
     with pytest.raises(RunError, match="`plate` moves up to"):

@@ -188,14 +188,12 @@ def test_what_lies_on_something_that_a_script_takes_away_falls(simulate):
 
 
 def test_what_lies_where_a_script_puts_something_down_gives_way(simulate):
-    """Nothing comes along on the way there."""
-    stand = MotionPath((0.0, 1.0), (Pose2(-6, 3), Pose2(-6, 3)))
+    """A path that jumps: nothing comes along on the way there."""
+    path = MotionPath((0.0, 1.0, 1.0, 2.0), (Pose2(-6, 3), Pose2(-6, 3), Pose2(2.3, 3), Pose2(2.3, 3)), start=6.0)
     simulation = simulate(
-        bodies=[Body("crate", CRATE, Pose3(2.0, 3.0), 2.0), Body("cart", CRATE, Pose3(-6, 3), path=stand)]
+        bodies=[Body("crate", CRATE, Pose3(2.0, 3.0), 2.0), Body("cart", CRATE, Pose3(-6, 3), path=path)]
     )
-    run(simulation, 7 * 240)
-    simulation.move("cart", MotionPath((0.0, 1.0), (Pose2(2.3, 3), Pose2(2.3, 3))))
-    run(simulation, 3 * 240)
+    run(simulation, 10 * 240)
     assert simulation.object_pose("crate").x < 1.95
 
 

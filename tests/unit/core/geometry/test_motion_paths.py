@@ -181,3 +181,8 @@ def test_the_largest_step_of_even_motion_is_speed_times_time():
     turn = MotionPath((0.0, 0.004), (Pose2(0, 0, 0), Pose2(0, 0, math.pi / 2)))
     assert largest_step(turn, 1 / 240, 0.5) == pytest.approx(math.pi / 4)
     assert largest_step(MotionPath((0.0,), THERE[:1]), 1.0) == 0.0
+
+
+def test_a_jump_is_no_step():
+    there = (Pose2(0, 0, 0), Pose2(1, 0, 0), Pose2(5, 0, 1), Pose2(6, 0, 1))
+    assert largest_step(MotionPath((0.0, 1.0, 1.0, 2.0), there, "loop"), 0.1, 0.5) == pytest.approx(0.1)

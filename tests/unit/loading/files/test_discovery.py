@@ -148,3 +148,11 @@ def test_runs_of_two_scenarios_have_no_folder_in_common(tmp_path: Path) -> None:
     (problem,) = raised.value.problems
     assert (problem.path, problem.code) == ("a/seed-1/map.png.scenario.yaml", "SC041")
     assert problem.message == "its output folder would be the folder of a run of `a`"
+
+
+@pytest.mark.parametrize("others", [[], ["good.scenario.yaml"]])
+def test_an_empty_folder_with_the_name_of_a_scenario_is_invalid(tmp_path, others):
+    (tmp_path / "x.scenario.yaml").mkdir()
+    (tmp_path / "good.scenario.yaml").touch()
+    with pytest.raises(InvalidInput, match=r"x\.scenario\.yaml: is a folder"):
+        discover([tmp_path / name for name in ["x.scenario.yaml", *others]], tmp_path)
