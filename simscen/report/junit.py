@@ -52,7 +52,7 @@ def _case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
     case = SubElement(suite, "testcase", {"classname": _classname(run), "name": name, "time": f"{run.wall:.3f}"})
     if family == "simscen":
         case.set("file", visible(scenario_file(run)))
-        case.set("line", "1")
+        case.set("line", str(next((found.line for found in complaints(run) if found.line and not found.warning), 1)))
         _properties(case, run)
     match run.outcome:
         case Outcome.FAILED:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
-from simscen.core.records.run_result import Outcome
+from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.session_events import Comparison, RunFinished
 from simscen.judge.metrics.session_summary import session_summary_data, summarize_session
 from simscen.judge.metrics.stack_comparison import comparison_data
@@ -29,10 +29,29 @@ def as_document(runs: Sequence[RunFinished], folder: str = "", comparison: Compa
         "total": len(runs),
         **counts,
         "simulated_seconds": sum(run.result.simulated for run in ordered),
-        "suite": session_summary_data(summarize_session(run.result for run in ordered)),
+        **_summaries(ordered),
         **({} if comparison is None else {"comparison": comparison_data(comparison)}),
         "runs": [{**result_data(run.result), "artifacts": _artifacts(run, folder)} for run in ordered],
     }
+
+
+def _summaries(runs: Sequence[RunFinished]) -> dict[str, Any]:
+    """Return `suite`, or `suites` by name for several stacks, which are never pooled."""
+    found = {
+        stack: session_summary_data(summarize_session(results)) for stack, results in results_by_stack(runs).items()
+    }
+    if len(found) > 1:
+        return {"suites": found}
+    return {"suite": next(iter(found.values()), session_summary_data(summarize_session([])))}
+
+
+def results_by_stack(runs: Sequence[RunFinished]) -> dict[str, list[RunResult]]:
+    """Return the results by stack in order of appearance, without the second runs of --check-determinism."""
+    found: dict[str, list[RunResult]] = {}
+    for run in runs:
+        if not run.key.repeats:
+            found.setdefault(run.key.stack_name, []).append(run.result)
+    return found
 
 
 def in_order(runs: Sequence[RunFinished]) -> list[RunFinished]:

@@ -177,7 +177,8 @@ between drives of the same way. NEES of one run is a mean over correlated errors
 distribution hold for a mean over runs at a fixed time, as `simscen bench nav` takes it."""
 
 SESSION = """\
-A session reports in results.json under `suite`, and `simscen report DIR` prints: `runs`; `success_rate` with its 95 %
+A session reports in results.json under `suite` (`suites` by name for several `--stack`), and `simscen report DIR`
+prints: `runs`, without the second runs of `--check-determinism`; `success_rate` with its 95 %
 Wilson interval, of all runs, those with errors included; `spl` and `soft_spl`, means over the runs that have them
 (`spl_runs` of them); `collisions_per_km` and `collisions_per_hour` over `kilometers` driven and `hours` simulated of
 the `measured_runs` that came to their end. Each of several robots of a run drives, collides and has an SPL of its own;

@@ -17,6 +17,7 @@ from simscen.judge.metrics.session_summary import session_summary_line, summariz
 from simscen.judge.metrics.stack_comparison import compare_stacks
 from simscen.report.journal import require_free
 from simscen.report.rebuild import read_journal
+from simscen.report.results import results_by_stack
 
 
 def command(
@@ -49,7 +50,7 @@ def command(
         written = reports.write(answers, comparison)
         shown(reports.closing(answers, past.wall, past.interrupted, comparison))
     if format_ is Format.TEXT:
-        for stack, results in _by_stack(answers).items():
+        for stack, results in results_by_stack(answers).items():
             print_text(
                 f"{stack}: {session_summary_line(summarize_session(results))}"
                 if stack
@@ -57,12 +58,3 @@ def command(
             )
     code = verdict(answers) if written else Exit.INCOMPLETE
     sys.exit(shown.exit(code))
-
-
-def _by_stack(answers: Sequence[RunFinished]) -> dict[str, list[RunResult]]:
-    """Return the results by stack in order of appearance, without the second runs of --check-determinism."""
-    found: dict[str, list[RunResult]] = {}
-    for answer in answers:
-        if not answer.key.repeats:
-            found.setdefault(answer.key.stack_name, []).append(answer.result)
-    return found

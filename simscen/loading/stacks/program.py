@@ -1,12 +1,13 @@
 """Parse the command of an external stack, find its program, and compute a digest of it."""
 
 import hashlib
+import itertools
 import json
 import os
 import shutil
 import stat
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from simscen.core.external_command import ANSWER_TIMEOUT_S, START_TIMEOUT_S, ExternalCommand, split_command
@@ -15,6 +16,10 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 
 CHUNK_BYTES = 1 << 20
+ENVIRONMENTS = frozenset({"__pycache__", "venv", "node_modules", "site-packages"})
+"""Folders whose Python files are not a stack's own."""
+MAX_FOLDERS, MAX_SOURCES = 500, 1000
+"""Folders searched and Python files read for the digest of a stack."""
 OWN = "simscen"
 """If the PATH has no simscen, the program that was called is used: its virtual environment is not activated."""
 
@@ -93,4 +98,30 @@ def _digest(argv: Sequence[str], own: Mapping[str, str], env: Mapping[str, str],
                 while data := stream.read(CHUNK_BYTES):
                     sha.update(data)
         sha.update(b"\0")
+    for home in _source_folders(argv, folder):
+        for file in itertools.islice(_python_files(home), MAX_SOURCES):
+            sha.update(f"{file.relative_to(home).as_posix()}\0".encode() + file.read_bytes() + b"\0")
     return sha.hexdigest()
+
+
+def _source_folders(argv: Sequence[str], folder: Path) -> list[Path]:
+    """Return the folders of the scripts and modules that a command names: their imports come from there."""
+    homes: set[Path] = set()
+    for before, word in itertools.pairwise(("", *argv)):
+        if len(word) >= 4096 or "\0" in word:
+            continue
+        module = folder / word.replace(".", "/")
+        if before == "-m" and (module.is_dir() or module.with_suffix(".py").is_file()):
+            homes.add(module if module.is_dir() else module.parent)
+        elif word.endswith(".py") and (folder / word).is_file():
+            homes.add((folder / word).parent)
+    return sorted(homes)
+
+
+def _python_files(home: Path) -> Iterator[Path]:
+    """Yield the readable Python files in and below a folder, without those of hidden folders and environments."""
+    for folder, below, names in itertools.islice(os.walk(home), MAX_FOLDERS):
+        below[:] = sorted(name for name in below if not name.startswith(".") and name not in ENVIRONMENTS)
+        for file in (Path(folder) / name for name in sorted(names) if name.endswith(".py")):
+            if file.is_file() and os.access(file, os.R_OK):
+                yield file

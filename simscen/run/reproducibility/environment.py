@@ -6,7 +6,7 @@ import importlib.util
 import math
 import platform
 from collections.abc import Iterable, Iterator
-from functools import cache
+from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -103,11 +103,17 @@ def plugin_fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
     }
 
 
-@cache
 def _files_digest(value: str) -> str:
     """Return the SHA-256 of the top-level package that contains the class, or of its module."""
+    stats = ((name, file, file.stat()) for name, file in _files(value))
+    return _digest_of_files(tuple((name, file, stat.st_mtime_ns, stat.st_size) for name, file, stat in stats))
+
+
+@lru_cache(maxsize=64)
+def _digest_of_files(files: tuple[tuple[str, Path, int, int], ...]) -> str:
+    """Return the SHA-256 of files; time of change and size are only there to read changed files again."""
     sha = hashlib.sha256()
-    for name, file in _files(value):
+    for name, file, _, _ in files:
         data = file.read_bytes()
         sha.update(f"{name}\0{len(data)}\0".encode() + data)
     return sha.hexdigest()

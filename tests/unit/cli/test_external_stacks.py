@@ -211,6 +211,26 @@ def test_the_digest_holds_words_the_variables_asked_for_and_the_content_of_files
     assert of() != one
 
 
+@pytest.mark.parametrize("command", ["python3 pkg/main.py", "python3 -m pkg", "python3 -m pkg.main"])
+def test_the_digest_holds_the_modules_beside_a_script_of_python(project: Path, command: str) -> None:
+    (project / "pkg/deep").mkdir(parents=True)
+    for name in ("__init__.py", "__main__.py", "main.py", "planner.py", "deep/map.py", "notes.txt"):
+        (project / "pkg" / name).write_text("")
+    (project / "pkg/venv").mkdir()
+
+    def digest() -> str:
+        return scenario_digest(loaded("mine", f"mine={command}")[0])
+
+    before = digest()
+    (project / "pkg/notes.txt").write_text("not code")
+    (project / "pkg/venv/other.py").write_text("not its own")
+    assert digest() == before
+    (project / "pkg/planner.py").write_text("gain = 2")
+    assert (changed := digest()) != before
+    (project / "pkg/deep/map.py").write_text("size = 2")
+    assert digest() != changed
+
+
 def test_simscen_itself_is_found_where_nobody_activated_its_environment(project: Path, monkeypatch) -> None:
     """Its adapter for ROS 2 is a command: `--stack mine='simscen ros2 …'`."""
     monkeypatch.setenv("PATH", "/nowhere")

@@ -79,7 +79,7 @@ def test_file_line_properties_and_attachments_are_there(failed):
     called_elsewhere = replace(failed, file="../scenarios/lidar_off.scenario.yaml")
     suite = ElementTree.fromstring(to_xml([called_elsewhere]))[0]
     assert (suite.get("name"), suite[0].get("file")) == (called_elsewhere.file,) * 2
-    assert case.get("line") == "1"
+    assert case.get("line") == "27", "where the first failed criterion is written"
     assert case.get("time") == "0.350"
     assert properties["simulated_seconds"] == "31.000"
     assert properties["margin.stopped_within"] == "-0.34 s"

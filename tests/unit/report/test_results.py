@@ -30,3 +30,17 @@ def test_artifacts_are_relative_to_the_session_so_that_the_folder_may_move(faile
 
 def test_neither_wall_time_nor_order_shows(passed, failed):
     assert to_json([passed, failed]) == to_json([replace(failed, wall=99.0), passed])
+
+
+def test_second_runs_of_a_comparison_are_no_evidence(passed, failed):
+    again = [replace(run, result=replace(run.result, key=run.key.twin)) for run in (passed, failed)]
+    assert as_document([passed, failed, *again])["suite"] == as_document([passed, failed])["suite"]
+
+
+def test_stacks_are_not_pooled(passed, failed):
+    def by(run, stack):
+        return replace(run, result=replace(run.result, key=replace(run.key, stack_name=stack)))
+
+    document = as_document([by(passed, "a"), by(passed, "a.again"), by(failed, "b")])
+    assert "suite" not in document
+    assert document["suites"] == {"a": as_document([passed])["suite"], "b": as_document([failed])["suite"]}

@@ -1,0 +1,17 @@
+"""The digest of a plug-in follows its files, also within one process (`--watch`)."""
+
+from simscen.run.reproducibility.environment import plugin_fingerprints
+from simscen.spec.registry import Entry
+
+
+def test_a_changed_file_of_a_plugin_changes_its_fingerprint(tmp_path, monkeypatch):
+    package = tmp_path / "own_criteria"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "limits.py").write_text("LIMIT = 1\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    entry = Entry("simscen.criteria", "own", "own_criteria.limits:Own", "own-criteria", "1.0")
+    before = plugin_fingerprints([entry])
+    assert plugin_fingerprints([entry]) == before
+    (package / "limits.py").write_text("LIMIT = 20\n")
+    assert plugin_fingerprints([entry]) != before
