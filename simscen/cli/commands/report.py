@@ -1,7 +1,6 @@
 """`simscen report`."""
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -11,8 +10,6 @@ from simscen.cli.diagnostics import print_text
 from simscen.cli.session.output_files import JunitFamily, Reports, require_writable, verdict
 from simscen.cli.session.terminal import Format, screen
 from simscen.core.errors import Exit
-from simscen.core.records.run_result import RunResult
-from simscen.core.records.session_events import RunFinished
 from simscen.judge.metrics.session_summary import session_summary_line, summarize_session
 from simscen.judge.metrics.stack_comparison import compare_stacks
 from simscen.report.journal import require_free
