@@ -4,6 +4,7 @@ The standard library's ElementTree forgets line numbers, so the tree is built he
 type declaration is refused, which rules out entity bombs and external entities at once (CWE-776, CWE-611).
 """
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -15,6 +16,8 @@ DEEPEST = 100
 MOST_ELEMENTS = 200_000
 """BARN's worlds have 13 000; twenty megabytes of `<a/>` would otherwise take gigabytes."""
 LONGEST_SHOWN_LINE = 300
+_COMMENT = re.compile(rb"<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?(?:\?>|\Z)|<!--(?P<text>.*?)(?:-->|\Z)", re.DOTALL)
+"""A comment; CDATA sections and processing instructions match too, so that no comment is found inside them."""
 
 
 class Broken(Exception):
@@ -109,8 +112,25 @@ def parse(data: bytes, source: Source, kind: type[E]) -> E:
     parser.StartElementHandler = start
     parser.EndElementHandler = end
     parser.CharacterDataHandler = characters
-    _run(parser, data, source)
+    _run(parser, blank_hyphens_in_comments(data), source)
     return root[0]
+
+
+def blank_hyphens_in_comments(data: bytes) -> bytes:
+    """Return the text with spaces for the hyphens inside comments; all positions stay the same.
+
+    XML forbids `--` in comments and expat refuses it, but the parsers of Gazebo and ROS (tinyxml2) accept it, so many
+    published files contain it.
+    """
+
+    def blank(match: re.Match[bytes]) -> bytes:
+        text = match["text"]
+        if not text or b"-" not in text:
+            return match[0]
+        start = match.start("text") - match.start()
+        return match[0][:start] + text.replace(b"-", b" ") + match[0][start + len(text) :]
+
+    return _COMMENT.sub(blank, data)
 
 
 def _run(parser: expat.XMLParserType, data: bytes, source: Source) -> None:

@@ -13,6 +13,9 @@ from simscen.worlds.sdf.markup import Element
 
 LARGEST = 513
 """Pixels along an edge: Gazebo's terrains have 2^n + 1, so that 512 cells have 513 corners."""
+FORMATS = ("PNG", "BMP", "PPM", "JPEG", "TIFF")
+GRAY_MODES = ("L", "I", "I;16", "I;16B", "F")
+"""Pillow's modes of one channel whose values are heights as they are."""
 
 
 def read_heightmap(element: Element, library: Library) -> Solid:
@@ -36,17 +39,19 @@ def _heights(uri: Element, library: Library) -> Array:
         # A bomb is recognized by its header below, Pillow's own warning would only say the same again.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(io.BytesIO(data), formats=("PNG", "BMP", "PPM", "JPEG"))
+            image = Image.open(io.BytesIO(data), formats=FORMATS)
         with image:
             if max(image.size) > LARGEST or min(image.size) < 2:
                 raise uri.unusable(f"{library.shown(path)}: {image.size[0]} x {image.size[1]} pixels;"
                                    f" 2 to {LARGEST} an edge are read")  # fmt: skip
-            gray = image if image.mode in ("L", "I", "I;16", "F") else image.convert("L")
+            gray = image if image.mode in GRAY_MODES else image.convert("L")
             pixels = np.asarray(gray, dtype=np.float64)
     except Image.DecompressionBombError as error:
         raise uri.unusable(f"{library.shown(path)}: image too large") from error
     except (OSError, ValueError, SyntaxError) as error:
-        raise uri.unusable(f"{library.shown(path)}: not a readable image (PNG, BMP, PGM or JPEG)") from error
+        raise uri.unusable(f"{library.shown(path)}: not a readable image (PNG, BMP, PGM, JPEG or TIFF)") from error
+    if not np.isfinite(pixels).all() or pixels.min() < 0:
+        raise uri.unusable(f"{library.shown(path)}: a height is negative or not a number", "save it as 16-bit gray")
     brightest = float(pixels.max())
     return pixels / brightest if brightest > 0 else pixels
 

@@ -134,10 +134,13 @@ class _Builder:
         )
 
     def _refuse_emptiness(self, element: Element) -> None:
-        """An empty floor may be meant, but not where things were skipped until nothing was left."""
+        """Raise Unusable or report a world without obstacles, unless it is a ground plane on purpose."""
         if self.report.skipped:
             told = f"nothing is left of this world: {self.report.skipped} things in it were skipped"
             raise element.unusable(told, "load it without --lenient to see what is missing")
+        if self.shapes.ground:
+            self.report.note(element.place, "holds nothing but a ground plane")
+            return
         self.report.unusable(element.unusable(self._why_empty(), "load it leniently if an empty floor is meant"))
 
     def _why_empty(self) -> str:
@@ -145,8 +148,6 @@ class _Builder:
         links = [part for model in models for part in model.parts if not isinstance(part, Model)]
         if not models:
             return "no collision geometry in this world: it has no models"
-        if self.shapes.ground:
-            return "no collision geometry in this world but a ground plane"
         if not links:
             return "no collision geometry in this world: its models have no links"
         return "no collision geometry in this world: its links have visuals at most"

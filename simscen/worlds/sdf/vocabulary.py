@@ -53,6 +53,7 @@ MATTERS = SHAPES | {
 """What adds a solid or moves one: a misspelling of these must not go unseen."""
 
 _ADDING = {"model", "include", "actor", "population", "link", "collision", "geometry"}
+_LOOKS = {"visual", "light", "sensor", "plugin", "particle_emitter", "projector", "audio_source", "audio_sink"}
 _XACRO_DEFINITIONS = ("xacro:arg", "xacro:property", "xacro:macro")
 _XACRO_CHOICES = ("xacro:if", "xacro:unless")
 
@@ -69,6 +70,8 @@ def judge_unknown(element: Element, parent: str, report: Report) -> None:
     if tag in harmless or tag in _XACRO_DEFINITIONS:
         return
     adds = any(below.tag in _ADDING for below in element.descendants())
+    if tag == "experimental:params" and _changes_only_looks(element):
+        return
     if tag == "experimental:params" or (tag.startswith("xacro:") and (adds or tag not in _XACRO_CHOICES)):
         raise element.unusable(f"<{tag[:60]}> is not expanded", "expand it first: run xacro, or `gz sdf -p`")
     if ":" in tag and not adds:
@@ -78,6 +81,17 @@ def judge_unknown(element: Element, parent: str, report: Report) -> None:
     if adds or parent in SHAPES or close in MATTERS[parent]:
         raise element.unusable(f"unknown element <{tag[:60]}>", hint)
     report.note(element.place, f"unknown element <{tag[:60]}> ignored" + (f"; {hint}" if hint else ""))
+
+
+def _changes_only_looks(params: Element) -> bool:
+    """Return whether an `<experimental:params>` changes nothing but visuals, lights, sensors and plugins."""
+    return all(
+        child.tag in _LOOKS
+        or (
+            child.tag in ("model", "link") and child.attributes.get("action") == "modify" and _changes_only_looks(child)
+        )
+        for child in params.children
+    )
 
 
 @lru_cache(maxsize=1000)  # a file of many elements has few kinds, and each look takes 0.3 ms

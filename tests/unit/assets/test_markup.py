@@ -42,3 +42,22 @@ def test_elements_know_where_they_stand_and_their_text() -> None:
     root = parse_sdf(b"<a>\n  x<b name='n'/>y\n</a>", "x.sdf", "")
     b = root.children[0]
     assert (b.line, b.col, b.name, b.parent, root.text) == (2, 4, "n", root, "xy")
+
+
+@pytest.mark.parametrize("comment", [b"<!-- a -- b -->", b"<!---- x ----->", b"<!-- <b> --\n -- \xc3\xa4 -- -->"])
+def test_comments_with_double_hyphens_are_accepted_and_positions_kept(comment: bytes) -> None:
+    root = parse_sdf(b"<a>" + comment + b"<c/></a>", "x.sdf", "")
+    (child,) = root.children
+    last = (b"<a>" + comment).split(b"\n")[-1]
+    assert (child.line, child.col) == (1 + comment.count(b"\n"), len(last.decode()) + 1)
+    assert parse_urdf(b"<a>" + comment + b"<c/></a>", "x.urdf").children[0].tag == "c"
+
+
+def test_hyphens_outside_comments_stay() -> None:
+    root = parse_sdf(b"<a x='--'><![CDATA[<!-- a--b -->]]></a>", "x.sdf", "")
+    assert (root.attributes["x"], root.text) == ("--", "<!-- a--b -->")
+
+
+def test_unclosed_comments_are_refused_in_linear_time() -> None:
+    with pytest.raises(Unusable, match="not well-formed"):
+        parse_sdf(b"<a>" + b"<!--" * 1_000_000, "x.sdf", "")

@@ -130,15 +130,40 @@ def test_a_missing_model_says_where_it_was_looked_for(refuse, models):
     assert problem.hint == "looked in elsewhere/models; allow its folder with --world-path"
 
 
-@pytest.mark.parametrize(
-    ("tag", "message"), [("poes", "did you mean <pose>?"), ("experimental:params", "expand it first")]
-)
+@pytest.mark.parametrize(("tag", "message"), [("poes", "did you mean <pose>?"), ("xacro:include", "expand it first")])
 def test_an_include_is_not_half_understood(refuse, models, tag, message):
     text = include("model://crate", f"<{tag}>1 0 0 0 0 0</{tag}>")
+    (problem,) = refuse(f"<sdf version='1.9' xmlns:xacro='x'><world name='w'>{text}</world></sdf>", search=[models])
+    assert problem.hint.startswith(message)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "<visual element_id='link::v' action='remove'/>",
+        "<link element_id='link' action='modify'><sensor name='s' action='add'/></link>",
+    ],
+)
+def test_params_that_change_only_looks_are_accepted(load, models, change):
+    text = include("model://crate", f"<experimental:params>{change}</experimental:params>")
+    world = load(f"<sdf version='1.9' xmlns:experimental='x'><world name='w'>{text}</world></sdf>", search=[models])
+    assert world.solids or world.bodies
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "<link element_id='link' action='remove'/>",
+        "<link element_id='link' action='modify'><pose>1 0 0 0 0 0</pose></link>",
+        "<collision element_id='link::c' action='remove'/>",
+    ],
+)
+def test_params_that_change_geometry_are_refused(refuse, models, change):
+    text = include("model://crate", f"<experimental:params>{change}</experimental:params>")
     (problem,) = refuse(
         f"<sdf version='1.9' xmlns:experimental='x'><world name='w'>{text}</world></sdf>", search=[models]
     )
-    assert problem.hint.startswith(message)
+    assert problem.hint.startswith("expand it first")
 
 
 def test_online_models_are_not_fetched(refuse):

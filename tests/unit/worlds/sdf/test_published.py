@@ -150,6 +150,7 @@ def test_a_world_of_which_nothing_is_left_is_an_error_even_leniently(load):
         load(include("model://gone") + include("model://lost"), lenient=True)
 
 
-def test_an_empty_floor_is_allowed_leniently(load):
-    world = load(include("model://ground_plane"), lenient=True)
+def test_a_world_of_only_a_ground_plane_is_empty_and_says_so(load):
+    world = load(include("model://ground_plane"))
     assert world.solids == ()
+    assert any("nothing but a ground plane" in note for note in world.notes)

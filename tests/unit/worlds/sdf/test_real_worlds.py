@@ -150,4 +150,4 @@ def test_an_empty_world_with_only_a_floor_says_so(data: Path) -> None:
     folder = data / "nav2_tb3_sandbox"
     world = load_sdf(folder / "worlds/tb3_empty_world.sdf.xacro", root=folder, lenient=True)
     assert not world.solids
-    assert any("but a ground plane" in note for note in world.notes)
+    assert any("nothing but a ground plane" in note for note in world.notes)

@@ -230,6 +230,17 @@ class TestHeightmaps:
         mesh = load(shaped(heightmap())).solids[0].shape
         assert sorted(mesh.vertices[:, 2]) == pytest.approx([0, 0, 1.5, 3], abs=1e-3)
 
+    @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+    def test_tiff_is_read(self, load, tmp_path, dtype):
+        Image.fromarray(np.array([[0, 100], [50, 0]], dtype)).save(tmp_path / "h.png", format="TIFF")
+        mesh = load(shaped(heightmap())).solids[0].shape
+        assert sorted(mesh.vertices[:, 2]) == pytest.approx([0, 0, 1.5, 3])
+
+    @pytest.mark.parametrize("height", [np.nan, -9999.0])
+    def test_a_tiff_with_cells_without_a_height_is_refused(self, refuse, tmp_path, height):
+        Image.fromarray(np.array([[0, 1], [height, 0]], np.float32)).save(tmp_path / "h.png", format="TIFF")
+        assert "a height is negative or not a number" in refuse(shaped(heightmap()))[0].message
+
     def test_pos_moves_it(self, load, tmp_path):
         self.save(tmp_path, [[0, 0], [0, 0]])
         (solid,) = load(shaped(heightmap("<size>1 1 1</size><pos>1 2 3</pos>"))).solids
