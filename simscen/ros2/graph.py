@@ -15,6 +15,8 @@ from simscen.ros2.messages import find_type, shift_stamps, write_clock
 from simscen.ros2.options import TopicNames
 
 NODE = "simscen"
+UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+"""Name of a node whose endpoints are discovered before the node itself."""
 CLOCK = "/clock"
 LATCHED = frozenset({"/map", "/tf_static", "/robot_description", "/keepout_filter_mask", "/speed_filter_mask"})
 """Topics with transient local durability: nodes that subscribe later receive the last message."""
@@ -165,7 +167,7 @@ def full_name(node: Node) -> str:
 def _endpoints(infos: List[Any]) -> List[Endpoint]:
     found = {}
     for info in infos:
-        if info.node_name != NODE:
+        if info.node_name not in (NODE, UNKNOWN_NODE):
             node = full_name((info.node_name, info.node_namespace))
             found[node, info.topic_type] = Endpoint(node, info.topic_type, info.qos_profile)
     return [found[key] for key in sorted(found)]

@@ -56,12 +56,14 @@ def nav2(tmp_path_factory: pytest.TempPathFactory) -> Nav2:
 
 
 def parameters(file: Path) -> dict[str, Any]:
-    """Return nav2_bringup's parameters with simulated time and the regulated pure pursuit controller."""
+    """Return nav2_bringup's parameters with simulated time, a longer server timeout, and regulated pure pursuit."""
     nodes: dict[str, Any] = yaml.safe_load(file.read_text())
     for name, node in nodes.items():
         own = node if "ros__parameters" in node else node[name]  # costmaps are nested twice
         own["ros__parameters"]["use_sim_time"] = True
     nodes["controller_server"]["ros__parameters"]["FollowPath"] = CONTROLLER
+    # Wall time in ms that the behavior tree waits for a server; the default of 20 is too short for a busy machine.
+    nodes["bt_navigator"]["ros__parameters"]["default_server_timeout"] = 200
     return nodes
 
 

@@ -1,4 +1,4 @@
-"""A real ROS 2, made by `make test-ros`, and runs whose stack is a graph in it."""
+"""A real ROS 2, made by `make test-ros`, and runs that a ROS graph drives."""
 
 import itertools
 import json
@@ -44,22 +44,22 @@ pass: [{goals_reached: {}}, {collisions: {max: 0}}]
 
 
 class Ros(NamedTuple):
-    """The Python that has rclpy, and how a node of these tests is started with it."""
+    """The Python with rclpy, and the commands that start nodes of these tests with it."""
 
     python: Path
     interfaces: bool | str
 
     def node(self, name: str, *arguments: str, sim_time: bool = True, **parameters: object) -> str:
-        """The command that starts a node."""
-        told = [*arguments, *(["-p", "use_sim_time:=true"] if sim_time else [])]
+        """Return the command that starts a node."""
+        options = [*arguments, *(["-p", "use_sim_time:=true"] if sim_time else [])]
         for key, value in parameters.items():
-            told += ["-p", f"{key}:={str(value).lower() if isinstance(value, bool) else value}"]
-        return shlex.join([str(self.python), str(NODES / f"{name}.py"), "--ros-args", *told])
+            options += ["-p", f"{key}:={str(value).lower() if isinstance(value, bool) else value}"]
+        return shlex.join([str(self.python), str(NODES / f"{name}.py"), "--ros-args", *options])
 
 
 @pytest.fixture(scope="session")
 def ros() -> Ros:
-    """Skips the test where there is no ROS."""
+    """Skip the test if there is no ROS."""
     try:
         made = json.loads((ROS / "rig.json").read_text())
     except OSError:
@@ -69,14 +69,14 @@ def ros() -> Ros:
 
 @pytest.fixture(scope="session")
 def with_interfaces(ros: Ros) -> Ros:
-    """Skips the test where tf2_msgs and nav2_msgs could not be built."""
+    """Skip the test if tf2_msgs and nav2_msgs could not be built."""
     if ros.interfaces is not True:
         pytest.skip(f"tf2_msgs and nav2_msgs could not be built: {ros.interfaces}")
     return ros
 
 
 class Ended(NamedTuple):
-    """How `simscen run` ended: exit code, what it printed, the folder of the session."""
+    """How `simscen run` ended: exit code, its output, the folder of the session."""
 
     code: int
     said: str
@@ -89,11 +89,11 @@ class Ended(NamedTuple):
 
     @property
     def about(self) -> dict[str, Any]:
-        """What the first log says of the stack."""
+        """The stack's description in the first log."""
         with self.logs[0].open("rb") as file:
             records = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
-        told: dict[str, Any] = json.loads(records["simscen.stack"]["about"])
-        return told
+        about: dict[str, Any] = json.loads(records["simscen.stack"]["about"])
+        return about
 
 
 Run = Callable[..., Ended]
@@ -101,7 +101,7 @@ Run = Callable[..., Ended]
 
 @pytest.fixture
 def run(ros: Ros, tmp_path: Path) -> Run:
-    """Runs a scenario with `simscen ros2 WORDS` as its stack, in a folder with a room and two goals, one nearby."""
+    """Return a function that runs a scenario with `simscen ros2 WORDS` as its stack, in a folder with a small world."""
     (tmp_path / "room.world.yaml").write_text(ROOM)
     (tmp_path / "goal.scenario.yaml").write_text(GOAL)
     (tmp_path / "short.scenario.yaml").write_text(SHORT)

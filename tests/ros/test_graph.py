@@ -1,4 +1,4 @@
-"""What a graph lacks is said exactly, and what simscen offers is what Nav2 asks for."""
+"""Errors about an incomplete graph are exact, and simscen publishes what Nav2 subscribes to."""
 
 import json
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ASKED = {
-    # topic: type, reliability and durability that the subscribers of Nav2 ask for, and where that is written
+    # topic: type, reliability and durability that Nav2's subscribers request, and where that is defined
     "/clock": ("rosgraph_msgs/msg/Clock", "BEST_EFFORT", "VOLATILE"),  # rclcpp::ClockQoS
     "/scan": ("sensor_msgs/msg/LaserScan", "BEST_EFFORT", "VOLATILE"),  # amcl, obstacle layer: SensorDataQoS
     "/odom": ("nav_msgs/msg/Odometry", "RELIABLE", "VOLATILE"),  # bt_navigator, controller_server: odom_topic
@@ -28,7 +28,7 @@ READY = "6"
 STRENGTH = {"BEST_EFFORT": 0, "RELIABLE": 1, "VOLATILE": 0, "TRANSIENT_LOCAL": 1}
 
 
-def test_topics_types_qos_and_frames_are_what_nav2_asks_for(with_interfaces, run, tmp_path: Path) -> None:
+def test_topics_types_qos_and_frames_match_nav2(with_interfaces, run, tmp_path: Path) -> None:
     ros, file = with_interfaces, tmp_path / "probe.json"
     ended = run("--launch", f"{ros.node('navigator')} & {ros.node('probe', file=file)}")
     assert ended.code == 0, ended.said
@@ -75,14 +75,14 @@ def test_topics_types_qos_and_frames_are_what_nav2_asks_for(with_interfaces, run
     ],
     ids=", ".join,
 )
-def test_what_a_graph_lacks_is_said_exactly(ros, run, flaws: dict[str, str]) -> None:
+def test_an_incomplete_graph_is_an_exact_error(ros, run, flaws: dict[str, str]) -> None:
     ended = run("--ready", READY, "--launch", ros.node("flawed", flaws=list(flaws)))
     assert ended.code == 3
     for message in flaws.values():
         assert message in ended.said
 
 
-def test_nodes_on_wall_time_and_lifecycle_nodes_that_sleep_are_named(ros, run) -> None:
+def test_nodes_on_wall_time_and_inactive_lifecycle_nodes_are_named(ros, run) -> None:
     awake = ros.node("flawed", "-r", "cmd_vel:=other", sim_time=False)
     ended = run("--ready", READY, "--launch", f"{awake} & {ros.node('sleeper')}")
     assert ended.code == 3
@@ -90,14 +90,14 @@ def test_nodes_on_wall_time_and_lifecycle_nodes_that_sleep_are_named(ros, run) -
     assert "the lifecycle node /sleeper is unconfigured, not active" in ended.said
 
 
-def test_a_topic_of_another_name_is_found_and_its_remapping_shown(ros, run) -> None:
+def test_the_remapping_for_a_topic_with_another_name_is_suggested(ros, run) -> None:
     ended = run("--ready", READY, "--launch", ros.node("navigator", "-r", "scan:=front", "-r", "cmd_vel:=base/cmd_vel"))
     assert ended.code == 3
     assert "--remap /cmd_vel:=/base/cmd_vel" in ended.said
     assert "--remap /scan:=/front" in ended.said
 
 
-def test_a_command_that_ends_at_once_is_said_with_what_it_printed(ros, run) -> None:
+def test_the_output_of_a_launch_command_that_exits_is_shown(ros, run) -> None:
     ended = run("--launch", "echo no such package: nav >&2; exit 7")
     assert ended.code == 3
     assert "the launched command ended with exit code 7" in ended.said

@@ -1,4 +1,4 @@
-"""A navigation node that knows nothing of simscen drives its scenarios over a real ROS 2."""
+"""A navigation node without any knowledge of simscen drives scenarios over a real ROS 2."""
 
 import hashlib
 import json
@@ -21,8 +21,8 @@ SCENARIOS = [
 ]
 
 
-def left_out(value: str) -> object:
-    """One of several values that `make test` leaves to `make test-ros`."""
+def slow_value(value: str) -> object:
+    """A parameter value that only `make test-ros` runs."""
     return pytest.param(value, marks=pytest.mark.slow)
 
 
@@ -31,7 +31,7 @@ def digest(log: Path) -> str:
 
 
 @pytest.mark.parametrize("stamped", [pytest.param(False, marks=pytest.mark.slow), True], ids=["Twist", "TwistStamped"])
-def test_it_reaches_a_goal_by_goal_pose_in_a_namespace_with_remappings(ros, run, stamped: bool) -> None:
+def test_a_goal_is_reached_by_goal_pose_in_a_namespace_with_remappings(ros, run, stamped: bool) -> None:
     names = ["-r", "__ns:=/robot1", "-r", "/tf:=tf", "-r", "/tf_static:=tf_static", "-r", "scan:=/front/scan"]
     words = ["--namespace", "robot1", "--remap", "/scan:=/front/scan"]
     ended = run(*words, "--launch", ros.node("navigator", *names, stamped=stamped))
@@ -39,7 +39,7 @@ def test_it_reaches_a_goal_by_goal_pose_in_a_namespace_with_remappings(ros, run,
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_it_passes_a_scenario_that_ships(ros, run, name: str) -> None:
+def test_the_navigator_passes_a_scenario_of_the_library(ros, run, name: str) -> None:
     ended = run("--launch", ros.node("navigator"), scenario=ROOT / "scenarios" / f"{name}.scenario.yaml")
     assert ended.code == 0, ended.said
 
@@ -48,10 +48,10 @@ def test_it_passes_a_scenario_that_ships(ros, run, name: str) -> None:
     "action",
     [
         "navigate_to_pose",
-        *map(left_out, ("navigate_through_poses", "follow_waypoints")),
+        *map(slow_value, ("navigate_through_poses", "follow_waypoints")),
     ],
 )
-def test_goals_go_to_an_action_of_nav2(with_interfaces, run, tmp_path: Path, action: str) -> None:
+def test_goals_are_sent_to_an_action_of_nav2(with_interfaces, run, tmp_path: Path, action: str) -> None:
     file = tmp_path / "short.scenario.yaml"
     file.write_text(
         file.read_text().replace("goals: [", "goals: [{name: first, pose: {x: 1.8, y: 1}, timeout: 30 s}, ")
@@ -69,7 +69,7 @@ TOURS = {"navigate_through_poses": WAY % "", "follow_waypoints": WAY % ", on_rea
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["navigate_through_poses", "follow_waypoints"])
-def test_the_scenario_says_by_which_action_goals_go(with_interfaces, run, tmp_path: Path, mode: str) -> None:
+def test_the_scenario_selects_the_action(with_interfaces, run, tmp_path: Path, mode: str) -> None:
     head = "simscen: 1\nworld: room.world.yaml\nrobot: {pose: start}\ntime_limit: 90\n"
     tour = f"navigation: {{mode: {mode}, loops: 2}}\n{TOURS[mode]}\npass: [{{goals_reached: {{}}}}]\n"
     (tmp_path / "tour.scenario.yaml").write_text(head + tour)
@@ -86,8 +86,8 @@ def test_the_scenario_says_by_which_action_goals_go(with_interfaces, run, tmp_pa
 
 
 @pytest.mark.parametrize("repeats", [2, pytest.param(20, marks=pytest.mark.slow)])
-def test_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run, repeats: int) -> None:
-    """Two at a time: neither do they hear each other."""
+def test_concurrent_lockstep_runs_have_equal_logs(ros, run, repeats: int) -> None:
+    """Two runs at a time, which must not receive each other's messages."""
     with ThreadPoolExecutor(2) as pool:
         words = ["--settle", "0.2", "--launch", ros.node("navigator")]
         calls = [pool.submit(run, *words, scenario="short.scenario.yaml") for _ in range(repeats)]
@@ -100,7 +100,7 @@ def test_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run, repeats:
 
 
 @pytest.mark.slow
-def test_paced_runs_say_so(ros, run) -> None:
+def test_paced_runs_are_marked(ros, run) -> None:
     words = ["--sync", "paced", "--factor", "4", "--launch", ros.node("navigator")]
     ended = run(*words, scenario="short.scenario.yaml")
     assert ended.code == 0, ended.said
@@ -108,7 +108,7 @@ def test_paced_runs_say_so(ros, run) -> None:
     assert (told["sync"], told["factor"]) == ("paced", 4.0)
 
 
-def test_killing_the_node_is_an_error_of_that_run_only_and_nothing_is_left(ros, run, alive, tmp_path: Path) -> None:
+def test_killing_a_node_is_an_error_of_its_run_only(ros, run, alive, tmp_path: Path) -> None:
     (tmp_path / "other.scenario.yaml").write_text((tmp_path / "short.scenario.yaml").read_text())
     tag = f"run{os.getpid()}"
     with ThreadPoolExecutor(1) as pool:
@@ -169,7 +169,7 @@ pass: [{goals_reached: {goals: [near]}}, {result: {status: CANCELED}}, {collisio
 
 @pytest.mark.parametrize(
     "action",
-    ["", *map(left_out, ("navigate_to_pose", "navigate_through_poses"))],
+    ["", *map(slow_value, ("navigate_to_pose", "navigate_through_poses"))],
 )
 def test_goals_are_preempted_and_canceled(with_interfaces, run, tmp_path: Path, action: str) -> None:
     (tmp_path / "changes.scenario.yaml").write_text(CHANGES)

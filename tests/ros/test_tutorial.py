@@ -1,4 +1,4 @@
-"""The tutorial on a ROS 2 stack, done as a new user does: in a clean folder, with what the page shows."""
+"""The tutorial on a ROS 2 stack, done as by a new user: in a clean folder, with the files of the page."""
 
 import os
 import re
@@ -19,10 +19,10 @@ COMMANDS = re.findall(r"^\$ (simscen .*)$", PAGE, re.MULTILINE)
     [COMMANDS[0], pytest.param(COMMANDS[1], marks=pytest.mark.slow)],
     ids=["once", "twice"],
 )
-def test_a_command_of_the_tutorial_does_what_it_says(ros, tmp_path: Path, command: str) -> None:
+def test_a_command_of_the_tutorial_works(ros, tmp_path: Path, command: str) -> None:
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
-    # simscen's own virtual environment is active, and the user's ROS behind it.
+    # simscen's virtual environment comes first, then the user's ROS.
     folders = [str(Path(sys.executable).parent), str(ros.python.parent), os.environ["PATH"]]
     environment = {**os.environ, "PATH": os.pathsep.join(folders)}
     done = subprocess.run(
@@ -45,9 +45,9 @@ def test_a_command_of_the_tutorial_does_what_it_says(ros, tmp_path: Path, comman
             marks=pytest.mark.slow,
         ),
     ],
-    ids=["nobody drives", "another name"],
+    ids=["no commands", "another name"],
 )
-def test_the_table_of_the_tutorial_says_what_is_said(ros, run, tmp_path: Path, change, message: str) -> None:
+def test_the_errors_in_the_tutorial_are_real(ros, run, tmp_path: Path, change, message: str) -> None:
     (tmp_path / "drive.py").write_text(FILES["drive.py"].replace(*change))
     ended = run("--ready", "5", "--launch", f"{ros.python} drive.py --ros-args -p use_sim_time:=true")
     assert message in ended.said

@@ -1,4 +1,4 @@
-"""A graph that lacks something, or has it otherwise: `flaws` say what."""
+"""A node with the errors that the parameter `flaws` lists."""
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, TwistStamped, Vector3
@@ -34,7 +34,7 @@ class Flawed(Node):
 
 
 def other():
-    """Publishes commands of another type; one participant of DDS cannot have both."""
+    """Publish commands of another type from a second context, because one DDS participant cannot have both."""
     context = rclpy.Context()
     rclpy.init(context=context)
     node = Node("other", context=context)

@@ -1,4 +1,4 @@
-"""A small navigation stack in one rclpy node: scan matching, A* on the map, pure pursuit. It knows nothing of simscen.
+"""A small navigation stack in one rclpy node: scan matching, A* on the map, pure pursuit, independent of simscen.
 
 In: /map, /scan, /odom, /initialpose, /tf_static, and goals by /goal_pose or an action of Nav2.
 Out: /cmd_vel (Twist, or TwistStamped with `stamped`), /plan, /amcl_pose, /tf map→odom.
@@ -51,7 +51,7 @@ def inverse(a):
 
 
 def spread(field, steps):
-    """How near each cell is to one that is 1: falls by 1/steps with each cell."""
+    """Proximity of each cell to a cell that is 1; it decreases by 1/steps per cell."""
     for _ in range(steps):
         padded = np.pad(field, 1)
         best = np.maximum.reduce([padded[1 + dy :, 1 + dx :][: field.shape[0], : field.shape[1]] for dy, dx in SIDES])
@@ -63,7 +63,7 @@ SIDES = [(-1, 0), (1, 0), (0, -1), (0, 1)]
 
 
 class World:
-    """The map: where it is free to drive, and how well a scan fits."""
+    """The map: free space, and the match of a scan."""
 
     def __init__(self, message, radius):
         info = message.info
@@ -82,7 +82,7 @@ class World:
         self.seen = np.zeros_like(self.blocked, dtype=np.int16)
 
     def fit(self, points):
-        """(..., n, 2) points on the map: how well they lie on walls, 0 to 1."""
+        """Return how well (..., n, 2) points on the map lie on walls, 0 to 1."""
         column, row = (np.floor((points[..., i] - self.origin[i]) / self.fine).astype(int) for i in (0, 1))
         height, width = self.field.shape
         inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
@@ -97,13 +97,13 @@ class World:
         return self.origin[0] + (cell[1] + 0.5) * self.step, self.origin[1] + (cell[0] + 0.5) * self.step
 
     def see(self, points):
-        """Remember what stands where the map is free; forget it a while after it was last seen."""
+        """Remember obstacles in the free space of the map for a while after they were last seen."""
         self.seen = np.maximum(self.seen - 1, 0)
         for x, y in points:
             self.seen[self.cell(x, y)] = 60
 
     def plan(self, start, goal):
-        """Points from start to goal, or None."""
+        """Return points from start to goal, or None."""
         obstacles = (self.blocked | (self.seen > 0)).astype(float)
         near = spread(obstacles, self.reach + 4)
         closed = near > 1 - self.reach / (self.reach + 4)
@@ -126,7 +126,7 @@ class World:
                 other = (cell[0] + dy, cell[1] + dx)
                 if not (0 <= other[0] < cost.shape[0] and 0 <= other[1] < cost.shape[1]):
                     continue
-                # Out of a tight spot it may go, into one it may not.
+                # The robot may leave a tight spot but not enter one.
                 if closed[other] and not closed[cell] and other != last:
                     continue
                 total = best[cell] + length * cost[other]
@@ -166,7 +166,7 @@ class Navigator(Node):
             self.create_subscription(PoseStamped, "goal_pose", self.on_goal, 10)
         self.create_timer(1 / rate, self.drive)
 
-    # What comes in
+    # Subscriptions
 
     def on_map(self, message):
         self.world = World(message, self.radius)
@@ -208,7 +208,7 @@ class Navigator(Node):
         near = (np.hypot(*points.T) < 2.0) & (self.world.fit(on_map) < 0.1)
         self.world.see(on_map[near])
 
-    # Where it is
+    # Localization
 
     def pose(self):
         return compose(self.correction, self.odom)
@@ -221,7 +221,7 @@ class Navigator(Node):
         )
 
     def match(self, points):
-        """Move the estimate to where the scan lies best on the map's walls, a little at a time."""
+        """Move the estimate towards the best match of the scan with the map's walls."""
         pose = self.pose()
         for step, turn in ((0.03, 0.02), (0.01, 0.007)):
             shifts = [(i * step, j * step, k * turn) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-2, -1, 0, 1, 2)]
@@ -253,7 +253,7 @@ class Navigator(Node):
             link.transform.rotation.z, link.transform.rotation.w = math.sin(turn / 2), math.cos(turn / 2)
             self.transforms.publish(TFMessage(transforms=[link]))
 
-    # Where it goes
+    # Control
 
     def on_goal(self, message):
         self.set_goals([message])
@@ -298,7 +298,7 @@ class Navigator(Node):
         return self.follow(pose, left)
 
     def follow(self, pose, left):
-        """Pure pursuit of a point on the plan, slower before turns and obstacles."""
+        """Pure pursuit of a point on the plan, slower in turns and near obstacles."""
         lookahead = 0.4
         nearest = min(
             range(len(self.plan)), key=lambda i: math.hypot(self.plan[i][0] - pose[0], self.plan[i][1] - pose[1])
@@ -317,7 +317,7 @@ class Navigator(Node):
         return speed, max(-1.2, min(1.2, 1.8 * bearing))
 
     def free_ahead(self, bearing):
-        """How far it may drive before the hull meets what the lidar saw now."""
+        """Return the distance that the robot can drive before it touches what the lidar sees."""
         if self.scan is None:
             return math.inf
         cos, sin = math.cos(bearing / 2), math.sin(bearing / 2)
@@ -335,7 +335,7 @@ class Navigator(Node):
             message.poses.append(pose)
         self.paths.publish(message)
 
-    # Goals by an action of Nav2
+    # Goals from an action of Nav2
 
     def serve(self, name):
         from nav2_msgs import action

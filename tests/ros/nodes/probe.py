@@ -1,4 +1,4 @@
-"""Writes into `file`, after `seconds`, what simscen publishes with which quality of service, and the frames it saw."""
+"""Write simscen's topics with their quality of service and the received frames to `file` after `seconds`."""
 
 import json
 from pathlib import Path

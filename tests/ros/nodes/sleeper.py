@@ -1,4 +1,4 @@
-"""A lifecycle node that nobody has activated, with all that a run needs but that."""
+"""A lifecycle node with everything that a run needs, but not active."""
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, Twist

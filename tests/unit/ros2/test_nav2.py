@@ -1,4 +1,4 @@
-"""Parameters of Nav2 that do not fit what simscen publishes."""
+"""Check of Nav2's parameters against what simscen publishes."""
 
 from pathlib import Path
 
@@ -66,13 +66,13 @@ def found(node: str, **parameters: object) -> list[Finding]:
         ),
     ],
 )
-def test_what_does_not_fit_is_told_of_each_node(node: str, parameters: dict[str, object], message: str) -> None:
+def test_a_wrong_parameter_is_found_in_each_node(node: str, parameters: dict[str, object], message: str) -> None:
     [finding] = found(node, **parameters)
     assert (finding.node, finding.severe) == (node, True)
     assert finding.message.startswith(message)
 
 
-def test_a_source_that_simscen_cannot_be_is_a_warning_and_one_that_is_off_is_nothing() -> None:
+def test_a_point_cloud_source_is_a_warning_unless_it_is_disabled() -> None:
     source = {"plugins": ["o"], "o__observation_sources": "cloud", "o__cloud__data_type": "PointCloud2"}
     [finding] = found("local_costmap", **source)
     assert (finding.parameter, finding.severe) == ("o.cloud.data_type", False)
@@ -84,7 +84,7 @@ def test_wall_time_is_a_warning_because_a_launch_file_may_set_it() -> None:
     assert not finding.severe
 
 
-def test_of_a_running_node_only_what_the_rules_read_is_asked() -> None:
+def test_only_parameters_of_the_rules_are_requested() -> None:
     known = ["plugins", "o.observation_sources", "o.scan.topic", "resolution", "robot_base_frame", "alpha1"]
     assert wanted("local_costmap", known) == ["plugins", "o.observation_sources", "o.scan.topic", "robot_base_frame"]
     assert wanted("amcl", ["alpha1", "scan_topic"]) == ["scan_topic"]
@@ -103,13 +103,13 @@ def called(folder: Path, text: str, *options: str) -> tuple[int, str]:
     return done.exit_code, done.output
 
 
-def test_a_file_that_fits_passes(tmp_path: Path) -> None:
+def test_a_correct_file_passes(tmp_path: Path) -> None:
     code, said = called(tmp_path, FITS)
     assert code == 0
     assert "nothing keeps Nav2 from working" in said
 
 
-def test_a_file_that_does_not_fit_is_told_line_by_line(tmp_path: Path) -> None:
+def test_wrong_parameters_of_a_file_are_reported_with_their_lines(tmp_path: Path) -> None:
     text = FITS.replace(
         "base_frame_id: base_link\n    odom_frame_id: odom\n    global", "base_frame_id: base\n    global"
     )
@@ -122,7 +122,7 @@ def test_a_file_that_does_not_fit_is_told_line_by_line(tmp_path: Path) -> None:
     assert all("SC340" in line for line in said.split("\n"))
 
 
-def test_a_second_name_of_the_base_makes_a_file_fit(tmp_path: Path) -> None:
+def test_a_second_name_of_the_base_frame_is_accepted(tmp_path: Path) -> None:
     text = FITS.replace("base_link", "base_footprint")
     assert called(tmp_path, text)[0] == 2
     assert called(tmp_path, text, "--base-frame", "base_footprint")[0] == 0
@@ -134,7 +134,7 @@ def test_a_file_without_parameters_of_nodes_is_refused(tmp_path: Path) -> None:
     assert "it has no key ros__parameters" in said
 
 
-def test_called_by_hand_it_says_what_it_is_for() -> None:
+def test_a_call_outside_a_run_is_a_usage_error() -> None:
     from simscen.core.errors import UsageError
 
     with pytest.raises(UsageError, match="there is no run to serve"):

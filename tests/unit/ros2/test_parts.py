@@ -1,4 +1,4 @@
-"""What the adapter does without ROS: names, domains, bytes, goals, and ending what was started."""
+"""Parts of the adapter that work without ROS: topic names, domains, messages, and ending processes."""
 
 import ast
 import os
@@ -12,6 +12,7 @@ import pytest
 
 import simscen.ros2
 from simscen.core.geometry.kinematics import Twist
+from simscen.peer import messages as peer_messages
 from simscen.record import pack
 from simscen.ros2 import messages
 from simscen.ros2.domain import claim, ros_environment
@@ -21,7 +22,7 @@ FOLDER = Path(simscen.ros2.__file__).parent
 
 
 @pytest.mark.parametrize("file", sorted(path.name for path in FOLDER.glob("*.py")))
-def test_the_adapter_is_python_3_8_and_imports_nothing_of_simscen_but_itself_and_the_peer(file: str) -> None:
+def test_the_adapter_is_python_3_8_and_imports_only_itself_and_the_peer(file: str) -> None:
     tree = ast.parse((FOLDER / file).read_text(), feature_version=(3, 8))
     imported = {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
     imported |= {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
@@ -42,19 +43,19 @@ def test_the_adapter_is_python_3_8_and_imports_nothing_of_simscen_but_itself_and
         ("robot1", ["/tf:=/tf"], "/tf", "/tf"),
     ],
 )
-def test_topics_are_in_the_namespace_and_are_remapped_as_in_ros(
+def test_topics_are_moved_to_the_namespace_and_remapped_as_in_ros(
     namespace: str, remappings: list[str], topic: str, name: str
 ) -> None:
     assert TopicNames(namespace, remappings)(topic) == name
 
 
 @pytest.mark.parametrize("text", ["/scan=/front", ":=/front", "/scan:="])
-def test_a_remapping_that_is_none_is_refused(text: str) -> None:
+def test_an_invalid_remapping_is_an_error(text: str) -> None:
     with pytest.raises(AdapterError, match="not of the form /from:=/to"):
         TopicNames("", [text])
 
 
-def test_two_runs_never_have_the_same_domain(tmp_path: Path) -> None:
+def test_two_runs_get_different_domains(tmp_path: Path) -> None:
     environment = {"XDG_RUNTIME_DIR": str(tmp_path)}
     first, second = claim(None, environment), claim(None, environment)
     assert (first.number, second.number) == (1, 2)
@@ -62,7 +63,7 @@ def test_two_runs_never_have_the_same_domain(tmp_path: Path) -> None:
     assert claim(None, environment).number == 1
 
 
-def test_a_domain_that_another_run_uses_cannot_be_had_by_number(tmp_path: Path) -> None:
+def test_a_domain_in_use_cannot_be_claimed_by_number(tmp_path: Path) -> None:
     environment = {"XDG_RUNTIME_DIR": str(tmp_path)}
     held = claim(42, environment)
     with pytest.raises(AdapterError, match=r"another run is using ROS domain 42: .* --jobs 1"):
@@ -73,7 +74,7 @@ def test_a_domain_that_another_run_uses_cannot_be_had_by_number(tmp_path: Path) 
     assert claim(42, environment).number == 42
 
 
-def test_the_lock_of_a_domain_goes_with_the_process_that_held_it(tmp_path: Path) -> None:
+def test_the_lock_of_a_domain_ends_with_its_process(tmp_path: Path) -> None:
     code = (
         "import os, sys; from simscen.ros2.domain import claim; held = claim(7, os.environ); print(flush=True); input()"
     )
@@ -91,14 +92,14 @@ def test_the_lock_of_a_domain_goes_with_the_process_that_held_it(tmp_path: Path)
 
 
 @pytest.mark.parametrize(("distro", "old"), [("humble", "1"), ("jazzy", None), ("", None)])
-def test_nodes_are_told_to_stay_on_this_machine_as_their_distribution_understands(distro: str, old: str | None) -> None:
+def test_discovery_is_restricted_to_this_machine_in_every_distribution(distro: str, old: str | None) -> None:
     told = ros_environment(5, "/tmp/logs", {"ROS_DISTRO": distro, "ROS_LOCALHOST_ONLY": "0"})
     assert told["ROS_DOMAIN_ID"] == "5"
     assert told["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
     assert told.get("ROS_LOCALHOST_ONLY") == old
 
 
-def test_a_stamped_velocity_is_read_whatever_the_length_of_its_frame() -> None:
+def test_a_stamped_twist_is_read_for_any_length_of_its_frame() -> None:
     numbers = (0.5, 0.0, 0.0, 0.0, 0.0, -0.25)
     for frame in ("", "b", "base_link", "base_footprint", "robot_1/base_link"):
         text = frame.encode() + b"\0"
@@ -108,11 +109,11 @@ def test_a_stamped_velocity_is_read_whatever_the_length_of_its_frame() -> None:
         assert messages.read_header(stamped) == (12_500_000_000, frame)
 
 
-def test_a_velocity_of_another_byte_order_is_read_too() -> None:
+def test_a_big_endian_twist_is_read() -> None:
     assert messages.read_twist(b"\0\0\0\0" + struct.pack(">6d", 1, 2, 3, 4, 5, 6), stamped=False) == (1, 2, 3, 4, 5, 6)
 
 
-def test_a_twist_is_written_as_in_the_log() -> None:
+def test_a_twist_has_the_same_bytes_as_in_the_log() -> None:
     assert messages.write_twist((0.3, 0.1, 0, 0, 0, -0.7)) == pack.twist().packer()(Twist(0.3, 0.1, -0.7))
 
 
@@ -125,9 +126,7 @@ def _alive(pid: int) -> bool:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("stubborn", [False, True])
-def test_all_that_was_launched_is_ended_when_the_adapter_goes_even_what_slipped_away(
-    tmp_path: Path, stubborn: bool
-) -> None:
+def test_all_launched_processes_end_with_the_adapter(tmp_path: Path, stubborn: bool) -> None:
     """A grandchild in a session of its own, whose parent has gone, deaf to SIGINT and SIGTERM."""
     note = tmp_path / "pid"
     deaf = "trap '' INT TERM; " if stubborn else ""
@@ -145,11 +144,27 @@ def test_all_that_was_launched_is_ended_when_the_adapter_goes_even_what_slipped_
     assert not _alive(pid)
 
 
-def test_the_keeper_ends_as_what_it_kept() -> None:
+def test_the_launcher_exits_with_the_code_of_its_command() -> None:
     for command, code in (("exit 3", 3), ("kill -9 $$", 137)):
         keeper = subprocess.Popen([sys.executable, str(FOLDER / "launch.py"), command], stdin=subprocess.PIPE)
         assert keeper.wait(30) == code
 
 
-def test_an_estimate_is_made_of_map_odom_and_odometry() -> None:
+def test_poses_are_composed() -> None:
     assert messages.compose((1.0, 2.0, 0.0), (0.5, 0.0, 0.1)) == pytest.approx((1.5, 2.0, 0.1))
+
+
+def test_all_stamps_of_a_plan_and_of_transforms_are_shifted() -> None:
+    poses = [(1.0, 2.0, 0.5), (3.0, 4.0, 0.0)]
+    late = messages.shift_stamps("nav_msgs/msg/Path", peer_messages.path((5, 900_000_000), poses), 1_300_000_000)
+    assert late == peer_messages.path((7, 200_000_000), poses)
+
+    def transforms(first: tuple[int, int], second: tuple[int, int]) -> bytes:
+        return peer_messages.transforms(
+            [(first, "map", "odom", (1.0, 2.0, 0.5)), (second, "odom", "base_link", (0.0, 0.0, 0.0))]
+        )
+
+    type_name = "tf2_msgs/msg/TFMessage"
+    assert messages.shift_stamps(type_name, transforms((3, 0), (4, 5)), -2 * 10**9) == transforms((1, 0), (2, 5))
+    early = messages.shift_stamps(type_name, transforms((1, 0), (4, 5)), -2 * 10**9)
+    assert early == transforms((0, 0), (2, 5)), "stamps do not become negative"
