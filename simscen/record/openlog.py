@@ -1,15 +1,20 @@
 """Opens a log that somebody else may have put there, and reads the records that are whole."""
 
 import errno
+import json
 import os
 import stat
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
 from mcap import records
-from mcap.exceptions import EndOfFile
+from mcap.exceptions import EndOfFile, McapError
+from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
+
+from simscen.record.header import RESULT
 
 LARGEST_RECORD = 1 << 28
 
@@ -21,6 +26,17 @@ def open_log(path: Path) -> IO[bytes]:
         os.close(descriptor)
         raise OSError(errno.EINVAL, "not a regular file", str(path))
     return os.fdopen(descriptor, "rb")
+
+
+def attached_result(path: Path) -> dict[str, Any] | None:
+    """Return the result.json in a log, from the index at its end; None if there is no such log."""
+    try:
+        with open_log(path) as stream:
+            found = next((one for one in make_reader(stream).iter_attachments() if one.name == RESULT), None)
+            data = json.loads(found.data) if found is not None else None
+    except (OSError, McapError, ValueError, struct.error):
+        return None
+    return data if isinstance(data, dict) else None
 
 
 class WholeRecords:

@@ -45,6 +45,7 @@ def run_data(run: RunFinished, folder: Path) -> dict[str, Any]:
     """An answer as plain data: its result.json and what that leaves out. Files are relative to `folder`."""
     files = {name: relative(path, str(folder)) if path else "" for name, path in asdict(run.artifacts).items()}
     about = {"wall": run.wall, "again": run.again, "file": run.file, "tags": list(run.tags)}
+    about |= {"resumed": True} if run.resumed else {}
     return {**about, "files": files, "result": result_data(run.result)}
 
 
@@ -52,4 +53,6 @@ def read_run(data: dict[str, Any], folder: Path) -> RunFinished:
     """The answer that `run_data` described, its files now in `folder`. Raises KeyError, TypeError or ValueError."""
     files = {name: str(folder / path) if path else "" for name, path in data["files"].items()}
     result, tags = from_data(data["result"]), tuple(data.get("tags", ()))
-    return RunFinished(result, data["wall"], Artifacts(**files), data["again"], data["file"], tags)
+    return RunFinished(
+        result, data["wall"], Artifacts(**files), data["again"], data["file"], tags, resumed=data.get("resumed", False)
+    )

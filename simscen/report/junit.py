@@ -79,6 +79,7 @@ def _properties(case: Element, run: RunFinished) -> None:
         "ended": run.result.ended,
         "expected": run.result.reason if run.outcome is not Outcome.SKIPPED else "",
         "again": command(run.again),
+        "resumed": "true" if run.resumed else "",
     }
     for verdict in run.result.verdicts:
         values[f"status.{verdict.id}"] = verdict.status.value

@@ -151,7 +151,7 @@ def _summary(run: RunFinished) -> tuple[Piece, ...]:
         return (Piece(excused(run), "quiet"),)
     if run.outcome is Outcome.ERROR and not run.result.simulated:
         return (Piece(f"{failure(run)[0]} after {run.wall:.2f} s", "quiet"),)
-    times = f"{run.result.simulated:6.1f} s simulated in {run.wall:.2f} s"
+    times = f"{run.result.simulated:6.1f} s simulated in {run.wall:.2f} s{', kept' if run.resumed else ''}"
     if run.outcome is Outcome.FAILED_AS_EXPECTED:
         return (Piece(f"{times}   {excused(run)}", "quiet"),)
     nearest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""

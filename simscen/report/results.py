@@ -31,7 +31,7 @@ def as_document(runs: Sequence[RunFinished], folder: str = "", comparison: Compa
         "simulated_seconds": sum(run.result.simulated for run in ordered),
         **_summaries(ordered),
         **({} if comparison is None else {"comparison": comparison_data(comparison)}),
-        "runs": [{**result_data(run.result), "artifacts": _artifacts(run, folder)} for run in ordered],
+        "runs": [{**result_data(run.result), "artifacts": _artifacts(run, folder), **_resumed(run)} for run in ordered],
     }
 
 
@@ -57,6 +57,10 @@ def results_by_stack(runs: Sequence[RunFinished]) -> dict[str, list[RunResult]]:
 def in_order(runs: Sequence[RunFinished]) -> list[RunFinished]:
     """By file, scenario and seed: the order they ended in does not show."""
     return sorted(runs, key=lambda run: (run.result.path, run.key))
+
+
+def _resumed(run: RunFinished) -> dict[str, bool]:
+    return {"resumed": True} if run.resumed else {}
 
 
 def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:

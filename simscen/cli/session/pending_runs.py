@@ -1,13 +1,15 @@
 """What a session has to do: all of its runs, or those that an earlier one in the same folder left."""
 
+import json
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionStarted, session_started
 from simscen.core.version import __version__
+from simscen.judge.result_json import result_data
 from simscen.loading.loaded import LoadedScenario
 from simscen.report.journal import Journal
 from simscen.report.journaldata import Planned
@@ -18,6 +20,9 @@ from simscen.run.reproducibility.digest import scenario_digest
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER
 from simscen.run.sessions.results import repeat_command, shown
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
+
+SAME_IN_LOG = ("scenario", "seed", "variation", "stack_name", "simulated_seconds", "verdicts")
+"""Keys of result.json that a log and the journal hold alike."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,7 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> PendingRuns:
     left: list[Job] = []
     for number, (job, answer) in enumerate(zip(jobs, answers, strict=True)):
         if answer is not None and answers[_twin(jobs, number)] is not None:
-            kept.append(answer)
+            kept.append(replace(answer, resumed=True))
         else:
             left.append(job)
     journal.plan(planned, __version__, workers)
@@ -72,13 +77,25 @@ def _planned(job: Job, scenario_digest: str) -> Planned:
 
 
 def _verdicts(journal: Journal) -> dict[Planned, RunFinished]:
-    """The verdicts that the folder holds already, by what was asked."""
+    """The verdicts that the folder holds already, by what was asked; only those whose logs are still theirs."""
     try:
         past = read_journal(journal.folder)
     except InvalidInput:  # a new folder
         return {}
     answers = {run: past.answered[run.key] for run in past.planned if run.key in past.answered}
-    return {run: answer for run, answer in answers.items() if answer.outcome is not Outcome.ERROR}
+    return {run: answer for run, answer in answers.items() if answer.outcome is not Outcome.ERROR and _has_log(answer)}
+
+
+def _has_log(answer: RunFinished) -> bool:
+    """Return whether the log of a run is still there and holds the same verdicts; True if none was written."""
+    if not answer.artifacts.mcap:
+        return True
+    from simscen.record.openlog import attached_result  # only a resumed session needs the library
+
+    recorded = attached_result(Path(answer.artifacts.mcap))
+    expected = json.loads(json.dumps(result_data(answer.result)))
+    expected["stack_name"] = answer.key.first.stack_name
+    return recorded is not None and all(recorded.get(key) == expected[key] for key in SAME_IN_LOG)
 
 
 def _twin(jobs: Sequence[Job], number: int) -> int:

@@ -157,7 +157,7 @@ class RunFinished:
 
     `wall` is in seconds. `again` is the command that repeats the run from the working folder, and `file` the scenario
     as seen from there, for people to open; "" = the result's own. `tags` are the scenario's.
-    `warnings` are those of the external stack.
+    `warnings` are those of the external stack. `resumed`: --resume kept it from the session before.
     """
 
     result: RunResult
@@ -167,6 +167,7 @@ class RunFinished:
     file: str = ""
     tags: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    resumed: bool = False
 
     @property
     def key(self) -> RunKey:

@@ -1,0 +1,65 @@
+"""--resume keeps a verdict only as long as its log is there, and marks it."""
+
+import json
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+import pytest
+
+WORLD = "{simscen: 1, walls: [{points: [[0, 0], [8, 0], [8, 6], [0, 6], [0, 0]]}]}"
+SCENARIO = f"""\
+simscen: 1
+world: {WORLD}
+robot: {{pose: {{x: 2, y: 2}}}}
+goals: []
+time_limit: TIME
+pass: [{{collisions: {{max: 0}}}}]
+"""
+
+
+@pytest.fixture
+def session(tmp_path):
+    for name, seconds in (("a", "0.2"), ("b", "0.3")):
+        (tmp_path / f"{name}.scenario.yaml").write_text(SCENARIO.replace("TIME", seconds))
+
+    def call(*options):
+        """In a process of its own, since one holds the folder until it ends."""
+        command = [sys.executable, "-m", "simscen", "run", "a.scenario.yaml", "b.scenario.yaml", "-j", "1", *options]
+        return subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+
+    call("--out", "out")
+    return tmp_path / "out", lambda: call("--resume", "out")
+
+
+def kept(folder):
+    runs = json.loads((folder / "results.json").read_text())["runs"]
+    return [run["scenario"] for run in runs if run.get("resumed")]
+
+
+def test_kept_verdicts_are_marked_in_the_console_and_in_the_reports(session):
+    folder, resume = session
+    assert kept(folder) == []
+    assert resume().count(", kept") == 2
+    assert kept(folder) == ["a", "b"]
+    marks = ElementTree.parse(folder / "junit.xml").findall(".//property[@name='resumed']")
+    assert [mark.get("value") for mark in marks] == ["true", "true"]
+
+
+@pytest.mark.parametrize("damage", ["deleted", "replaced", "cut", "emptied"])
+def test_a_run_whose_log_is_gone_or_another_is_run_again(session, damage):
+    folder, resume = session
+    log, other = folder / "runs/a/seed-1/run.mcap", folder / "runs/b/seed-1/run.mcap"
+    whole = log.read_bytes()
+    match damage:
+        case "deleted":
+            log.unlink()
+        case "replaced":
+            log.write_bytes(other.read_bytes())
+        case "cut":
+            log.write_bytes(whole[: len(whole) // 2])
+        case "emptied":
+            log.write_bytes(b"")
+    assert resume().count(", kept") == 1
+    assert kept(folder) == ["b"]
+    assert log.read_bytes() == whole
