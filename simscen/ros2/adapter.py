@@ -11,7 +11,7 @@ import os
 import sys
 import time
 from importlib.metadata import version
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -41,6 +41,8 @@ PREPARE_S = 10.0
 """Longest wait for a graph without sensor data."""
 PREPARE_SETTLE_S = 2.0
 """Additional time without new nodes after which an incomplete graph probably needs sensor data."""
+CHECK_PERIOD_S = 0.25
+"""Time between two checks of the graph, which should not slow down nodes that are starting."""
 STEP_SHARE = 0.8
 """Part of a step's wall time that waiting may take, so that the error arrives in time."""
 
@@ -139,7 +141,7 @@ class Adapter:
             self._complete = now - max(changed_at, incomplete_at) >= settle and not self._options.warm_up
             return now - max(changed_at, incomplete_at) >= settle
 
-        self._graph.spin_until(settled, min(self._options.ready, PREPARE_S))
+        self._graph.spin_until(_throttled(settled), min(self._options.ready, PREPARE_S))
         if self._complete:
             self._begin()
 
@@ -172,7 +174,7 @@ class Adapter:
             return time.monotonic() - changed_at >= self._options.settle
 
         try:
-            if not self._graph.spin_until(complete, limit_s):
+            if not self._graph.spin_until(_throttled(complete), limit_s):
                 waited = time.monotonic() - self._started_at
                 reasons = "; ".join(missing) or "nodes keep appearing and disappearing"
                 raise AdapterError(f"the graph is not ready after {waited:.0f} s: {reasons}")
@@ -339,6 +341,21 @@ class Adapter:
         self._graph.close()
         if self._launched is not None:
             self._launched.end()
+
+
+def _throttled(check: Callable[[], bool]) -> Callable[[], bool]:
+    """Return a function that calls `check` once per CHECK_PERIOD_S and returns False in between."""
+    due_at = -math.inf
+
+    def call() -> bool:
+        nonlocal due_at
+        if time.monotonic() < due_at:
+            return False
+        result = check()
+        due_at = time.monotonic() + CHECK_PERIOD_S
+        return result
+
+    return call
 
 
 def require_packages(options: Options) -> None:
