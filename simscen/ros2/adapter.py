@@ -176,6 +176,7 @@ class Adapter:
         try:
             if not self._graph.spin_until(_throttled(complete), limit_s):
                 waited = time.monotonic() - self._started_at
+                missing = list(dict.fromkeys([*self._readiness.likely_causes(), *missing]))
                 reasons = "; ".join(missing) or "nodes keep appearing and disappearing"
                 raise AdapterError(f"the graph is not ready after {waited:.0f} s: {reasons}")
         finally:

@@ -49,6 +49,10 @@ class Readiness:
             found += [] if found else self._nav2.wrong_parameters()
         return busy + found + self._wall_time() + self._inactive()
 
+    def likely_causes(self) -> List[str]:
+        """Return wrong parameters of Nav2's nodes, which may prevent other nodes from becoming active."""
+        return self._nav2.wrong_parameters() if self._options.nav2 else []
+
     def required_nodes(self) -> Set[str]:
         """Return the full names of nodes without which the run cannot continue.
 
