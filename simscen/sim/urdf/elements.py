@@ -9,7 +9,6 @@ import numpy as np
 
 from simscen.assets.addresses import PACKAGES
 from simscen.assets.folders import Absent, Folders, Trouble
-from simscen.assets.markup import Source
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
 from simscen.sim.inertia import MassProperties
@@ -101,7 +100,8 @@ def link_of(element: Element, meshes: Meshes) -> Link:
 
 def joint_of(element: Element) -> Joint:
     """A `<joint>`; raises Unusable."""
-    axis = (element.child("axis") or Element("axis", {}, Source(""), 0, 0)).numbers("xyz", 3, (1.0, 0.0, 0.0))
+    given = None if element.attributes.get("type") in ("fixed", "floating") else element.child("axis")
+    axis = (1.0, 0.0, 0.0) if given is None else given.numbers("xyz", 3, (1.0, 0.0, 0.0))
     length = math.hypot(*axis)
     if length == 0:
         raise Unusable(element, f"joint {element.name!r} turns about an axis of length 0")

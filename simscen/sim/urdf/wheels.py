@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Cylinder, Sphere
-from simscen.model.robot import Ackermann, Drive, Omnidirectional
+from simscen.model.robot import Ackermann, Differential, Drive, Omnidirectional
 from simscen.sim.urdf.elements import Joint
 from simscen.sim.urdf.tree import Tree
 
@@ -53,7 +53,8 @@ def chosen(tree: Tree, drive: Drive) -> list[WheelJoint]:
         raise InvalidInput([problem])
     wheels = found(tree)
     if not named:
-        return wheels
+        # A wheel that swivels is a caster of a differential drive, not a steered wheel: it becomes part of the hull.
+        return [w for w in wheels if not w.steered] if isinstance(drive, Differential) else wheels
     turned = steered_links(tree, [tree.joints[name] for name in steering or []])
     given = [
         WheelJoint(

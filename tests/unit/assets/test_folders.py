@@ -32,6 +32,27 @@ def test_a_package_is_one_of_the_command_line_else_one_around_else_one_below(fol
     assert found == [root / "vendor" / "ros", root / "shop", models]
 
 
+def test_a_package_is_found_by_the_name_in_its_package_xml(folders: Folders) -> None:
+    root, _ = folders.roots
+    mesh = put(root / "src" / "cart_repository" / "base.stl")
+    manifest = mesh.parent / "package.xml"
+    manifest.write_text("<package><!-- <name>other</name> -->\n <name> cart </name></package>")
+    assert folders.find("package://cart/base.stl", root / "worlds") == mesh
+    assert folders.find("package://cart/base.stl", mesh.parent / "urdf") == mesh
+    assert folders.package("cart", root) == mesh.parent
+    with pytest.raises(Absent):
+        folders.package("other", root)
+
+
+def test_a_package_xml_behind_a_link_is_not_read(folders: Folders, tmp_path: Path) -> None:
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (outside / "package.xml").write_text("<package><name>cart</name></package>")
+    (folders.roots[0] / "linked").symlink_to(outside)
+    with pytest.raises(Absent):
+        folders.package("cart", folders.roots[0])
+
+
 def test_a_package_that_is_given_is_not_looked_for(folders: Folders, tmp_path: Path) -> None:
     root, models = folders.roots
     put(models / "cart" / "base.stl")

@@ -9,7 +9,7 @@ from simscen.sim.urdf.xacro.budget import Refused
 
 PARAMETER = re.compile(
     r"""\s*(?P<name>[^\s:=]+)\s*
-        (?::?=\s*(?P<forward>\^\|?)?(?P<default>\$\{[^}]*\}|\$\([^)]*\)|(?:'[^']*'|"[^"]*"|[^\s'"])*))?
+        (?::?=\s*(?P<forward>\^\|?)?(?P<default>\$\{[^}]*\}|\$\([^)]*\)|(?:'''(?=\s|\Z)|'[^']*'|"[^"]*"|[^\s'"])*))?
         (?=\s|\Z)""",
     re.VERBOSE,
 )

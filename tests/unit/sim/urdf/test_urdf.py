@@ -114,6 +114,24 @@ def test_fixed_links_become_part_of_the_hull(load):
     assert solid.pose.position == pytest.approx((0.0, 0.0, 0.45))
 
 
+def test_fixed_joints_may_have_an_axis_of_zero(load, refusal):
+    text = """<link name="rack"/><joint name="on" type="{}"><parent link="base"/><child link="rack"/>
+    <axis xyz="0 0 0"/></joint>"""
+    assert load(robot(extra=text.format("fixed"))) is not None
+    assert "axis of length 0" in refusal(robot(extra=text.format("revolute"))).message
+
+
+def test_swivel_casters_of_a_differential_drive_are_not_steered_wheels(load):
+    caster = (
+        '<link name="fork"/><joint name="swivel" type="continuous"><parent link="base"/><child link="fork"/>'
+        '<origin xyz="-0.2 0 -0.02"/><axis xyz="0 0 1"/></joint>'
+        + WHEEL.format(side="rear", y=0).replace('link="base"', 'link="fork"').replace("0.05", "0.03")
+    )
+    body = load(robot(extra=caster))
+    assert [wheel.driven for wheel in body.wheels if wheel.driven] == [True, True]
+    assert not any(wheel.steered for wheel in body.wheels)
+
+
 def test_casters_that_stand_on_the_ground_are_left_to_the_bodys_own(load):
     caster = """
   <link name="caster"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>

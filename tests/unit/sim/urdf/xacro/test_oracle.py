@@ -35,6 +35,7 @@ CASES = {
     '<xacro:m a="1"><e1 z="1"/><f1><f2/><f3/></f1></xacro:m><xacro:m b="${7}" a="8"><e1/><f1/></xacro:m>',
     "macros see who calls them": '<xacro:macro name="i"><a v="${x}"/></xacro:macro>'
     '<xacro:macro name="o" params="x"><xacro:i/></xacro:macro><xacro:o x="3"/>',
+    "three quotes": '<xacro:macro name="m" params="ns:=\'\'\'"><a v="[${ns}]"/></xacro:macro><xacro:m/>',
     "forwarded": '<xacro:macro name="m" params="x:=^ y:=^|4 z=^|${5 + 1}"><a v="${x} ${y} ${z}"/></xacro:macro>'
     '<xacro:property name="x" value="1"/><xacro:property name="y" value="2"/><xacro:m/><xacro:m x="9"/>',
     "macros in macros": '<xacro:macro name="o"><xacro:macro name="i"><a/></xacro:macro><xacro:i/></xacro:macro><xacro:o/>',
