@@ -5,6 +5,7 @@ COLLADA is read with pycollada, because trimesh drops the unit and the node name
 
 import io
 import logging
+import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -141,7 +142,10 @@ def read_parts(data: bytes, suffix: str, file: str) -> tuple[Part, ...]:
     readers = {".dae": read_dae, ".stl": _stl, ".obj": _obj}
     if suffix not in readers:
         raise UnusableMesh(f"{suffix or 'files without suffix'} meshes are not read, only DAE, STL and OBJ")
-    parts = tuple(part for part in readers[suffix](data, file) if len(part.faces))
+    # Broken numbers are refused below with a message; NumPy's and trimesh's warnings would only reach the terminal.
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", RuntimeWarning)
+        parts = tuple(part for part in readers[suffix](data, file) if len(part.faces))
     if not parts:
         raise UnusableMesh("the mesh has no triangles")
     _check(parts)

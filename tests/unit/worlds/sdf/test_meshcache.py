@@ -1,6 +1,10 @@
+import warnings
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
+from simscen.worlds.sdf import mesh_files
 from simscen.worlds.sdf.mesh_files import UnusableMesh
 from simscen.worlds.sdf.meshcache import MeshCache
 
@@ -32,3 +36,16 @@ def test_a_broken_mesh_is_refused_each_time_by_the_name_it_has():
     for name in ("a.obj", "b.obj"):
         with pytest.raises(UnusableMesh):
             cache.read(b"v 0 0", ".obj", name)
+
+
+def test_warnings_of_the_readers_do_not_reach_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    def overflowing(data: bytes, _: str) -> Iterator[mesh_files.Part]:
+        corners = np.array([[1e308, 0, 0], [0, 1, 0], [0, 0, 1]]) * 10
+        warnings.warn("invalid value encountered in divide", RuntimeWarning, stacklevel=1)
+        yield mesh_files.Part((), corners, np.array([[0, 1, 2]]))
+
+    monkeypatch.setattr(mesh_files, "_stl", overflowing)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(mesh_files.UnusableMesh, match="not a finite number"):
+            mesh_files.read_parts(b"", ".stl", "x.stl")
