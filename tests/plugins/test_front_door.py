@@ -210,7 +210,7 @@ def test_another_version_of_the_package_does_not_judge_a_log_of_this_one(ran, ya
     (yardwork / "yardwork-1.2.dist-info/METADATA").write_text("Metadata-Version: 2.1\nName: yardwork\nVersion: 2.0\n")
     judged = simscen("judge", "out/runs/door/seed-1/run.mcap")
     assert judged.returncode == 2
-    assert "of yardwork==1.2, and installed is yardwork==2.0" in judged.stdout + judged.stderr
+    assert "of yardwork==1.2, but yardwork==2.0 is installed" in judged.stdout + judged.stderr
 
 
 @pytest.mark.slow

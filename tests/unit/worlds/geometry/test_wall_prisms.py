@@ -24,7 +24,7 @@ def test_a_wall_is_its_center_line_thickened_with_mitered_corners(points):
     pieces = [plan(solid) for solid in wall_solids(points, 0.2, 1.0, "w")]
     closed = points[0] == points[-1]
     line = shapely.LinearRing(points) if closed else shapely.LineString(points)
-    expected = line.buffer(0.1, cap_style="flat", join_style="miter")
+    expected = line.buffer(0.1, cap_style="flat", join_style="mitre")
     union = shapely.union_all(pieces)
     assert union.symmetric_difference(expected).area < 1e-9
     assert sum(piece.area for piece in pieces) == pytest.approx(union.area)  # nothing overlaps
