@@ -52,6 +52,7 @@ class Reports:
     ) -> None:
         self.folder, self.junit, self._only = folder, junit or folder / "junit.xml", only
         self._used = used or {}
+        self._missing: frozenset[Path] = frozenset()
         self._family: Family = family
 
     def begin(self) -> None:
@@ -70,8 +71,8 @@ class Reports:
             self.folder / PAGE: self._page(answers, comparison),
         }
         documents = {**({} if self._only else whole), self.junit: junit}
-        outcomes = [_written(path, data) for path, data in documents.items()]  # every one is tried
-        return all(outcomes)
+        self._missing = frozenset(path for path, data in documents.items() if not _written(path, data))
+        return not self._missing
 
     def write_live(self, answers: Sequence[RunFinished], live: Live) -> bool:
         """Write the page of a session that goes on."""
@@ -93,7 +94,7 @@ class Reports:
     def closing(
         self, answers: Sequence[RunFinished], wall: float, interrupted: bool, comparison: Comparison | None = None
     ) -> SessionFinished:
-        """The last event of a session."""
+        """The last event of a session; names no report that could not be written."""
         count = {outcome: sum(answer.outcome is outcome for answer in answers) for outcome in Outcome}
         return SessionFinished(
             count[Outcome.PASSED],
@@ -102,12 +103,12 @@ class Reports:
             simulated=sum(answer.result.simulated for answer in answers),
             wall=wall,
             interrupted=interrupted,
-            junit=str(self.junit),
+            junit="" if self.junit in self._missing else str(self.junit),
             folder=str(self.folder),
             comparison=comparison,
             expected=count[Outcome.FAILED_AS_EXPECTED],
             skipped=count[Outcome.SKIPPED],
-            page="" if self._only else str(self.folder / PAGE),
+            page="" if self._only or self.folder / PAGE in self._missing else str(self.folder / PAGE),
         )
 
 

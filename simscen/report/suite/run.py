@@ -37,7 +37,7 @@ def run_element(
         f'<summary>{pill(run.outcome)}<span class="name">{text(name)}</span>'
         f'<span class="quiet">{text(extra if name != extra else "")}</span>{told}'
         f'<span class="quiet near">{text(_nearest(run))}</span>'
-        f'<span class="time">{run.result.simulated:.1f} s</span></summary>'
+        f'<span class="time">{"kept · " if run.resumed else ""}{run.result.simulated:.1f} s</span></summary>'
         f'<div class="in">{_why(run)}{_verdicts(run)}{_disturbances(run)}{_links(run, folder)}{picture}'
         f"{_more(run, before)}</div></details>"
     )

@@ -1,10 +1,12 @@
 """What simscen writes goes where it should: below --out, and over nothing but plain files that nobody reads."""
 
+import errno
 import os
 from pathlib import Path
 
 import pytest
 
+from simscen.cli.session.output_files import Reports
 from simscen.core.records.run_result import RunKey
 from simscen.run.sessions.output_folder import create_output_folder, run_folder, write_atomically
 
@@ -141,3 +143,15 @@ def test_nothing_but_a_plain_file_is_replaced(odd) -> None:
     for kind in NOT_PLAIN:
         with pytest.raises(OSError, match=r"not a plain file|symbolic link|directory"):
             write_atomically(odd(kind), b"")
+
+
+def test_a_report_that_could_not_be_written_is_not_named(tmp_path: Path, monkeypatch) -> None:
+    def write(path: Path, data: bytes) -> None:
+        if path.name != "results.json":
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("simscen.cli.session.output_files.write_atomically", write)
+    reports = Reports(tmp_path, None, "simscen")
+    assert not reports.write([])
+    ended = reports.closing([], 1.0, False)
+    assert (ended.junit, ended.page) == ("", "")
