@@ -21,6 +21,8 @@ from simscen.stack.setting import Setting
 
 LONGEST_GAP = TICK_RATE
 """Ticks between two poses of the reference above which nothing is said in between."""
+NEAR_S = 0.05
+"""A belief this near in time to a pose of the reference is compared with it, whatever the gaps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +51,16 @@ class Lost:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Distances (n,) in m and heading errors (n,) in rad at `times` (n,) in s, and when the robot was lost."""
+    """Distances (n,) in m and heading errors (n,) in rad at `times` (n,) in s, and when the robot was lost.
+
+    `compared` is the share of all beliefs for which the reference says something.
+    """
 
     times: Array
     distance: Array
     yaw: Array
     lost: Sequence[Lost]
+    compared: float
 
     def figures(self) -> dict[str, float]:
         """Median, RMSE, largest and last distance in m; RMSE of the heading in rad."""
@@ -95,14 +101,16 @@ def localize(sensed: Sensed, spec: StackSpec, surroundings: Surroundings, estima
 def errors_of(localized: Localized, sensed: Sensed, far: float) -> Errors | None:
     """How far off the belief was wherever the reference says something; None where it never does.
 
-    The reference is interpolated, not over gaps. The robot is lost where the belief is more than `far` m off.
+    The reference is interpolated, not over gaps; within a gap, only beliefs at its ends count.
+    The robot is lost where the belief is more than `far` m off.
     """
     if len(sensed.ticks) < 2:
         return None
     known = sensed.ticks / TICK_RATE
     inside = (localized.times >= known[0]) & (localized.times <= known[-1])
     after = np.clip(np.searchsorted(known, localized.times), 1, len(known) - 1)
-    inside &= known[after] - known[after - 1] <= LONGEST_GAP / TICK_RATE
+    near = np.minimum(np.abs(known[after] - localized.times), np.abs(localized.times - known[after - 1])) <= NEAR_S
+    inside &= near | (known[after] - known[after - 1] <= LONGEST_GAP / TICK_RATE)
     times = localized.times[inside]
     if not len(times):
         return None
@@ -110,7 +118,13 @@ def errors_of(localized: Localized, sensed: Sensed, far: float) -> Errors | None
     x, y, heading = (np.interp(times, known, values) for values in (*sensed.truth[:, :2].T, yaw))
     poses = localized.poses[inside]
     distance = np.hypot(poses[:, 0] - x, poses[:, 1] - y)
-    return Errors(times, distance, wrap_array(poses[:, 2] - heading), lost_times(times, distance > far))
+    return Errors(
+        times,
+        distance,
+        wrap_array(poses[:, 2] - heading),
+        lost_times(times, distance > far),
+        len(times) / len(localized.times),
+    )
 
 
 def lost_times(times: Array, far: Array) -> list[Lost]:

@@ -25,6 +25,9 @@ from simscen.record.foreign.sensed import Sensed, read_sensed
 from simscen.record.foreign.sensedrows import TICK_RATE
 from simscen.stack.protocols import RobotModel, Surroundings
 
+MOSTLY_COMPARED = 0.99
+"""Share of the beliefs from which on a log counts as compared as a whole."""
+
 
 def command(
     log: Annotated[Path, typer.Argument(help="An MCAP file, a rosbag2 folder, a CARMEN .log or a .csv.")],
@@ -157,10 +160,13 @@ def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str
     figures = errors.figures()
     listed = ", ".join(f"{name} {figures[name]:.3f} m" for name in ("median", "rmse", "max", "final"))
     lines += [f"error: {listed}", f"heading: rmse {figures['yaw_rmse']:.4f} rad"]
+    if errors.compared < MOSTLY_COMPARED:
+        lines.append(f"compared with the reference: {errors.compared:.1%} of the beliefs")
     for one in errors.lost:
         end = "to the end" if one.until is None else f"to {one.until:.1f} s"
         lines.append(f"lost (more than {lost:g} m off) from {one.since:.1f} s {end}")
-    return lines if errors.lost else [*lines, f"never lost (more than {lost:g} m off)"]
+    where = "" if errors.compared > MOSTLY_COMPARED else ", as far as compared"
+    return lines if errors.lost else [*lines, f"never lost (more than {lost:g} m off){where}"]
 
 
 def _document(localized: Localized, errors: Errors | None, seed: int) -> dict[str, object]:
@@ -169,4 +175,4 @@ def _document(localized: Localized, errors: Errors | None, seed: int) -> dict[st
         return document | {"error": None}
     over = [list(row) for row in zip(errors.times.tolist(), errors.distance.tolist(), errors.yaw.tolist(), strict=True)]
     lost = [{"since": one.since, "until": one.until} for one in errors.lost]
-    return document | {"error": errors.figures(), "error_over_time": over, "lost": lost}
+    return document | {"error": errors.figures(), "compared": errors.compared, "error_over_time": over, "lost": lost}

@@ -1,0 +1,37 @@
+"""Errors of a recorded drive against references that are dense, sparse, or have gaps."""
+
+import numpy as np
+import pytest
+
+from simscen.bench.localization.recorded_drive import Localized, errors_of
+from simscen.record.foreign.sensed import Sensed
+from simscen.record.foreign.sensedrows import TICK_RATE
+
+
+def errors(reference_times, offset=0.2):
+    """Errors of a belief that is `offset` to the left of a robot at 1 m/s for 60 s, against poses at some times."""
+    times = np.arange(0.0, 60.0, 0.05)
+    poses = np.column_stack([times, np.full(len(times), offset), np.zeros(len(times))])
+    localized = Localized(times, poses, np.zeros((len(times), 3, 3)), 0, 0.0, 0.0)
+    known = np.asarray(reference_times, dtype=float)
+    truth = np.column_stack([known, np.zeros(len(known)), np.zeros(len(known))])
+    sensed = Sensed((), np.round(known * TICK_RATE).astype(int), truth)
+    return errors_of(localized, sensed, 1.0)
+
+
+def test_a_dense_reference_is_compared_throughout():
+    found = errors(np.arange(0.0, 60.5, 0.5))
+    assert found.compared == 1.0
+    assert found.distance == pytest.approx(0.2)
+
+
+def test_a_sparse_reference_is_compared_at_its_own_times():
+    found = errors(np.arange(0.0, 61.0, 5.0))
+    assert 12 / 1200 <= found.compared <= 3 * 13 / 1200
+    assert found.distance == pytest.approx(0.2)
+    assert set(np.round(found.times / 5.0)) == set(range(13)), "each of its poses"
+
+
+def test_a_gap_is_left_out_of_the_share():
+    found = errors(np.concatenate([np.arange(0.0, 20.0, 0.1), np.arange(40.0, 60.1, 0.1)]))
+    assert found.compared == pytest.approx(2 / 3, abs=0.01)
