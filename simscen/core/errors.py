@@ -19,13 +19,13 @@ class Exit(IntEnum):
 
 
 class SimscenError(Exception):
-    """Anything that ends a command or a run on purpose."""
+    """Error that ends a command or a run on purpose."""
 
     exit = Exit.INTERNAL
 
 
 class InvalidInput(SimscenError):
-    """A file is wrong; its author can mend it. Nothing was run."""
+    """An input file is invalid, and its author can fix it. Nothing was run."""
 
     exit = Exit.USAGE
 
@@ -34,30 +34,30 @@ class InvalidInput(SimscenError):
         super().__init__("\n".join(f"{p.place}: {p.message}" for p in self.problems))
 
     def __reduce__(self) -> "tuple[type[InvalidInput], tuple[list[Problem]]]":
-        """Made anew of its problems, not of their text: it comes whole out of a process of a pool."""
+        """Pickle the problems instead of the message, so that the error survives the return from a worker process."""
         return type(self), (self.problems,)
 
 
 class UsageError(SimscenError):
-    """The command was called wrongly, or its output folder is unusable; the caller can mend it."""
+    """The command line is invalid or the output folder is unusable; the caller can fix it."""
 
     exit = Exit.USAGE
 
 
 class NothingSelected(SimscenError):
-    """No scenario matched; the caller can mend it."""
+    """No scenario matched the selection; the caller can fix it."""
 
     exit = Exit.NOTHING_SELECTED
 
 
 BROKEN_COMPONENT = "broken-component"
-"""The kind of error of a run in which something that was installed answered with what is no answer."""
+"""Error kind of a run in which a component of a plug-in returned an invalid value."""
 
 
 class RunError(SimscenError):
     """A run could not be completed; `kind` is JUnit's error type: crashed, timeout, out-of-memory, invalid, …
 
-    `tail` is the end of what an external stack printed.
+    `tail` is the end of the output of an external stack.
     """
 
     exit = Exit.INCOMPLETE
@@ -67,15 +67,15 @@ class RunError(SimscenError):
         super().__init__(message)
 
     def __reduce__(self) -> "tuple[type[RunError], tuple[str, str, str]]":
-        """As InvalidInput."""
+        """Pickle all arguments, as in InvalidInput."""
         return type(self), (self.kind, str(self), self.tail)
 
 
 @dataclass(frozen=True, order=True)
 class Problem:
-    """What is wrong, where (`line` and `col` count from 1; 0 = the file as a whole), and how to mend it.
+    """A problem in an input file: message, position (`line` and `col` from 1; 0 for the whole file), and hint.
 
-    `code` is stable (SC…); `severity` is "error" or "warning"; `source` is the text of the line for the caret.
+    `code` is stable (SC…). `severity` is "error" or "warning". `source` is the text of the line, shown with a caret.
     """
 
     path: str
@@ -89,5 +89,5 @@ class Problem:
 
     @property
     def place(self) -> str:
-        """path:line:col, or the path alone."""
+        """The position as path:line:col, or the path alone."""
         return f"{self.path}:{self.line}:{self.col}" if self.line else self.path

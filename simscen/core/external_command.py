@@ -1,4 +1,4 @@
-"""What the name of an external stack runs, as the command line or the user's own configuration says."""
+"""Command that runs an external stack, from the command line or the user configuration."""
 
 import shlex
 from collections.abc import Mapping
@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 START_TIMEOUT_S = 30.0
 ANSWER_TIMEOUT_S = 10.0
-"""Seconds of wall time; see ExternalCommand."""
+"""Wall time; see ExternalCommand."""
 
 
 @dataclass(frozen=True)
 class ExternalCommand:
-    """A program that speaks the stack protocol: its words, its whole environment, and the folder it starts in.
+    """Program that speaks the stack protocol: its arguments, its whole environment, and its working folder.
 
-    `start_limit` bounds in seconds of wall time how long it may take until it has said what it wants to hear,
-    `answer_limit` each answer after that. The first word is looked for in the PATH of `env`, as a shell would.
-    `digest` changes with what is run: the words, the variables that were asked for, and the content of files among the
-    words. The environment as such is not part of it, and nothing of it belongs into a log or a report.
+    `start_limit` is the wall time in s until the program has subscribed, and `answer_limit` the wall time of each
+    answer after that. The program is searched in the PATH of `env`, like in a shell. `digest` changes with the
+    arguments, the requested variables, and the content of files among the arguments. It does not include the rest of
+    the environment, which must not appear in logs or reports.
     """
 
     argv: tuple[str, ...]
@@ -28,7 +28,7 @@ class ExternalCommand:
 
 
 def split_command(command: str) -> tuple[str, ...]:
-    """The words of a command line, quotes counting as in a shell. Raises ValueError with what is wrong with it."""
+    """Return the arguments of a command line with shell quoting. Raises ValueError with the reason."""
     try:
         words = tuple(shlex.split(command))
     except ValueError as error:

@@ -10,9 +10,9 @@ from pathlib import Path
 
 
 def require_regular_file(path: Path) -> None:
-    """Raise OSError unless `path` is a plain file or nothing.
+    """Raise OSError unless `path` is a regular file or does not exist.
 
-    To replace a device or a link breaks what others rely on, and a pipe that nobody reads is waited for.
+    Replacing a device or a link would break other programs, and writing to a pipe without a reader blocks.
     """
     try:
         mode = path.lstat().st_mode
@@ -23,14 +23,14 @@ def require_regular_file(path: Path) -> None:
     if stat.S_ISDIR(mode):
         raise OSError(errno.EISDIR, os.strerror(errno.EISDIR))
     if not stat.S_ISREG(mode):
-        raise OSError(errno.EINVAL, "it is not a plain file")
+        raise OSError(errno.EINVAL, "it is not a regular file")
 
 
 def require_not_input(path: Path, inputs: Iterable[Path]) -> None:
-    """Raise OSError when writing `path` would overwrite one of the files that were read."""
+    """Raise OSError if writing `path` would overwrite one of the files that were read."""
     real = os.path.realpath(path)
     if any(os.path.realpath(each) == real for each in inputs):
-        raise OSError(errno.EINVAL, "it is one of the files that are read")
+        raise OSError(errno.EINVAL, "it is one of the input files")
 
 
 _READ: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)
@@ -38,7 +38,7 @@ _READ: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)
 
 @contextmanager
 def collect_read_files() -> Iterator[set[Path]]:
-    """The set that every file goes into which is read within: real paths, also of files that could not be used."""
+    """Yield a set that collects the real paths of all files read in the block, including unusable ones."""
     read: set[Path] = set()
     token = _READ.set(read)
     try:
@@ -48,7 +48,7 @@ def collect_read_files() -> Iterator[set[Path]]:
 
 
 def record_read_file(file: Path) -> None:
-    """Say that a result depends on the content of this file; every reader of files that others name must."""
+    """Record that a result depends on this file. Each reader of files that other files name must call this."""
     read = _READ.get()
     if read is not None:
         read.add(file)

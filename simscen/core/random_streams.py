@@ -1,4 +1,4 @@
-"""Every random consumer has its own named stream, so that adding one thing reshuffles nothing else."""
+"""Random streams by name, so that a new consumer does not change the numbers that the others draw."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LARGEST_SEED = 2**32 - 1
 class Streams:
     """Random streams derived from (seed, name); `seed` lies in 1 … 2³²-1.
 
-    `whose` is the robot whose streams they are where there are several: no two draw the same.
+    With several robots, `whose` is the name of the robot; its streams are independent of those of other robots.
     """
 
     seed: int
@@ -25,11 +25,11 @@ class Streams:
             raise ValueError(f"seed must lie in 1 … {LARGEST_SEED}, got {self.seed}")
 
     def generator(self, name: str) -> np.random.Generator:
-        """A fresh generator for the consumer `name`, e.g. "sensor.lidar" or "fault.slip"."""
+        """Return a new generator for the consumer `name`, e.g. "sensor.lidar" or "fault.slip"."""
         return np.random.Generator(np.random.PCG64(np.random.SeedSequence(self._words(name))))
 
     def integer(self, name: str) -> int:
-        """A seed in 1 … 2³²-1 for an engine with a generator of its own, e.g. "planner#3" for OMPL."""
+        """Return a seed in 1 … 2³²-1 for a library with its own generator, e.g. "planner#3" for OMPL."""
         return self._words(name)[0] or 1
 
     def _words(self, name: str) -> list[int]:

@@ -1,4 +1,4 @@
-"""What triggers may look at and what actions may touch while a scenario runs."""
+"""Interfaces of a run for triggers, which observe it, and actions, which change it."""
 
 from __future__ import annotations
 
@@ -20,127 +20,127 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Effect:
-    """What came of an action: whether anything is different now, and what, or why nothing is."""
+    """Result of an action: whether it changed anything, and what, or why not."""
 
     happened: bool
     what: str
 
 
 class Situation(Protocol):
-    """The run as a trigger sees it at one beat; everything in the world frame."""
+    """State of the run at one step, as triggers see it; all in the world frame."""
 
     @property
     def tick(self) -> int:
-        """Simulated time in whole ticks."""
+        """Simulated time in ticks."""
         ...
 
     @property
     def clock(self) -> Clock:
-        """What makes ticks of seconds."""
+        """Conversion between ticks and seconds."""
         ...
 
     @property
     def robot(self) -> Pose2:
-        """The true pose of the robot."""
+        """True pose of the robot."""
         ...
 
     @property
     def twist(self) -> Twist:
-        """The true velocity of the robot in its own frame."""
+        """True velocity of the robot in its own frame."""
         ...
 
     @property
     def clearance(self) -> float | None:
-        """Meters from the robot's hull to the nearest obstacle by the newest sample of the truth, None before that.
+        """Distance in m from the hull to the nearest obstacle at the newest truth sample; None before the first.
 
-        What is further than was searched for is said to be that far.
+        At most the range of the search.
         """
         ...
 
     def scanned(self, sensor: str | None) -> int | None:
-        """The tick at which the stack last received a scan of this lidar, or of any; None before the first."""
+        """Return the tick at which the stack last received a scan of this lidar (or any), or None."""
         ...
 
     @property
     def travelled(self) -> float:
-        """Meters driven so far; being set down elsewhere is no drive."""
+        """Distance driven in m, without teleportation."""
         ...
 
     @property
     def belief(self) -> Belief | None:
-        """What the stack last said about its pose."""
+        """Latest belief that the stack published."""
         ...
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """Everything that has happened so far, oldest first."""
+        """All events so far, oldest first."""
         ...
 
     @property
     def plan(self) -> Path | None:
-        """The plan the robot is following."""
+        """Plan that the robot follows."""
         ...
 
     @property
     def goal(self) -> Goal | None:
-        """The goal the robot is driving to."""
+        """Current goal of the robot."""
         ...
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """The names of all robots, in order; none where there is one only."""
+        """Names of all robots in order; empty for a single robot."""
         ...
 
     def of(self, robot: str) -> Situation:
-        """The same run as it concerns the robot of this name."""
+        """Return the state for the robot of this name."""
         ...
 
     def region(self, name: str) -> Polygon:
-        """A named region of the world."""
+        """Return a named region of the world."""
         ...
 
     def object(self, name: str) -> Pose2 | None:
-        """Where a named object is now; None when it is not there."""
+        """Return the current pose of an object, or None if it does not exist."""
         ...
 
 
 class Stage(Situation, Protocol):
-    """The run as an action may change it."""
+    """The run as actions change it."""
 
     def of(self, robot: str) -> Stage:
-        """The same run as it concerns the robot of this name."""
+        """Return the stage for the robot of this name."""
         ...
 
     def spawn(self, body: Body) -> None:
-        """Put a new body into the world: physics, rays and picture see it from the next tick on."""
+        """Add a body to physics, ray casting and map pictures from the next tick on."""
         ...
 
     def walk(self, walker: WalkingPedestrian) -> None:
-        """Let somebody come who walks by themselves from the next tick on."""
+        """Add a pedestrian that walks from the next tick on."""
         ...
 
     def room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Whether a person of a radius in meters can stand there: no wall is in the way, no thing, person or robot."""
+        """Return whether a pedestrian of `radius` m fits there without touching walls, objects, people or robots."""
         ...
 
     def chance(self, name: str) -> np.random.Generator:
-        """The random stream of this name, anew each time it is asked for."""
+        """Return a new generator of the random stream with this name."""
         ...
 
     def remove(self, name: str) -> None:
-        """Take a body out of the world; it has to be there."""
+        """Remove an existing body from the world."""
         ...
 
     def door(self, name: str) -> tuple[Pose2, Pose2]:
-        """The poses of a door's panel when closed and when open."""
+        """Return the poses of a door panel when closed and when open."""
         ...
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """The path that moves an object now, and the seconds since it was set off; None when no script moves it."""
+        """Return the path that moves an object now and the seconds since its start; None without a script."""
         ...
 
     def mass(self, name: str) -> float:
-        """The mass in kg of an object that can be pushed; 0 of one that only a script moves, or that is not there."""
+        """Return the mass in kg of an object that can be pushed; 0 for scripted and missing objects."""
         ...
 
     def move(self, name: str, path: MotionPath) -> None:
@@ -148,26 +148,26 @@ class Stage(Situation, Protocol):
         ...
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Set an object down somewhere else, at rest; no script moves it any more."""
+        """Place an object somewhere else at rest and end its script."""
         ...
 
     def place_robot(self, pose: Pose2) -> None:
-        """Set the robot down somewhere else, at rest; the stack is not told."""
+        """Place the robot somewhere else at rest without informing the stack."""
         ...
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
-        """Push the robot, or an object with a mass: an impulse in N s in the world frame, at its center.
+        """Apply an impulse (N s, world frame) at the center of the robot or of an object with a mass.
 
-        It is spread evenly over so many `seconds`; over one tick of the physics for 0.
+        It is spread evenly over `seconds`, or over one physics tick for 0.
         """
         ...
 
     def lay(self, name: str, patch: Patch) -> None:
-        """Make a piece of floor slippery, or dry again; a patch of the same name is replaced."""
+        """Change the friction of a patch of floor; replaces a patch of the same name."""
         ...
 
     def send_goal(self, name: str) -> None:
-        """Preempt what the robot is doing with one of the goals that the scenario's events send."""
+        """Preempt the current task with one of the goals that events of the scenario send."""
         ...
 
     def cancel_goal(self) -> None:
@@ -175,13 +175,13 @@ class Stage(Situation, Protocol):
         ...
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Tell the stack that a zone of its costmap filters is on or off; why nothing came of it, or ""."""
+        """Send a zone command to the costmap filters of the stack; return why it had no effect, or ""."""
         ...
 
     def tell(self, event: Event) -> None:
-        """Write an event to the logs of all robots: it happened to the world."""
+        """Write an event that concerns the world to the logs of all robots."""
         ...
 
     def note(self, event: Event) -> None:
-        """Write an event to the log."""
+        """Write an event to the log of this robot."""
         ...

@@ -1,7 +1,4 @@
-"""Statistics without scipy: bootstrap and sign test, Wilson interval, chi-square quantiles.
-
-scipy takes half a second to import.
-"""
+"""Statistics without scipy, whose import takes half a second: bootstrap, sign test, Wilson interval, chi-square."""
 
 from __future__ import annotations
 
@@ -11,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 MIN_PAIRS = 5
-"""Pairs below which no interval is given: a bootstrap of four sees too little of what could have happened."""
+"""Minimum number of pairs for an interval: a bootstrap of four values is not meaningful."""
 RESAMPLES = 10_000
 MAX_DRAWS = 20_000_000
-"""Pairs drawn in all before there are fewer resamples, but never fewer than a tenth: thousands of pairs need fewer."""
+"""Limit of drawn pairs. Beyond it, the number of resamples is reduced to a tenth of RESAMPLES at least."""
 CONFIDENCE = 0.95
 _LN_2 = math.log(2.0)
 _DRAWS_PER_BATCH = 1 << 20
@@ -23,10 +20,10 @@ _DRAWS_PER_BATCH = 1 << 20
 def bootstrap_mean_interval(
     differences: Sequence[float], chance: np.random.Generator, weights: Sequence[float] | None = None
 ) -> tuple[float, float] | None:
-    """Between what bounds the mean difference, or the weighted one, lies with 95 %; None for fewer than FEWEST pairs.
+    """Return the 95 % interval of the mean difference, optionally weighted; None for less than MIN_PAIRS pairs.
 
-    The percentile interval of the bootstrap: pairs are drawn anew, with replacement, RESAMPLES times. (Efron and
-    Tibshirani: An Introduction to the Bootstrap, 1993, chapter 13.)
+    Percentile bootstrap with RESAMPLES resamples. (Efron and Tibshirani: An Introduction to the Bootstrap, 1993,
+    chapter 13.)
     """
     if len(differences) < MIN_PAIRS:
         return None
@@ -45,16 +42,16 @@ def bootstrap_mean_interval(
 
 
 def sign_test(more: int, less: int) -> float:
-    """How likely a split at least as uneven as `more` to `less` is when either is as likely: 0 … 1.
+    """Return the p-value of the exact two-sided sign test; pairs without a difference do not count.
 
-    Exact and two-sided; pairs without a difference are not counted. On passes that became failures and the other way
-    round it is McNemar's exact test. (Conover: Practical Nonparametric Statistics, 1999, section 3.4.)
+    For passes that became failures and vice versa, this is McNemar's exact test. (Conover: Practical Nonparametric
+    Statistics, 1999, section 3.4.)
     """
     pairs, fewer = more + less, min(more, less)
     term = math.exp(math.lgamma(pairs + 1) - math.lgamma(fewer + 1) - math.lgamma(pairs - fewer + 1) - pairs * _LN_2)
     tail = term
     for k in range(fewer, 0, -1):
-        term *= k / (pairs - k + 1)  # from the ways to choose k of the pairs to those to choose k - 1
+        term *= k / (pairs - k + 1)  # from the binomial coefficient of k to that of k - 1
         tail += term
     return min(1.0, 2 * tail)
 
@@ -64,10 +61,10 @@ Z_95 = 1.959963984540054
 
 
 def wilson_interval(successes: float, runs: int, z: float = Z_95) -> tuple[float, float]:
-    """The score interval of a proportion: what the true rate may be after `successes` of `runs`.
+    """Return the Wilson score interval of a rate after `successes` of `runs`.
 
-    Right also at 0 and at all of the runs, where the usual interval has no width. (Wilson 1927, JASA 22(158).)
-    Half a success is one of two runs that count for one together. Raises ValueError without runs.
+    It is also valid at 0 and 1, where the normal interval has no width. (Wilson 1927, JASA 22(158).) Half a success is
+    one of two runs that count as one. Raises ValueError without runs.
     """
     if runs < 1 or not 0 <= successes <= runs:
         raise ValueError(f"{successes} successes of {runs} runs")
@@ -78,7 +75,7 @@ def wilson_interval(successes: float, runs: int, z: float = Z_95) -> tuple[float
 
 
 def chi2_quantile(probability: float, freedom: int) -> float:
-    """The value that a chi-square variable of `freedom` degrees stays below with this probability.
+    """Return the quantile of the chi-square distribution with `freedom` degrees of freedom.
 
     Raises ValueError unless 0 < probability < 1 and freedom >= 1.
     """
@@ -93,9 +90,9 @@ def chi2_quantile(probability: float, freedom: int) -> float:
 
 
 def chi2_cdf(value: float, freedom: int) -> float:
-    """The probability of staying below a value > 0: the regularized incomplete gamma function P(freedom/2, value/2).
+    """Return the chi-square distribution function at a value > 0: the regularized gamma P(freedom/2, value/2).
 
-    Its power series, whose terms are all positive (Abramowitz and Stegun 1964, 6.5.29).
+    Computed by its power series, whose terms are all positive (Abramowitz and Stegun 1964, 6.5.29).
     """
     a, x = freedom / 2.0, value / 2.0
     term = total = 1.0 / a
@@ -108,9 +105,9 @@ def chi2_cdf(value: float, freedom: int) -> float:
 
 
 def nees_mean_bounds(samples: int, dimensions: int, probability: float) -> tuple[float, float]:
-    """Between which the mean of so many squared errors lies with this probability, each a sum of `dimensions` squares.
+    """Return the bounds of the mean NEES of a consistent estimator over `samples` with this probability.
 
-    chi2(dimensions x samples) / samples, two-sided: what a consistent estimator's NEES keeps (Bar-Shalom et al. 2001).
+    chi2(dimensions x samples) / samples, two-sided (Bar-Shalom et al. 2001).
     """
     tail, freedom = (1.0 - probability) / 2.0, dimensions * samples
     return chi2_quantile(tail, freedom) / samples, chi2_quantile(1.0 - tail, freedom) / samples

@@ -1,8 +1,8 @@
-"""Which simscen this is, and where its files are: what every room can read without importing its front door."""
+"""Version of simscen and location of its files, importable without the rest of the package."""
 
 from pathlib import Path
 
 __version__ = "0.1.0"
 
 PACKAGE = Path(__file__).parents[1]
-"""The folder of the package, with its shipped data."""
+"""Folder of the package with its shipped data."""

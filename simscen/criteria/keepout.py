@@ -107,7 +107,7 @@ class Keepout(Spec, Criterion):
             boxes = mask.forbidden
             if not len(boxes):
                 return f"no cell of `{self.mask}` is occupied"
-            return lambda poses: separation_from_boxes(mask.seen_from(poses), hull, boxes)
+            return lambda poses: separation_from_boxes(mask.to_mask_frame(poses), hull, boxes)
         if self.region not in case.regions:
             return f"the world has no region `{self.region}`"
         region = case.regions[self.region]

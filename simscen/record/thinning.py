@@ -71,8 +71,8 @@ class Thinning:
         """Whether everything is elsewhere than in the sample before, of which everything is kept."""
         if self._whole is None:
             return False
-        before, seen = self._whole[1], objects.foreseen
-        return before.foreseen is seen and before.row == objects.row - 1 and seen.all_moved[objects.row]
+        before, seen = self._whole[1], objects.predicted
+        return before.predicted is seen and before.row == objects.row - 1 and seen.all_moved[objects.row]
 
     def _each(self, tick: int, objects: Mapping[str, Pose3]) -> dict[str, Pose3]:
         kept = dict[str, Pose3]()

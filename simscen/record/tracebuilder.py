@@ -60,7 +60,7 @@ class TraceBuilder:
 
     def _add_objects(self, tick: int, moved: Mapping[str, Pose3]) -> None:
         if type(moved) is PosesAtTick:
-            self._rows.together(moved.foreseen.names).append(tick, moved.table)
+            self._rows.together(moved.predicted.names).append(tick, moved.table)
             return
         for name, pose in moved.items():
             series = self._rows.object(name)

@@ -36,8 +36,8 @@ class TruthTopics:
         stamp, fields = self._time.stamp(tick), (truth.pose, truth.twist, truth.clearance)
         if type(moved) is PosesAtTick:
             ahead = self._ahead
-            if ahead is None or ahead.foreseen is not moved.foreseen:
-                ahead = self._ahead = self._lay_out(moved.foreseen)
+            if ahead is None or ahead.predicted is not moved.predicted:
+                ahead = self._ahead = self._lay_out(moved.predicted)
             ahead.layout.write(now, stamp, *fields, ahead.packed[moved.row].tobytes())
             return
         names = tuple(moved)
@@ -51,17 +51,17 @@ class TruthTopics:
         links = [(frames.MAP, frames.of_object(name), stamp, pose) for name, pose in moved.items()]
         self._moves.write(now, self._transforms([(frames.MAP, self._frame, stamp, truth.pose), *links]))
 
-    def _lay_out(self, foreseen: PredictedPoses) -> "_Ahead":
+    def _lay_out(self, predicted: PredictedPoses) -> "_Ahead":
         """The messages at each of its moments at which all things have moved."""
-        before, names = self._ahead, foreseen.names
-        if before is not None and before.foreseen.names == names:
+        before, names = self._ahead, predicted.names
+        if before is not None and before.predicted.names == names:
             transforms, layout = before.transforms, before.layout
         else:
             transforms = TransformsAhead([(frames.MAP, frames.of_object(name)) for name in names])
             own = pack.transforms([(frames.MAP, self._frame, "pose")], len(names), transforms.size)
             layout = self._out.together((*self._always, (topics.TF, own)))
-        stamps = [self._time.stamp(tick) for tick in foreseen.ticks]
-        return _Ahead(foreseen, transforms, layout, transforms(stamps, foreseen.table))
+        stamps = [self._time.stamp(tick) for tick in predicted.ticks]
+        return _Ahead(predicted, transforms, layout, transforms(stamps, predicted.table))
 
     def _layout(self, moved: Iterable[str]) -> Together:
         """The messages with the poses of these things on /tf, behind the robot's."""
@@ -74,7 +74,7 @@ class TruthTopics:
 class _Ahead(NamedTuple):
     """All messages for things whose poses were worked out ahead, and those on /tf as they are `packed`."""
 
-    foreseen: PredictedPoses
+    predicted: PredictedPoses
     transforms: TransformsAhead
     layout: Together
     packed: Bytes

@@ -282,9 +282,9 @@ class Actors:
             if self._still_since is None or not all(actor.resting for actor in self._pushable):
                 self._still_since = tick
         elif self._travelling:
-            foreseen = self._ahead.at(tick)
-            if foreseen is not None:
-                self._poses = foreseen
+            predicted = self._ahead.at(tick)
+            if predicted is not None:
+                self._poses = predicted
             else:
                 self._poses = {**self._poses, **{a.body.name: self._pose(a, tick) for a in self._travelling}}
         self._posed_at = tick

@@ -59,7 +59,7 @@ class Walls:
         fresh = np.flatnonzero(self._missing & self._lots.near(x, y, far))
         self._missing[fresh] = False
         self.complete = not self._missing.any()
-        lots = (self._lots.lot(number) for number in fresh.tolist())
+        lots = (self._lots.tile(number) for number in fresh.tolist())
         bodies = [body for faces in lots for body in engine.static_faces(self._client, self._vertices, faces)]
         self.bodies += bodies
         return bodies

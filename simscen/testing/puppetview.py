@@ -52,7 +52,7 @@ class SquareRoom(RayCaster):
     """Rays to the four walls."""
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """See core.rays.RayCaster."""
+        """See core.geometry.ray_fans.RayCaster."""
         with np.errstate(divide="ignore", invalid="ignore"):
             walls = (np.sign(directions[:, :2]) * HALF - origins[:, :2]) / directions[:, :2]
         far: Array = np.nanmin(np.where(walls > 0, walls, np.inf), axis=1)

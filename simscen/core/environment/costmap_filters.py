@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FilterMasks:
-    """What a stack is told to keep out of, and where to drive slowly; None for no such mask."""
+    """Filter masks of a stack: keepout areas and speed limits. None means no such mask."""
 
     keepout: OccupancyGrid | None = None
     speed: SpeedLimits | None = None
@@ -27,7 +27,7 @@ class FilterMasks:
 
 @dataclass(frozen=True, eq=False)
 class SpeedLimits:
-    """A mask of speed limits; a cell of value v allows `base + multiplier * v` m/s, or percent of full speed."""
+    """Mask of speed limits; a cell of value v allows `base + multiplier * v` m/s, or percent of full speed."""
 
     grid: OccupancyGrid
     percent: bool
@@ -36,16 +36,19 @@ class SpeedLimits:
 
     @property
     def limiting(self) -> bool:
-        """Whether any cell limits anything."""
+        """Whether any cell limits the speed."""
         return any(self.of(int(value), 1.0) is not None for value in np.unique(self.grid.cells))
 
     def at(self, pose: Pose2, full_speed: float) -> float | None:
-        """The limit in m/s where the robot is, `full_speed` being the controller's; None for no limit."""
+        """Return the limit in m/s at the pose of the robot, or None.
+
+        `full_speed` is the top speed of the controller in m/s.
+        """
         value = int(self.grid.values_at(np.array([[pose.x, pose.y]]))[0])
         return self.of(value, full_speed)
 
     def along(self, points: Array, full_speed: float) -> Array:
-        """The limits (n,) in m/s at points (n, 2); inf for none."""
+        """Return the limits (n,) in m/s at points (n, 2); inf for no limit."""
         values = self.grid.values_at(points)
         limits = np.full(len(points), np.inf)
         for value in np.unique(values).tolist():
@@ -54,9 +57,9 @@ class SpeedLimits:
         return limits
 
     def of(self, value: int, full_speed: float) -> float | None:
-        """The limit in m/s that a cell's value means; None for no limit.
+        """Return the limit in m/s for the value of a cell, or None.
 
-        As in nav2's SpeedFilter, a limit of 0 is none, and neither is one below 0 or above 100 percent.
+        As in Nav2's SpeedFilter, a limit of 0, below 0, or above 100 percent means no limit.
         """
         limit = self.base + self.multiplier * value
         if value <= 0 or limit <= 0 or (self.percent and limit > 100):
@@ -65,19 +68,19 @@ class SpeedLimits:
 
 
 def in_keepout_mask(mask: OccupancyGrid, points: Array) -> npt.NDArray[np.bool_]:
-    """Which of the points (n, 2) a keepout mask forbids; its lighter cells forbid nothing."""
+    """Return which of the points (n, 2) a keepout mask forbids; lighter cells do not forbid anything."""
     return np.asarray(mask.values_at(points) == OCCUPIED)
 
 
 Block = tuple[int, int, int, int, int]
-"""Column, row, width and height in cells, and the value of them all."""
+"""Column, row, width and height in cells, and the value of all its cells."""
 
 
 @dataclass(frozen=True)
 class MaskBlocks:
-    """The cells of a mask that say something (1 … 100), as `blocks` that do not overlap.
+    """The cells of a mask with values from 1 to 100, as `blocks` that do not overlap.
 
-    `resolution` in m per cell; `origin` is the corner of cell (0, 0), as for an OccupancyGrid.
+    `resolution` is in m per cell, and `origin` is the corner of cell (0, 0), as in OccupancyGrid.
     """
 
     resolution: float
@@ -86,7 +89,7 @@ class MaskBlocks:
 
     @property
     def grid(self) -> OccupancyGrid:
-        """The mask as cells again, as far as any say something."""
+        """The mask as a grid, just large enough for all blocks."""
         width = max((column + width for column, _, width, _, _ in self.blocks), default=0)
         height = max((row + height for _, row, _, height, _ in self.blocks), default=0)
         cells = np.full((height, width), FREE, dtype=np.int8)
@@ -96,37 +99,39 @@ class MaskBlocks:
 
     @property
     def forbidden(self) -> Array:
-        """The occupied blocks (n, 4): least x, least y, greatest x and greatest y in meters in the mask's own frame."""
-        found = np.array([block[:4] for block in self.blocks if block[4] == OCCUPIED], dtype=np.float64).reshape(-1, 4)
-        found[:, 2:] += found[:, :2]
-        boxes: Array = found * self.resolution
+        """The occupied blocks (n, 4) as min x, min y, max x, max y in m in the frame of the mask."""
+        cells_xywh = np.array([block[:4] for block in self.blocks if block[4] == OCCUPIED], dtype=np.float64).reshape(
+            -1, 4
+        )
+        cells_xywh[:, 2:] += cells_xywh[:, :2]
+        boxes: Array = cells_xywh * self.resolution
         return boxes
 
-    def seen_from(self, poses: Array) -> Array:
-        """Poses (n, 3) of the map's frame in the mask's own."""
+    def to_mask_frame(self, poses: Array) -> Array:
+        """Return poses (n, 3) of the map frame in the frame of the mask."""
         local = self.origin.inverse().apply(poses[:, :2])
         return np.column_stack((local, poses[:, 2] - self.origin.yaw))
 
 
 def mask_blocks(grid: OccupancyGrid) -> MaskBlocks:
-    """The mask in blocks: runs of equal cells in a row, as long as the rows below have the same run."""
+    """Return the blocks of a mask: runs of equal cells in a row, extended over the following rows with the same run."""
     blocks: list[Block] = []
-    begun: dict[tuple[int, int, int], int] = {}
+    first_row: dict[tuple[int, int, int], int] = {}
     for row in range(len(grid.cells) + 1):
         if 0 < row < len(grid.cells) and np.array_equal(grid.cells[row], grid.cells[row - 1]):
             continue
         runs = _runs(grid.cells[row]) if row < len(grid.cells) else []
         here = set(runs)
-        for run in [run for run in begun if run not in here]:
+        for run in [run for run in first_row if run not in here]:
             column, width, value = run
-            blocks.append((column, begun[run], width, row - begun.pop(run), value))
+            blocks.append((column, first_row[run], width, row - first_row.pop(run), value))
         for run in runs:
-            begun.setdefault(run, row)
+            first_row.setdefault(run, row)
     return MaskBlocks(float(grid.resolution), grid.origin, tuple(blocks))
 
 
 def _runs(cells: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
-    """Column, width and value of each run of equal cells that say something."""
+    """Return column, width and value of each run of equal cells with a value above 0."""
     edges = np.concatenate(([0], np.flatnonzero(np.diff(cells)) + 1, [len(cells)])).tolist()
     return [(a, b - a, int(cells[a])) for a, b in pairwise(edges) if b > a and cells[a] > FREE]
 
@@ -136,7 +141,7 @@ Filter = Literal["keepout", "speed"]
 
 @dataclass(frozen=True, eq=False)
 class Zones:
-    """All that its filters say now: `keepout` are polygons it must not enter, `speed` such with a limit in m/s."""
+    """State of the costmap filters: `keepout` polygons, and `speed` polygons with their limits in m/s."""
 
     keepout: tuple[Polygon, ...] = ()
     speed: tuple[tuple[Polygon, float], ...] = ()
@@ -145,9 +150,9 @@ class Zones:
 
 @dataclass(frozen=True)
 class ZoneSwitch:
-    """An order to switch a zone, or a whole filter with all its zones and its mask where `region` is None.
+    """Command that enables or disables a zone, or, if `region` is None, a whole filter with its zones and mask.
 
-    `speed_limit` in m/s is for a zone of the speed filter; None keeps the one it has.
+    `speed_limit` (m/s) sets the limit of a zone of the speed filter; None keeps its limit.
     """
 
     filter: Filter

@@ -1,4 +1,4 @@
-"""What there was to see: the part of a world that a run's messages do not tell, for those who show it."""
+"""Visible parts of a world that the messages of a run do not contain, for replay pages and pictures."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ else:
 
 @dataclass(frozen=True)
 class MovableObject:
-    """Something of the world that can move: where it is at the start, and what it looks like from above.
+    """Movable object with its start pose and its outlines from above.
 
-    `outlines` are in its own frame; of a door, whose frame is at its hinge, `closed` and `opened` are where its panel
-    can be. `mass` in kg; 0 for what nothing can push.
+    `outlines` are in the frame of the object. `closed` and `opened` are the poses of a door panel, whose frame is at
+    the hinge. `mass` is in kg; 0 for an object that cannot be pushed.
     """
 
     name: str
@@ -38,10 +38,9 @@ class MovableObject:
 
 @dataclass(frozen=True)
 class DrivableSurface:
-    """Something that wheels may roll over: a ramp, a sill, a platform.
+    """Surface on which wheels can roll: a ramp, a sill, or a platform.
 
-    `height` is that of its highest point in m; `uphill` how much it rises for each meter of x and of y, zeros where
-    its top is level.
+    `height` of the highest point is in m. `uphill` is the rise per meter along x and y; zeros for a level surface.
     """
 
     name: str
@@ -52,7 +51,7 @@ class DrivableSurface:
 
 @dataclass(frozen=True)
 class FrictionRegion:
-    """A region whose floor has another friction than 1, that of dry concrete, from the start."""
+    """Region whose floor friction differs from 1, the value of dry concrete, from the start."""
 
     region: str
     outline: Polygon
@@ -61,9 +60,9 @@ class FrictionRegion:
 
 @dataclass(frozen=True)
 class FilterZone:
-    """A zone of a costmap filter as the stack of `robot` has it from the start; `speed_limit` in m/s, 0 for none.
+    """Zone of a costmap filter of `robot` at the start of the run. `speed_limit` is in m/s; 0 for none.
 
-    One of a filter mask has no region, and `cells` in place of an outline.
+    The zone of a filter mask has `cells` instead of a region and an outline.
     """
 
     filter: Filter
@@ -76,7 +75,7 @@ class FilterZone:
 
 @dataclass(frozen=True)
 class CompressedGrid:
-    """An occupancy grid as plain data: `data` is its int8 cells, row by row, compressed by zlib, in base64."""
+    """Occupancy grid as plain data; `data` is its int8 cells in row order, compressed by zlib, in base64."""
 
     width: int
     height: int
@@ -86,24 +85,24 @@ class CompressedGrid:
 
     @classmethod
     def of(cls, grid: OccupancyGrid) -> CompressedGrid:
-        """The grid packed."""
+        """Return the compressed grid."""
         packed = zlib.compress(np.ascontiguousarray(grid.cells).tobytes(), 9)
         height, width = grid.shape
         return cls(width, height, grid.resolution, grid.origin, base64.b64encode(packed).decode("ascii"))
 
     @property
     def grid(self) -> OccupancyGrid:
-        """The grid again. Raises ValueError where it is damaged."""
+        """The uncompressed grid. Raises ValueError if it is damaged."""
         try:
             cells = np.frombuffer(zlib.decompress(base64.b64decode(self.data)), dtype=np.int8)
         except zlib.error as error:
-            raise ValueError(f"its cells are damaged: {error}") from None
+            raise ValueError(f"the cells of the map are damaged: {error}") from None
         return OccupancyGrid(cells.reshape(self.height, self.width), self.resolution, self.origin)
 
 
 @dataclass(frozen=True)
 class Scenery:
-    """The world at the start of a run. `map` is how it is, where that is not the map that the robot was given."""
+    """Visible parts of the world at the start of a run. `map` is set if it differs from the map of the robot."""
 
     places: Mapping[str, Pose2] = field(default_factory=dict)
     things: tuple[MovableObject, ...] = ()

@@ -16,12 +16,12 @@ Polygon = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class World:
-    """Everything that is there before the robot: `solids` never move, `bodies` may.
+    """Everything in the world except the robots: `solids` are fixed, `bodies` can move.
 
-    `doors` maps a door's name, which is also its body's, to that body's pose when closed and when open. `friction` is
-    that of the floor in some of the `regions`, by name; elsewhere it is 1. `bounds` is (min x, min y, max x, max y) in
-    meters. `grid` is set when the world came with an occupancy map of its own (a ROS map). `notes` are warnings of the
-    importer, each a sentence that names file and element.
+    `doors` maps the name of a door, which is also the name of its body, to the poses of the body when closed and open.
+    `friction` maps names of `regions` to the friction of their floor; it is 1 elsewhere. `bounds` is (min x, min y, max
+    x, max y) in m. `grid` is set if the world has its own occupancy map (a ROS map). `notes` are warnings of the
+    importer, each with file and element.
     """
 
     name: str
@@ -38,9 +38,10 @@ class World:
 
 @dataclass(frozen=True)
 class BuiltWorld:
-    """A world made ready once and shared by all its runs; numpy arrays only, so that it survives a fork.
+    """World that is prepared once and shared by all its runs.
 
-    `mesh` fuses all static solids; `map` is the occupancy grid a robot would have been given.
+    It contains only numpy arrays, so that it survives a fork. `mesh` fuses all fixed solids. `map` is the occupancy
+    grid that robots get.
     """
 
     world: World
@@ -49,12 +50,12 @@ class BuiltWorld:
 
 
 DISC_CORNERS = 32
-"""Corners of the polygon that stands for a round patch."""
+"""Number of corners of the polygon that approximates a disc."""
 
 
 @dataclass(frozen=True)
 class Patch:
-    """A piece of floor: its `outline`, its `friction` against rubber wheels, and the tick at which it is over."""
+    """Patch of floor: its `outline`, its `friction` for rubber wheels, and the last tick at which it exists."""
 
     outline: Polygon
     friction: float
@@ -62,27 +63,27 @@ class Patch:
 
 
 def disc_outline(center: tuple[float, float], radius: float) -> Polygon:
-    """The outline of a round patch."""
+    """Return the outline of a disc as a polygon."""
     turns = [2 * math.pi * k / DISC_CORNERS for k in range(DISC_CORNERS)]
     return tuple((center[0] + radius * math.cos(turn), center[1] + radius * math.sin(turn)) for turn in turns)
 
 
 Behavior = Literal["regular", "impassive", "surprised", "scared", "curious", "threatening"]
-"""How somebody takes the robot (HuNavSim's names)."""
+"""Reaction of a pedestrian to the robot, with the names of HuNavSim."""
 Unseen = Literal["robots", "people", "objects"]
 Repeat = Literal["once", "loop", "back_and_forth"]
 
-BODY_HEIGHT = 1.7
-"""m; a body is an upright cylinder."""
+BODY_HEIGHT_M = 1.7
+"""Height of the upright cylinder that represents a pedestrian."""
 
 
 @dataclass(frozen=True)
 class WalkingPedestrian:
-    """Somebody called `name` who starts at rest at `pose` and walks to `goals` (x, y) in turn, in meters.
+    """Pedestrian that starts at rest at `pose` and walks to `goals` (x, y in m) in turn.
 
-    `speed` in m/s is the one they like best, `radius` and `height` those of their body in meters. Those of one `group`
-    keep together. `blind_to` is what they take no notice of. `reacts_within` meters and `reacts_for` seconds say when
-    a behavior other than regular and impassive begins and how long it lasts.
+    `speed` is the preferred speed in m/s; `radius` and `height` of the body are in m. Pedestrians of the same `group`
+    stay together. `blind_to` lists what the pedestrian ignores. Reactions other than regular and impassive begin within
+    `reacts_within` m of a robot and last `reacts_for` s.
     """
 
     name: str
@@ -91,7 +92,7 @@ class WalkingPedestrian:
     repeat: Repeat = "once"
     speed: float = 1.3
     radius: float = 0.25
-    height: float = BODY_HEIGHT
+    height: float = BODY_HEIGHT_M
     behavior: Behavior = "regular"
     group: str | None = None
     blind_to: frozenset[Unseen] = frozenset()
@@ -101,9 +102,9 @@ class WalkingPedestrian:
 
 @dataclass(frozen=True)
 class PedestrianAction:
-    """Something a person did: `what` is reached, reacted or calmed.
+    """Action of a pedestrian: it reached a goal, began a reaction, or ended one.
 
-    `about` is the number of the goal (from 1), or the robot.
+    `about` is the number of the goal (from 1) or the name of the robot.
     """
 
     name: str

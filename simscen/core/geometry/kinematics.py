@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 
 class Twist(NamedTuple):
-    """A velocity of the robot's base in its own frame: m/s forward, m/s to the left, rad/s anticlockwise."""
+    """Velocity of the base in its own frame: m/s forward, m/s to the left, rad/s counterclockwise."""
 
     vx: float = 0.0
     vy: float = 0.0
@@ -16,17 +16,16 @@ STOP = Twist()
 
 
 WheelValues = tuple[float, float, float, float]
-"""Of the wheels front left, front right, rear left, rear right."""
+"""Values of the front left, front right, rear left and rear right wheel."""
 
 
 @dataclass(frozen=True)
 class MecanumWheels:
-    """Wheels of `radius`, `half_base` before and behind and `half_track` beside the middle, all in meters.
+    """Four mecanum wheels of `radius`, at `half_base` before and behind and `half_track` beside the center (m).
 
-    `slant` is the cotangent of the angle between a roller and its wheel's axle: 1 for 45 degrees. Seen from above the
-    rollers on top point to the middle (those on the ground make an O). Taheri, Qiao and Ghaeminezhad, Kinematic Model
-    of a Four Mecanum Wheeled Mobile Robot, IJCA 113(3), 2015; here for any slant: a roller hands over only motion along
-    its own axis.
+    `slant` is the cotangent of the angle between roller and wheel axle: 1 for 45 degrees. Seen from above, the upper
+    rollers point to the center, and the lower ones form an O. Kinematics of Taheri, Qiao and Ghaeminezhad, "Kinematic
+    Model of a Four Mecanum Wheeled Mobile Robot", IJCA 113(3), 2015, for any slant.
     """
 
     radius: float
@@ -36,11 +35,11 @@ class MecanumWheels:
 
     @property
     def lever(self) -> float:
-        """Meters that a wheel rolls for each radian that the base turns."""
+        """Distance in m that a wheel rolls per radian of rotation of the base."""
         return self.half_track + self.slant * self.half_base
 
     def speeds(self, motion: Twist) -> WheelValues:
-        """Angles in rad (or rad/s) that the wheels roll for a motion of the base (m, m, rad, or each a second)."""
+        """Return the wheel rotations in rad (or rad/s) for a motion of the base in m and rad (or per second)."""
         ahead, left, turn = motion.vx, self.slant * motion.vy, self.lever * motion.wz
         return (
             (ahead - left - turn) / self.radius,
@@ -50,7 +49,7 @@ class MecanumWheels:
         )
 
     def motion(self, speeds: WheelValues) -> Twist:
-        """The motion of the base that agrees best with what the wheels rolled: the pseudo-inverse of `speeds`."""
+        """Return the least-squares motion of the base for wheel rotations: the pseudo-inverse of `speeds`."""
         front_left, front_right, rear_left, rear_right = (self.radius * speed / 4 for speed in speeds)
         return Twist(
             front_left + front_right + rear_left + rear_right,

@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     Mask = npt.NDArray[np.bool_]
 
 MAX_CONVEX_FACES = 400
-"""A mesh of more faces is taken as concave without a look."""
+"""Meshes with more faces are treated as concave without a test."""
 _YZX, _ZXY = (1, 2, 0), (2, 0, 1)
 CONVEX_TOLERANCE_M = 1e-6
-"""m by which corners may stand out of a face of a convex mesh."""
+"""Distance in m by which vertices of a convex mesh may lie outside the plane of a face."""
 
 
 def submesh(vertices: Array, faces: Faces) -> Mesh:
-    """Some faces with the vertices that they use."""
+    """Return the given faces with only the vertices that they use."""
     if faces.size < len(vertices) // 8:
         used, indices = np.unique(faces, return_inverse=True)
         return Mesh(vertices[used], indices.reshape(-1, 3).astype(np.int32))
@@ -37,7 +37,7 @@ def submesh(vertices: Array, faces: Faces) -> Mesh:
 
 
 def submesh_between_heights(vertices: Array, faces: Faces, heights: tuple[float, float]) -> Mesh:
-    """Those of some faces that reach between two heights, with the vertices that they use."""
+    """Return the faces that are partly between two heights, with the vertices that they use."""
     low, high = heights
     below, above = (outside[faces] for outside in (vertices[:, 2] < low, vertices[:, 2] > high))
     beside = (below[:, 0] & below[:, 1] & below[:, 2]) | (above[:, 0] & above[:, 1] & above[:, 2])
@@ -45,12 +45,12 @@ def submesh_between_heights(vertices: Array, faces: Faces, heights: tuple[float,
 
 
 def is_convex(mesh: Mesh) -> bool:
-    """Whether a mesh is its own convex hull; one of many faces is not even looked at."""
+    """Return whether a mesh is its own convex hull; False for meshes with more than MAX_CONVEX_FACES faces."""
     if len(mesh.faces) > MAX_CONVEX_FACES:
         return False
     a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
     u, v = b - a, c - a
-    normals = u.take(_YZX, 1) * v.take(_ZXY, 1) - u.take(_ZXY, 1) * v.take(_YZX, 1)  # half of the time of `cross`
+    normals = u.take(_YZX, 1) * v.take(_ZXY, 1) - u.take(_ZXY, 1) * v.take(_YZX, 1)  # takes half the time of np.cross
     heights = normals @ mesh.vertices.T - (normals * a).sum(axis=1)[:, None]
     lengths = np.maximum(np.sqrt((normals * normals).sum(axis=1)), 1e-12)
     return bool((heights <= CONVEX_TOLERANCE_M * lengths[:, None]).all())
@@ -58,7 +58,7 @@ def is_convex(mesh: Mesh) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class FaceTiles:
-    """`faces[starts[k]:starts[k + 1]]` are lot k; `low` and `high` are the corners (n, 2) around it."""
+    """Faces in square tiles: `faces[starts[k]:starts[k + 1]]` are tile k, with bounds `low` and `high` (n, 2)."""
 
     faces: Faces
     starts: Numbers
@@ -68,20 +68,20 @@ class FaceTiles:
     def __len__(self) -> int:
         return len(self.low)
 
-    def lot(self, number: int) -> Faces:
-        """The faces of a lot."""
+    def tile(self, number: int) -> Faces:
+        """Return the faces of a tile."""
         return self.faces[self.starts[number] : self.starts[number + 1]]
 
     def near(self, x: float, y: float, within: float) -> npt.NDArray[np.bool_]:
-        """Which lots may have anything within so many meters of a place."""
-        place = (x, y)
-        outside = np.maximum(np.maximum(self.low - place, place - self.high), 0.0)
+        """Return which tiles may have a face within `within` m of a point."""
+        point = (x, y)
+        outside = np.maximum(np.maximum(self.low - point, point - self.high), 0.0)
         found: npt.NDArray[np.bool_] = (outside * outside).sum(axis=1) <= within * within
         return found
 
 
 def tile_faces(vertices: Array, faces: Faces, edge: float) -> FaceTiles:
-    """Faces by the square with an edge of so many meters that their middle lies in."""
+    """Sort faces into square tiles with an edge of `edge` m, by the center of each face."""
     corners = vertices[faces, :2]
     squares = np.floor(corners.mean(axis=1) / edge)
     order = np.lexsort((squares[:, 1], squares[:, 0]))
@@ -94,17 +94,17 @@ def tile_faces(vertices: Array, faces: Faces, edge: float) -> FaceTiles:
 
 
 FLOOR_HEIGHT_M = 0.005
-"""Faces that lie wholly below this height in m are left to the ground plane, on which wheels roll smoothly."""
+"""Faces below this height are left to the ground plane, on which wheels roll smoothly."""
 MAX_SLOPE_RAD = math.radians(50)
-"""What is steeper is a wall, whatever drives: rubber on dry concrete (friction 1) holds up to 45°."""
+"""Steeper faces are walls for every robot: rubber on dry concrete (friction 1) holds up to 45°."""
 SOLIDS_PER_BATCH = 64
-"""Solids that all others are compared with in one go, which takes memory for each pair."""
+"""Number of solids that are compared with all others at once, to limit memory."""
 
 Owners = frozenset[int]
 
 
 def face_normals(mesh: TriangleMesh) -> Array:
-    """The unit normals (n, 3) of the faces of a mesh; zero for one without area."""
+    """Return the unit normals (n, 3) of the faces of a mesh; zeros for faces without area."""
     a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
     across = np.cross(b - a, c - a)
     lengths = np.linalg.norm(across, axis=1, keepdims=True)
@@ -112,16 +112,20 @@ def face_normals(mesh: TriangleMesh) -> Array:
     return unit
 
 
-def upward_faces(mesh: TriangleMesh, steepest: float = MAX_SLOPE_RAD) -> Mask:
-    """Which faces are above FLOOR, face upwards and are no steeper than an angle in rad."""
+def upward_faces(mesh: TriangleMesh, max_slope: float = MAX_SLOPE_RAD) -> Mask:
+    """Return which faces are above FLOOR_HEIGHT_M, face upwards, and are at most `steepest` rad steep."""
     top = mesh.vertices[mesh.faces, 2].max(axis=1, initial=-math.inf)
-    found: Mask = (face_normals(mesh)[:, 2] >= math.cos(steepest)) & (top > FLOOR_HEIGHT_M)
+    found: Mask = (face_normals(mesh)[:, 2] >= math.cos(max_slope)) & (top > FLOOR_HEIGHT_M)
     return found
 
 
 @cached_on_instance
 def drivable_solids(mesh: TriangleMesh, reach: float) -> Owners:
-    """The solids of a static mesh, by number, that wheels which get onto a step of `reach` m at most may roll on."""
+    """Return the indices of the fixed solids that wheels can roll on if they can climb steps of `reach` m.
+
+    A solid with an upward face at most `reach` m above the floor is drivable, and so are the solids that continue from
+    there. All other solids are walls, which only the hull touches.
+    """
     faces = np.flatnonzero(upward_faces(mesh))
     corners = mesh.vertices[mesh.faces[faces]]
     bottom = corners[:, :, 2].min(axis=1)

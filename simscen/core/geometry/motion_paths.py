@@ -1,4 +1,4 @@
-"""Where something on a scripted path is at a time."""
+"""Poses, speeds and steps of bodies on scripted paths."""
 
 import itertools
 import math
@@ -10,27 +10,24 @@ from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.shapes import MotionPath
 
 SMOOTH_PEAK_SPEED_RATIO = 1.5
-"""How much faster than evenly something is in the middle of a way that it is eased along."""
+"""Ratio of peak speed to mean speed of a segment with smooth easing."""
 MAX_STEP_M = 0.1
-"""Longest way that any part of a scripted body may move in a tick.
-
-Contact is found once a tick, so that a faster body could pass through a robot unnoticed. All robots are wider than
-this.
-"""
+"""Longest distance that any part of a scripted body may move per tick. Contact is tested once per tick, so a faster
+body could pass through a robot unnoticed. All robots are wider than this."""
 Step = tuple[float, float, float]
-_made = tuple.__new__  # a pose without the calls of its class
+_new_pose = tuple.__new__  # faster than the constructor of the class
 
 
 def pose_at(path: MotionPath, seconds: float) -> Pose2:
-    """The pose on the path, `seconds` after it was set off."""
+    """Return the pose on the path, `seconds` after it started."""
     times = path.times
     if len(times) == 1:
         return path.poses[0]
     local = min(max(_local(path, path.elapsed(seconds)), times[0]), times[-1])
     leg = min(bisect_right(times, local), len(times) - 1) - 1
     begin, end = path.poses[leg], path.poses[leg + 1]
-    lasts = times[leg + 1] - times[leg]
-    part = (local - times[leg]) / lasts if lasts > 0 else 1.0
+    duration = times[leg + 1] - times[leg]
+    part = (local - times[leg]) / duration if duration > 0 else 1.0
     if path.ease == "spline":
         return _on_curve(path, leg, part)
     if path.ease == "smooth":
@@ -43,7 +40,7 @@ def pose_at(path: MotionPath, seconds: float) -> Pose2:
 
 
 class PathSampler:
-    """A path at a height `z`, asked at one time after the other: what is the same along a leg is worked out once."""
+    """Path at height `z` that is sampled at increasing times; values of the current segment are cached."""
 
     def __init__(self, path: MotionPath, z: float) -> None:
         self._path, self._z = path, z
@@ -54,7 +51,7 @@ class PathSampler:
         self._leg: PathSegment
 
     def at(self, seconds: float) -> Pose3:
-        """`pose_at`, upright in space."""
+        """Return `pose_at` as a pose in space."""
         path, z = self._path, self._z
         if not self._even:
             return Pose3.planar(pose_at(path, seconds), z)
@@ -70,22 +67,22 @@ class PathSampler:
             number = min(bisect_right(path.times, local), len(path.times) - 1) - 1
             self._leg, self._begin = PathSegment.of(path, number), path.times[number]
             self._end = path.times[number + 1] if number + 2 < len(path.times) else math.inf
-        begin, lasts, x, y, yaw, dx, dy, turn, qz, qw = self._leg
-        part = (local - begin) / lasts if lasts > 0 else 1.0
+        begin, duration, x, y, yaw, dx, dy, turn, qz, qw = self._leg
+        part = (local - begin) / duration if duration > 0 else 1.0
         x, y = x + part * dx, y + part * dy
         if turn:
             return Pose3.planar(Pose2(x, y, wrap(yaw + part * turn)), z)
-        return _made(Pose3, (x, y, z, 0.0, 0.0, qz, qw))
+        return _new_pose(Pose3, (x, y, z, 0.0, 0.0, qz, qw))
 
 
 class PathSegment(NamedTuple):
-    """From one pose of a path to the next: when it begins, how long it lasts, from where, and by how much.
+    """Segment between two poses of a path: start time, duration, start pose, and displacement.
 
-    `qz` and `qw` are the quaternion of the heading that it begins with.
+    `qz` and `qw` are the quaternion of the initial heading.
     """
 
     begin: float
-    lasts: float
+    duration: float
     x: float
     y: float
     yaw: float
@@ -97,7 +94,7 @@ class PathSegment(NamedTuple):
 
     @classmethod
     def of(cls, path: MotionPath, number: int) -> "PathSegment":
-        """The leg of this number."""
+        """Return the segment with this index."""
         (x, y, yaw), to = path.poses[number], path.poses[number + 1]
         begin, end = path.times[number : number + 2]
         *_, qz, qw = Pose3.planar(Pose2(x, y, wrap(yaw)))
@@ -105,9 +102,9 @@ class PathSegment(NamedTuple):
 
 
 def top_speed(path: MotionPath, reach: float = 0.0) -> float:
-    """A speed in m/s that nothing within `reach` meters of its origin ever exceeds; inf where it jumps.
+    """Return an upper bound in m/s of the speed of any point within `reach` m of the origin; inf for jumps.
 
-    It is the fastest that something eased or even ever moves, and no less for a spline.
+    The bound is exact for linear and smooth easing.
     """
     speeds = [_speed(path, leg, reach) for leg in range(len(path.times) - 1)]
     if path.mode == "loop" and _meters(_step(path.poses[-1], path.poses[0]), reach) > 0:
@@ -116,15 +113,15 @@ def top_speed(path: MotionPath, reach: float = 0.0) -> float:
 
 
 def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
-    """Return the longest way in m that anything within `reach` of the origin moves within `seconds`, at most.
+    """Return an upper bound in m of the distance that a point within `reach` m moves within `seconds`.
 
-    A jump does not count, as in worlds of Gazebo: a leg that takes no time, or a loop that does not close.
+    Jumps do not count, as in worlds of Gazebo: a segment without duration, or a loop that does not close.
     """
     durations = [end - begin for begin, end in itertools.pairwise(path.times)]
-    lengths = [_speed(path, leg, reach) * lasts if lasts > 0 else 0.0 for leg, lasts in enumerate(durations)]
+    lengths = [_speed(path, leg, reach) * duration if duration > 0 else 0.0 for leg, duration in enumerate(durations)]
     if path.mode == "back_and_forth":
         lengths, durations = lengths + lengths[::-1], durations + durations[::-1]
-    if path.mode != "once" and (lap := sum(durations)) > 0:  # repeated, so that steps across the end count
+    if path.mode != "once" and (lap := sum(durations)) > 0:  # repeated, so that steps across the end count too
         laps = 2 + int(seconds / lap)
         lengths, durations = lengths * laps, durations * laps
     times = list(itertools.accumulate(durations, initial=0.0))
@@ -135,7 +132,7 @@ def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
 
 
 def too_fast(name: str, step: float) -> str:
-    """Return the message about a scripted body that moves `step` meters in one tick."""
+    """Return the message for a scripted body that moves `step` m in one tick."""
     return (
         f"`{name}` moves up to {step:.2g} m in one physics tick; contact with the robot can be missed if it moves more "
         f"than {MAX_STEP_M:g} m"
@@ -151,26 +148,26 @@ def _interpolate(time: float, times: Sequence[float], values: Sequence[float]) -
 
 
 class SweptSegment(NamedTuple):
-    """Straight from one place to another in the plane, but for what it may stray from that, all in meters."""
+    """Straight segment in the plane in m, and the largest `deviation` of the path from it."""
 
     x: float
     y: float
     to_x: float
     to_y: float
-    strays: float = 0.0
+    deviation: float = 0.0
 
 
 def swept_segments(path: MotionPath) -> list[SweptSegment]:
-    """Where something on a path ever is: on its way from each pose to the next."""
+    """Return the segments that contain all positions on a path."""
     (x, y, _), *_ = poses = path.poses
     legs = range(len(path.times) - 1)
-    return [SweptSegment(*poses[leg][:2], *poses[leg + 1][:2], _strays(path, leg)) for leg in legs] or [
+    return [SweptSegment(*poses[leg][:2], *poses[leg + 1][:2], _deviation(path, leg)) for leg in legs] or [
         SweptSegment(x, y, x, y)
     ]
 
 
-def _strays(path: MotionPath, leg: int) -> float:
-    """A cubic curve lies within its control points, which are a third of a leg's time from its ends."""
+def _deviation(path: MotionPath, leg: int) -> float:
+    """Return a bound of the deviation: a cubic curve lies in the hull of its control points."""
     if path.ease != "spline":
         return 0.0
     third = (path.times[leg + 1] - path.times[leg]) / 3
@@ -192,9 +189,9 @@ def _speed(path: MotionPath, leg: int, reach: float) -> float:
 
 def _on_curve(path: MotionPath, leg: int, part: float) -> Pose2:
     begin, end = path.poses[leg], path.poses[leg + 1]
-    lasts = path.times[leg + 1] - path.times[leg]
+    duration = path.times[leg + 1] - path.times[leg]
     risen = part * part * (3.0 - 2.0 * part)
-    leaving, arriving = part * (1.0 - part) ** 2 * lasts, -(part**2) * (1.0 - part) * lasts
+    leaving, arriving = part * (1.0 - part) ** 2 * duration, -(part**2) * (1.0 - part) * duration
     x, y, yaw = (
         here + risen * way + leaving * before + arriving * after
         for here, way, before, after in zip(
@@ -205,7 +202,7 @@ def _on_curve(path: MotionPath, leg: int, part: float) -> Pose2:
 
 
 def _velocity(path: MotionPath, k: int) -> Step:
-    """The velocity of a spline at pose k, in m/s and rad/s."""
+    """Return the velocity of a spline at pose k in m/s and rad/s."""
     last = len(path.poses) - 1
     if 0 < k < last:
         before, after = k - 1, k
@@ -214,8 +211,8 @@ def _velocity(path: MotionPath, k: int) -> Step:
     else:
         return 0.0, 0.0, 0.0
     seconds = path.times[before + 1] - path.times[before] + path.times[after + 1] - path.times[after]
-    swept_segments = [_step(path.poses[leg], path.poses[leg + 1]) for leg in (before, after)]
-    x, y, yaw = ((a + b) / seconds for a, b in zip(*swept_segments, strict=True))
+    steps = [_step(path.poses[leg], path.poses[leg + 1]) for leg in (before, after)]
+    x, y, yaw = ((a + b) / seconds for a, b in zip(*steps, strict=True))
     return x, y, yaw
 
 
@@ -228,12 +225,12 @@ def _meters(step: Step, reach: float) -> float:
 
 
 def _local(path: MotionPath, seconds: float) -> float:
-    """Where on the path it is, as a time of `times`."""
-    first, lasts = path.times[0], path.times[-1] - path.times[0]
+    """Return the path time, with repetitions folded into `times`."""
+    first, duration = path.times[0], path.times[-1] - path.times[0]
     since = seconds - first
-    if lasts <= 0 or since <= 0 or path.mode == "once":
+    if duration <= 0 or since <= 0 or path.mode == "once":
         return seconds
     if path.mode == "loop":
-        return first + math.fmod(since, lasts)
-    phase = math.fmod(since, 2 * lasts)
-    return first + (phase if phase <= lasts else 2 * lasts - phase)
+        return first + math.fmod(since, duration)
+    phase = math.fmod(since, 2 * duration)
+    return first + (phase if phase <= duration else 2 * duration - phase)

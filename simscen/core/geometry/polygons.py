@@ -9,11 +9,11 @@ from simscen.core.geometry import Pose2
 Corner = tuple[float, float]
 
 MIN_WIDTH_M = 1e-6
-"""m; what is thinner encloses no area."""
+"""Thinner polygons have no area."""
 
 
 def distance_to_polygon(point: Pose2, corners: Sequence[tuple[float, float]]) -> float:
-    """Distance in meters from a point to a filled polygon; 0 inside."""
+    """Return the distance in m from a point to a filled polygon; 0 inside."""
     edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
     if polygon_contains(corners, (point.x, point.y)):
         return 0.0
@@ -21,7 +21,7 @@ def distance_to_polygon(point: Pose2, corners: Sequence[tuple[float, float]]) ->
 
 
 def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
-    """Meters from the border of a polygon for a place in it; negative outside."""
+    """Return the distance in m of a position inside a polygon from its border; -1 outside."""
     if not polygon_contains(corners, (pose.x, pose.y)):
         return -1.0
     return min(
@@ -30,9 +30,9 @@ def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
 
 
 def polygon_defect(ring: Sequence[Corner]) -> str | None:
-    """What keeps a ring of corners from being the border of one area, as words that follow "it"; None for nothing.
+    """Return why a ring of corners is not the border of one area, as words after "it"; None if it is.
 
-    Repeated corners are one, so that a ring may be closed by its first corner.
+    Repeated corners count once, so a ring may end with its first corner.
     """
     corners = without_repeated_corners(ring)
     if _encloses_no_area(corners):
@@ -53,12 +53,12 @@ def polygon_defect(ring: Sequence[Corner]) -> str | None:
 
 
 def without_repeated_corners(ring: Sequence[Corner]) -> tuple[Corner, ...]:
-    """The corners without those that repeat the one before."""
+    """Return the corners without those equal to the previous one."""
     return tuple(corner for k, corner in enumerate(ring) if corner != ring[k - 1])
 
 
 def signed_double_area(a: Corner, b: Corner, c: Corner) -> float:
-    """Twice the area of the triangle; positive when the way from a over b to c turns left."""
+    """Return twice the signed area of the triangle; positive if a, b, c are counterclockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
@@ -71,12 +71,12 @@ def _encloses_no_area(corners: Sequence[Corner]) -> bool:
 
 
 def _folds_back(a: Corner, b: Corner, c: Corner) -> bool:
-    """Whether the way from a to b goes back on itself to c."""
+    """Return whether the path from a over b to c reverses its direction at b."""
     return signed_double_area(a, b, c) == 0 and (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0
 
 
 def _segments_touch(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
-    """Whether the segments a-b and c-d have a point in common."""
+    """Return whether the segments a-b and c-d have a common point."""
     sides = (
         signed_double_area(a, b, c),
         signed_double_area(a, b, d),
@@ -90,12 +90,12 @@ def _segments_touch(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
 
 
 def _lies_between(a: Corner, b: Corner, point: Corner) -> bool:
-    """Whether a point on the line through a and b lies between them."""
+    """Return whether a point on the line through a and b lies between them."""
     return all(min(a[k], b[k]) <= point[k] <= max(a[k], b[k]) for k in (0, 1))
 
 
 def distance_to_segment(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> float:
-    """Distance in meters from (x, y) to the segment from a to b."""
+    """Return the distance in m from (x, y) to the segment from a to b."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     squared = dx * dx + dy * dy
     along = ((x - a[0]) * dx + (y - a[1]) * dy) / squared if squared else 0.0
@@ -104,12 +104,12 @@ def distance_to_segment(x: float, y: float, a: tuple[float, float], b: tuple[flo
 
 
 def polygon_contains(corners: Sequence[tuple[float, float]], point: tuple[float, float]) -> bool:
-    """Whether a point is inside a polygon; on its edge, either answer may come."""
+    """Return whether a point is inside a polygon. Points on an edge may count either way."""
     return sum(_is_left_of(point, a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)) % 2 == 1
 
 
 def segments_cross(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
-    """Whether the segments a-b and c-d cross inside of both; to touch is not to cross."""
+    """Return whether the segments a-b and c-d cross in their interiors; touching does not count."""
     return (
         signed_double_area(a, b, c) * signed_double_area(a, b, d) < 0
         and signed_double_area(c, d, a) * signed_double_area(c, d, b) < 0
@@ -117,7 +117,7 @@ def segments_cross(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
 
 
 def _is_left_of(point: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> bool:
-    """Whether a ray from the point along +x crosses the edge (half-open, so that corners count once)."""
+    """Return whether a ray from the point along +x crosses the edge (half-open, so that corners count once)."""
     if (a[1] > point[1]) == (b[1] > point[1]):
         return False
     return point[0] < a[0] + (point[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
@@ -127,10 +127,10 @@ Piece = tuple[Corner, ...]
 
 
 def convex_pieces(ring: Sequence[Corner]) -> list[Piece]:
-    """Convex anticlockwise polygons that cover a ring without a flaw exactly once; a convex one stays whole.
+    """Decompose a valid ring into convex counterclockwise polygons that cover it exactly once.
 
-    Ears are clipped, then diagonals that no piece needs are taken out (Hertel and Mehlhorn, 1983): at most four times
-    as many pieces as needed. Raises ValueError for a ring that crosses itself.
+    Ear clipping, then removal of unnecessary diagonals (Hertel and Mehlhorn, 1983): at most four times the minimum
+    number of pieces. Raises ValueError for a ring that intersects itself.
     """
     corners = without_repeated_corners(ring)
     if sum(signed_double_area(corners[0], a, b) for a, b in pairwise(corners)) < 0:
@@ -141,7 +141,7 @@ def convex_pieces(ring: Sequence[Corner]) -> list[Piece]:
 
 
 def _triangles(corners: list[Corner]) -> list[Piece]:
-    """Ear clipping (Meisters, 1975)."""
+    """Triangulate by ear clipping (Meisters, 1975)."""
     found: list[Piece] = []
     while len(corners) > 2:
         k = next((k for k in range(len(corners)) if _is_collinear(corners, k) or _is_ear(corners, k)), None)
@@ -162,7 +162,7 @@ def _is_collinear(corners: Sequence[Corner], k: int) -> bool:
 
 
 def _is_ear(corners: Sequence[Corner], k: int) -> bool:
-    """Whether the triangle at corner k lies inside, with no other corner in it."""
+    """Return whether the triangle at corner k lies inside and contains no other corner."""
     a, b, c = _triangle_at(corners, k)
     if signed_double_area(a, b, c) <= 0:
         return False
@@ -193,11 +193,11 @@ def _edges(piece: Piece) -> list[tuple[Corner, Corner]]:
 
 
 def _rotated_to(piece: Piece, corner: Corner) -> Piece:
-    """The same polygon, beginning at a corner."""
+    """Return the same polygon with `corner` as its first corner."""
     k = piece.index(corner)
     return (*piece[k:], *piece[:k])
 
 
 def _is_convex(corners: Sequence[Corner]) -> bool:
-    """Whether an anticlockwise ring without a flaw never turns right."""
+    """Return whether a valid counterclockwise ring never turns right."""
     return all(signed_double_area(*_triangle_at(corners, k)) >= 0 for k in range(len(corners)))

@@ -1,4 +1,4 @@
-"""Poses and rigid motions in the plane and in space. Meters and radians; frames as in ROS REP 103."""
+"""Poses and rigid motions in the plane and in space, in m and rad, with the frames of ROS REP 103."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ if TYPE_CHECKING:
 
     Array = npt.NDArray[np.float64]
 else:
-    Array = object  # annotations are not evaluated; commands that only read files need no numpy
+    Array = object  # annotations are not evaluated; light commands do not need numpy types
 
 
 _PI, _TURN = math.pi, 2 * math.pi
 _cos, _sin, _remainder, _isfinite = math.cos, math.sin, math.remainder, math.isfinite
-# A tuple of its class, without the two calls that the class itself would make: poses are made 50 000 times a minute.
-_made = tuple.__new__
+# Faster than the constructor of the class: about 50 000 poses are created per minute.
+_new_pose = tuple.__new__
 
 
 def wrap(angle: float) -> float:
-    """The same angle in (-π, π]."""
+    """Return the same angle in (-π, π]."""
     wrapped = _remainder(angle, _TURN)
     return wrapped if wrapped != -_PI else _PI
 
 
 def wrap_array(angles: Array) -> Array:
-    """The same angles in [-π, π)."""
+    """Return the same angles in [-π, π)."""
     return (angles + np.pi) % (2 * np.pi) - np.pi
 
 
@@ -36,7 +36,7 @@ Vector = tuple[float, float, float]
 
 
 def rotated(turn: tuple[float, float, float, float], vector: Vector) -> Vector:
-    """A vector turned by a unit quaternion (x, y, z, w)."""
+    """Return a vector rotated by a unit quaternion (x, y, z, w)."""
     x, y, z, w = turn
     a, b, c = vector
     p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
@@ -44,7 +44,7 @@ def rotated(turn: tuple[float, float, float, float], vector: Vector) -> Vector:
 
 
 def forward_and_left(turn: tuple[float, float, float, float]) -> tuple[Vector, Vector]:
-    """The x and y axes of a frame that is turned by a unit quaternion (x, y, z, w)."""
+    """Return the x and y axes of a frame that is rotated by a unit quaternion (x, y, z, w)."""
     x, y, z, w = turn
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)),
@@ -53,49 +53,49 @@ def forward_and_left(turn: tuple[float, float, float, float]) -> tuple[Vector, V
 
 
 class Pose2(NamedTuple):
-    """A position and heading in the plane; read `a_from_b` as the pose of frame b in frame a."""
+    """Position and heading in the plane; read `a_from_b` as the pose of frame b in frame a."""
 
     x: float
     y: float
     yaw: float = 0.0
 
     def compose(self, other: Pose2) -> Pose2:
-        """`a_from_b.compose(b_from_c)` is `a_from_c`."""
+        """Return `a_from_c` for `a_from_b.compose(b_from_c)`."""
         x, y, yaw = self
         along, left, turn = other
         c, s = _cos(yaw), _sin(yaw)
         turned = _remainder(yaw + turn, _TURN)
-        return _made(Pose2, (x + c * along - s * left, y + s * along + c * left, turned if turned != -_PI else _PI))
+        return _new_pose(Pose2, (x + c * along - s * left, y + s * along + c * left, turned if turned != -_PI else _PI))
 
     def inverse(self) -> Pose2:
-        """`a_from_b.inverse()` is `b_from_a`."""
+        """Return `b_from_a` for `a_from_b.inverse()`."""
         x, y, yaw = self
         c, s = _cos(yaw), _sin(yaw)
         turned = _remainder(-yaw, _TURN)
-        return _made(Pose2, (-c * x - s * y, s * x - c * y, turned if turned != -_PI else _PI))
+        return _new_pose(Pose2, (-c * x - s * y, s * x - c * y, turned if turned != -_PI else _PI))
 
     def between(self, other: Pose2) -> Pose2:
-        """The pose `other` seen from this one; both given in the same frame."""
+        """Return the pose `other` relative to this one; both are in the same frame."""
         x, y, yaw = self
         far, aside, turn = other
         c, s = _cos(yaw), _sin(yaw)
         turned = _remainder(turn - yaw, _TURN)
         along, left = -c * x - s * y + c * far + s * aside, s * x - c * y - s * far + c * aside
-        return _made(Pose2, (along, left, turned if turned != -_PI else _PI))
+        return _new_pose(Pose2, (along, left, turned if turned != -_PI else _PI))
 
     def apply(self, points: Array) -> Array:
-        """Points (n, 2) of this pose's frame, expressed in its parent frame."""
+        """Return points (n, 2) of the frame of this pose in its parent frame."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         moved: Array = points @ np.array([[c, s], [-s, c]]) + np.array([self.x, self.y])
         return moved
 
     def distance(self, other: Pose2) -> float:
-        """Distance between the two positions in meters; headings do not count."""
+        """Return the distance between the two positions in m."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
 
 class Pose3(NamedTuple):
-    """A position and a unit quaternion (x, y, z, w) in space."""
+    """Position and unit quaternion (x, y, z, w) in space."""
 
     x: float = 0.0
     y: float = 0.0
@@ -107,7 +107,7 @@ class Pose3(NamedTuple):
 
     @classmethod
     def from_rpy(cls, x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> Pose3:
-        """Fixed-axis roll, pitch, yaw as in URDF and SDF."""
+        """Return the pose with fixed-axis roll, pitch and yaw, as in URDF and SDF."""
         cr, sr = math.cos(roll / 2), math.sin(roll / 2)
         cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
         cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
@@ -121,14 +121,14 @@ class Pose3(NamedTuple):
 
     @classmethod
     def planar(cls, pose: Pose2, z: float = 0.0) -> Pose3:
-        """A pose of the plane, lifted to height `z`; an infinite heading, as broken odometry says, is no number."""
+        """Return a pose of the plane at height `z`. An infinite heading, as of broken odometry, becomes nan."""
         x, y, yaw = pose
         half = yaw / 2 if _isfinite(yaw) else math.nan
-        return _made(cls, (x, y, z, 0.0, 0.0, _sin(half), _cos(half)))
+        return _new_pose(cls, (x, y, z, 0.0, 0.0, _sin(half), _cos(half)))
 
     @property
     def position(self) -> tuple[float, float, float]:
-        """(x, y, z) in meters."""
+        """(x, y, z) in m."""
         return self.x, self.y, self.z
 
     @property
@@ -137,18 +137,18 @@ class Pose3(NamedTuple):
         return self.qx, self.qy, self.qz, self.qw
 
     def rotation(self) -> Array:
-        """The 3 x 3 rotation matrix."""
+        """Return the 3 x 3 rotation matrix."""
         x, y, z, w = self.quaternion
         (a, b, c), (d, e, f) = forward_and_left((x, y, z, w))
         return np.array([[a, d, 2 * (x * z + y * w)], [b, e, 2 * (y * z - x * w)], [c, f, 1 - 2 * (x * x + y * y)]])
 
     def apply(self, points: Array) -> Array:
-        """Points (n, 3) of this pose's frame, expressed in its parent frame."""
+        """Return points (n, 3) of the frame of this pose in its parent frame."""
         moved: Array = points @ self.rotation().T + np.array(self.position)
         return moved
 
     def compose(self, other: Pose3) -> Pose3:
-        """`a_from_b.compose(b_from_c)` is `a_from_c`."""
+        """Return `a_from_c` for `a_from_b.compose(b_from_c)`."""
         x, y, z = self._moved(other.position)
         ax, ay, az, aw = self.quaternion
         bx, by, bz, bw = other.quaternion
@@ -161,7 +161,7 @@ class Pose3(NamedTuple):
         )  # fmt: skip
 
     def _moved(self, point: tuple[float, float, float]) -> tuple[float, float, float]:
-        """One point of its frame in its parent frame; for an upright pose without numpy, which takes time to import."""
+        """Return a point of this frame in the parent frame; upright poses do not need numpy for this."""
         if self.qx != 0 or self.qy != 0:
             x, y, z = self.apply(np.array([point]))[0].tolist()
             return x, y, z
@@ -169,18 +169,18 @@ class Pose3(NamedTuple):
         return c * point[0] - s * point[1] + self.x, s * point[0] + c * point[1] + self.y, point[2] + self.z
 
     def inverse(self) -> Pose3:
-        """`a_from_b.inverse()` is `b_from_a`."""
+        """Return `b_from_a` for `a_from_b.inverse()`."""
         turn = Pose3(0, 0, 0, -self.qx, -self.qy, -self.qz, self.qw)
         x, y, z = (-turn.apply(np.array([self.position]))[0]).tolist()
         return turn._replace(x=x, y=y, z=z)
 
     @property
     def yaw(self) -> float:
-        """Rotation about z in radians, in (-π, π]."""
+        """Rotation about z in rad, in (-π, π]."""
         x, y, z, w = self.quaternion
         return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
     @property
     def plane(self) -> Pose2:
-        """Its position and heading on the ground."""
+        """Position and heading on the ground."""
         return Pose2(self.x, self.y, self.yaw)

@@ -1,4 +1,4 @@
-"""Rays in packets of sixteen as Embree takes them (`RTCRayHit16`), fans of lidar rays, and the ray-caster protocol."""
+"""Rays in packets of 16 for Embree (`RTCRayHit16`), fans of lidar rays, and the ray caster protocol."""
 
 from __future__ import annotations
 
@@ -15,42 +15,42 @@ from simscen.core.geometry import Array, Pose3, Vector
 Singles = npt.NDArray[np.float32]
 
 PACKET_SIZE = 16
-"""Rays in a packet."""
+"""Number of rays per packet."""
 _ROWS = 21
-"""A packet's numbers of each ray: start, nearest, direction, time, end, mask, number, flags; then 9 of what it met."""
-_END, _MASK, _MET = 8, 9, 17
-_ALIGNED, _WORD = 64, 4
-"""Bytes by which each packet, and of which each number, has to be."""
-_ALL = 0xFFFFFFFF
+"""Values per ray: start, nearest, direction, time, end, mask, id, flags; then 9 of the hit."""
+_END, _MASK, _HIT = 8, 9, 17
+_PACKET_ALIGNMENT, _VALUE_BYTES = 64, 4
+"""Alignment of packets, and size of values, in bytes."""
+_ALL_BITS = 0xFFFFFFFF
 MIN_DIRECTION_COMPONENT = 2e-18
-"""Parts of directions that are nothing. To Embree any part within 1e-18 is positive, but by the signs of parts it tells
-which rays of a packet go together, and whole packets whose rays part there would meet nothing."""
+"""Smaller direction components are set to 0. Embree treats components within 1e-18 as positive, but groups the rays of
+a packet by the signs of their components, so that a packet with such rays would not hit anything."""
 
 
 class RayPackets:
-    """Room for rays: `starts` and `directions` (packets, 3, 16), and `ends` (packets, 16), which become what they meet.
+    """Buffer of rays: `starts` and `directions` (packets, 3, 16), and `ends` (packets, 16), which become the hits.
 
-    A ray that ends before it begins, as those do that fill up the last packet, is not asked.
+    Rays whose end is before their start are skipped; they fill up the last packet.
     """
 
     def __init__(self, count: int) -> None:
         packets = -(-count // PACKET_SIZE)
-        room = np.zeros(packets * _ROWS * PACKET_SIZE + _ALIGNED // _WORD, dtype=np.float32)
-        rows = room[-room.ctypes.data % _ALIGNED // _WORD :][: packets * _ROWS * PACKET_SIZE].reshape(
-            packets, _ROWS, PACKET_SIZE
-        )
+        buffer = np.zeros(packets * _ROWS * PACKET_SIZE + _PACKET_ALIGNMENT // _VALUE_BYTES, dtype=np.float32)
+        rows = buffer[-buffer.ctypes.data % _PACKET_ALIGNMENT // _VALUE_BYTES :][
+            : packets * _ROWS * PACKET_SIZE
+        ].reshape(packets, _ROWS, PACKET_SIZE)
         words = rows.view(np.uint32)
-        words[:, _MASK] = words[:, _MET:] = _ALL
+        words[:, _MASK] = words[:, _HIT:] = _ALL_BITS
         self.starts: Singles = rows[:, :3]
         self.directions: Singles = rows[:, 4:7]
         self.ends: Singles = rows[:, _END]
         self._count = count
-        first, size = rows.ctypes.data, _ROWS * PACKET_SIZE * _WORD
+        first, size = rows.ctypes.data, _ROWS * PACKET_SIZE * _VALUE_BYTES
         self.addresses = [c_void_p(first + number * size) for number in range(packets)]
-        """Where each packet lies."""
+        """Address of each packet."""
 
     def put(self, starts: Array, directions: Array, ends: float | Singles) -> None:
-        """Rays that begin at `starts` (n, 3) and point along `directions` (n, 3), as far as `ends`."""
+        """Set the rays: they begin at `starts` (n, 3) and extend along `directions` (n, 3) up to `ends`."""
         for rows, values in ((self.starts, starts), (self.directions, directions)):
             flat = np.zeros((len(rows) * PACKET_SIZE, 3), dtype=np.float32)
             flat[: self._count] = values
@@ -61,7 +61,7 @@ class RayPackets:
         self.ends[:] = last.reshape(-1, PACKET_SIZE)
 
     def distances(self) -> Singles:
-        """How far each ray (n,) goes by now."""
+        """Return the current length (n,) of each ray."""
         return self.ends.flatten()[: self._count]
 
 
@@ -69,15 +69,15 @@ ALL_PACKETS = slice(None)
 
 
 class RayFan:
-    """Rays in one plane that all begin in one place, as those of a lidar, evenly spaced.
+    """Evenly spaced rays in one plane with a common origin, as those of a lidar.
 
-    It has room for what is worked out anew at each scan: where the rays begin, which way they point, and how far.
+    Holds the buffers that each scan overwrites: origin, directions and lengths.
     """
 
     def __init__(self, first: float, increment: float, count: int) -> None:
-        """Ray k points at `first` + k `increment` rad in the x-y plane; together they are no more than a full turn."""
+        """Ray k points at `first` + k `increment` rad in the x-y plane. The rays cover at most a full turn."""
         self.rays = RayPackets(count)
-        """As `begin`, `turn` and `end` said; what fills up the last packet is its last ray once more."""
+        """Rays as set by `begin`, `turn` and `end`; the last packet is filled up with copies of the last ray."""
         angles = first + increment * np.minimum(np.arange(PACKET_SIZE * len(self.rays.ends)), count - 1)
         self._first, self._increment, self._count = first, increment, count
         self._full = 2 * math.pi / increment
@@ -87,16 +87,16 @@ class RayFan:
         return self._count
 
     def at(self, pose: Pose3) -> tuple[Array, Array]:
-        """Origins (n, 3) and unit directions (n, 3) of the rays of a fan whose frame is at `pose`."""
+        """Return origins (n, 3) and unit directions (n, 3) of the rays of a fan with its frame at `pose`."""
         (x, y), turn = self._flat[:, : self._count], pose.rotation()
         return np.repeat([pose.position], self._count, axis=0), np.column_stack((x, y, np.zeros_like(x))) @ turn.T
 
     def begin(self, x: float, y: float, z: float, packets: slice = ALL_PACKETS) -> None:
-        """Those of some `packets` begin there."""
+        """Set the origin of the rays in some `packets`."""
         self.rays.starts[packets] = np.array(((x,), (y,), (z,)), dtype=np.float32)
 
     def turn(self, ahead: Vector, left: Vector, packets: slice = ALL_PACKETS) -> None:
-        """Work out the directions of some `packets` where the fan's x and y axes are `ahead` and `left`."""
+        """Compute the directions in some `packets`, with the x and y axes of the fan along `ahead` and `left`."""
         directions = self.rays.directions[packets]
         flat = (
             self._flat
@@ -108,11 +108,11 @@ class RayFan:
         directions[:] = turned.reshape(3, -1, PACKET_SIZE).swapaxes(0, 1)
 
     def end(self, reach: float) -> None:
-        """No ray goes farther."""
+        """Limit the length of all rays."""
         self.rays.ends[:] = reach
 
     def towards(self, x: float, y: float, least: float) -> list[slice]:
-        """The rays whose products with a vector (x, y, any) of the fan's frame are `least` or more, and some beside."""
+        """Return the ranges of rays whose dot product with (x, y) is at least `least`, and some neighbors."""
         far = math.hypot(x, y)
         if least > far:
             return []
@@ -129,21 +129,21 @@ class RayFan:
 
 
 class RayCaster(Protocol):
-    """Casts rays against everything solid but the robot that asks."""
+    """Casts rays against all solids except the robot that carries the sensor."""
 
     @abstractmethod
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """Distances (n,) in meters along unit `directions` (n, 3) from `origins` (n, 3).
+        """Return distances (n,) in m along unit `directions` (n, 3) from `origins` (n, 3).
 
-        inf where nothing is hit within `reach` meters; who needs to know no more is answered sooner.
+        The distance is inf if nothing is hit within `reach` m; a shorter reach is faster.
 
         *Given* the same geometry *then* the same distances, bit for bit, whatever was asked before.
         """
         ...
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Array | Singles:
-        """The same distances (n,) of a fan whose frame is at `pose` of its own; any beyond `reach` for nothing.
+        """Return the distances (n,) of a fan with its frame at `pose`; values beyond `reach` mean no hit.
 
-        What begins in one place is asked sooner.
+        Faster than `cast`, because all rays have the same origin.
         """
         return self.cast(*fan.at(pose), reach)

@@ -1,4 +1,4 @@
-"""Poses of scripted bodies at many times, computed in one batch."""
+"""Poses of scripted bodies at many ticks, computed in one batch."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -9,70 +9,70 @@ from simscen.core.geometry import Array, Pose3, Vector
 from simscen.core.geometry.motion_paths import PathSampler, PathSegment
 from simscen.core.geometry.shapes import MotionPath
 
-_made = tuple.__new__  # a pose without the calls of its class
+_new_pose = tuple.__new__  # faster than the constructor of the class
 
 
 class PredictedPoses:
-    """Things at `ticks`: those of `names` as in `table` (tick, thing, pose); of `everything`, by name, others stay."""
+    """Poses of objects at `ticks`: moving ones (`names`) in `table` (tick, object, pose), others in `everything`."""
 
     def __init__(self, ticks: range, names: tuple[str, ...], table: Array, everything: Mapping[str, Pose3]) -> None:
         self.ticks, self.names, self.table, self.everything = ticks, names, table, everything
         self.complete = len(names) == len(everything)
-        """Whether none stay."""
+        """Whether all objects move."""
 
     def at(self, tick: int) -> "PosesAtTick | None":
-        """Where everything is at a tick; None at any other."""
+        """Return the poses at a tick, or None outside of `ticks`."""
         return PosesAtTick(self, self.ticks.index(tick)) if tick in self.ticks else None
 
-    def far(self, place: Vector, distance: float) -> set[str]:
-        """Those in the table that are never within a distance in meters of a place."""
-        ways = self.table[:, :, :3] - place
-        nearest = (ways * ways).sum(axis=2).min(axis=0)
+    def far(self, point: Vector, distance: float) -> set[str]:
+        """Return the moving objects that stay more than `distance` m away from a point."""
+        offsets = self.table[:, :, :3] - point
+        nearest = (offsets * offsets).sum(axis=2).min(axis=0)
         return {name for name, far in zip(self.names, (nearest > distance * distance).tolist(), strict=True) if far}
 
     @cached_property
     def columns(self) -> dict[str, int]:
-        """Where in the table those are that do not stay."""
+        """Column of each moving object in the table."""
         return {name: column for column, name in enumerate(self.names)}
 
     @cached_property
     def all_moved(self) -> list[bool]:
-        """For each tick, whether everything is elsewhere than at the tick before."""
+        """For each tick, whether every object has another pose than at the tick before."""
         moved = (self.table[1:] != self.table[:-1]).any(axis=2).all(axis=1)
         return [False, *(moved & self.complete).tolist()]
 
 
 class PosesAtTick(Mapping[str, Pose3]):
-    """Where everything is at one of those moments; a pose is made when somebody looks at it."""
+    """Poses of all objects at one tick; created on access."""
 
-    __slots__ = ("foreseen", "row")
+    __slots__ = ("predicted", "row")
 
-    def __init__(self, foreseen: PredictedPoses, row: int) -> None:
-        self.foreseen, self.row = foreseen, row
+    def __init__(self, predicted: PredictedPoses, row: int) -> None:
+        self.predicted, self.row = predicted, row
 
     @property
     def table(self) -> Array:
-        """The poses (thing, pose) of those that do not stay."""
-        row: Array = self.foreseen.table[self.row]
+        """Poses (object, pose) of the moving objects."""
+        row: Array = self.predicted.table[self.row]
         return row
 
     def __getitem__(self, name: str) -> Pose3:
-        seen = self.foreseen
+        seen = self.predicted
         column = seen.columns.get(name)
-        return seen.everything[name] if column is None else _made(Pose3, seen.table[self.row, column].tolist())
+        return seen.everything[name] if column is None else _new_pose(Pose3, seen.table[self.row, column].tolist())
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.foreseen.everything)
+        return iter(self.predicted.everything)
 
     def __len__(self) -> int:
-        return len(self.foreseen.everything)
+        return len(self.predicted.everything)
 
 
 class BatchPathSampler:
-    """Paths, each at a height z, asked at many times at once: `Track.at` to the last bit, by the same operations.
+    """Paths at heights z, sampled at many times at once, bit-identical to `PathSampler.at`.
 
-    Where something turns or is eased it is asked one time after the other: a sine of numpy's may differ in its last
-    bit. Most are legs of one heading.
+    Segments with rotation or easing are sampled one by one, because a sine of numpy may differ in the last bit. Most
+    segments have a constant heading.
     """
 
     def __init__(self, each: Sequence[tuple[MotionPath, float]]) -> None:
@@ -86,7 +86,7 @@ class BatchPathSampler:
         self._once = np.array([path.mode == "once" for path in paths]) | (self._lasts <= 0)
         self._returns = np.array([path.mode == "back_and_forth" for path in paths])
         self._period = np.where(self._once, 1.0, np.where(self._returns, 2 * self._lasts, self._lasts))
-        # The legs of all paths, one behind the other; `inner` are the times at which those of several legs change them.
+        # Segments of all paths in one list; `inner` are the times at which paths of several segments switch.
         legs, self._numbers, self._inner = list[PathSegment](), list[int](), list[tuple[int, Array]]()
         for column, path in enumerate(paths):
             self._numbers.append(len(legs))
@@ -99,7 +99,7 @@ class BatchPathSampler:
         self._turns = self._legs[7] != 0
 
     def at(self, seconds: Array) -> Array:
-        """Poses (n, m, 7) at times (n, m), each since its path was set off."""
+        """Return poses (n, m, 7) at times (n, m), each relative to the start of its path."""
         running = seconds - self._start
         local = self._phase + np.where(running > 0, running, 0.0)
         since = local - self._first
@@ -121,4 +121,4 @@ class BatchPathSampler:
 
 
 _UNEVEN = PathSegment(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-"""Of what is asked one time after the other."""
+"""Placeholder of paths that are sampled one by one."""

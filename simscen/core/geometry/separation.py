@@ -1,4 +1,4 @@
-"""How far two polygons are apart, or how deep they are in each other."""
+"""Signed distance between polygons: separation, or penetration depth."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) -> Array:
-    """Signed distance (n,) in meters between `moving`, carried along `poses` (n, 3), and `fixed`, both filled.
+    """Return the signed distance (n,) in m between `moving` at `poses` (n, 3) and `fixed`, both filled polygons.
 
-    Apart it is the distance of their nearest points. Overlapping it is negative by the shortest way on which `moving`
-    would get clear of `fixed`; where one is not convex, of those two of their convex pieces that are deepest in each
-    other, a lower bound. `moving` may be a single point. Raises ValueError for a ring that crosses itself.
+    Positive values are the distance between the nearest points. Negative values are the shortest translation that would
+    separate the polygons; for concave polygons, that of the pair of convex pieces with the deepest penetration, a lower
+    bound. `moving` may be a single point. Raises ValueError for a polygon that intersects itself.
     """
     pieces = [_array(piece) for piece in (convex_pieces(moving) if len(moving) > 2 else [moving])]
     others = [_array(piece) for piece in convex_pieces(fixed)]
@@ -35,15 +35,15 @@ def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) 
 
 
 POSES_PER_BATCH = 64
-"""Poses whose surroundings are looked at together: few enough to be near each other on a drive."""
+"""Number of poses that share one search for nearby boxes; consecutive poses of a drive are close together."""
 
 
 def separation_from_boxes(poses: Array, moving: Sequence[Corner], boxes: Array) -> Array:
-    """As `separation`, from the nearest of many rectangles (m, 4): least x and y, greatest x and y; inf for none.
+    """Return `separation` from the nearest of many rectangles (m, 4) as min x, min y, max x, max y; inf for none.
 
-    Of overlapping ones the deepest counts. A box is compared only where it can be the nearest: its distance from where
-    the robot stands differs from that of the hull by no more than the hull reaches. The same holds of several poses and
-    the middle of them.
+    If rectangles overlap the polygon, the deepest one counts. Only rectangles that can be the nearest are compared:
+    their distance from the position of the robot differs from that of the hull by at most the radius of the hull. The
+    same holds for a batch of poses and their mean position.
     """
     pieces = [_array(piece) for piece in (convex_pieces(moving) if len(moving) > 2 else [moving])]
     reach = max(float(np.hypot(*piece.T).max()) for piece in pieces)
@@ -61,7 +61,7 @@ def separation_from_boxes(poses: Array, moving: Sequence[Corner], boxes: Array) 
 
 
 def _can_be_nearest(points: Array, boxes: Array, reach: float) -> npt.NDArray[np.bool_]:
-    """Which of the boxes (m, 4) can be the nearest of anything that is no more than `reach` from points (n, 2)."""
+    """Return which boxes (m, 4) can be the nearest to anything within `reach` of the points (n, 2)."""
     beside = np.maximum(boxes[:, :2] - points[:, np.newaxis], points[:, np.newaxis] - boxes[:, 2:])
     outside = np.maximum(beside, 0.0)
     gaps = np.hypot(outside[..., 0], outside[..., 1])
@@ -74,7 +74,7 @@ def _array(corners: Sequence[Corner]) -> Array:
 
 
 def _transformed_corners(poses: Array, corners: Array) -> Array:
-    """The corners (h, 2) of the robot's frame in the world, (n, h, 2)."""
+    """Return corners (h, 2) of the robot frame in the world frame, (n, h, 2)."""
     c, s = np.cos(poses[:, 2])[:, np.newaxis], np.sin(poses[:, 2])[:, np.newaxis]
     turned = np.stack((c * corners[:, 0] - s * corners[:, 1], s * corners[:, 0] + c * corners[:, 1]), axis=2)
     placed: Array = turned + poses[:, np.newaxis, :2]
@@ -82,10 +82,10 @@ def _transformed_corners(poses: Array, corners: Array) -> Array:
 
 
 def _convex_separation(moving: Array, still: Array) -> Array:
-    """Of convex anticlockwise polygons (n, h, 2) and (n, r, 2).
+    """Return the separation of convex counterclockwise polygons (n, h, 2) and (n, r, 2).
 
-    Two convex polygons overlap unless an edge of one has the whole other outside; the least overlap along the edges'
-    normals is the shortest way out (the edges of their Minkowski difference have no other directions).
+    By the separating axis theorem, two convex polygons overlap unless an edge of one has the other polygon outside. The
+    least overlap along the edge normals is the shortest translation that separates them.
     """
     along = np.maximum(_separation_along_normals(still, moving), _separation_along_normals(moving, still))
     apart = np.minimum(_distance_to_border(moving, still), _distance_to_border(still, moving))
@@ -94,7 +94,7 @@ def _convex_separation(moving: Array, still: Array) -> Array:
 
 
 def _separation_along_normals(polygon: Array, points: Array) -> Array:
-    """How far the nearest of `points` (n, k, 2) is outside the edge of `polygon` (n, m, 2) that it is furthest from."""
+    """Return the largest distance over the edges of `polygon` (n, m, 2) of the nearest of `points` (n, k, 2)."""
     if polygon.shape[1] < 2:
         return np.full(len(points), -np.inf)
     along = np.roll(polygon, -1, axis=1) - polygon
@@ -105,7 +105,7 @@ def _separation_along_normals(polygon: Array, points: Array) -> Array:
 
 
 def _distance_to_border(points: Array, polygon: Array) -> Array:
-    """Distance of the points (n, k, 2) to the border of `polygon` (n, m, 2)."""
+    """Return the distance of the points (n, k, 2) to the border of `polygon` (n, m, 2)."""
     along = np.roll(polygon, -1, axis=1) - polygon
     squared = np.maximum((along**2).sum(axis=2), np.finfo(np.float64).tiny)[:, np.newaxis]
     offset = points[:, :, np.newaxis] - polygon[:, np.newaxis]

@@ -1,7 +1,7 @@
-"""Solids in space: one list of them feeds physics, rays and map alike.
+"""Shapes, solids and bodies. Physics, ray casting and maps use the same solids.
 
-Every shape is given about its own origin: boxes, cylinders, capsules and cones are centered, their axis is z.
-Sizes are in meters.
+Each shape is given in its own frame: boxes, cylinders, capsules and cones are centered, with z as their axis. Sizes are
+in m.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Box:
-    """A box with edge lengths (x, y, z)."""
+    """Box with edge lengths (x, y, z)."""
 
     size: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Cylinder:
-    """A cylinder of `radius` and `length` along z."""
+    """Cylinder of `radius` and `length` along z."""
 
     radius: float
     length: float
@@ -34,14 +34,14 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Sphere:
-    """A ball of `radius`."""
+    """Sphere of `radius`."""
 
     radius: float
 
 
 @dataclass(frozen=True)
 class Capsule:
-    """A cylinder of `length` along z with half balls of the same radius on both ends."""
+    """Cylinder of `length` along z with half spheres of the same radius at both ends."""
 
     radius: float
     length: float
@@ -49,14 +49,14 @@ class Capsule:
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """An ellipsoid with half-axes (x, y, z)."""
+    """Ellipsoid with half-axes (x, y, z)."""
 
     radii: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Cone:
-    """A cone with its base circle at -length/2 and its tip at +length/2."""
+    """Cone with its base circle at -length/2 and its tip at +length/2."""
 
     radius: float
     length: float
@@ -64,7 +64,7 @@ class Cone:
 
 @dataclass(frozen=True)
 class Extrusion:
-    """A simple polygon, anticlockwise in the xy plane, pulled up from z = 0 to `height`."""
+    """Simple polygon, counterclockwise in the xy plane, extruded from z = 0 to `height`."""
 
     polygon: tuple[tuple[float, float], ...]
     height: float
@@ -72,7 +72,7 @@ class Extrusion:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles as they are, concave ones too: `vertices` (n, 3) in meters, `faces` (m, 3) anticlockwise."""
+    """Triangle mesh, possibly concave: `vertices` (n, 3) in m, `faces` (m, 3) counterclockwise."""
 
     vertices: Array
     faces: npt.NDArray[np.int32]
@@ -83,21 +83,21 @@ Shape = Box | Cylinder | Sphere | Capsule | Ellipsoid | Cone | Extrusion | Mesh
 
 @dataclass(frozen=True)
 class Solid:
-    """A shape at a place: `pose` is the shape's frame in the frame of whatever owns the solid."""
+    """Shape at a pose: `pose` is the frame of the shape in the frame of the owner."""
 
     shape: Shape
     pose: Pose3 = Pose3()
     name: str = ""
     friction: float = 1.0
-    """Of its surface against the wheels' rubber, which is 1 on dry concrete."""
+    """Friction of the surface with rubber wheels; 1 for dry concrete."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """Something that can move as one piece.
+    """Rigid body that can move.
 
-    `pose` is where it starts, `solids` are placed in its own frame. `mass` in kg; 0 means that nothing but the
-    scenario moves it. `path` scripts its motion.
+    `pose` is its start pose, and `solids` are in its own frame. `mass` is in kg; 0 means that only the scenario moves
+    it. `path` scripts its motion.
     """
 
     name: str
@@ -109,18 +109,18 @@ class Body:
 
 @dataclass(frozen=True)
 class MotionPath:
-    """A path through planar poses: at `times[k]` (s, on its own clock) something that follows it is at `poses[k]`.
+    """Path through planar poses: at path time `times[k]` (s), a body on the path is at `poses[k]`.
 
-    Its clock stands at `phase` until `start` seconds after it was set off, and runs from then on. `mode`: "once" stays
-    at the end, "loop" starts over, "back_and_forth" turns around. `ease` is how it goes from one pose to the next:
+    The path time is `phase` until `start` seconds after the start of the path, and increases from then on. `mode` is
+    "once" (stay at the end), "loop" (start over), or "back_and_forth". `ease` is the motion between two poses:
 
-    - "linear": evenly.
-    - "smooth": from rest to rest, by 3 u² - 2 u³ of the way after the share u of the time; 1.5 times as fast as
-      evenly where it is fastest.
-    - "spline": along a cubic Hermite curve, whose velocity at pose k is that of Catmull and Rom for uneven times,
-      (p[k+1] - p[k-1]) / (t[k+1] - t[k-1]); at rest at both ends, but across the seam of a loop. Headings, too.
+    - "linear": constant velocity.
+    - "smooth": from rest to rest, with 3 u² - 2 u³ of the distance after the fraction u of the time; the peak speed is
+      1.5 times the mean speed.
+    - "spline": cubic Hermite curve for position and heading, with Catmull-Rom velocities at pose k for uneven times,
+      (p[k+1] - p[k-1]) / (t[k+1] - t[k-1]); at rest at both ends, except in a loop.
 
-    Headings turn the shorter way from each pose to the next.
+    Headings take the shorter rotation between two poses.
     """
 
     times: tuple[float, ...]
@@ -131,20 +131,20 @@ class MotionPath:
     phase: float = 0.0
 
     def elapsed(self, seconds: float) -> float:
-        """What its clock shows `seconds` after it was set off, turning around and starting over not counted."""
+        """Return the path time `seconds` after the start of the path, before folding of repetitions."""
         return self.phase + max(0.0, seconds - self.start)
 
     def over(self, seconds: float) -> bool:
-        """Whether nothing moves along it any more, `seconds` after it was set off."""
+        """Return whether the motion has ended `seconds` after the start of the path."""
         return self.mode == "once" and self.elapsed(seconds) >= self.times[-1]
 
 
 @dataclass(frozen=True)
 class TriangleMesh:
-    """Many solids fused: `vertices` (n, 3), `faces` (m, 3) and, for each face, the index of its owner in `names`.
+    """Fused solids: `vertices` (n, 3), `faces` (m, 3), and the index into `names` of the owner of each face.
 
-    `frictions` are those of the solids' surfaces, by the same index; empty where all are 1. `hulls` are the vertices
-    of solids that are convex for sure, None of others; empty where nobody has asked.
+    `frictions` are the surface frictions by the same index; empty if all are 1. `hulls` are the vertices of solids
+    known to be convex, and None for others; empty if not computed.
     """
 
     vertices: Array

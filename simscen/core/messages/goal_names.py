@@ -1,26 +1,26 @@
-"""What goals are called, how they are driven to and how they may end: all that a scenario says of them in words."""
+"""Names of goals, navigation modes, and expected failures of goals."""
 
 import re
 from typing import Literal
 
 Mode = Literal["navigate_to_pose", "navigate_through_poses", "follow_waypoints"]
-"""Nav2's actions that take goals: one after the other, passed in one drive, or as waypoints with a task at each."""
+"""Nav2's navigation actions: one goal after the other, all goals in one drive, or waypoints with a task at each."""
 
 FAILED = "failed"
-"""How a goal is to end at which the robot is to fail with whatever code."""
+"""Expected end of a goal that fails with any error code."""
 
 
 def loop_goal_name(name: str, loop: int) -> str:
-    """What a goal of that name is called when the list of goals is driven for the `loop`-th time."""
+    """Return the name of a goal in the given loop over the list of goals, counted from 1."""
     return name if loop == 1 else f"{name}#{loop}"
 
 
 LOOP_NAME = re.compile(r"(.+)#[0-9]+")
-"""The name of a goal in a further loop."""
+"""Name of a goal in a loop after the first."""
 
 
 def matches_goal_name(name: str, asked: str | None) -> bool:
-    """Whether a goal is the one that is asked for: `shelf` is `shelf` in every loop, `shelf#2` that of the second."""
+    """Return whether a goal matches a name: `shelf` matches in every loop, `shelf#2` only in the second."""
     if asked is None or name == asked:
         return True
     loop = LOOP_NAME.fullmatch(name)

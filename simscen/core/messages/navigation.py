@@ -12,11 +12,11 @@ from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array, Pose2
 
 RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup", "retrace"]
-"""The behaviors of a recovery, with Nav2's names."""
+"""Recovery behaviors with Nav2's names."""
 
 ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recovery", "rate"]
-"""Why a plan is made anew while its goal stays: it is blocked, the robot has left it, an obstacle came too near to it,
-obstacles went away, the rolling window moved on, after a recovery, or it was time."""
+"""Reason for a new plan to the same goal: the old one is blocked, the robot left it, an obstacle is too close to it, a
+better one is free, the rolling window moved, a recovery ended, or the planning period is over."""
 
 
 class ErrorCode(IntEnum):
@@ -52,17 +52,17 @@ class ErrorCode(IntEnum):
 
 
 _THROUGH_POSES = {**{code + 100: code for code in range(200, 209)}, **{code + 100: code for code in range(9000, 9004)}}
-"""ComputePathThroughPoses and NavigateThroughPoses number what the actions of one pose do, 100 higher."""
+"""ComputePathThroughPoses and NavigateThroughPoses use the codes of the actions for one pose plus 100."""
 
 
 def error_code(number: int) -> ErrorCode | int:
-    """The code of a number, by the name that one pose and several share; the number itself where it has no name."""
+    """Return the code of a number, with the code for one pose also for several poses; unknown numbers unchanged."""
     number = _THROUGH_POSES.get(number, number)
     return ErrorCode(number) if number in {int(code) for code in ErrorCode} else number
 
 
 class TaskResult(str, Enum):
-    """How a navigation task ended; nav2_simple_commander's names."""
+    """Result of a navigation task, with the names of nav2_simple_commander."""
 
     UNKNOWN = "UNKNOWN"
     SUCCEEDED = "SUCCEEDED"
@@ -72,10 +72,10 @@ class TaskResult(str, Enum):
 
 @fast_dataclass()
 class Goal:
-    """A pose to reach in the map frame, within tolerances (m, rad), in at most `timeout` simulated seconds.
+    """Pose to reach in the map frame within tolerances (m, rad), in at most `timeout` simulated seconds.
 
-    `via`: it is passed within its tolerance without a stop, whatever the heading, on the way to the goal after it, in
-    one plan (Nav2's NavigateThroughPoses). `wait`: simulated seconds to stay there (Nav2's WaitAtWaypoint).
+    A `via` goal is passed within its tolerance without a stop and with any heading, in one plan with the next goal
+    (Nav2's NavigateThroughPoses). `wait` is the time in simulated seconds to stay there (Nav2's WaitAtWaypoint).
     """
 
     name: str
@@ -87,25 +87,25 @@ class Goal:
     wait: float = 0.0
 
     def at(self, pose: Pose2) -> Goal:
-        """The same goal elsewhere, or in another frame."""
+        """Return the same goal at another pose or in another frame."""
         return Goal(self.name, pose, self.xy_tolerance, self.yaw_tolerance, self.timeout, self.via, self.wait)
 
 
 @fast_dataclass(eq=False)
 class Path:
-    """A planned path: `points` (n, 3) x, y, yaw in the map frame, made at `tick`."""
+    """Planned path: `points` (n, 3) are x, y, yaw in the map frame; `tick` is the time of planning."""
 
     points: Array = field(default_factory=lambda: np.empty((0, 3)))
     tick: int = 0
 
     def length(self) -> float:
-        """Length in meters."""
+        """Return the length in m."""
         return float(np.hypot(*np.diff(self.points[:, :2], axis=0).T).sum()) if len(self.points) > 1 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What a localizer is told at the start: `pose` with standard deviations (m, m, rad); None = anywhere."""
+    """Initial estimate for a localizer: `pose` with standard deviations (m, m, rad); None for any pose on the map."""
 
     pose: Pose2 | None
     std: tuple[float, float, float] = (0.5, 0.5, 0.2618)
@@ -113,10 +113,10 @@ class Estimate:
 
 @fast_dataclass(eq=False)
 class Belief:
-    """A localizer's answer: `pose` in the map frame and its covariance (3, 3) over (x, y, yaw).
+    """Output of a localizer: `pose` in the map frame and its covariance (3, 3) over (x, y, yaw).
 
-    `map_from_odom` is the correction it publishes on /tf. `particles` (n, 4) holds x, y, yaw, weight where there are
-    any. `updated` is the tick of the newest measurement that changed it.
+    `map_from_odom` is the transform that it publishes on /tf. `particles` (n, 4) are x, y, yaw, weight, if it has any.
+    `updated` is the tick of the newest measurement that it used.
     """
 
     pose: Pose2

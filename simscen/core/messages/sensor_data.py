@@ -1,4 +1,4 @@
-"""What sensors say. A reading carries its sensor's instance name and the tick it was taken at."""
+"""Sensor readings. Each contains the instance name of its sensor and the tick at which it was taken."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """A planar lidar scan.
+    """Planar lidar scan.
 
-    `ranges` (n,) in meters; inf where nothing was hit up to `range_max`, nan where the beam gave no answer. Beam k
-    points at `angle_min + k * angle_increment` in the lidar's frame, which is at `mount` in the robot's base frame.
+    `ranges` (n,) are in m; inf if nothing was hit up to `range_max`, nan if the beam returned nothing. Beam k points at
+    `angle_min + k * angle_increment` in the lidar frame, which is at `mount` in the base frame of the robot.
     """
 
     sensor: str
@@ -33,11 +33,11 @@ class Scan:
     mount: Pose2 = Pose2(0.0, 0.0, 0.0)
 
     def angles(self) -> Array:
-        """Beam directions (n,) in the lidar's frame, in radians."""
+        """Return the beam directions (n,) in the lidar frame in rad."""
         return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
 
     def points(self) -> Array:
-        """The hits (m, 2) in the robot's base frame; beams without a hit are left out."""
+        """Return the hits (m, 2) in the base frame of the robot, without beams that hit nothing."""
         hit = np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
         angles, ranges = self.angles()[hit], self.ranges[hit]
         return self.mount.apply(np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles))))
@@ -45,7 +45,7 @@ class Scan:
 
 @fast_dataclass()
 class Odometry:
-    """Dead reckoning from the wheels: `pose` in the odom frame, `twist` in the base frame."""
+    """Dead reckoning from wheel encoders: `pose` in the odom frame, `twist` in the base frame."""
 
     sensor: str
     tick: int
@@ -55,7 +55,7 @@ class Odometry:
 
 @fast_dataclass()
 class Imu:
-    """Turn rate (rad/s, about x y z), specific force (m/s², with gravity) and heading (rad), in the base frame."""
+    """Angular velocity (rad/s) and specific force (m/s², including gravity) about x, y, z of the base frame."""
 
     sensor: str
     tick: int
@@ -65,7 +65,7 @@ class Imu:
 
 @fast_dataclass()
 class Bump:
-    """A bumper: whether it is pressed."""
+    """State of a bumper."""
 
     sensor: str
     tick: int
@@ -74,10 +74,10 @@ class Bump:
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """A camera frame: `rgb` (h, w, 3) uint8, `depth` (h, w) in meters along the optical axis, inf where nothing is.
+    """Camera frame: `rgb` (h, w, 3) uint8, `depth` (h, w) in m along the optical axis, inf if nothing was hit.
 
-    The camera sits at `mount` in the robot's base frame and looks along its x axis; `field_of_view` is horizontal, in
-    rad, of square pixels. 0 where nobody has said how it sees.
+    The camera is at `mount` in the base frame of the robot and looks along the x axis. `field_of_view` is the
+    horizontal angle in rad for square pixels; 0 if unknown.
     """
 
     sensor: str

@@ -29,12 +29,12 @@ class LiveRayCaster(RayCaster):
         self._looked: tuple[Iterable[str], Mapping[str, Pose3], Mapping[str, Pose3]] | None = None
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """See core.rays.RayCaster."""
+        """See core.geometry.ray_fans.RayCaster."""
         self._look((0.0, 0.0, 0.0), math.inf)
         return self._scene.cast(origins, directions, reach)
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
-        """See core.rays.RayCaster."""
+        """See core.geometry.ray_fans.RayCaster."""
         self._look(pose[:3], reach)
         return self._scene.sweep(fan, pose, reach)
 
@@ -46,20 +46,20 @@ class LiveRayCaster(RayCaster):
             self._extent = max([_extent(mesh) for mesh in self._meshes.values()], default=0.0)
             self._near = looked = None
         where, homes = robot.objects(), robot.homes
-        names = self._names(where.foreseen, place, reach) if type(where) is PosesAtTick else self._meshes
+        names = self._names(where.predicted, place, reach) if type(where) is PosesAtTick else self._meshes
         # Identical objects mean that nothing has moved.
         if looked is None or names is not looked[0] or where is not looked[1] or homes is not looked[2]:
             self._looked = names, where, homes
             self._scene.set_moving({name: (self._meshes[name], where[name]) for name in names}, homes)
 
-    def _names(self, foreseen: PredictedPoses, place: Vector, reach: float) -> Iterable[str]:
+    def _names(self, predicted: PredictedPoses, place: Vector, reach: float) -> Iterable[str]:
         """Return the objects that can be in reach according to their scripted paths."""
         near = self._near
-        if near is None or not near.holds(foreseen, place, reach):
+        if near is None or not near.holds(predicted, place, reach):
             # 1 % more, because rays end slightly beyond their reach.
-            far = foreseen.far(place, 1.01 * (reach + REFRESH_DISTANCE_M + self._extent))
+            far = predicted.far(place, 1.01 * (reach + REFRESH_DISTANCE_M + self._extent))
             names = [name for name in self._meshes if name not in far]
-            near = self._near = ReachableObjects(foreseen, place, reach + REFRESH_DISTANCE_M, names)
+            near = self._near = ReachableObjects(predicted, place, reach + REFRESH_DISTANCE_M, names)
         return near.names
 
     def _surfaces(self, bodies: Mapping[str, Body]) -> dict[str, TriangleMesh]:
@@ -77,16 +77,16 @@ class LiveRayCaster(RayCaster):
 
 
 class ReachableObjects(NamedTuple):
-    """Moving objects that rays from a place can reach, as long as the scripted paths stay as `foreseen`."""
+    """Moving objects that rays from a place can reach, as long as the scripted paths stay as `predicted`."""
 
-    foreseen: PredictedPoses
+    predicted: PredictedPoses
     place: Vector
     reach: float
     names: list[str]
 
-    def holds(self, foreseen: PredictedPoses, place: Vector, reach: float) -> bool:
+    def holds(self, predicted: PredictedPoses, place: Vector, reach: float) -> bool:
         """Return whether the list is valid for rays from another place."""
-        return foreseen is self.foreseen and math.dist(place, self.place) + reach <= self.reach
+        return predicted is self.predicted and math.dist(place, self.place) + reach <= self.reach
 
 
 def _parts(body: Body) -> list[tuple[Shape, Pose3]]:

@@ -120,7 +120,7 @@ def keepout_masks_on_goals(scene: Scene) -> Iterator[Finding]:
         mask = masks[name]
         if not len(mask.forbidden):
             continue
-        start = mask.seen_from(np.array([scene.start]))
+        start = mask.to_mask_frame(np.array([scene.start]))
         if separation_from_boxes(start, scene.outline, mask.forbidden)[0] < 0:
             yield Finding(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
             continue

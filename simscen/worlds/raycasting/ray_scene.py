@@ -24,7 +24,7 @@ _ROOM, _HAIR = 0.1, 0.01
 
 
 class RayScene(RayCaster):
-    """A `core.rays.RayCaster` over the triangles of a world and of the bodies that move in it.
+    """A `core.geometry.ray_fans.RayCaster` over the triangles of a world and of the bodies that move in it.
 
     A body that moves stays as it was built; the few rays that come near it are carried into its frame. Of what lies at
     home the triangles are carried into the frame of the world instead, once, so that many are asked at once: that is
@@ -62,7 +62,7 @@ class RayScene(RayCaster):
             self._piles.keep(at_home)
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """See core.rays.RayCaster."""
+        """See core.geometry.ray_fans.RayCaster."""
         limit = min(reach, _FARTHEST)
         if not len(origins):
             return np.empty(0)
@@ -72,7 +72,7 @@ class RayScene(RayCaster):
         return answer
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
-        """See core.rays.RayCaster: with as few operations as may be, for each takes 1 µs where it runs once a scan."""
+        """See core.geometry.ray_fans.RayCaster. Runs once per scan, so that each numpy call (1 µs) counts."""
         place, (ahead, left) = pose[:3], forward_and_left(pose[3:])
         fan.turn(ahead, left)
         fan.end(min(reach, _FARTHEST) * _BEYOND)

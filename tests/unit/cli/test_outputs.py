@@ -15,7 +15,7 @@ NOT_PLAIN = ("device", "fifo", "link", "dangling", "folder")
 
 @pytest.fixture
 def odd(tmp_path: Path):
-    """Something that is not a plain file, by name."""
+    """A path that is not a regular file, by name."""
 
     def odd(kind: str) -> Path:
         path = tmp_path / f"odd-{kind}.png"
@@ -106,7 +106,7 @@ def test_what_is_read_is_not_written_over(simscen, tmp_path: Path) -> None:
     ):
         ended = simscen(*command)
         assert ended.code == 2
-        assert ended.err.endswith("it is one of the files that are read\n")
+        assert ended.err.endswith("it is one of the input files\n")
     assert (tmp_path / "room.world.yaml").read_text() == world
     assert (tmp_path / "good.scenario.yaml").read_text() == scenario
 
@@ -141,7 +141,7 @@ def test_latest_that_is_someones_own_stays(tmp_path: Path, monkeypatch) -> None:
 
 def test_nothing_but_a_plain_file_is_replaced(odd) -> None:
     for kind in NOT_PLAIN:
-        with pytest.raises(OSError, match=r"not a plain file|symbolic link|directory"):
+        with pytest.raises(OSError, match=r"not a regular file|symbolic link|directory"):
             write_atomically(odd(kind), b"")
 
 

@@ -18,7 +18,9 @@ EVERY, AHEAD = 6, 20
 STAYS = {"a shelf": Pose3(1.0, 2.0), "the door": Pose3(3.0, 4.0)}
 
 
-def foreseen(moves: tuple[str, ...], stays: dict[str, Pose3], pauses: float, seed: int, begin: int = 0) -> list[Moment]:
+def predicted(
+    moves: tuple[str, ...], stays: dict[str, Pose3], pauses: float, seed: int, begin: int = 0
+) -> list[Moment]:
     """Four seconds in which some things stay, and others move at most moments."""
     chance = np.random.default_rng(seed)
     table = chance.uniform(-5, 5, (160, len(moves), 7))
@@ -55,8 +57,8 @@ def log_and_trace(moments: list[Moment]) -> tuple[bytes, Trace]:
 @pytest.mark.parametrize("pauses", [0.0, 0.02, 0.7, 1.0])
 @pytest.mark.parametrize("stays", [{}, STAYS], ids=["all move", "some stay"])
 def test_a_run_is_written_as_if_each_pose_had_been_looked_at(stays: dict[str, Pose3], pauses: float) -> None:
-    late = foreseen(("cart 1", "cart 2", "cart 3"), stays, pauses, seed=3)
-    late += foreseen(("cart 1", "cart 3"), stays, pauses, seed=4, begin=late[-1].tick + 10 * EVERY)
+    late = predicted(("cart 1", "cart 2", "cart 3"), stays, pauses, seed=3)
+    late += predicted(("cart 1", "cart 3"), stays, pauses, seed=4, begin=late[-1].tick + 10 * EVERY)
     at_once = [replace(m, sample=m.truth and m.truth._replace(objects=dict(m.truth.objects))) for m in late]
     (log, trace), (expected, traced) = log_and_trace(late), log_and_trace(at_once)
     assert log == expected

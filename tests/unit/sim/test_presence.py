@@ -59,7 +59,7 @@ def test_all_whose_ways_lead_a_robot_within_its_reach_are_met_and_few_others(sim
         return min(math.dist(pose_at(actor.path, actor.path.start + at)[:2], place[:2]) for at in moments) - actor.size
 
     away = {actor.body.name: nearest(actor) for actor in actors}
-    strays = {actor.body.name: max(way.strays for way in actor.ways) for actor in actors}
+    strays = {actor.body.name: max(way.deviation for way in actor.ways) for actor in actors}
     names = {actor.body.name for actor in met}
     assert 0 < len(names) < 50
     assert {name for name, distance in away.items() if distance <= 3.0 + STRIDE} <= names

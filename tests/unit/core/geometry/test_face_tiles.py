@@ -17,7 +17,7 @@ def test_the_lots_near_a_place_hold_every_face_that_is_so_near_and_none_of_the_f
     vertices, faces = grid(40)
     lots = tile_faces(vertices, faces, 4.0)
     near = lots.near(10.5, 20.0, 9.0)
-    taken = {tuple(face) for number in np.flatnonzero(near) for face in lots.lot(number).tolist()}
+    taken = {tuple(face) for number in np.flatnonzero(near) for face in lots.tile(number).tolist()}
     inside = np.hypot(*(vertices[faces, :2] - (10.5, 20.0)).transpose(2, 0, 1)).min(axis=1) <= 9.0
     assert {tuple(face) for face in faces[inside].tolist()} <= taken
     assert len(taken) < 2 * 22 * 22

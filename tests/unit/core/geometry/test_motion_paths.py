@@ -139,8 +139,8 @@ def test_nothing_strays_farther_from_its_ways_than_they_say(ease, mode):
         path = MotionPath((0.0, *sorted(chance.uniform(0.1, 9) for _ in range(3))), poses, mode, ease=ease)
         for moment in range(60):
             x, y, _ = pose_at(path, 0.3 * moment)
-            away = [(beside(x, y, way), way.strays) for way in swept_segments(path)]
-            assert any(meters <= strays + 1e-9 for meters, strays in away)
+            away = [(beside(x, y, way), way.deviation) for way in swept_segments(path)]
+            assert any(meters <= deviation + 1e-9 for meters, deviation in away)
             strayed.append(min(meters for meters, _ in away))
     assert (max(strayed) > 0.1) == (ease == "spline")
 
