@@ -10,7 +10,6 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.records.events import EventKind
-from simscen.core.records.trace import Samples
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
 
 if TYPE_CHECKING:
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Samples, Ticks, Trace
 
     Flags = npt.NDArray[np.bool_]
-
 else:
     Flags = object  # annotations are not evaluated; commands that only read files need no numpy
 
@@ -205,6 +203,8 @@ def nees(error: Array, covariance: Array) -> Array:
 
 def nees_samples(trace: Trace) -> Samples:
     """NEES (n, 1) of each belief against the truth at its tick; none without covariances."""
+    from simscen.core.records.trace import Samples
+
     belief, poses = check_samples(trace.belief, "the belief", trace), truth(trace)
     if not len(belief) or not len(poses) or belief.values.shape[1] < 9:
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 1)))
