@@ -11,18 +11,13 @@ import numpy as np
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.geometry.separation import separation
 from simscen.core.records.events import EventKind
-from simscen.core.records.trace import Ticks
 from simscen.criteria.trace_signals.ground_truth import check_samples
 from simscen.criteria.trace_signals.readers import goal_distance, poses_of
 from simscen.criteria.trace_signals.sampling import SignalQuery, SignalUnavailable
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
-    from simscen.core.records.trace import Trace
-
-if TYPE_CHECKING:
-    from simscen.core.records.trace import Trace
-
+    from simscen.core.records.trace import Ticks, Trace
 
 _TINY = sys.float_info.min
 """Square meters; stands for the square of a step of no length, to divide by."""
