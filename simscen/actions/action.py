@@ -27,7 +27,7 @@ class AnyAction(Choice):
     stop: Annotated[Action | None, LazySpec("simscen.actions.stop", "Stop")] = None
     open: Annotated[Action | None, LazySpec("simscen.actions.doors", "OpenDoor")] = None
     close: Annotated[Action | None, LazySpec("simscen.actions.doors", "CloseDoor")] = None
-    kidnap: Annotated[Action | None, LazySpec("simscen.actions.robot", "Kidnap")] = None
+    kidnap: Annotated[Action | None, LazySpec("simscen.actions.kidnap", "Kidnap")] = None
     push: Annotated[Action | None, LazySpec("simscen.actions.push", "Push")] = None
     new_goal: Annotated[Action | None, LazySpec("simscen.actions.goals", "NewGoal")] = None
     cancel_goal: Annotated[Action | None, LazySpec("simscen.actions.goals", "CancelGoal")] = None
@@ -55,6 +55,6 @@ class AnyAction(Choice):
         assert isinstance(action, Action)
         if self.narrow is None:
             return action.perform(stage)
-        from simscen.actions.watched import perform_watched
+        from simscen.actions.plugin_actions import perform_checked
 
-        return perform_watched(action, stage, self.added_by)
+        return perform_checked(action, stage, self.added_by)

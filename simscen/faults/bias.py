@@ -11,10 +11,9 @@ from pydantic import Field
 
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Image, Imu, Reading
-from simscen.faults._keys import misplaced_key
-from simscen.faults._odometry import OdometryDistortion
-from simscen.faults._ranging import with_distances
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
+from simscen.faults.common import OdometryDistortion, inapplicable_key
+from simscen.faults.range_readings import with_distances
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Acceleration, Angle, AngularSpeed, Length, Quantity, Ratio
 
@@ -56,7 +55,7 @@ class Bias(Spec, Fault):
 
     def senseless(self, instance: Instance) -> tuple[str, str] | None:
         """Keys that mean nothing there."""
-        return misplaced_key(self, instance)
+        return inapplicable_key(self, instance)
 
     def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
         """Scale each increment, or add to each value."""

@@ -12,8 +12,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Reading
-from simscen.faults._belief import with_correction
 from simscen.faults.base import Disturbance, Fault, FaultSetting
+from simscen.faults.common import apply_correction
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration
 
@@ -74,7 +74,7 @@ class _Late(Disturbance):
         if (fresh := self._corrections.pass_on(newest, self._due(), now)) is not None:
             arrived.append(fresh)
         self._correction = arrived[-1] if arrived else self._correction or newest
-        return with_correction(belief, self._correction)
+        return apply_correction(belief, self._correction)
 
     def end(self) -> Disturbance | None:
         """What is under way still arrives."""

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from simscen.core.messages.sensor_data import Reading, Scan
-from simscen.faults._ranging import limited
 from simscen.faults.base import Disturbance, Fault, FaultSetting
+from simscen.faults.range_readings import clip_to_sensor_range
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength
 
@@ -43,4 +43,4 @@ class _Cloud(Disturbance):
         particles = np.round(self._chance.exponential(self._path, len(reading.ranges)), 3)
         with np.errstate(invalid="ignore"):
             before = particles < np.minimum(reading.ranges, reading.range_max)
-        return replace(reading, ranges=np.where(before, limited(reading, particles), reading.ranges))
+        return replace(reading, ranges=np.where(before, clip_to_sensor_range(reading, particles), reading.ranges))

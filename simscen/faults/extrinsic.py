@@ -10,9 +10,9 @@ import numpy as np
 
 from simscen.core.geometry import Pose3
 from simscen.core.messages.sensor_data import Image, Imu, Reading, Scan
-from simscen.faults._keys import misplaced_key
-from simscen.faults._ranging import seen_as
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
+from simscen.faults.common import inapplicable_key
+from simscen.faults.range_readings import ranges_with_scan_errors
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Length
 
@@ -50,7 +50,7 @@ class Extrinsic(Spec, Fault):
 
     def senseless(self, instance: Instance) -> tuple[str, str] | None:
         """Keys that mean nothing there."""
-        return misplaced_key(self, instance)
+        return inapplicable_key(self, instance)
 
     def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
         """From now on it measures from there."""
@@ -65,7 +65,7 @@ class _Knocked(Disturbance):
         match reading:
             case Scan() if self._sight is not None:
                 there, elsewhere = self._sight.distances(reading), self._sight.distances(reading, self._error)
-                return replace(reading, ranges=seen_as(reading, elsewhere, there))
+                return replace(reading, ranges=ranges_with_scan_errors(reading, elsewhere, there))
             case Image() if self._sight is not None:
                 seen = self._sight.image(self._error)
                 return replace(reading, rgb=seen.rgb, depth=seen.depth)

@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.geometry.kinematics import Twist
-from simscen.faults._sides import motion_of, sideless, sides
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
+from simscen.faults.common import inapplicable_side, side_speeds, twist_from_sides
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Quantity
 
@@ -40,7 +40,7 @@ class Gain(Spec, Fault):
     def senseless(self, instance: Instance) -> tuple[str, str] | None:
         """Sides of what has none."""
         for key in ("left", "right"):
-            if key in self.model_fields_set and (why := sideless(instance, key)):
+            if key in self.model_fields_set and (why := inapplicable_side(instance, key)):
                 return why
         return None
 
@@ -58,5 +58,5 @@ class _Scaled(Disturbance):
         scaled = Twist(gain.linear * command.vx, gain.linear * command.vy, gain.angular * command.wz)
         if not separation or gain.left == gain.right == 1:
             return scaled
-        left, right = sides(scaled, separation)
-        return motion_of(gain.left * left, gain.right * right, scaled.vy, separation)
+        left, right = side_speeds(scaled, separation)
+        return twist_from_sides(gain.left * left, gain.right * right, scaled.vy, separation)

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.messages.sensor_data import Reading, Scan
-from simscen.faults._ranging import seen_as
 from simscen.faults.base import Disturbance, Fault, FaultSetting
+from simscen.faults.range_readings import ranges_with_scan_errors
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Probability
 from simscen.spec.references import ObjectName
@@ -49,5 +49,5 @@ class _Panes(Disturbance):
         through = self._chance.random(len(reading.ranges)) < self._glass.probability
         there = self._sight.distances(reading)
         behind = self._sight.distances(reading, without=self._glass.of)
-        told = seen_as(reading, behind, there)
+        told = ranges_with_scan_errors(reading, behind, there)
         return replace(reading, ranges=np.where(through & (behind != there), told, reading.ranges))

@@ -13,9 +13,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Reading, Scan
-from simscen.faults._keys import misplaced_key
-from simscen.faults._odometry import OdometryDistortion
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
+from simscen.faults.common import OdometryDistortion, inapplicable_key
 from simscen.spec.base import Spec
 from simscen.spec.quantities import (
     NonNegativeAcceleration,
@@ -62,7 +61,7 @@ class Noise(Spec, Fault):
 
     def senseless(self, instance: Instance) -> tuple[str, str] | None:
         """Keys that mean nothing there."""
-        return misplaced_key(self, instance)
+        return inapplicable_key(self, instance)
 
     def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
         """Draw anew for each message."""

@@ -10,8 +10,8 @@ from pydantic import Field
 
 from simscen.core.geometry import Array
 from simscen.core.messages.sensor_data import Reading, Scan
-from simscen.faults._ranging import limited
 from simscen.faults.base import Disturbance, Fault, FaultSetting
+from simscen.faults.range_readings import clip_to_sensor_range
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Quantity
 
@@ -61,7 +61,9 @@ class _Wet(Disturbance):
         told = np.where(np.isfinite(ranges), np.round(ranges * (1 + errors), 3), ranges)
         with np.errstate(invalid="ignore"):
             seen = self._returned(ranges) >= REFERENCE / reading.range_max**2
-        return replace(reading, ranges=np.where(np.isfinite(ranges) & ~seen, np.inf, limited(reading, told)))
+        return replace(
+            reading, ranges=np.where(np.isfinite(ranges) & ~seen, np.inf, clip_to_sensor_range(reading, told))
+        )
 
     def _returned(self, ranges: Array) -> Array:
         returned: Array = self._rain.reflectivity * np.exp(-2 * self._rain.extinction * ranges) / ranges**2

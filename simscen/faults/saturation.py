@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.geometry.kinematics import Twist
-from simscen.faults._sides import motion_of, sideless, sides
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
+from simscen.faults.common import inapplicable_side, side_speeds, twist_from_sides
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAcceleration, PositiveAngularAcceleration, Quantity
 
@@ -48,7 +48,7 @@ class Saturation(Spec, Fault):
     def senseless(self, instance: Instance) -> tuple[str, str] | None:
         """Sides of what has none."""
         for key in ("left", "right"):
-            if getattr(self, key) is not None and (why := sideless(instance, key)):
+            if getattr(self, key) is not None and (why := inapplicable_side(instance, key)):
                 return why
         return None
 
@@ -78,9 +78,9 @@ class _Weak(Disturbance):
         limited = Twist(ahead, aside, turn)
         if not separation or (spec.left is None and spec.right is None):
             return limited
-        left, right = sides(limited, separation)
+        left, right = side_speeds(limited, separation)
         (left,), (right,) = _short((left,), spec.left), _short((right,), spec.right)
-        return motion_of(left, right, limited.vy, separation)
+        return twist_from_sides(left, right, limited.vy, separation)
 
     def _within_accelerations(self, before: Twist, wanted: Twist, seconds: float) -> Twist:
         spec = self._spec

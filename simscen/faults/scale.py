@@ -11,9 +11,9 @@ from pydantic import Field
 
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Imu, Reading
-from simscen.faults._odometry import OdometryDistortion
-from simscen.faults._ranging import with_distances
 from simscen.faults.base import Disturbance, Fault, FaultSetting
+from simscen.faults.common import OdometryDistortion
+from simscen.faults.range_readings import with_distances
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Quantity
 

@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.geometry.kinematics import Twist
-from simscen.faults._odometry import OdometryDistortion
 from simscen.faults.base import Disturbance, Fault, FaultSetting
+from simscen.faults.common import OdometryDistortion
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Quantity
 

@@ -10,8 +10,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Reading
-from simscen.faults._belief import with_correction
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
+from simscen.faults.common import apply_correction
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Frequency
 
@@ -65,4 +65,4 @@ class _Seldom(Disturbance):
     def belief(self, belief: Belief) -> Belief:
         if self._due() or self._correction is None:
             self._correction = belief.map_from_odom
-        return with_correction(belief, self._correction)
+        return apply_correction(belief, self._correction)

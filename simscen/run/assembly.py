@@ -30,7 +30,7 @@ from simscen.run.robot_interface import (
 )
 from simscen.sensors.build import build_sensors
 from simscen.sensors.sensor import Sensor
-from simscen.sim.robot import Robot
+from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Placed, Simulation
 from simscen.stack.build import build_stack
 from simscen.stack.protocols import Stack, Surroundings

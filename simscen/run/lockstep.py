@@ -23,7 +23,7 @@ from simscen.run.faults.injector import FaultInjector
 from simscen.run.live_world.director import Director
 from simscen.run.live_world.stage import LiveStage
 from simscen.run.robot_interface import SensorSuite, TickSchedule
-from simscen.sim.robot import Robot
+from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
 from simscen.stack.protocols import Stack
 

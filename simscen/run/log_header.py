@@ -25,8 +25,8 @@ from simscen.record.sceneryfile import NAME as SCENERY
 from simscen.record.sceneryfile import scenery_to_json
 from simscen.run.preparation.scenario import PreparedScenario
 from simscen.run.robot_interface import sensor_frames, sensor_kinds
-from simscen.sim.outline import convex_hull, footprint, parts
-from simscen.sim.urdf.describe import describe
+from simscen.sim.body.outline import convex_hull, footprint, outlines_in_band
+from simscen.sim.urdf.writer import to_urdf
 from simscen.worlds.routes.shortest_paths import Z_RANGE
 
 _KNOWN: WeakKeyDictionary[PreparedScenario, LogHeader] = WeakKeyDictionary()
@@ -52,7 +52,7 @@ def _of_one(prepared: PreparedScenario) -> LogHeader:
         case=prepared.case,
         scenario=resolved_text(prepared.loaded),
         map=prepared.map,
-        robot_description=describe(prepared.body),
+        robot_description=to_urdf(prepared.body),
         frames=sensor_frames(prepared.robot),
         sensors=sensor_kinds(prepared),
         facts={**_key_facts(prepared), **{fact_of(entry): requirement_of(entry) for entry in prepared.plugins}},
@@ -86,7 +86,7 @@ def world_scenery(prepared: PreparedScenario) -> Scenery:
 
 
 def _thing(body: Body, world: World) -> MovableObject:
-    outlines = parts(body.solids, Z_RANGE) or ([footprint(body.solids)] if body.solids else [])
+    outlines = outlines_in_band(body.solids, Z_RANGE) or ([footprint(body.solids)] if body.solids else [])
     rounded = tuple(tuple((round(x, MILLIMETERS), round(y, MILLIMETERS)) for x, y in outline) for outline in outlines)
     closed, opened = world.doors.get(body.name, (None, None))
     return MovableObject(body.name, body.pose.plane, rounded, closed, opened, body.mass)

@@ -14,7 +14,7 @@ from simscen.model.stack import StackSpec
 from simscen.model.stackbase import StackBase
 from simscen.run.preparation.scenario import PreparedScenario
 from simscen.sensors.sensor import Sensor
-from simscen.sim.robot_body import RobotBody
+from simscen.sim.body.robot_body import RobotBody
 from simscen.stack.localizers.ground_truth import TRUTH
 from simscen.stack.protocols import RobotModel
 

@@ -28,7 +28,7 @@ from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
 from simscen.run.log_header import log_header
 from simscen.run.preparation.scenario import PreparedScenario, prepare
-from simscen.sim.alone import NAMELESS
+from simscen.sim.single_robot import NAMELESS
 from simscen.spec.registry import Entry
 
 Attach = Callable[[RunSetup, Sequence[Log]], Sequence[Log]]

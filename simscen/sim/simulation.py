@@ -13,16 +13,16 @@ from simscen.core.environment.world_model import Patch
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, MotionPath, TriangleMesh
 from simscen.core.records.case import CLEARANCE_RANGE
-from simscen.sim import engine
-from simscen.sim.actors import Actors
-from simscen.sim.clients import CLIENTS
-from simscen.sim.contacts import Before
-from simscen.sim.film import Film
-from simscen.sim.robot import Robot, Scene
-from simscen.sim.robot_body import RobotBody
-from simscen.sim.settled import EVERY, LOOKS
-from simscen.sim.terrain import Terrain
-from simscen.sim.walls import Walls
+from simscen.sim.body.robot_body import RobotBody
+from simscen.sim.bullet import engine
+from simscen.sim.bullet.client_pool import CLIENT_POOL
+from simscen.sim.contact.collisions import PreStepMotion
+from simscen.sim.objects.actors import Actors
+from simscen.sim.objects.rest import SAMPLE_COUNT, SAMPLE_PERIOD_TICKS
+from simscen.sim.robots.robot import Robot, Scene
+from simscen.sim.scene.camera import RenderScene
+from simscen.sim.scene.terrain import Terrain
+from simscen.sim.scene.walls import Walls
 
 FIRMWARE_RATE = 60
 """Hz at which a base's firmware updates its wheel speeds; Clearpath's and Robotis' run at 50 to 100 Hz."""
@@ -64,12 +64,12 @@ class Simulation:
         the engine has no primitive for. Without `pictures` no robot has eyes that take any, and the renderer need not
         be shown anything.
         """
-        client = CLIENTS.take()
+        client = CLIENT_POOL.take()
         engine.set_up(client, tick_rate, solver_iterations, one_by_one=len(robots) > 1)
         terrain = Terrain(client, static, max((w.radius for r in robots.values() for w in r.body.wheels), default=0.0))
         walls = Walls(client, terrain.rest)
         look = engine.AS_IT_IS if pictures else engine.speck(client)
-        film = Film(client, static, triangulate) if pictures else None
+        film = RenderScene(client, static, triangulate) if pictures else None
         actors = Actors(client, tick_rate, triangulate, look, all_present=pictures)
         self._scene = Scene(client, tick_rate, walls, terrain, actors, film)
         self._attends: tuple[int, Callable[[], None]] | None = None
@@ -90,7 +90,7 @@ class Simulation:
             if tick == 0:
                 actors.lay(settling.at_rest())
             pybullet.stepSimulation(client)
-            if -EVERY * LOOKS <= tick < 0 and tick % EVERY == 0:
+            if -SAMPLE_PERIOD_TICKS * SAMPLE_COUNT <= tick < 0 and tick % SAMPLE_PERIOD_TICKS == 0:
                 settling.look()
         actors.settled(0)
         for name, robot in self.robots.items():
@@ -186,7 +186,7 @@ class Simulation:
         pybullet.stepSimulation(scene.client)
         scene.tick += 1
         for robot in self.robots.values():
-            robot.feel(Before(motions[robot.base.id], others, motions))
+            robot.feel(PreStepMotion(motions[robot.base.id], others, motions))
         scene.actors.show(scene.tick)
 
     def _put_up_walls(self, ticks: int) -> None:
@@ -273,4 +273,4 @@ class Simulation:
         """Give the engine back."""
         for robot in self.robots.values():
             robot.close()
-        CLIENTS.give_back(self._scene.client)
+        CLIENT_POOL.give_back(self._scene.client)

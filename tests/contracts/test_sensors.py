@@ -16,8 +16,8 @@ from simscen.core.messages.sensor_data import Bump, Image, Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.model.robot import RobotSpec
 from simscen.sensors.build import build_sensors
-from simscen.sim.alone import Alone
-from simscen.sim.embody import robot_body
+from simscen.sim.body.from_spec import build_robot_body
+from simscen.sim.single_robot import SingleRobotSimulation
 from simscen.worlds.geometry.triangulation import fuse, triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
 
@@ -52,7 +52,7 @@ class Rig:
     """A robot in a room with its sensors."""
 
     def __init__(self, spec, seed=1, pose=Pose2(0.5, -0.3, 0.4)):
-        self.simulation = Alone(ROOM, [], robot_body(spec), pose, triangulate)
+        self.simulation = SingleRobotSimulation(ROOM, [], build_robot_body(spec), pose, triangulate)
         self.sensors = build_sensors(spec, Clock(240), Streams(seed), self.simulation, RayScene(ROOM))
 
     def drive(self, twist, ticks):

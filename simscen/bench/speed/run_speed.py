@@ -20,7 +20,7 @@ from simscen.record.backlog import Log
 from simscen.run.lockstep import RunSetup
 from simscen.run.preparation.scenario import PreparedScenario, lidar_height, prepare
 from simscen.run.simulate import GC_THRESHOLD, simulate
-from simscen.sim.bare import BareWorld
+from simscen.sim.bullet.baseline import PyBulletBaseline
 from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.reference import ReferenceStack
 from simscen.worlds.geometry.triangulation import fuse, triangulate
@@ -143,7 +143,7 @@ def _watched(watch: Stopwatch, setup: RunSetup, own: Sequence[Log]) -> Sequence[
 def bare_patrol(prepared: PreparedScenario, simulated: float) -> float:
     """CPU seconds that PyBullet takes to step and scan as often in the same world, and nothing else."""
     lidar = next(sensor.lidar for sensor in prepared.robot.sensors.values() if sensor.lidar)
-    bare = BareWorld(prepared.built.mesh, prepared.body, prepared.start, triangulate)
+    bare = PyBulletBaseline(prepared.built.mesh, prepared.body, prepared.start, triangulate)
     around = _circle(lidar.beams)
     begun = time.process_time()
     for _ in range(round(simulated * lidar.rate)):
@@ -163,8 +163,8 @@ def measure_field(obstacles: int) -> Field:
     around = _circle(BEAMS)
     directions = np.column_stack((around, np.zeros(BEAMS)))
     origins = np.tile([0.0, 0.0, height], (BEAMS, 1))
-    fused = BareWorld(mesh, prepared.body, start, triangulate)
-    bare = BareWorld(solids, prepared.body, start, triangulate)
+    fused = PyBulletBaseline(mesh, prepared.body, start, triangulate)
+    bare = PyBulletBaseline(solids, prepared.body, start, triangulate)
     field = Field(
         obstacles,
         scan_ms=1e3 * _each(lambda: rays.cast(origins, directions), 200),

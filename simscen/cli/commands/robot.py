@@ -19,7 +19,7 @@ from simscen.loading.files.robotfile import RobotFile, load_robot_file
 if TYPE_CHECKING:
     from simscen.run.robot_check.drive_checks import DriveCheck, RobotCheckResult
     from simscen.run.robot_check.trial_drive import Motion, Trial
-    from simscen.sim.robot_body import RobotBody
+    from simscen.sim.body.robot_body import RobotBody
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
 

@@ -26,7 +26,7 @@ from simscen.run.process.isolation import MAX_MEMORY_BYTES, apply_plugin_path
 from simscen.run.process.jobs import Job, ReplayMode
 from simscen.run.process.worker import ProgressReporter
 from simscen.run.simulate import execute_run
-from simscen.sim.clients import CLIENTS
+from simscen.sim.bullet.client_pool import CLIENT_POOL
 
 _PREPARED = ScenarioCache(CachedWorldBuilder(DiskCache(cache_folder(os.environ))))
 Image.preinit()  # imports what it would import when the first picture is written
@@ -51,7 +51,7 @@ def _warm_up(job: Job) -> None:
     import_components(prepared)
     precompute(prepared)
     log_header(prepared, job.key.seed)
-    CLIENTS.make_ahead()
+    CLIENT_POOL.make_ahead()
 
 
 def _memory() -> int:

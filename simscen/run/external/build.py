@@ -16,7 +16,7 @@ from simscen.run.external.stack import ExternalStack
 from simscen.run.preparation.scenario import PreparedScenario
 from simscen.run.process.isolation import clean_environment
 from simscen.run.robot_interface import sensor_frames, sensor_kinds
-from simscen.sim.urdf.describe import describe
+from simscen.sim.urdf.writer import to_urdf
 from simscen.stack.protocols import Surroundings
 
 
@@ -36,7 +36,7 @@ def build_external_stack(
         sensors=sensor_kinds(prepared),
         mounts=sensor_frames(prepared.robot),
         rates={name: float(getattr(sensor.chosen, "rate", 0.0)) for name, sensor in prepared.robot.sensors.items()},
-        robot_description=describe(prepared.body),
+        robot_description=to_urdf(prepared.body),
         stop_on_failure=prepared.spec.on_goal_failure == "stop",
         mode=prepared.spec.navigation.mode,
         robot_name=prepared.loaded.robot_name,

@@ -11,11 +11,10 @@ from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.polygons import distance_to_polygon
 from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
 from simscen.core.records.events import Event, EventKind, Value
-from simscen.people.people import People, Point
-from simscen.people.seen import SeenRobot, SeenThing, Surroundings
-from simscen.people.walls import Walls
-from simscen.sim.outline import footprint, parts
-from simscen.sim.robot import Robot
+from simscen.pedestrians.crowd import Crowd, Point
+from simscen.pedestrians.surroundings import ObservedObject, ObservedRobot, Surroundings, Walls
+from simscen.sim.body.outline import footprint, outlines_in_band
+from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
 from simscen.worlds.geometry.cross_section import section
 from simscen.worlds.routes.shortest_paths import ShortestPaths, ways_in
@@ -58,8 +57,8 @@ class PedestrianSimulation:
         return Walls(np.concatenate([cut.segments for cut in cuts]), owners, opaque)
 
     @cached_property
-    def _people(self) -> People:
-        return People(self._walls, self._way)
+    def _people(self) -> Crowd:
+        return Crowd(self._walls, self._way)
 
     def come(self, walker: WalkingPedestrian) -> Body:
         """Add a pedestrian and return its body."""
@@ -119,23 +118,26 @@ class PedestrianSimulation:
         robots = tuple(self._seen(robot) for robot in self._simulation.robots.values())
         things = self._simulation.things()
         known = [(name, body, pose) for name, (body, pose) in things.items() if name not in self._behaviors]
-        return Surroundings(robots, tuple(SeenThing(name, self._placed(body, pose)) for name, body, pose in known))
+        return Surroundings(robots, tuple(ObservedObject(name, self._placed(body, pose)) for name, body, pose in known))
 
     def _placed(self, body: Body, pose: Pose3) -> tuple[Array, ...]:
         """Return the outlines of an object in the world frame."""
         known = self._outlines.get(body.name)
         if known is None or known[0] is not body.solids:
-            known = body.solids, tuple(np.array(outline) for outline in parts(body.solids, BODY_HEIGHT_RANGE_M))
+            known = (
+                body.solids,
+                tuple(np.array(outline) for outline in outlines_in_band(body.solids, BODY_HEIGHT_RANGE_M)),
+            )
             self._outlines[body.name] = known
         return tuple(pose.plane.apply(outline) for outline in known[1])
 
-    def _seen(self, robot: Robot) -> SeenRobot:
+    def _seen(self, robot: Robot) -> ObservedRobot:
         if robot.name not in self._hulls:
             self._hulls[robot.name] = np.array(footprint(robot.shape.solids))
         outline = self._hulls[robot.name]
         (vx, vy, _), _ = robot.base_velocity()
         radius = float(np.hypot(outline[:, 0], outline[:, 1]).max())
-        return SeenRobot(robot.name, robot.base_pose().plane, (vx, vy), radius, outline)
+        return ObservedRobot(robot.name, robot.base_pose().plane, (vx, vy), radius, outline)
 
     def _way(self, start: Point, goal: Point, radius: float) -> list[Point]:
         """Return a path around walls, with extra clearance if possible; a straight line if there is no path."""

@@ -8,7 +8,7 @@ from simscen.core.geometry import Array, Pose3, Vector
 from simscen.core.geometry.ray_fans import RayCaster, RayFan, Singles
 from simscen.core.geometry.scripted_poses import PosesAtTick, PredictedPoses
 from simscen.core.geometry.shapes import Body, Shape, TriangleMesh
-from simscen.sim.robot import Robot
+from simscen.sim.robots.robot import Robot
 from simscen.worlds.geometry.triangulation import fuse
 from simscen.worlds.raycasting.ray_scene import RayScene
 

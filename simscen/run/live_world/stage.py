@@ -19,8 +19,8 @@ from simscen.core.records.events import Event, EventKind, Value
 from simscen.core.records.trace import Decision, Truth
 from simscen.run.live_world.costmap_filters import CostmapFilters
 from simscen.run.live_world.pedestrians import PedestrianSimulation
-from simscen.sim.outline import parts
-from simscen.sim.robot import Robot
+from simscen.sim.body.outline import outlines_in_band
+from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
 from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.protocols import Stack
@@ -314,7 +314,7 @@ def body_data(body: Body) -> dict[str, Value]:
     pose = body.pose.plane
     place: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
     outlines: list[Value] = [
-        [[round(x, 3), round(y, 3)] for x, y in outline] for outline in parts(body.solids, Z_RANGE)
+        [[round(x, 3), round(y, 3)] for x, y in outline] for outline in outlines_in_band(body.solids, Z_RANGE)
     ]
     return {**place, **_outline(body.solids[0].shape), "parts": outlines}
 

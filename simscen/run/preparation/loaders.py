@@ -18,7 +18,7 @@ from simscen.model.world import WorldSpec
 from simscen.worlds.world_file import build_own
 
 if TYPE_CHECKING:
-    from simscen.sim.robot_body import RobotBody
+    from simscen.sim.body.robot_body import RobotBody
 
 
 def load_world(loaded: LoadedScenario) -> World:
@@ -78,13 +78,13 @@ def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
     entry = loaded.spec.own
     if entry.payload is None and entry.motor_torque == 1.0:
         return body
-    from simscen.sim.laden import center, laden, stands, top, weakened
+    from simscen.sim.body.payload import add_payload, center, hull_height, is_stable, scale_motor_torque
 
-    body = weakened(body, entry.motor_torque)
+    body = scale_motor_torque(body, entry.motor_torque)
     if entry.payload is not None:
-        x, y, z = entry.payload.at or (0.0, 0.0, top(body))
-        body = laden(body, entry.payload.mass, (x, y, z))
-        if not stands(body):
+        x, y, z = entry.payload.at or (0.0, 0.0, hull_height(body))
+        body = add_payload(body, entry.payload.mass, (x, y, z))
+        if not is_stable(body):
             x, y, _ = center(body)
             what = f"the robot falls over: with its payload its center of mass is at ({x:.2f}, {y:.2f}), off its wheels"
             raise InvalidInput([loaded.problem(("robot", "payload"), "SC406", what, "put it nearer to the middle")])
@@ -93,14 +93,14 @@ def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
 
 def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, RobotBody]:
     """Load the specification and body of a robot. Files that it refers to must lie in `roots`."""
-    from simscen.sim.embody import robot_body
-    from simscen.sim.urdf.files import Found
+    from simscen.sim.body.from_spec import build_robot_body
     from simscen.sim.urdf.xacro.expand import UnknownArgument
+    from simscen.sim.urdf.xml_source import RobotFiles
 
     spec = robot.spec or _inferred(robot.path, roots)
-    found = Found(robot.urdf, robot.packages) if robot.urdf else None
+    found = RobotFiles(robot.urdf, robot.packages) if robot.urdf else None
     try:
-        return spec, robot_body(spec, robot.path, roots, read_mesh, found)
+        return spec, build_robot_body(spec, robot.path, roots, read_mesh, found)
     except UnknownArgument as error:
         raise InvalidInput([_unknown(robot, error.name, error.declared)]) from error
 
@@ -113,6 +113,6 @@ def _unknown(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Prob
 
 
 def _inferred(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:
-    from simscen.sim.urdf.infer import spec_of_urdf
+    from simscen.sim.urdf.infer_spec import infer_robot_spec
 
-    return spec_of_urdf(urdf, roots, read_mesh)
+    return infer_robot_spec(urdf, roots, read_mesh)

@@ -9,8 +9,8 @@ from simscen.core.geometry.shapes import Solid
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.robot import RobotSpec
 from simscen.run.preparation.loaders import load_robot
-from simscen.sim.ground import refuse_dragging
-from simscen.sim.robot_body import RobotBody
+from simscen.sim.body.checks import check_ground_clearance
+from simscen.sim.body.robot_body import RobotBody
 from simscen.worlds.geometry.prisms import is_flat
 
 CIRCLE_CORNERS = 24
@@ -46,7 +46,7 @@ def robot_size(loaded: LoadedScenario) -> RobotSize:
     """
     spec = loaded.robot.spec
     if spec is not None and spec.body is not None and (spec.radius is not None or spec.footprint is not None):
-        refuse_dragging(spec, loaded.robot.path)
+        check_ground_clearance(spec, loaded.robot.path)
         corners = tuple((x, y) for x, y in spec.footprint) if spec.footprint is not None else _round(spec.radius or 0.0)
         return RobotSize(corners, spec.radius, _height_of_shapes(spec))
     body = load_robot(loaded)[1]
@@ -63,9 +63,9 @@ def _height_of_shapes(spec: RobotSpec) -> float:
 
 
 def _height_of_hull(body: RobotBody) -> float:
-    from simscen.sim.outline import extremes
+    from simscen.sim.body.outline import hull_points
 
-    return max(float(solid.pose.apply(extremes(solid.shape))[:, 2].max()) for solid in body.hull)
+    return max(float(solid.pose.apply(hull_points(solid.shape))[:, 2].max()) for solid in body.hull)
 
 
 def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, ...]:
@@ -73,10 +73,10 @@ def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, 
     reach = max((wheel.radius for wheel in body.wheels), default=0.0)
     if is_flat(solids, reach):
         return solids
-    from simscen.sim.climb import climb_of
+    from simscen.sim.body.climb import compute_climb_limits
     from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 
-    return drive_obstacles(solids, reach, *climb_of(body))
+    return drive_obstacles(solids, reach, *compute_climb_limits(body))
 
 
 def blocking_world(loaded: LoadedScenario, world: World) -> World:

@@ -26,8 +26,8 @@ from simscen.run.preparation.filter_masks import load_criterion_masks, load_mask
 from simscen.run.preparation.goals import event_goals, expected_failures, scenario_goals
 from simscen.run.preparation.loaders import load_map, load_robot, load_world
 from simscen.run.preparation.robot_size import blocking_solids, inscribed_radius
-from simscen.sim.alone import NAMELESS
-from simscen.sim.robot_body import RobotBody
+from simscen.sim.body.robot_body import RobotBody
+from simscen.sim.single_robot import NAMELESS
 from simscen.spec.registry import Entry
 from simscen.triggers.clearance_below import ClearanceBelow
 from simscen.worlds.build import build

@@ -10,7 +10,7 @@ from simscen.model.localizers import LocalizerSpec
 from simscen.model.recovery import Recovery
 from simscen.model.stack import StackSpec
 from simscen.run.preparation.scenario import PreparedScenario
-from simscen.sim import walls
+from simscen.sim.scene import walls
 from simscen.spec.component import Component
 from simscen.worlds.raycasting import ray_scene
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from simscen.model.robot import Drive, Mecanum, SkidSteer
 from simscen.run.robot_check.trial_drive import RestingState, Trial, run_trials
-from simscen.sim.climb import Climb, climb_of
-from simscen.sim.robot_body import RobotBody
+from simscen.sim.body.climb import ClimbLimits, compute_climb_limits
+from simscen.sim.body.robot_body import RobotBody
 
 LEAN, LIFT, CREEP = math.radians(1.0), 0.002, 0.001
 """At rest: rad, m above or below its wheels' ground, m in a second."""
@@ -48,7 +48,7 @@ class RobotCheckResult:
     rest: RestingState
     trials: tuple[Trial, ...]
     checks: tuple[DriveCheck, ...]
-    climb: Climb
+    climb: ClimbLimits
 
     @property
     def failed(self) -> int:
@@ -60,7 +60,7 @@ def check_robot(body: RobotBody) -> RobotCheckResult:
     """Drive a robot and check it. Raises RunError if the simulation becomes unstable."""
     rest, trials = run_trials(body)
     return RobotCheckResult(
-        rest, trials, tuple(_checks(body, rest, {trial.name: trial for trial in trials})), climb_of(body)
+        rest, trials, tuple(_checks(body, rest, {trial.name: trial for trial in trials})), compute_climb_limits(body)
     )
 
 

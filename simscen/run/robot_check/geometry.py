@@ -11,9 +11,9 @@ from simscen.loading.loaded import LoadedRobot
 from simscen.loading.yaml.tree import value_position
 from simscen.model.robot import RobotSpec
 from simscen.run.preparation.loaders import read_mesh, robot_from_file
-from simscen.sim.ground import refuse_dragging
-from simscen.sim.robot_body import RobotBody
-from simscen.sim.undercarriage import Wheel
+from simscen.sim.body.checks import check_ground_clearance
+from simscen.sim.body.robot_body import RobotBody
+from simscen.sim.body.undercarriage import Wheel
 
 DIMENSION_TOLERANCE = 0.01
 """Relative difference from the URDF that a dimension of the drive may have."""
@@ -23,12 +23,12 @@ def geometry_warnings(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, root
     """Return warnings about a robot with a URDF: different dimensions, or wheels and casters off the ground."""
     if robot.urdf is None:
         return []
-    from simscen.sim.urdf.body import tree_of_spec
-    from simscen.sim.urdf.files import Found
-    from simscen.sim.urdf.stance import stance_of
+    from simscen.sim.urdf.body import read_spec_tree
+    from simscen.sim.urdf.wheel_alignment import alignment_warnings
+    from simscen.sim.urdf.xml_source import RobotFiles
 
-    tree = tree_of_spec(spec, robot.path, roots, read_mesh, Found(robot.urdf, robot.packages))
-    return [*dimension_warnings(robot, body), *stance_of(tree, spec.drive)]
+    tree = read_spec_tree(spec, robot.path, roots, read_mesh, RobotFiles(robot.urdf, robot.packages))
+    return [*dimension_warnings(robot, body), *alignment_warnings(tree, spec.drive)]
 
 
 def dimension_warnings(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]:
@@ -70,7 +70,7 @@ def robot_problems(file: RobotFile) -> list[Problem]:
             found = geometry_warnings(robot, spec, body, file.roots)
         else:
             assert robot.spec is not None  # a robot has one or the other
-            refuse_dragging(robot.spec, robot.path)
+            check_ground_clearance(robot.spec, robot.path)
             found = []
     except InvalidInput as error:
         found = error.problems

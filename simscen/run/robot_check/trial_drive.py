@@ -10,9 +10,9 @@ from simscen.model.robot import Ackermann
 from simscen.run.robot_interface import robot_model
 from simscen.sensors.kinematics import kinematics_of
 from simscen.sensors.odometry import along_arc
-from simscen.sim.alone import Alone
-from simscen.sim.robot_body import RobotBody
+from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.simulation import FIRMWARE_RATE
+from simscen.sim.single_robot import SingleRobotSimulation
 from simscen.worlds.geometry.triangulation import fuse, triangulate
 
 TICK_RATE = 240
@@ -81,7 +81,7 @@ def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
 
     Raises RunError if the simulation becomes unstable.
     """
-    simulation = Alone(fuse([]), [], body, Pose2(0.0, 0.0, 0.0), triangulate)
+    simulation = SingleRobotSimulation(fuse([]), [], body, Pose2(0.0, 0.0, 0.0), triangulate)
     try:
         rest = _rest(simulation)
         return rest, tuple(_trial(simulation, body, name, legs) for name, legs in _trials(body).items())
@@ -98,14 +98,14 @@ def _trials(body: RobotBody) -> dict[str, list[_Leg]]:
     return trials | ({"sideways": [_Leg(0.0, LINE)]} if robot_model(body).holonomic else {})
 
 
-def _rest(simulation: Alone) -> RestingState:
+def _rest(simulation: SingleRobotSimulation) -> RestingState:
     begin = simulation.base_pose()
     simulation.step(RESTING)
     end = simulation.base_pose()
     return RestingState(_tilt(end, Pose3()), end.z, math.hypot(end.x - begin.x, end.y - begin.y))
 
 
-def _trial(simulation: Alone, body: RobotBody, name: str, legs: list[_Leg]) -> Trial:
+def _trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: list[_Leg]) -> Trial:
     simulation.place_robot(Pose2(0.0, 0.0, 0.0))
     simulation.step(SETTLING)
     motion, level = kinematics_of(body.drive), simulation.base_pose()

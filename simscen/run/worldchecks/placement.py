@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations, product
 
 from simscen.actions.doors import CloseDoor, OpenDoor, panel_path
+from simscen.actions.kidnap import Kidnap
 from simscen.actions.move import Move
 from simscen.actions.pedestrian import Pedestrian
-from simscen.actions.robot import Kidnap
 from simscen.actions.spawn import Spawn
 from simscen.actions.teleport import Teleport
 from simscen.core.environment.world_model import Polygon
@@ -19,7 +19,7 @@ from simscen.core.messages.navigation import Goal
 from simscen.loading.checks.registry import Finding, Keys
 from simscen.loading.yaml.tree import MappingNode
 from simscen.run.worldchecks.scene import SILL_M, START, TOUCH_M, WORLD, Scene, expects_start_failure
-from simscen.sim.outline import reach
+from simscen.sim.body.outline import radius_and_height
 from simscen.spec.motions import Motion
 from simscen.triggers.time import Time
 from simscen.triggers.trigger import Trigger
@@ -176,7 +176,7 @@ def check_motion_speeds(scene: Scene) -> Iterator[Finding]:
     """Find scripted motions so fast that contact with the robot could be missed between two ticks."""
     tick = 1 / scene.loaded.spec.physics.tick_rate
     for keys, tree, name, path, solids in _motions(scene):
-        step = largest_step(path, tick, reach(solids)[0] if solids else 0.0)
+        step = largest_step(path, tick, radius_and_height(solids)[0] if solids else 0.0)
         if step > MAX_STEP_M:
             hint = f"make it {math.ceil(10 * step / MAX_STEP_M) / 10:g} times slower, or raise `physics.tick_rate`"
             yield Finding(keys, too_fast(name, step), hint, tree=tree)

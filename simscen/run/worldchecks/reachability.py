@@ -61,9 +61,9 @@ def check_reachability(scene: Scene) -> Iterator[Finding]:
 def _ramp_hint(scene: Scene) -> str:
     """Return when a goal may be reachable after all: a solid that is not upright may be a ramp."""
     from simscen.run.preparation.loaders import load_robot
-    from simscen.sim.climb import climb_of
+    from simscen.sim.body.climb import compute_climb_limits
 
-    slope = math.degrees(climb_of(load_robot(scene.loaded)[1]).slope)
+    slope = math.degrees(compute_climb_limits(load_robot(scene.loaded)[1]).slope)
     climbs = f"climbs slopes up to {slope:.1f}°" if slope else "cannot climb slopes"
     return f"unless a tilted solid there is a ramp that the robot can climb; this robot {climbs}"
 

@@ -11,31 +11,30 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Solid
 from simscen.model.robot import Mecanum, Omnidirectional, RobotSpec
-from simscen.sim.ground import GROUND_CLEARANCE
-from simscen.sim.inertia import MassProperties, combined
-from simscen.sim.outline import extremes
-from simscen.sim.robot_body import RobotBody, assemble
-from simscen.sim.undercarriage import Wheel, wheel_inertia
-from simscen.sim.urdf.elements import Meshes, MeshReader
-from simscen.sim.urdf.files import Found, read_xml
-from simscen.sim.urdf.markup import CODE
-from simscen.sim.urdf.tree import Tree, tree_of
-from simscen.sim.urdf.wheels import WheelJoint, chosen
+from simscen.sim.body.checks import GROUND_CLEARANCE
+from simscen.sim.body.inertia import MassProperties, combine
+from simscen.sim.body.outline import hull_points
+from simscen.sim.body.robot_body import RobotBody, assemble
+from simscen.sim.body.undercarriage import Wheel, wheel_inertia
+from simscen.sim.urdf.elements import MeshReader, MeshSource
+from simscen.sim.urdf.tree import Tree, build_tree
+from simscen.sim.urdf.wheels import WheelJoint, select_wheels
 from simscen.sim.urdf.xacro.expand import UnknownArgument, expand
+from simscen.sim.urdf.xml_source import CODE, RobotFiles, read_xml
 
 CASTER = 0.35
 """A caster is smaller than this fraction of the hull's length and width."""
 
 
-def body_of_urdf(
-    spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: Found | None
+def body_from_urdf(
+    spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: RobotFiles | None
 ) -> RobotBody:
     """The body that `spec.urdf`, relative to `file` unless it was `found`, describes. Raises InvalidInput."""
-    return body_of_tree(spec, tree_of_spec(spec, file, roots, read_mesh, found))
+    return body_from_tree(spec, read_spec_tree(spec, file, roots, read_mesh, found))
 
 
-def tree_of_spec(
-    spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: Found | None
+def read_spec_tree(
+    spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: RobotFiles | None
 ) -> Tree:
     """The links and joints that `spec.urdf` describes. Raises InvalidInput."""
     assert spec.urdf is not None
@@ -60,7 +59,7 @@ def read_tree(
         robot = expand(robot, path, folders, lambda included: read_xml(included, folders), arguments)
     elif arguments:
         raise UnknownArgument(robot, next(iter(arguments)), ())
-    return tree_of(robot, Meshes(path.parent, folders, read_mesh, expanded))
+    return build_tree(robot, MeshSource(path.parent, folders, read_mesh, expanded))
 
 
 def _text(argument: str | float | bool) -> str:
@@ -68,9 +67,9 @@ def _text(argument: str | float | bool) -> str:
     return str(argument).lower() if isinstance(argument, bool) else str(argument)
 
 
-def body_of_tree(spec: RobotSpec, tree: Tree) -> RobotBody:
+def body_from_tree(spec: RobotSpec, tree: Tree) -> RobotBody:
     """The robot: joints that are neither wheels nor steering stay at zero."""
-    joints = chosen(tree, spec.drive)
+    joints = select_wheels(tree, spec.drive)
     _check_wheels(spec, tree, joints)
     rolling = {link for wheel in joints for link in tree.subtree(wheel.joint.child)}
     fixed = [name for name in tree.links if name not in rolling]
@@ -103,7 +102,7 @@ def _check_wheels(spec: RobotSpec, tree: Tree, wheels: list[WheelJoint]) -> None
     if spec.drive.type == "ackermann" and not any(wheel.steered for wheel in wheels):
         hint = "name the steering joints in the drive's `steering`"
         raise InvalidInput([tree.element.problem("no steered wheels found", hint)])
-    refuse_rear_steering(wheels)
+    check_front_steering(wheels)
 
 
 def _check_corners(tree: Tree, wheels: list[WheelJoint]) -> None:
@@ -117,7 +116,7 @@ def _check_corners(tree: Tree, wheels: list[WheelJoint]) -> None:
         raise InvalidInput([tree.element.problem(message, hint)])
 
 
-def refuse_rear_steering(wheels: Sequence[WheelJoint]) -> None:
+def check_front_steering(wheels: Sequence[WheelJoint]) -> None:
     """Raises InvalidInput for a car whose steered wheels are not ahead of those that drive."""
     steered = [wheel for wheel in wheels if wheel.steered]
     if not steered:
@@ -142,7 +141,7 @@ def _base(wheels: list[WheelJoint], solids: Sequence[Solid]) -> Pose3:
 
 
 def _lowest(solid: Solid) -> float:
-    return float(solid.pose.apply(extremes(solid.shape))[:, 2].min())
+    return float(solid.pose.apply(hull_points(solid.shape))[:, 2].min())
 
 
 def _scale(spec: RobotSpec, tree: Tree) -> float:
@@ -158,7 +157,7 @@ def _weighed(tree: Tree, links: Sequence[str], base_from_root: Pose3, scale: flo
     parts = [mass.placed(base_from_root.compose(pose)) for pose, mass in masses if mass is not None and mass.mass > 0]
     if not parts:
         raise InvalidInput([tree.element.problem("nothing but the wheels has a mass")])
-    whole = combined(parts)
+    whole = combine(parts)
     return MassProperties(whole.mass * scale, whole.center, whole.tensor * scale)
 
 
@@ -180,7 +179,7 @@ def _wheel(tree: Tree, wheel: WheelJoint, base_from_root: Pose3, scale: float, s
 
 def _off_the_ground(tree: Tree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
     """The hull without casters. Raises InvalidInput when the hull itself would drag over the ground."""
-    points = [solid.pose.apply(extremes(solid.shape)) for solid in hull]
+    points = [solid.pose.apply(hull_points(solid.shape)) for solid in hull]
     whole = np.ptp(np.concatenate(points)[:, :2], axis=0)
     kept = []
     for solid, corners in zip(hull, points, strict=True):

@@ -11,9 +11,8 @@ from simscen.assets.addresses import PACKAGES
 from simscen.assets.folders import Absent, Folders, Trouble
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
-from simscen.sim.inertia import MassProperties
-from simscen.sim.urdf.files import MESH_BYTES
-from simscen.sim.urdf.markup import Element, Unusable
+from simscen.sim.body.inertia import MassProperties
+from simscen.sim.urdf.xml_source import MESH_BYTES, Element, InvalidElement
 
 MESH_REACH = 20.0
 """m along any axis from a mesh's own origin, which need not be in it."""
@@ -45,7 +44,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Meshes:
+class MeshSource:
     """Where meshes are looked for, and who reads them.
 
     `read` gives the triangles of a file in meters, and raises ValueError with a sentence when it cannot. `expanded` =
@@ -68,13 +67,13 @@ class Meshes:
             mesh = self.read(path)
         except (Trouble, ValueError) as error:
             hint = error.hint if isinstance(error, Trouble) else ""
-            raise Unusable(element, f"mesh {written[:200]!r}: {error}", hint) from error
+            raise InvalidElement(element, f"mesh {written[:200]!r}: {error}", hint) from error
         with np.errstate(over="ignore"):
             vertices = mesh.vertices * np.array(scale)
             farthest = float(np.abs(vertices).max(initial=0.0))
         if not farthest <= MESH_REACH:
             hint = 'is it in millimeters? give it scale="0.001 0.001 0.001"'
-            raise Unusable(
+            raise InvalidElement(
                 element, f"mesh {written[:200]!r} reaches {farthest:.4g} m, more than {MESH_REACH:g} m", hint
             )
         return Mesh(vertices, mesh.faces)
@@ -88,7 +87,7 @@ class Meshes:
             raise
 
 
-def link_of(element: Element, meshes: Meshes) -> Link:
+def parse_link(element: Element, meshes: MeshSource) -> Link:
     """A `<link>`; raises Unusable."""
     collisions = tuple(
         Solid(_shape(collision.needed("geometry"), meshes), _origin(collision), element.text("name"))
@@ -98,13 +97,13 @@ def link_of(element: Element, meshes: Meshes) -> Link:
     return Link(element.text("name"), collisions, None if inertial is None else _mass(inertial), element)
 
 
-def joint_of(element: Element) -> Joint:
+def parse_joint(element: Element) -> Joint:
     """A `<joint>`; raises Unusable."""
     given = None if element.attributes.get("type") in ("fixed", "floating") else element.child("axis")
     axis = (1.0, 0.0, 0.0) if given is None else given.numbers("xyz", 3, (1.0, 0.0, 0.0))
     length = math.hypot(*axis)
     if length == 0:
-        raise Unusable(element, f"joint {element.name!r} turns about an axis of length 0")
+        raise InvalidElement(element, f"joint {element.name!r} turns about an axis of length 0")
     return Joint(
         element.text("name"),
         element.text("type"),
@@ -125,7 +124,7 @@ def _origin(element: Element) -> Pose3:
     return Pose3.from_rpy(x, y, z, roll, pitch, yaw)
 
 
-def _shape(geometry: Element, meshes: Meshes) -> Shape:
+def _shape(geometry: Element, meshes: MeshSource) -> Shape:
     for element in geometry.children:
         match element.tag:
             case "box":
@@ -140,22 +139,22 @@ def _shape(geometry: Element, meshes: Meshes) -> Shape:
             case "mesh":
                 return meshes.mesh(element)
             case other:
-                raise Unusable(
+                raise InvalidElement(
                     element, f"unknown geometry <{other}>", "box, cylinder, sphere, capsule and mesh are read"
                 )
-    raise Unusable(geometry, "<geometry> is empty")
+    raise InvalidElement(geometry, "<geometry> is empty")
 
 
 def _mass(inertial: Element) -> MassProperties:
     mass = inertial.needed("mass").numbers("value", 1)[0]
     if mass < 0:
-        raise Unusable(inertial.needed("mass"), "a mass must not be negative")
+        raise InvalidElement(inertial.needed("mass"), "a mass must not be negative")
     tensor = inertial.child("inertia")
     values = [0.0] * 6
     if tensor is not None:
         values = [tensor.numbers(key, 1, (0.0,))[0] for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")]
         if min(values[0], values[3], values[5]) < 0:
-            raise Unusable(tensor, "a moment of inertia must not be negative")
+            raise InvalidElement(tensor, "a moment of inertia must not be negative")
     xx, xy, xz, yy, yz, zz = values
     own = MassProperties(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     return own.placed(_origin(inertial))

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
-from simscen.sim.urdf.elements import Joint, Link, Meshes, joint_of, link_of
-from simscen.sim.urdf.markup import Element, Unusable
+from simscen.sim.urdf.elements import Joint, Link, MeshSource, parse_joint, parse_link
+from simscen.sim.urdf.xml_source import Element, InvalidElement
 
 MOST_LINKS = 200
 """Bullet takes 19 s to load a thousand."""
@@ -31,7 +31,7 @@ class Tree:
             yield from self.subtree(joint.child)
 
 
-def tree_of(robot: Element, meshes: Meshes) -> Tree:
+def build_tree(robot: Element, meshes: MeshSource) -> Tree:
     """The tree of a `<robot>`. Raises InvalidInput with everything that is wrong with its links and joints."""
     if robot.tag != "robot":
         raise InvalidInput([robot.problem(f"expected <robot>, got <{robot.tag}>")])
@@ -43,10 +43,10 @@ def tree_of(robot: Element, meshes: Meshes) -> Tree:
     for element in robot.children:
         try:
             if element.tag == "link":
-                _add(links, link_of(element, meshes), element)
+                _add(links, parse_link(element, meshes), element)
             elif element.tag == "joint":
-                _add(joints, joint_of(element), element)
-        except Unusable as error:
+                _add(joints, parse_joint(element), element)
+        except InvalidElement as error:
             problems.append(error.problem)
     if problems:
         raise InvalidInput(problems)
@@ -55,7 +55,7 @@ def tree_of(robot: Element, meshes: Meshes) -> Tree:
 
 def _add(known: "dict[str, Link] | dict[str, Joint]", thing: "Link | Joint", element: Element) -> None:
     if thing.name in known:
-        raise Unusable(element, f"two <{element.tag}>s are called {thing.name!r}")
+        raise InvalidElement(element, f"two <{element.tag}>s are called {thing.name!r}")
     known[thing.name] = thing  # type: ignore[assignment]  # each dictionary is only ever given its own kind
 
 

@@ -28,7 +28,7 @@ class WheelJoint:
     steered: bool
 
 
-def found(tree: Tree) -> list[WheelJoint]:
+def infer_wheels(tree: Tree) -> list[WheelJoint]:
     """The wheels that the URDF makes plain: continuous joints about a sideways axis that carry something round."""
     steering = steered_links(tree, [j for j in tree.joints.values() if j.type in TURNING and _about(tree, j, 2)])
     wheels = [
@@ -39,7 +39,7 @@ def found(tree: Tree) -> list[WheelJoint]:
     return sorted((w for w in wheels if w is not None), key=lambda w: (w.place[0], -w.place[1], w.joint.name))
 
 
-def chosen(tree: Tree, drive: Drive) -> list[WheelJoint]:
+def select_wheels(tree: Tree, drive: Drive) -> list[WheelJoint]:
     """The wheels of a drive: those that its specification names, or those that are found. Raises InvalidInput."""
     if isinstance(drive, Omnidirectional):
         return []
@@ -51,7 +51,7 @@ def chosen(tree: Tree, drive: Drive) -> list[WheelJoint]:
             f"no joint called {unknown[0]!r}", f"joints: {', '.join(sorted(tree.joints))[:300]}"
         )
         raise InvalidInput([problem])
-    wheels = found(tree)
+    wheels = infer_wheels(tree)
     if not named:
         # A wheel that swivels is a caster of a differential drive, not a steered wheel: it becomes part of the hull.
         return [w for w in wheels if not w.steered] if isinstance(drive, Differential) else wheels

@@ -4,7 +4,7 @@ import pytest
 
 from simscen.assets import markup
 from simscen.core.errors import InvalidInput
-from simscen.sim.urdf.markup import parse as parse_urdf
+from simscen.sim.urdf.xml_source import parse_xml as parse_urdf
 from simscen.worlds.sdf.markup import parse as parse_sdf
 from simscen.worlds.sdf.report import Unusable
 

@@ -13,8 +13,8 @@ from playground import box, shipped
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, MotionPath
-from simscen.sim.embody import robot_body
-from simscen.sim.alone import Alone
+from simscen.sim.body.from_spec import robot_body
+from simscen.sim.single_robot import Alone
 from simscen.worlds.geometry.triangulation import fuse, triangulate
 
 solids = [box(f"box{{k}}", (k * 7 % 11) - 5, (k * 5 % 9) - 4, 0.3, 0.4) for k in range(60)]

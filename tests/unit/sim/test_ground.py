@@ -9,8 +9,8 @@ from playground import box, shipped
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, Box, Mesh, Solid
-from simscen.sim.climb import climb_of, grip_angle
-from simscen.sim.embody import robot_body
+from simscen.sim.body.climb import compute_climb_limits, grip_angle
+from simscen.sim.body.from_spec import build_robot_body
 from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 from simscen.worlds.geometry.ramp_wedges import wedge
 from simscen.worlds.geometry.triangulation import fuse
@@ -30,9 +30,11 @@ def on_ground(simulate):
     """Makes simulations in which a robot knows what it climbs."""
 
     def make(robot, solids, **where):
-        body = robot_body(shipped(robot))
+        body = build_robot_body(shipped(robot))
         reach = max((wheel.radius for wheel in body.wheels), default=0.0)
-        return simulate(body, solids, obstacles=fuse(drive_obstacles(tuple(solids), reach, *climb_of(body))), **where)
+        return simulate(
+            body, solids, obstacles=fuse(drive_obstacles(tuple(solids), reach, *compute_climb_limits(body))), **where
+        )
 
     return make
 
@@ -88,8 +90,8 @@ def test_a_driven_wheel_climbs_a_step_of_r_times_1_minus_1_over_the_root_of_1_pl
     on_ground, robot, share, over
 ):
     """Without a run-up, by its own friction alone; wheels behind it push, so that skid steering gets higher."""
-    body = robot_body(shipped(robot))
-    step = share * climb_of(body).step
+    body = build_robot_body(shipped(robot))
+    step = share * compute_climb_limits(body).step
     if robot == "jackal" and not over:
         return
     simulation = on_ground(robot, [box("step", 1.0, 0, 1.0, 2, step)], pose=Pose2(0.3, 0, 0), drive=(0.05, 0, 0))
@@ -116,7 +118,7 @@ def test_a_step_that_the_hull_cannot_pass_is_hit(on_ground):
 @pytest.mark.parametrize("robot", ["jackal", "turtlebot"])
 def test_friction_holds_a_robot_on_a_slope_whose_tangent_is_below_it(on_ground, robot, share, climbs):
     """tan θ = μ x the share of the weight on driven wheels; a quarter less or more decides."""
-    degrees, body = 6.0, robot_body(shipped(robot))
+    degrees, body = 6.0, build_robot_body(shipped(robot))
     low, high = 0.01, 1.0
     for _ in range(40):
         middle = (low + high) / 2

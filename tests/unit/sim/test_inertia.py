@@ -6,7 +6,7 @@ import trimesh
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Solid, Sphere
-from simscen.sim.inertia import MassProperties, combined, of_shape, of_solids, volume
+from simscen.sim.body.inertia import MassProperties, combine, inertia_of_shape, inertia_of_solids, volume
 from simscen.worlds.geometry.triangulation import triangulate
 
 SHAPES = [
@@ -25,7 +25,7 @@ def test_mass_properties_are_those_trimesh_integrates_over_the_surface(shape):
     surface = triangulate(shape)
     mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
     mesh.density = 3.0 / mesh.volume
-    ours = of_shape(shape, 3.0)
+    ours = inertia_of_shape(shape, 3.0)
     assert volume(shape) == pytest.approx(mesh.volume, rel=0.01)
     assert ours.center == pytest.approx(mesh.center_mass, abs=1e-3)
     assert ours.tensor == pytest.approx(mesh.moment_inertia, rel=0.01, abs=1e-3)
@@ -33,14 +33,14 @@ def test_mass_properties_are_those_trimesh_integrates_over_the_surface(shape):
 
 def test_two_halves_of_a_box_are_the_box():
     halves = [Solid(Box((0.2, 0.3, 0.1)), Pose3(x=side)) for side in (-0.1, 0.1)]
-    whole = of_shape(Box((0.4, 0.3, 0.1)), 2.0)
-    ours = of_solids(halves, 2.0)
+    whole = inertia_of_shape(Box((0.4, 0.3, 0.1)), 2.0)
+    ours = inertia_of_solids(halves, 2.0)
     assert ours.center == pytest.approx(whole.center)
     assert ours.tensor == pytest.approx(whole.tensor)
 
 
 def test_principal_axes_of_a_turned_box_are_the_boxs_own():
-    box = of_shape(Box((0.4, 0.3, 0.1)), 2.0)
+    box = inertia_of_shape(Box((0.4, 0.3, 0.1)), 2.0)
     moments, frame = box.placed(Pose3.from_rpy(1, 2, 3, 0.3, -0.2, 0.9)).principal()
     assert sorted(moments) == pytest.approx(sorted(np.diag(box.tensor)))
     assert frame.position == pytest.approx((1, 2, 3))
@@ -51,6 +51,6 @@ def test_principal_axes_of_a_turned_box_are_the_boxs_own():
 
 
 def test_massless_parts_change_nothing():
-    box = of_shape(Box((0.4, 0.3, 0.1)), 2.0)
+    box = inertia_of_shape(Box((0.4, 0.3, 0.1)), 2.0)
     nothing = MassProperties(0.0, np.array([5.0, 0.0, 0.0]), np.zeros((3, 3)))
-    assert combined([box, nothing]).tensor == pytest.approx(box.tensor)
+    assert combine([box, nothing]).tensor == pytest.approx(box.tensor)

@@ -9,7 +9,7 @@ from playground import box, shipped
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.run.live_world.ray_caster import LiveRayCaster
-from simscen.sim.embody import robot_body
+from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.simulation import Placed, Simulation
 from simscen.worlds.geometry.triangulation import fuse, triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
@@ -23,7 +23,9 @@ def meet():
     made = []
 
     def make(solids=(), **robots):
-        placed = {name: Placed(robot_body(shipped(model)), Pose2(*pose)) for name, (model, *pose) in robots.items()}
+        placed = {
+            name: Placed(build_robot_body(shipped(model)), Pose2(*pose)) for name, (model, *pose) in robots.items()
+        }
         made.append(Simulation(fuse(list(solids)), [], placed, triangulate))
         return made[-1]
 
@@ -53,7 +55,7 @@ def corners(simulation, name, body):
 
 @pytest.mark.slow
 def test_the_clearance_of_each_counts_the_other_as_measured_by_brute_force(meet):
-    amr, turtlebot = robot_body(shipped("amr")), robot_body(shipped("turtlebot"))
+    amr, turtlebot = build_robot_body(shipped("amr")), build_robot_body(shipped("turtlebot"))
     for x, y, yaw in ((1.3, 0.4, 0.7), (0.2, 1.1, 2.0), (-1.2, -0.6, -1.0)):
         simulation = meet(a=("amr", 0.0, 0.0, 0.3), b=("turtlebot", x, y, yaw))
         here, there = corners(simulation, "a", amr), corners(simulation, "b", turtlebot)
@@ -81,7 +83,7 @@ def test_each_is_among_the_things_that_the_other_sees(meet):
     assert a.truth().objects["b"] == simulation.robots["b"].base_pose()
     rays = LiveRayCaster(RayScene(fuse([])), a)
     (ahead, back) = rays.cast(np.array([[0.3, 0.0, 0.1]] * 2), np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), 5.0)
-    radius = robot_body(shipped("turtlebot")).radius
+    radius = build_robot_body(shipped("turtlebot")).radius
     assert ahead == pytest.approx(1.7 - radius, abs=0.02)
     assert math.isinf(back), "it does not see itself"
 

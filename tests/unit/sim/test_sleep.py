@@ -9,7 +9,7 @@ from playground import box
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, MotionPath, Solid, Sphere
-from simscen.sim.settled import Settling
+from simscen.sim.objects.rest import RestDetector
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
 BALL = (Solid(Sphere(0.1), Pose3(z=0.1), "ball"),)
@@ -65,7 +65,7 @@ def test_what_only_begins_to_tip_over_when_a_run_begins_does_tip_over(simulate):
 def test_what_rests_is_slow_at_every_look_and_not_faster_at_each(monkeypatch, speeds, rests):
     seen = iter(speeds)
     monkeypatch.setattr(pybullet, "getBaseVelocity", lambda *_: ((next(seen), 0.0, 0.0), (0.0, 0.0, 0.0)))
-    settling = Settling(0, [7])
+    settling = RestDetector(0, [7])
     for _ in speeds:
         settling.look()
     assert settling.at_rest() == ({7} if rests else set())

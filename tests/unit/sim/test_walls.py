@@ -10,7 +10,7 @@ from playground import box
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, Cylinder, Solid
-from simscen.sim import walls
+from simscen.sim.scene import walls
 
 FOREST = [
     Solid(Cylinder(0.1, 1.0), Pose3(x, y, 0.5), f"post {x} {y}")

@@ -9,15 +9,18 @@ from pathlib import Path
 
 from simscen.assets.folders import Absent, Folders, Trouble
 from simscen.core.errors import InvalidInput, Problem
-from simscen.sim.urdf.files import URDF_BYTES
-from simscen.sim.urdf.markup import Element
-from simscen.sim.urdf.xacro.budget import Budget, Missing, Refused
-from simscen.sim.urdf.xacro.calls import bind, called
-from simscen.sim.urdf.xacro.macros import Macro, Macros, macro_of
-from simscen.sim.urdf.xacro.properties import define
+from simscen.sim.urdf.xacro.definitions import (
+    Macro,
+    Macros,
+    bind_parameters,
+    define_property,
+    parse_macro,
+    resolve_macro,
+)
+from simscen.sim.urdf.xacro.limits import Budget, ExpansionError, MissingFile, parse_bool
 from simscen.sim.urdf.xacro.scope import Block, Scope
-from simscen.sim.urdf.xacro.text import Texts, needed
-from simscen.sim.urdf.xacro.values import truth
+from simscen.sim.urdf.xacro.text import TextEvaluator, required_attribute
+from simscen.sim.urdf.xml_source import URDF_BYTES, Element
 
 MOST_FILES = 200
 """Files that one robot is made of; each is at most as large as a URDF."""
@@ -68,7 +71,7 @@ def declared_in(element: Element) -> set[str]:
 class _Expansion:
     def __init__(self, file: Path, folders: Folders, read: FileReader, arguments: Mapping[str, str]) -> None:
         self._budget = Budget()
-        self._texts = Texts(folders, file, self._budget, arguments)
+        self._texts = TextEvaluator(folders, file, self._budget, arguments)
         self.declared: set[str] = set()
         self.missing: dict[str, Problem] = {}
         self._folders, self._read_file = folders, read
@@ -76,7 +79,7 @@ class _Expansion:
         self._calls: list[tuple[Macro, Element]] = []
         self._elements, self._bytes = 0, 0
         self._meanings = {
-            "xacro:property": lambda source, _, scope, __: define(source, scope, self._texts),
+            "xacro:property": lambda source, _, scope, __: define_property(source, scope, self._texts),
             "xacro:macro": self._macro,
             "xacro:arg": self._argument,
             "xacro:include": self._include,
@@ -95,7 +98,7 @@ class _Expansion:
                 self._budget.spend()
                 other = self._call if source.tag.startswith("xacro:") else self._plain
                 self._meanings.get(source.tag, other)(source, into, scope, macros)
-        except Refused as refused:
+        except ExpansionError as refused:
             calls = [f"in macro {m.name!r}, called at {e.source.name}:{e.line}" for m, e in self._calls[-1:]]
             hint = "; ".join(filter(None, [refused.hint, *calls]))
             raise InvalidInput([source.problem(refused.message, hint)]) from refused
@@ -110,53 +113,55 @@ class _Expansion:
         self._elements += 1
         self._bytes += len(source.tag) + sum(len(name) + len(text) for name, text in attributes.items())
         if self._elements > MOST_ELEMENTS or self._bytes > URDF_BYTES:
-            raise Refused(f"more than {MOST_ELEMENTS} elements or {URDF_BYTES // 2**20} MiB when expanded")
+            raise ExpansionError(f"more than {MOST_ELEMENTS} elements or {URDF_BYTES // 2**20} MiB when expanded")
         made = replace(source, attributes=attributes, children=[])
         into.children.append(made)
         self._children(source, made, scope, macros)
 
     def _macro(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        macro = macro_of(source)
+        macro = parse_macro(source)
         macros.macros[macro.name] = macro
 
     def _argument(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        name = needed(source, "name")
+        name = required_attribute(source, "name")
         self.declared.add(name)
         if name not in self._texts.arguments:
-            self._texts.arguments[name] = self._texts.text(needed(source, "default", empty=True), scope)
+            self._texts.arguments[name] = self._texts.text(required_attribute(source, "default", empty=True), scope)
 
     def _if(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        if truth(self._texts.value(needed(source, "value"), scope)) is (source.tag == "xacro:if"):
+        if parse_bool(self._texts.value(required_attribute(source, "value"), scope)) is (source.tag == "xacro:if"):
             self._children(source, into, scope, macros)
 
     def _attribute(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        name = self._texts.text(needed(source, "name"), scope)
-        into.attributes[name] = self._texts.text(needed(source, "value", empty=True), scope)
+        name = self._texts.text(required_attribute(source, "name"), scope)
+        into.attributes[name] = self._texts.text(required_attribute(source, "value", empty=True), scope)
 
     def _element(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        self.element(replace(source, tag=self._texts.text(needed(source, "xacro:name"), scope)), into, scope, macros)
+        self.element(
+            replace(source, tag=self._texts.text(required_attribute(source, "xacro:name"), scope)), into, scope, macros
+        )
 
     def _insert(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        name = needed(source, "name")
+        name = required_attribute(source, "name")
         for written in (f"**{name}", f"*{name}"):
             owner = scope.owner(written)
             if owner is not None and isinstance(block := owner.held[written], Block):
                 insert = self._plain if block.whole else self._children
                 insert(block.element, into, scope, macros)
                 return
-        raise Refused(f"there is no block {name[:60]!r}")
+        raise ExpansionError(f"there is no block {name[:60]!r}")
 
     def _call_by_name(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        name = self._texts.text(needed(source, "macro"), scope)
+        name = self._texts.text(required_attribute(source, "macro"), scope)
         rest = {key: value for key, value in source.attributes.items() if key != "macro"}
         self._call(replace(source, tag=f"xacro:{name}", attributes=rest), into, scope, macros)
 
     def _call(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
         self._budget.spend(10)
-        macro, around, around_macros = called(source.tag.removeprefix("xacro:"), scope, macros)
+        macro, around, around_macros = resolve_macro(source.tag.removeprefix("xacro:"), scope, macros)
         holder = replace(source, attributes={}, children=[])
         self._children(source, holder, scope, macros)
-        inside = bind(macro, source, holder.children, scope, Scope(around), self._texts)
+        inside = bind_parameters(macro, source, holder.children, scope, Scope(around), self._texts)
         self._calls.append((macro, source))
         self._children(macro.body, into, inside, Macros(around_macros))
         self._calls.pop()
@@ -164,11 +169,11 @@ class _Expansion:
     def _include(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
         try:
             self._included(source, into, scope, macros)
-        except Missing as missing:
+        except MissingFile as missing:
             self.missing.setdefault(missing.message, source.problem(missing.message, missing.hint))
 
     def _included(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        written = self._texts.text(needed(source, "filename"), scope)
+        written = self._texts.text(required_attribute(source, "filename"), scope)
         if space := self._texts.text(source.attributes.get("ns", ""), scope):
             around, scope = scope, Scope(scope, namespace=True)
             around.held[space] = scope
@@ -177,9 +182,9 @@ class _Expansion:
             found = self._folders.find(written, self._texts.file.parent, absolute=True)
             path = self._folders.check(found, URDF_BYTES)
         except Trouble as trouble:
-            if isinstance(trouble, Absent) and truth(source.attributes.get("optional", "false")):
+            if isinstance(trouble, Absent) and parse_bool(source.attributes.get("optional", "false")):
                 return
-            raise Missing(f"include {written[:200]!r}: {trouble}", trouble.hint) from trouble
+            raise MissingFile(f"include {written[:200]!r}: {trouble}", trouble.hint) from trouble
         before, self._texts.file = self._texts.file, path
         self._children(self._parsed(path), into, scope, macros)
         self._texts.file = before
@@ -187,7 +192,7 @@ class _Expansion:
     def _parsed(self, path: Path) -> Element:
         if path not in self._read:
             if len(self._read) >= MOST_FILES:
-                raise Refused(f"more than {MOST_FILES} files are included")
+                raise ExpansionError(f"more than {MOST_FILES} files are included")
             self._read[path] = self._read_file(path)
             self.declared |= declared_in(self._read[path])
         return self._read[path]

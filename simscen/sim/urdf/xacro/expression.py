@@ -5,9 +5,8 @@ import operator
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from simscen.sim.urdf.xacro.budget import LONGEST, Budget, Refused
 from simscen.sim.urdf.xacro.functions import GLOBALS, METHODS, NAMESPACES, TYPES, Function
-from simscen.sim.urdf.xacro.values import MOST_BITS, Value, bounded, size
+from simscen.sim.urdf.xacro.limits import MAX_BITS, MAX_LENGTH, Budget, ExpansionError, Value, check_bounds, size
 
 MOST_CHARACTERS = 1000
 
@@ -36,11 +35,11 @@ class Names(Protocol):
 def evaluate(text: str, names: Names, budget: Budget) -> Value:
     """The value of an expression; raises Refused."""
     if len(text) > MOST_CHARACTERS:
-        raise Refused(f"an expression is longer than {MOST_CHARACTERS} characters")
+        raise ExpansionError(f"an expression is longer than {MOST_CHARACTERS} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: brackets in brackets
-        raise Refused("not an expression", HINT) from None
+        raise ExpansionError("not an expression", HINT) from None
     return _Evaluation(names, budget).value(tree.body)
 
 
@@ -52,9 +51,9 @@ class _Evaluation:
         with self._budget:
             self._budget.spend()
             try:
-                value = bounded(self._raw(node))
+                value = check_bounds(self._raw(node))
             except (ArithmeticError, TypeError, ValueError, LookupError) as error:
-                raise Refused(str(error)[:200] or type(error).__name__) from None
+                raise ExpansionError(str(error)[:200] or type(error).__name__) from None
             self._budget.spend(size(value) // 16)
             return value
 
@@ -81,7 +80,7 @@ class _Evaluation:
             case ast.Call(function, arguments, keywords):
                 return self._called(function, arguments, keywords)
             case _:
-                raise Refused(f"{_told(node)} is not expanded", HINT)
+                raise ExpansionError(f"{_told(node)} is not expanded", HINT)
 
     def _named(self, node: ast.expr) -> object:
         path = _path(node)
@@ -91,7 +90,9 @@ class _Evaluation:
             known = _known(path)
         if isinstance(known, int | float):
             return known
-        raise Refused(f"{'.'.join(path)[:60]!r} is not defined" if known is None else f"{path[-1]}() is not called")
+        raise ExpansionError(
+            f"{'.'.join(path)[:60]!r} is not defined" if known is None else f"{path[-1]}() is not called"
+        )
 
     def _first(self, values: list[ast.expr], wanted: bool) -> Value:
         for each in values:
@@ -121,7 +122,7 @@ class _Evaluation:
         if path in (("isinstance",), ("python", "isinstance")) and len(arguments) == 2:
             kind = _path(arguments[1])[-1]
             if kind not in TYPES:
-                raise Refused(f"isinstance() of {kind[:60]!r} is not expanded")
+                raise ExpansionError(f"isinstance() of {kind[:60]!r} is not expanded")
             return isinstance(self.value(arguments[0]), TYPES[kind])
         known: Function | float | None
         if path:
@@ -132,22 +133,22 @@ class _Evaluation:
         else:
             known, receiver = None, []
         if not callable(known):
-            raise Refused(f"{ast.unparse(function)[:60]}() is not called", HINT)
+            raise ExpansionError(f"{ast.unparse(function)[:60]}() is not called", HINT)
         named = {keyword.arg: self.value(keyword.value) for keyword in keywords if keyword.arg is not None}
         if keywords and (known is not dict or len(named) < len(keywords)):
-            raise Refused("arguments by name are not expanded")
+            raise ExpansionError("arguments by name are not expanded")
         return known(*receiver, *(self.value(each) for each in arguments), **named)
 
 
 def _binary(kind: type[ast.operator], left: Any, right: Any) -> object:
     if kind is ast.Mult and isinstance(left, str | list) != isinstance(right, str | list):
         many, times = (left, right) if isinstance(left, str | list) else (right, left)
-        if isinstance(times, int) and size(many) * times > LONGEST:
-            raise Refused(f"the value is longer than {LONGEST}")
-    if kind is ast.Pow and isinstance(left, int) and isinstance(right, int) and left.bit_length() * right > MOST_BITS:
-        raise Refused("the number is too large")
+        if isinstance(times, int) and size(many) * times > MAX_LENGTH:
+            raise ExpansionError(f"the value is longer than {MAX_LENGTH}")
+    if kind is ast.Pow and isinstance(left, int) and isinstance(right, int) and left.bit_length() * right > MAX_BITS:
+        raise ExpansionError("the number is too large")
     if kind is ast.Mod and isinstance(left, str):
-        raise Refused("texts are not formatted with %", "write ${…} between the words instead")
+        raise ExpansionError("texts are not formatted with %", "write ${…} between the words instead")
     return BINARY[kind](left, right)
 
 
@@ -158,7 +159,7 @@ def _path(node: ast.expr) -> tuple[str, ...]:
         case ast.Attribute(value, name):
             return (*_path(value), name)
         case _:
-            raise Refused(f"{_told(node)} has no names that are expanded", HINT)
+            raise ExpansionError(f"{_told(node)} has no names that are expanded", HINT)
 
 
 def _is_namespace(node: ast.expr) -> bool:

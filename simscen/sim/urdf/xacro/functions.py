@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from simscen.sim.urdf.xacro.budget import LONGEST, Refused
+from simscen.sim.urdf.xacro.limits import MAX_LENGTH, ExpansionError
 
 Function = Callable[..., object]
 
@@ -13,14 +13,14 @@ TYPES: Mapping[str, type] = {"int": int, "float": float, "str": str, "bool": boo
 
 def _round(number: float, digits: int | None = None) -> float:
     if digits is not None and abs(digits) > 100:  # Python would make 10**digits
-        raise Refused("round() takes up to 100 digits")
+        raise ExpansionError("round() takes up to 100 digits")
     return round(number, digits)
 
 
 def _range(*bounds: int) -> list[int]:
     numbers = range(*bounds)
-    if len(numbers) > LONGEST:
-        raise Refused(f"range() gives more than {LONGEST} numbers")
+    if len(numbers) > MAX_LENGTH:
+        raise ExpansionError(f"range() gives more than {MAX_LENGTH} numbers")
     return list(numbers)
 
 
@@ -35,7 +35,7 @@ def _told(*_: object) -> str:
 
 
 def _fatal(*messages: object) -> str:
-    raise Refused(f"the file says: {' '.join(map(str, messages))[:200]}")
+    raise ExpansionError(f"the file says: {' '.join(map(str, messages))[:200]}")
 
 
 MATH: Mapping[str, Function | float] = {
@@ -58,14 +58,14 @@ GLOBALS: Mapping[str, Function | float] = {**MATH, **PYTHON}
 
 
 def _replace(text: str, old: str, new: str) -> str:
-    if text.count(old) * len(new) > LONGEST:
-        raise Refused(f"replace() gives more than {LONGEST} characters")
+    if text.count(old) * len(new) > MAX_LENGTH:
+        raise ExpansionError(f"replace() gives more than {MAX_LENGTH} characters")
     return text.replace(old, new)
 
 
 def _join(separator: str, words: list[Any]) -> str:
-    if len(words) * len(separator) > LONGEST:
-        raise Refused(f"join() gives more than {LONGEST} characters")
+    if len(words) * len(separator) > MAX_LENGTH:
+        raise ExpansionError(f"join() gives more than {MAX_LENGTH} characters")
     return separator.join(words)
 
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Union
 
-from simscen.sim.urdf.markup import Element
-from simscen.sim.urdf.xacro.values import Value
+from simscen.sim.urdf.xacro.limits import Value
+from simscen.sim.urdf.xml_source import Element
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,16 +5,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from simscen.assets.folders import Folders, Trouble
-from simscen.sim.urdf.markup import Element
-from simscen.sim.urdf.xacro.budget import LONGEST, Budget, Missing, Refused
 from simscen.sim.urdf.xacro.expression import evaluate
+from simscen.sim.urdf.xacro.limits import MAX_LENGTH, Budget, ExpansionError, MissingFile, Value, parse_literal
 from simscen.sim.urdf.xacro.scope import Block, Lazy, Resolving, Scope
-from simscen.sim.urdf.xacro.values import Value, literal
+from simscen.sim.urdf.xml_source import Element
 
 TOKEN = re.compile(r"\$\$+[{(]|\$\{[^}]*\}|\$\([^)]*\)|[^$]+|\$[^{($]+|\$\Z")
 
 
-class Texts:
+class TextEvaluator:
     """Evaluates texts; `file` is the one being expanded, `arguments` are those of `<xacro:arg>`."""
 
     def __init__(self, folders: Folders, file: Path, budget: Budget, arguments: Mapping[str, str]) -> None:
@@ -32,14 +31,14 @@ class Texts:
         while position < len(text):
             token = TOKEN.match(text, position)
             if token is None:
-                raise Refused(f"{text[position : position + 60]!r}: a bracket is not closed")
+                raise ExpansionError(f"{text[position : position + 60]!r}: a bracket is not closed")
             parts.append(self._part(token[0], scope))
             position = token.end()
         if len(parts) == 1:
             return parts[0]
         joined = "".join(map(str, parts))
-        if len(joined) > LONGEST:
-            raise Refused(f"a text is longer than {LONGEST} characters")
+        if len(joined) > MAX_LENGTH:
+            raise ExpansionError(f"a text is longer than {MAX_LENGTH} characters")
         return joined
 
     def text(self, text: str, scope: Scope) -> str:
@@ -49,7 +48,7 @@ class Texts:
     def literal(self, text: str, scope: Scope) -> Value:
         """What a text means, as the number or boolean that it may be; raises Refused."""
         value = self.value(text, scope)
-        return literal(value) if isinstance(value, str) else value
+        return parse_literal(value) if isinstance(value, str) else value
 
     def property(self, scope: Scope, name: str) -> "Value | Scope":
         """A property of a scope, evaluated now if it was not before; raises KeyError, Refused."""
@@ -62,13 +61,13 @@ class Texts:
                 try:
                     with self.budget:
                         value = self.literal(text, owner)
-                except Refused:
+                except ExpansionError:
                     owner.held[name] = lazy
                     raise
                 owner.held[name] = value
                 return value
             case Resolving():
-                raise Refused(f"the property {name!r} is defined by itself")
+                raise ExpansionError(f"the property {name!r} is defined by itself")
             case Block():
                 raise KeyError(name)
             case found:
@@ -81,10 +80,10 @@ class Texts:
             expression = str(self.value(token[2:-1], scope))
             try:
                 return evaluate(expression, _Scoped(self, scope), self.budget)
-            except Refused as refused:
+            except ExpansionError as refused:
                 if refused.message.startswith("${"):
                     raise
-                raise Refused(f"${{{expression[:100]}}}: {refused.message}", refused.hint) from None
+                raise ExpansionError(f"${{{expression[:100]}}}: {refused.message}", refused.hint) from None
         if token.startswith("$("):
             return self._substituted(str(self.value(token[2:-1], scope)))
         return token
@@ -94,7 +93,9 @@ class Texts:
             case ["arg", name] if name in self.arguments:
                 return self.arguments[name]
             case ["arg", name]:
-                raise Refused(f"$(arg {name[:60]}): there is no such argument", 'give it a <xacro:arg default="…">')
+                raise ExpansionError(
+                    f"$(arg {name[:60]}): there is no such argument", 'give it a <xacro:arg default="…">'
+                )
             case ["optenv", _, *default]:
                 return " ".join(default)  # whatever the environment says, a run is that of its files
             case ["find", package]:
@@ -102,19 +103,19 @@ class Texts:
             case ["dirname"]:
                 return str(self.file.parent)
             case ["env", *_]:
-                raise Refused(f"$({command[:60]}): the environment is not read", "write the value into the file")
+                raise ExpansionError(f"$({command[:60]}): the environment is not read", "write the value into the file")
             case _:
-                raise Refused(f"$({command[:60]}) is not expanded", "arg, find, dirname and optenv are")
+                raise ExpansionError(f"$({command[:60]}) is not expanded", "arg, find, dirname and optenv are")
 
     def _package(self, name: str) -> str:
         try:
             return str(self._folders.package(name, self.file.parent))
         except Trouble as trouble:
-            raise Missing(f"$(find {name[:60]}): {trouble}", trouble.hint) from None
+            raise MissingFile(f"$(find {name[:60]}): {trouble}", trouble.hint) from None
 
 
 class _Scoped:
-    def __init__(self, texts: Texts, scope: Scope) -> None:
+    def __init__(self, texts: TextEvaluator, scope: Scope) -> None:
         self._texts, self._scope = texts, scope
 
     def value(self, path: tuple[str, ...]) -> Value:
@@ -128,9 +129,9 @@ class _Scoped:
         return held
 
 
-def needed(element: Element, attribute: str, empty: bool = False) -> str:
+def required_attribute(element: Element, attribute: str, empty: bool = False) -> str:
     """An attribute that must be there, as written; raises Refused."""
     text = element.attributes.get(attribute)
     if text is None or not (text or empty):
-        raise Refused(f'<{element.tag[:60]}> without {attribute}="…"')
+        raise ExpansionError(f'<{element.tag[:60]}> without {attribute}="…"')
     return text

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from playground import shipped
 
-from simscen.sim.embody import robot_body
-from simscen.sim.outline import extremes
-from simscen.sim.urdf.describe import describe
+from simscen.sim.body.from_spec import build_robot_body
+from simscen.sim.body.outline import hull_points
+from simscen.sim.urdf.writer import to_urdf
 
 
 @pytest.mark.parametrize("name", ["turtlebot", "amr", "jackal"])
 def test_a_description_read_again_gives_the_same_robot(tmp_path, name):
     spec = shipped(name)
-    body = robot_body(spec)
-    (tmp_path / "robot.urdf").write_text(describe(body))
+    body = build_robot_body(spec)
+    (tmp_path / "robot.urdf").write_text(to_urdf(body))
     written = {"body": None, "mass": None, "urdf": "robot.urdf"}
-    again = robot_body(spec.model_copy(update=written), tmp_path / "x.robot.yaml", [tmp_path])
+    again = build_robot_body(spec.model_copy(update=written), tmp_path / "x.robot.yaml", [tmp_path])
     assert again.mass == pytest.approx(body.mass)
     assert [(w.x, w.y, w.radius) for w in again.wheels] == [
         pytest.approx((w.x, w.y, w.radius), abs=1e-6) for w in body.wheels
@@ -23,16 +23,16 @@ def test_a_description_read_again_gives_the_same_robot(tmp_path, name):
     assert again.chassis.center == pytest.approx(body.chassis.center, abs=1e-6)
     assert again.footprint == pytest.approx(np.array(body.footprint), abs=1e-6)
     for ours, theirs in zip(body.hull, again.hull, strict=False):
-        there = theirs.pose.apply(extremes(theirs.shape))
-        assert ours.pose.apply(extremes(ours.shape)) == pytest.approx(there, abs=1e-6)
+        there = theirs.pose.apply(hull_points(theirs.shape))
+        assert ours.pose.apply(hull_points(ours.shape)) == pytest.approx(there, abs=1e-6)
 
 
 def test_an_omnidirectional_urdf_stands_on_its_lowest_point_and_goes_sideways(tmp_path, simulate):
     spec = shipped("omni")
-    (tmp_path / "robot.urdf").write_text(describe(robot_body(spec)))
+    (tmp_path / "robot.urdf").write_text(to_urdf(build_robot_body(spec)))
     written = {"body": None, "mass": None, "urdf": "robot.urdf"}
-    body = robot_body(spec.model_copy(update=written), tmp_path / "x.robot.yaml", [tmp_path])
-    assert min((s.pose.apply(extremes(s.shape))[:, 2]).min() for s in body.hull) == pytest.approx(0.0)
+    body = build_robot_body(spec.model_copy(update=written), tmp_path / "x.robot.yaml", [tmp_path])
+    assert min((s.pose.apply(hull_points(s.shape))[:, 2]).min() for s in body.hull) == pytest.approx(0.0)
     simulation = simulate(body, drive=(0.0, 0.3, 0.0))
     simulation.step(480)
     assert simulation.truth().twist == pytest.approx((0.0, 0.3, 0.0), abs=1e-6)

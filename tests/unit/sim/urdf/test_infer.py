@@ -4,9 +4,9 @@ import pytest
 from playground import shipped
 
 from simscen.core.errors import InvalidInput
-from simscen.sim.embody import robot_body
-from simscen.sim.urdf.describe import describe
-from simscen.sim.urdf.infer import spec_of_urdf
+from simscen.sim.body.from_spec import build_robot_body
+from simscen.sim.urdf.infer_spec import infer_robot_spec
+from simscen.sim.urdf.writer import to_urdf
 
 JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf/jackal.urdf"
 
@@ -15,7 +15,7 @@ JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf/jackal.urdf"
 def infer(tmp_path):
     def infer(text):
         (tmp_path / "robot.urdf").write_text(text)
-        return spec_of_urdf(tmp_path / "robot.urdf", [tmp_path])
+        return infer_robot_spec(tmp_path / "robot.urdf", [tmp_path])
 
     return infer
 
@@ -23,7 +23,7 @@ def infer(tmp_path):
 @pytest.mark.parametrize("name", ["turtlebot", "amr", "jackal"])
 def test_the_drive_of_a_shipped_robot_is_found_in_its_description(infer, name):
     spec = shipped(name)
-    found = infer(describe(robot_body(spec)))
+    found = infer(to_urdf(build_robot_body(spec)))
     assert found.drive.type == spec.drive.type
     assert found.drive.wheel_radius == pytest.approx(spec.drive.wheel_radius)
     assert found.drive.wheel_separation == pytest.approx(spec.drive.wheel_separation)
@@ -31,7 +31,7 @@ def test_the_drive_of_a_shipped_robot_is_found_in_its_description(infer, name):
 
 
 def test_the_lidar_sits_on_its_link_or_on_top(infer):
-    text = describe(robot_body(shipped("amr")))
+    text = to_urdf(build_robot_body(shipped("amr")))
     assert infer(text).sensors["lidar"].lidar.mount.z == pytest.approx(0.38 + 0.02)
     link = (
         '<link name="base_scan"/><joint name="s" type="fixed"><parent link="base_link"/><child link="base_scan"/>'
@@ -42,14 +42,14 @@ def test_the_lidar_sits_on_its_link_or_on_top(infer):
 
 
 def test_wheel_joints_that_know_their_speed_limit_the_robot(infer):
-    text = describe(robot_body(shipped("amr"))).replace(
+    text = to_urdf(build_robot_body(shipped("amr"))).replace(
         '<axis xyz="0 1 0" />', '<axis xyz="0 1 0"/><limit effort="1" velocity="5"/>'
     )
     assert infer(text).limits.linear == pytest.approx(0.5)
 
 
 def test_wheels_on_a_suspension_are_not_steered(infer):
-    text = describe(robot_body(shipped("turtlebot")))
+    text = to_urdf(build_robot_body(shipped("turtlebot")))
     for side in ("left", "right"):
         text = text.replace(
             f'<joint name="wheel_{side}" type="continuous">\n    <parent link="base_link" />',
@@ -63,14 +63,14 @@ def test_wheels_on_a_suspension_are_not_steered(infer):
 
 def test_a_robot_without_wheels_is_not_guessed(infer):
     with pytest.raises(InvalidInput, match="cannot tell from its wheels"):
-        infer(describe(robot_body(shipped("omni"))))
+        infer(to_urdf(build_robot_body(shipped("omni"))))
 
 
 @pytest.mark.skipif(not JACKAL.exists(), reason="the Jackal of others is not here: see CONTRIBUTING.md")
 def test_the_jackal_is_skid_steered():
-    spec = spec_of_urdf(JACKAL)
+    spec = infer_robot_spec(JACKAL)
     assert spec.drive.type == "skid_steer"
     assert spec.drive.wheel_separation == pytest.approx(0.37559)
     assert spec.drive.wheel_base == pytest.approx(0.262)
     assert spec.drive.turning_scale == pytest.approx(1.487, abs=0.001)
-    assert robot_body(spec, JACKAL).mass == pytest.approx(18.4, abs=0.1)
+    assert build_robot_body(spec, JACKAL).mass == pytest.approx(18.4, abs=0.1)

@@ -13,8 +13,8 @@ from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Box, Mesh
 from simscen.model.robot import RobotSpec
-from simscen.sim.alone import Alone
-from simscen.sim.embody import robot_body
+from simscen.sim.body.from_spec import build_robot_body
+from simscen.sim.single_robot import SingleRobotSimulation
 from simscen.worlds.geometry.triangulation import fuse, triangulate
 from simscen.worlds.sdf.mesh_files import UnusableMesh, read_parts
 
@@ -64,7 +64,7 @@ def read_mesh(path):
 def load(tmp_path):
     def load(text, **more):
         (tmp_path / "robot.urdf").write_bytes(text if isinstance(text, bytes) else text.encode())
-        return robot_body(spec(**more), tmp_path / "cart.robot.yaml", [tmp_path], read_mesh)
+        return build_robot_body(spec(**more), tmp_path / "cart.robot.yaml", [tmp_path], read_mesh)
 
     return load
 
@@ -142,7 +142,7 @@ def test_casters_that_stand_on_the_ground_are_left_to_the_bodys_own(load):
 
 
 def test_it_drives(load):
-    simulation = Alone(fuse([]), [], load(robot()), Pose2(0, 0, 0), triangulate)
+    simulation = SingleRobotSimulation(fuse([]), [], load(robot()), Pose2(0, 0, 0), triangulate)
     simulation.drive(Twist(0.5, 0.0, 0.0))
     simulation.step(240)
     begin = simulation.truth().pose.x
@@ -156,7 +156,7 @@ def test_meshes_are_part_of_the_hull_as_their_convex_hull(load, tmp_path):
     body = load(robot(extra="", geometry='<mesh filename="tetra.stl" scale="0.001 0.001 0.001"/>'))
     (solid,) = (solid for solid in body.hull if solid.name == "base")
     assert solid.shape.vertices.max() == pytest.approx(0.3)
-    simulation = Alone(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation = SingleRobotSimulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
     simulation.step(10)
     simulation.close()
 
@@ -209,7 +209,7 @@ def test_38_a_link_that_leads_outside_is_not_followed(refusal, tmp_path):
 def test_39_a_folder_is_no_urdf(tmp_path):
     (tmp_path / "robot.urdf").mkdir()
     with pytest.raises(InvalidInput, match="not a regular file"):
-        robot_body(spec(), tmp_path / "cart.robot.yaml", [tmp_path])
+        build_robot_body(spec(), tmp_path / "cart.robot.yaml", [tmp_path])
 
 
 def test_40_a_pipe_is_no_mesh(refusal, tmp_path):
@@ -299,7 +299,7 @@ def test_a_urdf_outside_the_root_is_refused(tmp_path):
     (tmp_path / "in").mkdir()
     (tmp_path / "robot.urdf").write_text(robot())
     with pytest.raises(InvalidInput, match="outside the scenario root"):
-        robot_body(spec(urdf="../robot.urdf"), tmp_path / "in/cart.robot.yaml", [tmp_path / "in"])
+        build_robot_body(spec(urdf="../robot.urdf"), tmp_path / "in/cart.robot.yaml", [tmp_path / "in"])
 
 
 def test_a_car_is_steered_by_the_wheels_below_upright_joints(load):
@@ -315,7 +315,7 @@ def test_a_car_is_steered_by_the_wheels_below_upright_joints(load):
     body = load(robot(extra=steering), drive=drive)
     assert [(w.steered, w.driven, round(w.x, 3)) for w in body.wheels] == [
         (False, True, 0.0), (False, True, 0.0), (True, False, 0.4), (True, False, 0.4)]  # fmt: skip
-    simulation = Alone(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation = SingleRobotSimulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
     simulation.drive(Twist(0.4, 0.0, 0.4))
     simulation.step(720)
     assert simulation.truth().twist == pytest.approx((0.4, 0.0, 0.4), abs=0.02)
@@ -326,7 +326,7 @@ def test_xacro_files_are_expanded(tmp_path):
     (tmp_path / "robot.urdf.xacro").write_text(
         robot().replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" ')
     )
-    assert robot_body(spec(urdf="robot.urdf.xacro"), tmp_path / "cart.robot.yaml", [tmp_path]).hull
+    assert build_robot_body(spec(urdf="robot.urdf.xacro"), tmp_path / "cart.robot.yaml", [tmp_path]).hull
 
 
 @pytest.fixture
@@ -336,8 +336,8 @@ def jackal():
     drive = {"type": "skid_steer", "wheel_radius": 0.098, "wheel_separation": 0.37559, "wheel_base": 0.262,
              "turning_scale": 1.6}  # fmt: skip
     limits = {"linear": 2.0, "angular": 4.0, "linear_acceleration": 3.0, "angular_acceleration": 8.0}
-    body = robot_body(spec(drive, "jackal.urdf", limits=limits), JACKAL / "jackal.robot.yaml", [JACKAL])
-    simulation = Alone(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    body = build_robot_body(spec(drive, "jackal.urdf", limits=limits), JACKAL / "jackal.robot.yaml", [JACKAL])
+    simulation = SingleRobotSimulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
     yield simulation
     simulation.close()
 
@@ -417,4 +417,4 @@ def test_a_body_of_shapes_has_the_same_bounds(tmp_path):
     data = {"simscen": 1, "name": "cart", "drive": DIFFERENTIAL, "limits": LIMITS, "sensors": {}, "mass": 9}
     ship = RobotSpec.model_validate({**data, "body": [{"box": [1000, 1, 1], "z": 0.1}]})
     with pytest.raises(InvalidInput, match=r"robot 'cart' reaches 500 m from its base, more than 10 m"):
-        robot_body(ship, tmp_path / "cart.robot.yaml")
+        build_robot_body(ship, tmp_path / "cart.robot.yaml")

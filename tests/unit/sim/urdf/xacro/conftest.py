@@ -4,8 +4,8 @@ import pytest
 
 from simscen.assets.folders import Folders
 from simscen.core.errors import InvalidInput
-from simscen.sim.urdf.files import read_xml
 from simscen.sim.urdf.xacro.expand import expand as expand_xacro
+from simscen.sim.urdf.xml_source import read_xml
 
 
 @pytest.fixture

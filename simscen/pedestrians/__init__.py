@@ -1,0 +1,1 @@
+"""Pedestrians: the social force model and reactions to robots. Imports only simscen.core."""

@@ -1,0 +1,1 @@
+"""Robot bodies: geometry, mass, wheels and casters. Needs no physics engine."""

@@ -1,0 +1,130 @@
+"""What robots and things cover of the ground."""
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from simscen.core.decorators import cached_on_instance
+from simscen.core.environment.world_model import Polygon
+from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
+
+FEW = 200
+"""Points up to which it does not pay to look which of them may be corners."""
+_CIRCLE = 64
+"""Corners of a circle's outline: within 0.03 % of the radius."""
+
+
+def circle(radius: float, corners: int = 32) -> Polygon:
+    """A regular polygon with its corners on the circle, anticlockwise from straight ahead."""
+    angles = [2 * math.pi * k / corners for k in range(corners)]
+    return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
+
+
+def footprint(solids: Iterable[Solid]) -> Polygon:
+    """The convex outline of solids seen from above, anticlockwise."""
+    return convex_hull(np.concatenate([solid.pose.apply(hull_points(solid.shape))[:, :2] for solid in solids]))
+
+
+def outlines_in_band(solids: Iterable[Solid], z_range: tuple[float, float]) -> list[Polygon]:
+    """The outlines of solids seen from above, those that reach into the heights; of a mesh or tilted one, its hull."""
+    return [outline for solid in solids if (outline := _outline(solid.shape, solid.pose, z_range))]
+
+
+@cached_on_instance
+def _outline(shape: Shape, pose: Pose3, z_range: tuple[float, float]) -> Polygon:
+    """None (no corners) if it does not reach into the heights. Of a row of chairs it is one for all of them."""
+    corners = pose.apply(hull_points(shape))
+    if corners[:, 2].min() >= z_range[1] or corners[:, 2].max() <= z_range[0]:
+        return ()
+    upright = isinstance(shape, Extrusion) and pose.qx == pose.qy == 0
+    outline = _bottom(corners) if upright else convex_hull(corners[:, :2])
+    return outline if len(outline) > 2 else ()
+
+
+def _bottom(corners: Array) -> Polygon:
+    return tuple((x, y) for x, y in corners[: len(corners) // 2, :2].tolist())
+
+
+def hull_points(shape: Shape) -> Array:
+    """Points (n, 3) whose convex hull is that of the shape; round ones within 0.1 % of the radius."""
+    match shape:
+        case Box(size):
+            return np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]) * size
+        case Cylinder(radius, length):
+            return np.concatenate((_ring(radius, -length / 2), _ring(radius, length / 2)))
+        case Cone(radius, length):
+            return np.concatenate((_ring(radius, -length / 2), [[0.0, 0.0, length / 2]]))
+        case Sphere(radius):
+            return _ball((radius, radius, radius))
+        case Ellipsoid(radii):
+            return _ball(radii)
+        case Capsule(radius, length):
+            ball, up = _ball((radius, radius, radius)), np.array([0.0, 0.0, length / 2])
+            return np.concatenate((ball - up, ball + up))
+        case Extrusion(polygon, height):
+            return np.array([(x, y, z) for z in (0.0, height) for x, y in polygon])
+        case Mesh(vertices):
+            return vertices
+
+
+def radius_and_height(solids: Iterable[Solid]) -> tuple[float, float]:
+    """How far solids extend from the z axis, and how high above or below the origin, in meters."""
+    points = np.concatenate([solid.pose.apply(hull_points(solid.shape)) for solid in solids])
+    return float(np.hypot(points[:, 0], points[:, 1]).max()), float(np.abs(points[:, 2]).max())
+
+
+def convex_hull(points: Array) -> Polygon:
+    """The convex hull of points (n, 2), anticlockwise (Andrew's monotone chain, 1979)."""
+    ordered = sorted({(round(x, 9), round(y, 9)) for x, y in _outer(points).tolist()})
+    if len(ordered) < 3:
+        return tuple(ordered)
+    return (*_chain(ordered)[:-1], *_chain(ordered[::-1])[:-1])
+
+
+def _outer(points: Array) -> Array:
+    """Without most of those that are no corners: they lie inside of what spans the outermost (Akl, Toussaint 1978)."""
+    if len(points) < FEW:
+        return points
+    angles = np.arange(32) * (math.pi / 16)
+    outermost = (points @ np.array([np.cos(angles), np.sin(angles)])).argmax(axis=0)
+    ring = points[outermost]
+    sides = np.roll(ring, -1, axis=0) - ring
+    across = (points @ np.array([-sides[:, 1], sides[:, 0]])) - (ring[:, 1] * sides[:, 0] - ring[:, 0] * sides[:, 1])
+    inside = ((across > 1e-6) | (np.abs(sides).sum(axis=1) == 0.0)).all(axis=1)
+    inside[outermost] = False
+    kept: Array = points[~inside]
+    return kept
+
+
+def _chain(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    chain: list[tuple[float, float]] = []
+    for x, y in points:
+        while len(chain) > 1:
+            (ax, ay), (bx, by) = chain[-2:]
+            if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0:
+                break
+            chain.pop()
+        chain.append((x, y))
+    return chain
+
+
+def _ring(radius: float, z: float) -> Array:
+    return _rings(np.array([radius]), np.array([z]))
+
+
+def _rings(radii: Array, heights: Array) -> Array:
+    """Points of level circles about the z axis, one after the other."""
+    angles = np.arange(_CIRCLE) * (2 * math.pi / _CIRCLE)
+    points = np.empty((len(radii), _CIRCLE, 3))
+    points[:, :, 0], points[:, :, 1] = np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))
+    points[:, :, 2] = heights[:, None]
+    return points.reshape(-1, 3)
+
+
+def _ball(radii: tuple[float, float, float]) -> Array:
+    latitudes = np.linspace(-math.pi / 2, math.pi / 2, _CIRCLE // 2 + 1).tolist()
+    rings = [(max(0.0, math.cos(latitude)), math.sin(latitude)) for latitude in latitudes]
+    result: Array = _rings(*np.array(rings).T) * radii
+    return result

@@ -1,0 +1,1 @@
+"""PyBullet clients, collision shapes and rigid bodies."""

@@ -1,0 +1,293 @@
+"""PyBullet itself: a client with every parameter set, and collision shapes from solids."""
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+import pybullet
+
+from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, submesh
+from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
+from simscen.sim.body.inertia import GRAVITY
+from simscen.sim.body.outline import hull_points
+from simscen.sim.bullet.hull_vertices import reduce_hull_vertices
+
+FACES_AT_ONCE = 40_000
+"""Bullet's shared-memory commands hold at most 131072 vertices and 524288 indices."""
+STRIP = 20.0
+"""m of x that lie together in one lot of faces."""
+BREAKING = 0.02
+"""Share of a shape's extent within which a point of contact is the one of the step before."""
+AT_REST = 1e-6
+"""(m/s)² below which a body is at rest; Bullet's own 0.05 would stop a ball that rolls at 0.2 m/s."""
+UNTIL_ASLEEP = 2.0
+"""Seconds at rest after which Bullet lets a body lie until it is touched (btMultiBody's SLEEP_TIMEOUT)."""
+
+TERRAIN, GROUND, HULL, WHEEL, UNMOVED = 128, 64, 32, 16, 2
+"""Collision groups of uneven ground, of the plane, of a robot's parts, and Bullet's own of what nothing pushes."""
+NOTHING, EVERYTHING = 0, -1
+AS_IT_IS = -1
+"""The look of a body that the renderer shows as the shape that it is; of most triangles it shows nothing."""
+
+ORIGIN = Pose3()
+
+PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
+"""What the engine knows as such."""
+
+Triangulate = Callable[[Shape], Mesh]
+Frame = tuple[tuple[float, float, float], Pose3]
+Faces = npt.NDArray[np.int32]
+
+
+def set_up(client: int, tick_rate: int, solver_iterations: int, one_by_one: bool = False) -> None:
+    """Set every parameter, so that no default decides a trajectory.
+
+    `one_by_one`: what touches nothing in common is solved apart, so that it does not matter what else is in the world.
+    """
+    pybullet.setPhysicsEngineParameter(
+        fixedTimeStep=1 / tick_rate,
+        numSolverIterations=solver_iterations,
+        numSubSteps=0,
+        # Stopping at 1e-4 would spare 8 % of a step, but robots on four wheels then creep by 0.1 mm/s.
+        solverResidualThreshold=1e-7,
+        erp=0.2,
+        contactERP=0.2,
+        frictionERP=0.2,
+        globalCFM=0.0,
+        restitutionVelocityThreshold=0.2,
+        contactBreakingThreshold=BREAKING,
+        contactSlop=1e-5,
+        collisionFilterMode=0,
+        useSplitImpulse=0,
+        enableConeFriction=1,
+        enableFileCaching=0,
+        deterministicOverlappingPairs=1,
+        allowedCcdPenetration=0.04,
+        jointFeedbackMode=0,
+        constraintSolverType=pybullet.CONSTRAINT_SOLVER_LCP_SI,
+        minimumSolverIslandSize=1 if one_by_one else 128,
+        reportSolverAnalytics=0,
+        enableSAT=0,
+        physicsClientId=client,
+    )
+    pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=client)
+
+
+def touch(client: int, body: int, link: int, group: int, others: int) -> None:
+    """Let a link touch only what is in the groups `others`, and of that only what lets itself be touched by `group`."""
+    pybullet.setCollisionFilterGroupMask(body, link, group, others, physicsClientId=client)
+
+
+def static_mesh(client: int, mesh: TriangleMesh) -> list[int]:
+    """What never moves, as few bodies: concave meshes without the faces that lie on the ground."""
+    return static_faces(client, mesh.vertices, above_floor(mesh.vertices, mesh.faces))
+
+
+def static_faces(client: int, vertices: Array, faces: Faces) -> list[int]:
+    """Faces that never move, as few bodies."""
+    return [_concave(client, vertices, tile) for tile in tiles(vertices, faces)]
+
+
+def tiles(vertices: Array, faces: Faces) -> list[Faces]:
+    """Faces in as many lots as Bullet takes at once; those of a lot lie together, in strips and from end to end."""
+    if len(faces) > FACES_AT_ONCE:
+        middle = vertices[faces, :2].mean(axis=1)
+        faces = faces[np.lexsort((middle[:, 1], np.floor(middle[:, 0] / STRIP)))]
+    return [faces[k : k + FACES_AT_ONCE] for k in range(0, len(faces), FACES_AT_ONCE)]
+
+
+def above_floor(vertices: Array, faces: Faces) -> Faces:
+    """Those faces that do not lie on the ground."""
+    standing: Faces = faces[(vertices[faces, 2] > FLOOR_HEIGHT_M).any(axis=1)]
+    return standing
+
+
+def _concave(client: int, vertices: Array, faces: Faces) -> int:
+    body = fixed(client, concave_shape(client, submesh(vertices, faces)))
+    # Bullet would thicken the triangles by 1 mm.
+    pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
+    return body
+
+
+def concave_shape(client: int, mesh: Mesh) -> int:
+    """Triangles as they are."""
+    vertices, indices = mesh.vertices.tolist(), mesh.faces.ravel().tolist()
+    shape: int = pybullet.createCollisionShape(
+        pybullet.GEOM_MESH,
+        vertices=vertices,
+        indices=indices,
+        flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
+        physicsClientId=client,
+    )
+    # PyBullet holds on to these lists for ever; 80 MB for a map of 220 000 triangles.
+    for emptied in (*vertices, vertices, indices):
+        emptied.clear()
+    return _made(shape)
+
+
+def convex_shape(client: int, corners: Array) -> int:
+    """The convex hull of points (n, 3)."""
+    shape: int = pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=corners.tolist(), physicsClientId=client)
+    return _made(shape)
+
+
+def compound_shape(client: int, solids: Iterable[Solid]) -> int:
+    """One rigid shape of boxes, cylinders, balls and capsules."""
+    kinds, halves, radii, lengths, places, turns = [], [], [], [], [], []
+    for solid in solids:
+        kind, half, radius, length = _primitive(solid.shape)
+        kinds.append(kind)
+        halves.append(half)
+        radii.append(radius)
+        lengths.append(length)
+        places.append(solid.pose.position)
+        turns.append(solid.pose.quaternion)
+    shape: int = pybullet.createCollisionShapeArray(
+        shapeTypes=kinds,
+        halfExtents=halves,
+        radii=radii,
+        lengths=lengths,
+        collisionFramePositions=places,
+        collisionFrameOrientations=turns,
+        physicsClientId=client,
+    )
+    return _made(shape)
+
+
+def hull_shape(client: int, solids: Iterable[Solid]) -> int:
+    """The convex hull of solids of any kind."""
+    return convex_shape(client, np.concatenate([solid.pose.apply(_corners(solid.shape)) for solid in solids]))
+
+
+def _corners(shape: Shape) -> Array:
+    return reduce_hull_vertices(shape) if isinstance(shape, Mesh) else hull_points(shape)
+
+
+def hull_shapes(client: int, solids: Sequence[Solid]) -> list[int]:
+    """A robot's hull: one shape of all primitives, then the convex hull of each other solid."""
+    primitives = [solid for solid in solids if isinstance(solid.shape, PRIMITIVES)]
+    others = [solid for solid in solids if not isinstance(solid.shape, PRIMITIVES)]
+    first = [compound_shape(client, primitives)] if primitives else []
+    return first + [hull_shape(client, [solid]) for solid in others]
+
+
+def body_shape(client: int, solids: Sequence[Solid], pushable: bool, triangulate: Triangulate) -> int:
+    """The collision shape of something that moves; concave where it is and nothing pushes it.
+
+    Bullet moves convex shapes only, so what it pushes and cannot build from primitives becomes its convex hull.
+    """
+    if simple(solids):
+        return compound_shape(client, solids)
+    return hull_shape(client, solids) if pushable else concave_shape(client, fused(solids, triangulate))
+
+
+def hollow(solids: Sequence[Solid], pushable: bool) -> bool:
+    """Whether the collision shape of something that moves is a surface without an inside."""
+    return not simple(solids) and not pushable
+
+
+def simple(solids: Sequence[Solid]) -> bool:
+    """Whether the engine knows all of them as such."""
+    return all(isinstance(solid.shape, PRIMITIVES) for solid in solids)
+
+
+def fused(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
+    """The surfaces of solids as one."""
+    meshes = [(triangulate(solid.shape), solid.pose) for solid in solids]
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in meshes)])
+    vertices = np.concatenate([pose.apply(mesh.vertices) for mesh, pose in meshes])
+    faces = [mesh.faces + np.int32(start) for (mesh, _), start in zip(meshes, starts, strict=False)]
+    return Mesh(vertices, np.concatenate(faces))
+
+
+def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float, look: int = AS_IT_IS) -> int:
+    """A rigid body of a collision shape, with principal moments and center of mass in `frame`, and how it looks.
+
+    Nothing pushes one of mass 0, which sleeps while it stands: Bullet looks anew at what lies upon something awake.
+    """
+    moments, base_from_center = frame
+    center = pose.compose(base_from_center)
+    number: int = pybullet.createMultiBody(
+        mass, shape, look, pose.position, pose.quaternion,
+        baseInertialFramePosition=base_from_center.position,
+        baseInertialFrameOrientation=base_from_center.quaternion, physicsClientId=client,
+    )  # fmt: skip
+    pybullet.changeDynamics(
+        number, -1, lateralFriction=friction, restitution=0.0, linearDamping=0.0, angularDamping=0.0,
+        physicsClientId=client,
+    )  # fmt: skip
+    if mass == 0:  # Bullet would look at each step for where it touches the ground, though neither moves the other
+        touch(client, number, -1, UNMOVED, ~(UNMOVED | GROUND | TERRAIN))
+        sleeps = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
+        pybullet.changeDynamics(number, -1, activationState=sleeps, physicsClientId=client)
+    if mass > 0:
+        pybullet.changeDynamics(number, -1, localInertiaDiagonal=moments, physicsClientId=client)
+        pybullet.resetBasePositionAndOrientation(number, center.position, center.quaternion, physicsClientId=client)
+    return number
+
+
+def wake(client: int, number: int) -> None:
+    """Wake a body; it lies still again from UNTIL_ASLEEP after it came to rest until something with mass touches it."""
+    awake = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP
+    pybullet.changeDynamics(number, -1, activationState=awake, sleepThreshold=AT_REST, physicsClientId=client)
+
+
+def lay(client: int, number: int) -> None:
+    """Let a body that is at rest sleep after the next step, as if it had been so for UNTIL_ASLEEP."""
+    asleep = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
+    pybullet.changeDynamics(number, -1, activationState=asleep, sleepThreshold=AT_REST, physicsClientId=client)
+
+
+def fixed(client: int, shape: int, look: int = AS_IT_IS, pose: Pose3 = ORIGIN, friction: float = 1.0) -> int:
+    """A body that never moves; it sleeps, for Bullet looks anew at what lies upon something that is awake.
+
+    It is a rigid body: a multibody, as Bullet would have it, has six velocities of its own that stay zero, and each
+    contact with it is solved for them too. On a ground that is one a robot's step takes an eighth longer.
+    """
+    number: int = pybullet.createMultiBody(
+        0.0, shape, look, pose.position, pose.quaternion, useMaximalCoordinates=1, physicsClientId=client
+    )
+    touch(client, number, -1, UNMOVED, ~(UNMOVED | GROUND | TERRAIN))
+    pybullet.changeDynamics(
+        number, -1, lateralFriction=friction, restitution=0.0, activationState=pybullet.ACTIVATION_STATE_SLEEP,
+        physicsClientId=client,
+    )  # fmt: skip
+    return number
+
+
+def plane(client: int, look: int = AS_IT_IS) -> int:
+    """The plane z = 0."""
+    return fixed(client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client), look)
+
+
+def speck(client: int) -> int:
+    """The look of what nobody will ever see, a triangle too small to be drawn: Bullet makes that of a shape at once.
+
+    For a plane it paints 3 MB, which takes a millisecond.
+    """
+    corners = [(0.0, 0.0, 0.0), (1e-9, 0.0, 0.0), (0.0, 1e-9, 0.0)]
+    look: int = pybullet.createVisualShape(
+        pybullet.GEOM_MESH, vertices=corners, indices=[0, 1, 2], physicsClientId=client
+    )
+    return look
+
+
+def _primitive(shape: Shape) -> tuple[int, Sequence[float], float, float]:
+    match shape:
+        case Box((x, y, z)):
+            return pybullet.GEOM_BOX, (x / 2, y / 2, z / 2), 0.0, 0.0
+        case Cylinder(radius, length):
+            return pybullet.GEOM_CYLINDER, (0.0, 0.0, 0.0), radius, length
+        case Capsule(radius, length):
+            return pybullet.GEOM_CAPSULE, (0.0, 0.0, 0.0), radius, length
+        case Sphere(radius):
+            return pybullet.GEOM_SPHERE, (0.0, 0.0, 0.0), radius, 0.0
+        case _:
+            raise TypeError(f"{type(shape).__name__} is not a primitive of the engine")
+
+
+def _made(shape: int) -> int:
+    if shape < 0:
+        raise RuntimeError("PyBullet refused a collision shape")
+    return shape

@@ -1,0 +1,1 @@
+"""Movable objects other than robots: scripted, pushed and deferred."""

@@ -1,0 +1,1 @@
+"""Robots in the physics engine: bases, drives and their state."""

@@ -1,0 +1,1 @@
+"""Static world, ground and camera images."""

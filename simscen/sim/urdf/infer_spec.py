@@ -1,0 +1,102 @@
+"""A robot's specification from its URDF alone, where the URDF makes it plain."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from simscen.assets.folders import Folders
+from simscen.core.errors import InvalidInput
+from simscen.model.robot import (
+    Ackermann,
+    Differential,
+    Drive,
+    InertialUnit,
+    Lidar,
+    Limits,
+    Mount,
+    RobotSpec,
+    Sensor,
+    SkidSteer,
+    WheelOdometry,
+)
+from simscen.sim.body.outline import hull_points
+from simscen.sim.urdf.body import body_from_tree, check_front_steering, read_tree
+from simscen.sim.urdf.elements import MeshReader
+from simscen.sim.urdf.tree import Tree
+from simscen.sim.urdf.wheels import WheelJoint, infer_wheels
+
+STRAIGHT = 0.02
+"""m by which wheels of one axle may differ along x."""
+LIDAR_NAMES = ("laser", "lidar", "scan")
+"""What links are called that a lidar is on."""
+HINT = "write a short *.robot.yaml beside it that names its drive, limits and sensors: see `simscen explain robot`"
+
+
+def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshReader | None = None) -> RobotSpec:
+    """The robot in a URDF file: drive from its wheels, and a lidar, odometry and IMU with our defaults.
+
+    Two driven wheels make a differential drive, four or more a skid-steered one, steered wheels a car. Limits are
+    1 m/s, 1.5 rad/s, 1 m/s² and 2 rad/s², or less where its wheel joints say so. The lidar sits on the link that is
+    called laser, lidar or scan, or on top. Raises InvalidInput when the file is unusable or its drive is not plain.
+    """
+    folders = Folders.of(roots or (path.resolve().parent,))
+    tree = read_tree(path, folders, read_mesh)
+    wheels = infer_wheels(tree)
+    drive = _drive(tree, wheels)
+    draft = RobotSpec(
+        simscen=1,
+        name=tree.name.lstrip("/") or path.stem,
+        urdf=path.name,
+        drive=drive,
+        limits=_limits(wheels, drive),
+        sensors={},
+    )
+    sensors = {
+        "lidar": Sensor(lidar=Lidar(mount=_lidar_mount(tree, draft, wheels))),
+        "odom": Sensor(odometry=WheelOdometry()),
+        "imu": Sensor(imu=InertialUnit()),
+    }
+    return draft.model_copy(update={"sensors": sensors})
+
+
+def _drive(tree: Tree, wheels: list[WheelJoint]) -> Drive:
+    driven = [wheel for wheel in wheels if not wheel.steered]
+    left, right = ([w for w in driven if (w.place[1] > 0) is side] for side in (True, False))
+    if not left or len(left) != len(right):
+        raise InvalidInput([tree.element.problem("cannot tell from its wheels how this robot drives", HINT)])
+    separation = float(np.mean([w.place[1] for w in left]) - np.mean([w.place[1] for w in right]))
+    axles = [w.place[0] for w in driven]
+    size = {"wheel_radius": driven[0].radius, "wheel_separation": separation, "wheel_width": driven[0].width}
+    steered = [wheel.place[0] for wheel in wheels if wheel.steered]
+    if steered:
+        check_front_steering(wheels)
+        base = float(np.mean(steered) - np.mean(axles))
+        return Ackermann.model_validate({"type": "ackermann", "wheel_base": base, "max_steering": 0.5, **size})
+    if max(axles) - min(axles) < STRAIGHT:
+        return Differential.model_validate({"type": "differential", **size})
+    base = max(axles) - min(axles)
+    # Coulomb friction at the corners of a rectangle: turning in place takes this much more than the kinematics say.
+    scale = min(10.0, 1 + (base / separation) ** 2)
+    return SkidSteer.model_validate({"type": "skid_steer", "wheel_base": base, "turning_scale": scale, **size})
+
+
+def _limits(wheels: list[WheelJoint], drive: Drive) -> Limits:
+    limits = [(wheel.joint.element.child("limit"), wheel.radius) for wheel in wheels if not wheel.steered]
+    speeds = [limit.numbers("velocity", 1, (0.0,))[0] * radius for limit, radius in limits if limit is not None]
+    linear = min([1.0, *(speed for speed in speeds if speed > 0)])
+    angular = min(1.5, 2 * linear / getattr(drive, "wheel_separation", 1.0))
+    return Limits(linear=linear, angular=angular, linear_acceleration=1.0, angular_acceleration=2.0)
+
+
+def _lidar_mount(tree: Tree, draft: RobotSpec, wheels: list[WheelJoint]) -> Mount:
+    body = body_from_tree(draft, tree)
+    ground = min(wheel.place[2] - wheel.radius for wheel in wheels)
+    axle = np.mean([wheel.place for wheel in wheels if not wheel.steered], axis=0)
+    for name in tree.links:
+        if any(word in name.lower() for word in LIDAR_NAMES):
+            pose = tree.poses[name]
+            x, y, z = float(pose.x - axle[0]), float(pose.y - axle[1]), float(pose.z - ground)
+            return Mount(x=x, y=y, z=max(0.0, z), yaw=pose.yaw)
+    top = max(float(solid.pose.apply(hull_points(solid.shape))[:, 2].max()) for solid in body.hull)
+    return Mount(z=top + 0.02)

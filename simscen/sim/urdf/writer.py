@@ -1,0 +1,79 @@
+"""A robot's body as URDF, for whoever shows it: /robot_description in a log."""
+
+import math
+from xml.etree import ElementTree as ET
+
+from simscen.core.geometry import Pose3
+from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
+from simscen.sim.body.outline import hull_points
+from simscen.sim.body.robot_body import RobotBody
+from simscen.sim.body.undercarriage import Wheel
+
+BASE = "base_link"
+
+
+def to_urdf(body: RobotBody) -> str:
+    """URDF text: the base link with the hull in the base frame, and a continuous joint for each wheel.
+
+    Shapes that URDF does not know are shown as their bounding boxes.
+    """
+    robot = ET.Element("robot", name=body.name)
+    base = ET.SubElement(robot, "link", name=BASE)
+    center = Pose3(*body.chassis.center.tolist())
+    _inertial(base, body.chassis.mass, center, [[float(value) for value in row] for row in body.chassis.tensor])
+    for solid in (*body.hull, *body.casters):
+        _shown(base, solid)
+    for wheel in body.wheels:
+        _wheel(robot, wheel)
+    ET.indent(robot)
+    return ET.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _wheel(robot: ET.Element, wheel: Wheel) -> None:
+    link = ET.SubElement(robot, "link", name=f"{wheel.name}_link")
+    tensor = [[float(value) for value in row] for row in wheel.inertia.tensor]
+    _inertial(link, wheel.inertia.mass, Pose3(), tensor)
+    _shown(link, Solid(Cylinder(wheel.radius, wheel.width), Pose3.from_rpy(0, 0, 0, math.pi / 2, 0, 0)))
+    joint = ET.SubElement(robot, "joint", name=wheel.name, type="continuous")
+    ET.SubElement(joint, "parent", link=BASE)
+    ET.SubElement(joint, "child", link=f"{wheel.name}_link")
+    ET.SubElement(joint, "origin", xyz=_text(wheel.x, wheel.y, wheel.radius), rpy="0 0 0")
+    ET.SubElement(joint, "axis", xyz="0 1 0")
+
+
+def _inertial(link: ET.Element, mass: float, center: Pose3, tensor: list[list[float]]) -> None:
+    inertial = ET.SubElement(link, "inertial")
+    _origin(inertial, center)
+    ET.SubElement(inertial, "mass", value=_text(mass))
+    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    ET.SubElement(inertial, "inertia", {name: _text(tensor[row][column]) for name, (row, column) in names.items()})
+
+
+def _shown(link: ET.Element, solid: Solid) -> None:
+    for kind in ("visual", "collision"):
+        element = ET.SubElement(link, kind)
+        geometry = ET.SubElement(element, "geometry")
+        pose = solid.pose
+        match solid.shape:
+            case Box(size):
+                ET.SubElement(geometry, "box", size=_text(*size))
+            case Cylinder(radius, length) | Capsule(radius, length):
+                ET.SubElement(geometry, "cylinder", radius=_text(radius), length=_text(length))
+            case Sphere(radius):
+                ET.SubElement(geometry, "sphere", radius=_text(radius))
+            case other:
+                low, high = hull_points(other).min(axis=0), hull_points(other).max(axis=0)
+                ET.SubElement(geometry, "box", size=_text(*(high - low).tolist()))
+                pose = pose.compose(Pose3(*((low + high) / 2).tolist()))
+        _origin(element, pose)
+
+
+def _origin(element: ET.Element, pose: Pose3) -> None:
+    x, y, z, w = pose.quaternion
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
+    ET.SubElement(element, "origin", xyz=_text(*pose.position), rpy=_text(roll, pitch, pose.yaw))
+
+
+def _text(*values: float) -> str:
+    return " ".join(f"{value:.9g}" for value in values)

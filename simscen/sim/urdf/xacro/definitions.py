@@ -1,0 +1,164 @@
+"""What `<xacro:macro name="…" params="…">` defines."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from simscen.sim.urdf.xacro.limits import ExpansionError, parse_bool, parse_literal
+from simscen.sim.urdf.xacro.scope import Block, Held, Lazy, Scope
+from simscen.sim.urdf.xacro.text import TextEvaluator, required_attribute
+from simscen.sim.urdf.xml_source import Element
+
+PARAMETER = re.compile(
+    r"""\s*(?P<name>[^\s:=]+)\s*
+        (?::?=\s*(?P<forward>\^\|?)?(?P<default>\$\{[^}]*\}|\$\([^)]*\)|(?:'''(?=\s|\Z)|'[^']*'|"[^"]*"|[^\s'"])*))?
+        (?=\s|\Z)""",
+    re.VERBOSE,
+)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter: `*name` and `**name` are blocks; `forward` = take the caller's property of that name first."""
+
+    name: str
+    forward: bool = False
+    default: str | None = None
+
+    @property
+    def is_block(self) -> bool:
+        """Whether it takes an element."""
+        return self.name.startswith("*")
+
+
+@dataclass(frozen=True, eq=False)
+class Macro:
+    """A macro and the element that holds its body."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    body: Element
+
+
+@dataclass(eq=False)
+class Macros:
+    """Macros by name, each scope in front of the one around it; `spaces` are included namespaces."""
+
+    parent: "Macros | None" = None
+    macros: dict[str, Macro] = field(default_factory=dict)
+    spaces: "dict[str, Macros]" = field(default_factory=dict)
+
+    def find(self, name: str) -> Macro | None:
+        """The innermost macro of that name."""
+        return next((scope.macros[name] for scope in self._outwards() if name in scope.macros), None)
+
+    def space(self, name: str) -> "Macros | None":
+        """The innermost namespace of that name."""
+        return next((scope.spaces[name] for scope in self._outwards() if name in scope.spaces), None)
+
+    def _outwards(self) -> "Iterator[Macros]":
+        scope: Macros | None = self
+        while scope is not None:
+            yield scope
+            scope = scope.parent
+
+
+def parse_macro(element: Element) -> Macro:
+    """The macro that an element defines; raises Refused."""
+    name = element.name.removeprefix("xacro:")
+    if not name or name == "call" or "." in name:
+        raise ExpansionError(f"{name[:60]!r} is not a name for a macro")
+    return Macro(name, tuple(_parameters(element.attributes.get("params", ""))), element)
+
+
+def _parameters(text: str) -> list[Parameter]:
+    found = []
+    position = 0
+    while text[position:].strip():
+        match = PARAMETER.match(text, position)
+        if match is None:
+            raise ExpansionError(f"params: cannot read {text[position:].strip()[:60]!r}")
+        found.append(Parameter(match["name"], match["forward"] is not None, match["default"] or None))
+        position = match.end()
+    return found
+
+
+# MERGED: Which macro a call means, and what its parameters are in it.
+def resolve_macro(written: str, scope: Scope, macros: Macros) -> tuple[Macro, Scope, Macros]:
+    """The macro `name` or `namespace.name` and the scopes that its own lie in; raises Refused."""
+    *spaces, name = written.split(".")
+    for space in spaces:
+        owner, inner = scope.owner(space), macros.space(space)
+        found = owner.held[space] if owner is not None else None
+        if inner is None or not isinstance(found, Scope):
+            raise ExpansionError(f"there is no namespace {space[:60]!r}")
+        scope, macros = found, inner
+    macro = macros.find(name)
+    if macro is None:
+        raise ExpansionError(f"there is no macro {written[:60]!r}")
+    return macro, scope, macros
+
+
+def bind_parameters(
+    macro: Macro, call: Element, blocks: list[Element], scope: Scope, inside: Scope, texts: TextEvaluator
+) -> Scope:
+    """`inside` with the macro's parameters: all of them mean what they mean in `scope`, where it is called.
+
+    Raises Refused.
+    """
+    missing = {parameter.name: parameter for parameter in macro.parameters}
+    for name, text in call.attributes.items():
+        if missing.pop(name, None) is None:
+            raise ExpansionError(f"macro {macro.name!r} has no parameter {name[:60]!r}")
+        inside.held[name] = texts.literal(text, scope)
+    waiting = iter(blocks)
+    for name in [parameter.name for parameter in macro.parameters if parameter.is_block]:
+        block = next(waiting, None)
+        if block is None:
+            raise ExpansionError(f"macro {macro.name!r} needs a block for {name!r}")
+        inside.held[name] = Block(block, whole=not name.startswith("**"))
+        del missing[name]
+    if extra := next(waiting, None):
+        raise ExpansionError(f"macro {macro.name!r} has no use for <{extra.tag[:60]}>")
+    for name, parameter in missing.items():
+        inside.held[name] = _default(parameter, scope, macro, texts)
+    return inside
+
+
+def _default(parameter: Parameter, scope: Scope, macro: Macro, texts: TextEvaluator) -> Held:
+    if parameter.forward and scope.owner(parameter.name) is not None:
+        return texts.property(scope, parameter.name)
+    if parameter.default is not None:
+        return texts.literal(parameter.default, scope)
+    what = "there is no property to forward to" if parameter.forward else "a call does not give"
+    raise ExpansionError(f"macro {macro.name!r}: {what} {parameter.name!r}")
+
+
+# MERGED: What `<xacro:property>` defines.
+def define_property(source: Element, scope: Scope, texts: TextEvaluator) -> None:
+    """Define, default or remove a property; raises Refused."""
+    name = texts.text(required_attribute(source, "name"), scope)
+    if not name.isidentifier() or name.startswith("__"):
+        raise ExpansionError(f"{name[:60]!r} is not a name for a property")
+    value, default = source.attributes.get("value"), source.attributes.get("default")
+    remove = parse_bool(texts.value(source.attributes.get("remove", "false"), scope))
+    if (value is not None) + (default is not None) + remove > 1:
+        raise ExpansionError("value, default and remove exclude each other")
+    known = scope.owner(name) is not None
+    if remove and known:
+        scope.remove(name)
+    elif default is None or not known:
+        _set(source, name, value if default is None else default, scope, texts)
+
+
+def _set(source: Element, name: str, value: str | None, scope: Scope, texts: TextEvaluator) -> None:
+    lazy = parse_bool(texts.value(source.attributes.get("lazy_eval", "true"), scope))
+    where = source.attributes.get("scope", "")
+    into = {"global": scope.top(), "parent": scope.caller()}.get(where, scope)
+    if value is None:
+        into.held[f"**{name}"] = Block(source, whole=False)
+    elif lazy and into is scope:
+        plain = parse_literal(value)
+        into.held[name] = Lazy(plain) if isinstance(plain, str) else plain
+    else:
+        into.held[name] = texts.literal(value, scope)

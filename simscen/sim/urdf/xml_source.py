@@ -1,0 +1,100 @@
+"""The elements of a URDF, which say what is wrong with them at their line."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from typing_extensions import Self
+
+from simscen.assets import markup
+from simscen.assets.folders import Folders, Trouble
+from simscen.core.errors import InvalidInput, Problem
+
+CODE = "SC400"
+"""The stable code of every problem with a robot's URDF; the message tells them apart."""
+
+
+class InvalidElement(Exception):
+    """An element that cannot be used, and why."""
+
+    def __init__(self, element: "Element", message: str, hint: str = "") -> None:
+        self.problem = element.problem(message, hint)
+        super().__init__(message)
+
+
+@dataclass(eq=False, slots=True)
+class Element(markup.Element):
+    """An element of a URDF or xacro file."""
+
+    def needed(self, tag: str) -> Self:
+        """The first child of that kind; raises Unusable when there is none."""
+        found = self.child(tag)
+        if found is None:
+            raise InvalidElement(self, f"<{self.tag}> without <{tag}>")
+        return found
+
+    def text(self, attribute: str) -> str:
+        """An attribute that must be there."""
+        if not self.attributes.get(attribute):
+            raise InvalidElement(self, f'<{self.tag}> without {attribute}="…"')
+        return self.attributes[attribute]
+
+    def numbers(self, attribute: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
+        """So many finite numbers."""
+        if attribute not in self.attributes and default is not None:
+            return default
+        words = self.text(attribute).split()
+        try:
+            values = tuple(float(word) for word in words)
+        except ValueError:
+            raise InvalidElement(self, f'{attribute}="{" ".join(words)[:60]}" are not numbers') from None
+        if len(values) != count:
+            raise InvalidElement(self, f"{attribute} has {len(values)} numbers instead of {count}")
+        if not all(math.isfinite(value) and abs(value) <= 1e6 for value in values):
+            raise InvalidElement(self, f"{attribute}: must be a finite number of reasonable size")
+        return values
+
+    def positive(self, attribute: str, count: int = 1) -> tuple[float, ...]:
+        """So many numbers above zero."""
+        values = self.numbers(attribute, count)
+        if min(values) <= 0:
+            raise InvalidElement(self, f"{attribute} must be greater than 0")
+        return values
+
+    def problem(self, message: str, hint: str = "") -> Problem:
+        """What is wrong with it."""
+        source = self.source.line(self.line)
+        return Problem(self.source.name, self.line, self.col, CODE, message, hint, source=source)
+
+
+def parse_xml(data: bytes, file: str) -> Element:
+    """The root of an XML text. Raises InvalidInput, with the line, for what is not read."""
+    try:
+        return markup.parse(data, markup.Source.of(data, file), Element)
+    except markup.Broken as error:
+        problem = Problem(file, error.line, error.col, CODE, error.message, error.hint, source=error.source)
+        raise InvalidInput([problem]) from error
+
+
+# MERGED: The files that a robot is made of.
+URDF_BYTES = 2 * 2**20
+MESH_BYTES = 20 * 2**20
+
+
+@dataclass(frozen=True)
+class RobotFiles:
+    """Where the files are that a `*.robot.yaml` names: its URDF, and the folders of ROS packages by name."""
+
+    urdf: Path
+    packages: Mapping[str, Path]
+
+
+def read_xml(path: Path, folders: Folders) -> Element:
+    """The elements of a URDF or of a file that it includes, as written. Raises InvalidInput."""
+    shown = folders.shown(path)
+    try:
+        _, data = folders.open(path, URDF_BYTES)
+    except Trouble as trouble:
+        raise InvalidInput([Problem(shown, 0, 0, CODE, str(trouble))]) from trouble
+    return parse_xml(data, shown)

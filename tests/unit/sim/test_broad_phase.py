@@ -1,0 +1,27 @@
+"""Who may meet soon, against what moves as fast as it may."""
+
+import numpy as np
+import pytest
+
+from simscen.sim.objects.broad_phase import HORIZON_S, NEAR_CONTACT_S, BoundingDiscs, find_candidates
+
+
+def test_nobody_meets_within_the_time_that_is_promised():
+    rng = np.random.default_rng(5)
+    for _ in range(300):
+        scripted = BoundingDiscs(rng.uniform(-2, 2, (3, 2)), rng.uniform(0.1, 0.3, 3), rng.uniform(0, 2, 3))
+        pushable = BoundingDiscs(rng.uniform(-2, 2, (4, 2)), rng.uniform(0.1, 0.3, 4), rng.uniform(0, 1, 4))
+        found = find_candidates(scripted, pushable, hit=1.5)
+        assert 0 < found.seconds <= HORIZON_S
+        apart = np.linalg.norm(scripted.places[:, None] - pushable.places, axis=2)
+        reach = scripted.radii[:, None] + pushable.radii + found.seconds * (scripted.speeds[:, None] + 1.5)
+        for mover, thing in np.argwhere(apart < reach).tolist():
+            assert mover in found.scripted
+            assert thing in found.pushable
+
+
+def test_what_is_far_apart_is_left_alone_and_what_jumps_meets_everybody():
+    far = BoundingDiscs.of([((9.0, 0.0, 0.0), 0.3, 0.0)])
+    assert find_candidates(BoundingDiscs.of([((0.0, 0.0, 0.0), 0.3, 1.0)]), far, 1.0) == ((), (), HORIZON_S)
+    assert find_candidates(BoundingDiscs.of([((0.0, 0.0, 0.0), 0.3, np.inf)]), far, 1.0) == ((0,), (0,), NEAR_CONTACT_S)
+    assert find_candidates(BoundingDiscs.of([]), far, 1.0) == ((), (), pytest.approx(HORIZON_S))

@@ -1,0 +1,159 @@
+"""What nobody pushes is in the engine once a robot comes near to its ways, which nobody notices."""
+
+import math
+import random
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+from playground import box, shipped
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.motion_paths import pose_at
+from simscen.core.geometry.shapes import Body, MotionPath
+from simscen.core.records.events import EventKind
+from simscen.sim.body.from_spec import build_robot_body
+from simscen.sim.objects.actor import Actor
+from simscen.sim.objects.deferred import REQUERY_DISTANCE_M, DeferredActors, ProximityQuery
+from simscen.sim.simulation import Placed, Simulation
+from simscen.worlds.geometry.triangulation import fuse, triangulate
+
+CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
+NAMES = [f"thing {number}" for number in range(10)]
+
+
+def wild_path(chance, start, wide):
+    """At up to 5 m/s, from a place."""
+    places = [(start[0] + chance.gauss(0, wide), start[1] + chance.gauss(0, wide)) for _ in range(3)]
+    mode = chance.choice(["once", "loop", "back_and_forth"])
+    poses = [Pose2(*start), *(Pose2(*place, chance.uniform(-3, 3)) for place in places)]
+    if mode == "loop":
+        poses[-1] = poses[0]
+    times = [0.0]
+    for here, there in pairwise(poses):
+        times.append(times[-1] + math.dist(here[:2], there[:2]) / chance.choice([0.5, 2.0, 5.0]) + 0.3)
+    ease = chance.choice(["linear", "smooth", "spline"])
+    return MotionPath(tuple(times), tuple(poses), mode, chance.choice([0.0, 1.0]), ease)
+
+
+def thing(chance, name, start):
+    path = None if chance.random() < 0.3 else wild_path(chance, start, chance.choice([1, 5]))
+    return Body(name, CRATE, Pose3(*start), path=path)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_all_whose_ways_lead_a_robot_within_its_reach_are_met_and_few_others(simulate, seed):
+    """Held against where paths are at many moments."""
+    chance = random.Random(seed)
+    bodies = [thing(chance, f"{k}", (chance.uniform(-20, 20), chance.uniform(-20, 20))) for k in range(60)]
+    simulation = simulate(bodies=bodies, pose=Pose2(100.0, 100.0), pictures=False)
+    actors = list(simulation._scene.actors._actors.values())
+    absent, place = DeferredActors(actors), (chance.uniform(-5, 5), chance.uniform(-5, 5), 0.0)
+    met = absent.met([ProximityQuery(place, 3.0)])
+
+    def nearest(actor: Actor) -> float:
+        if actor.path is None:
+            return math.dist(actor.body.pose[:2], place[:2]) - actor.size
+        moments = (k / 100 * actor.path.times[-1] for k in range(101))
+        return min(math.dist(pose_at(actor.path, actor.path.start + at)[:2], place[:2]) for at in moments) - actor.size
+
+    away = {actor.body.name: nearest(actor) for actor in actors}
+    strays = {actor.body.name: max(way.deviation for way in actor.ways) for actor in actors}
+    names = {actor.body.name for actor in met}
+    assert 0 < len(names) < 50
+    assert {name for name, distance in away.items() if distance <= 3.0 + REQUERY_DISTANCE_M} <= names
+    assert {name for name in names if away[name] > 3.2 + REQUERY_DISTANCE_M + strays[name]} == set()
+    assert absent.met([ProximityQuery((place[0] + REQUERY_DISTANCE_M, *place[1:]), 3.0 - REQUERY_DISTANCE_M)]) == []
+
+
+def course(seed, present):
+    """What two robots at up to 2 m/s meet among fast carts: truth and collisions of each beat, and who was present."""
+    chance = random.Random(seed)
+    quick = build_robot_body(shipped("turtlebot"))
+    quick = replace(quick, limits=quick.limits.model_copy(update={"linear": 2.0, "linear_acceleration": 4.0}))
+    bodies = [thing(chance, name, (chance.uniform(-9, 9), chance.uniform(-9, 9))) for name in NAMES]
+    bodies += [thing(chance, f"far {number}", (60.0, 10.0 * number)) for number in range(3)]
+    placed = {"a": Placed(quick, Pose2(0.0, 0.0)), "b": Placed(build_robot_body(shipped("jackal")), Pose2(2.0, 1.5))}
+    simulation = Simulation(fuse([box("post", 3, -2, 0.3, 0.3)]), bodies, placed, triangulate, pictures=present)
+    beats = []
+    for beat in range(48):
+        simulation.step(6)
+        for robot in simulation.robots.values():
+            robot.drive(Twist(1.5 if beat % 20 < 15 else -1.5, 0.0, 1.0))
+            beats.append((robot.truth(), robot.collisions()))
+        if beat % 8 == 7:
+            robot, name = simulation.robots[chance.choice("ab")], chance.choice(NAMES)
+            here, there = robot.base_pose(), simulation.object_pose(name)
+            beside = (here.x + chance.uniform(0.3, 1.0), here.y + chance.uniform(-1.0, 1.0))
+            what = beat // 8
+            if what in (0, 3):  # beside a cart, or into it
+                robot.place(Pose2(there.x + chance.uniform(-0.9, 0.9), there.y + 0.5))
+            elif what == 1:
+                simulation.spawn(thing(chance, "new", beside))
+            elif what == 2:
+                simulation.move(name, wild_path(chance, there[:2], 3))
+            else:
+                simulation.place(name, Pose2(*beside))
+    count = len(simulation._scene.actors.ids()), len(simulation._scene.actors.bodies())
+    simulation.close()
+    return beats, count
+
+
+@pytest.mark.parametrize("seed", [4, 6])
+def test_robots_meet_what_they_would_if_all_were_in_the_engine_from_the_start(seed):
+    """To the last bit."""
+    everybody, (all_there, all_known) = course(seed, present=True)
+    absence, (there, known) = course(seed, present=False)
+    assert absence == everybody
+    assert all_there == all_known == known > there
+    assert EventKind.COLLISION_STARTED in {event.kind for _, events in everybody for event in events}
+
+
+def there(simulation):
+    return set(simulation._scene.actors.ids().values())
+
+
+RADIUS = build_robot_body(shipped("turtlebot")).radius
+FAR = Body("far", CRATE, Pose3(7.5))
+COMES = Body("comes", CRATE, Pose3(0, 30), path=MotionPath((0.0, 60.0), (Pose2(0, 30), Pose2(0, 1.0))))
+
+
+def test_the_engine_has_what_comes_near_some_time_and_what_a_robot_comes_near_to(simulate):
+    simulation = simulate(bodies=[FAR, COMES], pictures=False)
+    assert there(simulation) == {"comes"}
+    simulation.place_robot(Pose2(4.0, 0.0))
+    assert there(simulation) == {"comes", "far"}
+    assert simulation.truth().clearance == 2.0
+    simulation.place_robot(Pose2(6.5, 0.0))
+    assert simulation.truth().clearance == pytest.approx(7.3 - 6.5 - RADIUS, abs=0.001)
+
+
+@pytest.mark.parametrize("every", [12, 18 * 240], ids=["asked", "not asked"])
+def test_what_a_robot_drives_into_from_afar_is_touched(simulate, every):
+    simulation = simulate(bodies=[FAR], drive=(0.5, 0.0, 0.0), pictures=False)
+    for _ in range(18 * 240 // every):
+        simulation.step(every)
+        clearance = simulation.truth().clearance
+    assert clearance <= 0.0
+    assert [event.name for event in simulation.collisions()] == ["far"]
+
+
+def test_where_anything_can_be_pushed_the_engine_has_everything(simulate):
+    simulation = simulate(bodies=[FAR], pictures=False)
+    assert there(simulation) == set()
+    simulation.spawn(Body("light", CRATE, Pose3(-3.0), mass=1.0))
+    assert there(simulation) == {"far", "light"}
+
+
+def test_who_is_led_is_in_the_engine_for_it_may_go_anywhere(simulate):
+    simulation = simulate(pictures=False)
+    simulation.come(FAR, 1.0)
+    assert there(simulation) == {"far"}
+
+
+def test_nobody_is_measured_against_what_is_missing(simulate):
+    """Rather than that a collision with it is not seen."""
+    simulation = simulate(bodies=[FAR], pictures=False)
+    with pytest.raises(LookupError, match='"far" is not in the engine'):
+        simulation._scene.actors.within((7.0, 0.0, 0.0), 2.0, 2.0, 0, simulation.robot.base.id)

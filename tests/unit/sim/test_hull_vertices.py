@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import ConvexHull
+
+from simscen.core.geometry import Pose3
+from simscen.core.geometry.shapes import Body, Cylinder, Mesh, Solid
+from simscen.sim.bullet.hull_vertices import MANY_CORNERS, STANDS_OUT, reduce_hull_vertices
+
+
+def mesh(made):
+    return Mesh(np.asarray(made.vertices, float), np.asarray(made.faces, np.int32))
+
+
+BALL = mesh(trimesh.creation.icosphere(subdivisions=5, radius=0.3))
+ROUND = {
+    "ball": BALL,
+    "long": Mesh(BALL.vertices * [12.0, 0.4, 0.7], BALL.faces),
+    "ring": mesh(trimesh.creation.torus(0.5, 0.1, 64, 64)),
+    "tube": mesh(trimesh.creation.cylinder(0.3, 2.0, sections=2000)),
+}
+
+
+@pytest.mark.parametrize("shape", ROUND)
+def test_what_is_left_out_stands_out_by_less_than_a_millimeter(shape):
+    """Brute force: the distance of every vertex to each plane of the hull of those that are kept."""
+    full = ROUND[shape].vertices
+    kept = reduce_hull_vertices(ROUND[shape])
+    assert len(kept) < len(ConvexHull(full).vertices) / 2
+    assert reduce_hull_vertices(ROUND[shape]) is kept
+    planes = ConvexHull(kept).equations
+    assert max((planes[:, :3] @ point + planes[:, 3]).max() for point in full) <= STANDS_OUT + 1e-9
+    rows = {tuple(row) for row in full.tolist()}
+    assert all(tuple(row) in rows for row in kept.tolist())
+
+
+def test_a_hull_of_few_corners_is_kept_whole():
+    box = trimesh.creation.box((1, 2, 3)).subdivide().subdivide().subdivide()
+    assert len(box.vertices) > MANY_CORNERS
+    assert ConvexHull(reduce_hull_vertices(mesh(box))).volume == pytest.approx(6.0)
+    assert len(reduce_hull_vertices(mesh(box))) < 100
+
+
+def test_what_is_flat_is_kept_whole():
+    flat = Mesh(BALL.vertices * [1, 1, 0], BALL.faces)
+    assert reduce_hull_vertices(flat) is flat.vertices
+
+
+def test_a_thing_of_80_000_faces_can_be_pushed_and_filmed(simulate):
+    """Bullet's commands take 131 072 vertices, and its renderer three for each face."""
+    fine = mesh(trimesh.creation.cylinder(0.3, 0.6, sections=20_000))
+    told = []
+    for shape in (Cylinder(0.3, 0.6), fine):
+        simulation = simulate(bodies=[Body("drum", (Solid(shape, Pose3(z=0.3), "drum"),), Pose3(1.5), 2.0)])
+        simulation.step(24)
+        told.append(simulation.truth().clearance)
+    assert told[1] == pytest.approx(told[0], abs=2e-3)
+    _, depth = simulation.image(Pose3(z=0.3), 32, 24, 1.0, 10.0)
+    assert depth[12, 16] == pytest.approx(1.2, abs=0.02)

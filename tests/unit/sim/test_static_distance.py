@@ -1,0 +1,228 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pybullet
+import pytest
+import shapely
+import trimesh
+from playground import box, shipped
+
+from simscen.core.geometry import Pose3
+from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Mesh, Solid
+from simscen.sim.body.from_spec import build_robot_body
+from simscen.sim.bullet.engine import fixed, hull_shape, tiles
+from simscen.sim.contact.static_distance import StaticDistance, max_displacement, point_to_triangles
+from simscen.sim.contact.winding_number import encloses, encloses_along_line
+from simscen.worlds.geometry.triangulation import fuse
+
+
+def test_distances_to_triangles_are_trimeshs():
+    rng = np.random.default_rng(3)
+    corners = rng.normal(size=(300, 3, 3))
+    point = rng.normal(size=3)
+    closest = trimesh.triangles.closest_point(corners, np.tile(point, (300, 1)))
+    assert point_to_triangles(point, corners) == pytest.approx(np.linalg.norm(closest - point, axis=1))
+
+
+def test_a_triangle_without_area_is_as_far_as_its_edges():
+    flat = np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]])
+    assert point_to_triangles(np.array([1.5, 2.0, 0.0]), flat) == pytest.approx([2.0])
+
+
+def test_no_point_moves_farther_than_the_bound_and_the_bound_is_not_idle():
+    rng, extent = np.random.default_rng(5), 0.4
+    points = rng.normal(size=(400, 3))
+    points *= extent / np.linalg.norm(points, axis=1, keepdims=True)
+    for turn in (0.0, 1e-3, 0.1, 1.0, 3.0):
+        for flip in (1.0, -1.0):  # a quaternion and its opposite are the same heading
+            before = Pose3.from_rpy(*rng.normal(size=3), *rng.uniform(-1, 1, 3))
+            step = Pose3.from_rpy(*rng.normal(0.0, 0.1, 3), 0.0, turn, 0.0)
+            after = before.compose(step)
+            said = Pose3(*after.position, *(flip * part for part in after.quaternion))
+            moved = np.linalg.norm(after.apply(points) - before.apply(points), axis=1)
+            assert moved.max() <= max_displacement(before, said, extent) + 1e-12
+            if flip > 0:
+                farthest = math.dist(before.position, after.position) + 2 * extent * math.sin(turn / 2)
+                assert max_displacement(before, said, extent) <= 1.5 * farthest
+
+
+@pytest.fixture
+def proximity():
+    solids = [
+        box("shelf", 0, 0, 2, 2),
+        Solid(Cylinder(0.3, 1), Pose3(3, 0, 0.5), "post"),
+        Solid(Extrusion(((0, 0), (2, 0), (2, 0.2), (0.2, 0.2), (0.2, 2), (0, 2)), 1.0), Pose3(5, 5), "corner"),
+        Solid(Box((20, 20, 0.1)), Pose3(z=-0.05), "floor"),
+    ]
+    made = StaticDistance(fuse(solids), build_robot_body(shipped("turtlebot")), 2.0)
+    yield made
+    made.close()
+
+
+def test_the_owner_is_the_solid_whose_surface_is_nearest(proximity):
+    assert proximity.owner((1.01, 0.5, 0.2)) == "shelf"
+    assert proximity.owner((2.71, 0.0, 0.2)) == "post"
+    assert proximity.owner((50.0, 0.0, 0.2)) == ""
+
+
+def test_distances_are_to_the_nearest_solid_but_the_floor(proximity):
+    assert proximity.distance(Pose3(1.9, 0.0)) == pytest.approx(0.8 - 0.22, abs=1e-3)
+    assert proximity.distance(Pose3(1.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
+    assert proximity.distance(Pose3(-9.0, -9.0)) == math.inf
+
+
+def test_a_hollow_solid_is_hollow(proximity):
+    assert proximity.distance(Pose3(6.0, 6.0)) == pytest.approx(0.8 - 0.22, abs=1e-3)
+
+
+def test_the_same_place_gives_the_same_distance_whatever_was_asked_before(proximity):
+    first = proximity.distance(Pose3(1.9, 0.3))
+    for x in range(10):
+        proximity.distance(Pose3(x, x / 2))
+    assert proximity.distance(Pose3(1.9, 0.3)) == first
+
+
+def drum_robot(radius, height):
+    """A robot that is nothing but an upright cylinder."""
+    return replace(
+        build_robot_body(shipped("turtlebot")), casters=(), hull=(Solid(Cylinder(radius, height), Pose3(z=height / 2)),)
+    )
+
+
+def test_distances_on_a_way_through_a_crowd_are_shapelys():
+    rng = np.random.default_rng(11)
+    corner = Extrusion(((0, 0), (1, 0), (1, 0.2), (0.2, 0.2), (0.2, 1), (0, 1)), 1.0)
+    kinds = (Box((0.6, 0.4, 1.0)), Cylinder(0.3, 1.0), corner)
+    places = [Pose3.from_rpy(x, y, 0.5, 0.0, 0.0, yaw) for x, y, yaw in rng.uniform((0, 0, -3), (24, 24, 3), (160, 3))]
+    mesh = fuse([Solid(kinds[k % 3], pose, str(k)) for k, pose in enumerate(places)])
+    corners = mesh.vertices[mesh.faces]
+    plan = shapely.union_all(shapely.polygons(corners[np.ptp(corners[:, :, 2], axis=1) == 0][:, :, :2]))
+    poses = [Pose3(2.0, 2.0)]
+    for turn in rng.normal(0.0, 0.15, 800).tolist():
+        onward = poses[-1].compose(Pose3.from_rpy(0.06, 0.0, 0.0, 0.0, 0.0, turn))
+        poses.append(onward if 0 < onward.x < 24 and 0 < onward.y < 24 else Pose3(*rng.uniform(0, 24, 2)))
+    expected = plan.distance(shapely.points([pose[:2] for pose in poses])) - 0.25
+    expected[expected > 1.0] = math.inf
+    made = StaticDistance(mesh, drum_robot(0.25, 1.2), 1.0)
+    said = np.array([made.distance(pose) for pose in poses])
+    made.close()
+    outside = expected > 0
+    assert outside.sum() > 500
+    assert np.isinf(expected).sum() > 100
+    assert said[outside] == pytest.approx(expected[outside], abs=1e-4)
+    assert (said[~outside] <= 0).all()
+
+
+def test_the_nearest_of_two_changes_with_each_step_between_them():
+    made = StaticDistance(fuse([box("left", 0, 0.9, 1, 1), box("right", 0, -0.9, 1, 1)]), drum_robot(0.2, 0.4), 2.0)
+    for k in range(20):
+        y = 0.05 * (-1) ** (k // 2)
+        assert made.distance(Pose3(0.01 * k - 0.1, y)) == pytest.approx(0.15, abs=1e-6)
+    made.close()
+
+
+def test_a_reach_ends_where_it_ends():
+    made = StaticDistance(fuse([box("ahead", 2.0, 0, 1, 1)]), drum_robot(0.2, 0.4), 1.0)
+    assert made.distance(Pose3(0.2995)) == math.inf
+    assert made.distance(Pose3(0.3005)) == pytest.approx(0.9995, abs=1e-6)
+    assert made.distance(Pose3(0.2995)) == math.inf
+    made.close()
+
+
+def test_the_top_of_a_tilted_robot_may_be_nearest_to_what_its_base_is_far_from():
+    made = StaticDistance(
+        fuse([box("ahead", 1.5, 0, 1, 4, 4), box("behind", -1.15, 0, 1, 4, 4)]), drum_robot(0.2, 1.5), 2.0
+    )
+    leans = 1.5 * math.sin(0.3) + 0.2 * math.cos(0.3)
+    assert made.distance(Pose3.from_rpy(0.0, 0.0, 0.0, 0.0, 0.3, 0.0)) == pytest.approx(1.0 - leans, abs=1e-3)
+    made.close()
+
+
+def test_what_stands_behind_nearer_solids_is_not_built():
+    rows = [box(f"{y} {k}", 1.0 * k, y, 1.1, 0.4) for y in (-0.8, 0.8, -1.4, 1.4) for k in range(30)]
+    made = StaticDistance(fuse(rows), drum_robot(0.2, 0.4), 2.0)
+    for k in range(200):
+        assert made.distance(Pose3(0.1 * k)) == pytest.approx(0.4, abs=1e-6)
+    assert 20 <= len(made._pairs) <= 44
+    made.close()
+
+
+def wall_of_many_triangles(columns, rows):
+    """The plane x = 5 from y = -10 to 10, up to 2 m: every triangle with corners of its own."""
+    y, z = np.meshgrid(np.linspace(-10, 10, columns + 1), np.linspace(0, 2, rows + 1), indexing="ij")
+    grid = np.stack((np.full_like(y, 5.0), y, z), axis=-1)
+    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+    corners = np.stack((np.stack((a, b, c), axis=-2), np.stack((a, c, d), axis=-2))).reshape(-1, 3)
+    return Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+
+
+@pytest.mark.slow
+def test_a_solid_of_more_triangles_than_bullet_takes_at_once_is_as_near_as_any():
+    wall = wall_of_many_triangles(400, 60)
+    assert len(wall.faces) == 48_000
+    made = StaticDistance(fuse([Solid(wall, Pose3(), "wall")]), build_robot_body(shipped("turtlebot")), 2.0)
+    for y in (-9.0, -3.3, 0.0, 9.5):
+        assert made.distance(Pose3(4.0, y)) == pytest.approx(1.0 - 0.22, abs=1e-3)
+    made.close()
+
+
+def test_every_face_is_in_one_tile():
+    wall = wall_of_many_triangles(400, 60)
+    found = np.concatenate(tiles(wall.vertices, wall.faces))
+    assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, wall.faces.tolist()))
+    assert [len(tile) for tile in tiles(wall.vertices, wall.faces)] == [40_000, 8_000]
+
+
+def test_a_hull_of_more_corners_than_bullet_takes_at_once_is_that_of_its_outermost():
+    points = np.random.default_rng(4).uniform(-0.2, 0.2, size=(150_000, 3))
+    made = StaticDistance(fuse([]), build_robot_body(shipped("turtlebot")), 2.0)
+    shape = hull_shape(made._client, [Solid(Mesh(points, np.empty((0, 3), np.int32)), Pose3(), "cloud")])
+    low, high = pybullet.getAABB(fixed(made._client, shape), physicsClientId=made._client)
+    assert low == pytest.approx(points.min(axis=0), abs=0.05)
+    assert high == pytest.approx(points.max(axis=0), abs=0.05)
+    made.close()
+
+
+def test_a_solid_as_large_as_a_map_is_asked_where_the_robot_is_only():
+    wall = wall_of_many_triangles(400, 60)
+    made = StaticDistance(fuse([Solid(wall, Pose3(), "wall")]), build_robot_body(shipped("turtlebot")), 2.0)
+    assert made.distance(Pose3(4.0, 0.0)) == pytest.approx(1.0 - 0.22, abs=1e-3)
+    assert sum(len(made._parts.faces(part)) for part in made._pairs) < 0.5 * len(wall.faces)
+    assert made.owner((5.0, 1.0, 0.5)) == "wall"
+    assert made.around((4.0, 0.0, 0.5)) == []
+
+
+def room_of_many_triangles():
+    """A closed box of 12 x 12 x 2 m from the origin, of some thousand triangles."""
+    box = trimesh.creation.box((12.0, 12.0, 2.0)).subdivide().subdivide().subdivide().subdivide()
+    return Mesh(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32))
+
+
+def test_a_place_is_inside_a_solid_of_many_tiles_as_in_any_other():
+    made = StaticDistance(
+        fuse([Solid(room_of_many_triangles(), Pose3(z=1.0), "block"), box("shelf", 20, 0, 2, 2)]),
+        build_robot_body(shipped("turtlebot")),
+        2.0,
+    )
+    assert [made.name(k) for k in made.around((1.0, 1.0, 0.5))] == ["block"]
+    assert [made.name(k) for k in made.around((20.0, 0.0, 0.5))] == ["shelf"]
+    assert made.distance(Pose3(6.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
+    assert not made.convex(0)
+    assert made.convex(1)
+
+
+def test_a_line_through_a_place_tells_whether_a_surface_winds_around_it():
+    """Trimesh asks along rays of its own; where the line meets a corner or passes a hole it does not answer."""
+    rng = np.random.default_rng(8)
+    block, ring = trimesh.creation.box((2.0, 2.0, 2.0)).subdivide(), trimesh.creation.annulus(0.5, 1.5, 3.0)
+    both = trimesh.util.concatenate([block, ring.apply_translation((1.0, 0.4, 0.3))])
+    places = rng.uniform(-2.5, 2.5, (300, 3))
+    inside = block.contains(places) | ring.contains(places)
+    said = [encloses_along_line(both.triangles, tuple(place)) for place in places.tolist()]
+    assert 20 < inside.sum() < 280
+    assert said == inside.tolist()
+    assert encloses_along_line(block.triangles, (1.0, 1.0, 1.0)) is None  # a corner
+    lidless = block.triangles[block.triangles[:, :, 2].min(axis=1) < 0.99]
+    assert encloses_along_line(lidless, (0.1, 0.2, 0.0)) is None
+    assert encloses(lidless, (0.1, 0.2, 0.0))

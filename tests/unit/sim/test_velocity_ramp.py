@@ -1,0 +1,53 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.model.robot import Limits
+from simscen.sim.robots.velocity_ramp import VelocityRamp
+
+LIMITS = Limits(
+    linear=1.0, reverse=0.5, angular=2.0, linear_acceleration=1.0, linear_deceleration=2.0, angular_acceleration=4.0
+)
+PERIOD = 0.1
+speeds = st.floats(-3, 3)
+
+
+@given(st.lists(st.builds(Twist, speeds, speeds, speeds), min_size=1, max_size=40))
+def test_no_command_makes_it_faster_or_harder_than_the_limits(commands):
+    ramp, before = VelocityRamp(LIMITS, PERIOD, holonomic=False), STOP
+    for command in commands:
+        ramp.command(command)
+        ramp.advance()
+        now = ramp.velocity
+        assert -0.5 <= now.vx <= 1.0 and now.vy == 0 and abs(now.wz) <= 2.0
+        slower = abs(now.vx) <= abs(before.vx)
+        assert abs(now.vx - before.vx) <= (2.0 if slower else 1.0) * PERIOD + 1e-12
+        assert abs(now.wz - before.wz) <= 4.0 * PERIOD + 1e-12
+        before = now
+
+
+def test_it_reaches_the_command_and_says_when_there_is_nothing_to_do():
+    ramp = VelocityRamp(LIMITS, PERIOD, holonomic=False)
+    ramp.command(Twist(0.25, 0.0, 0.0))
+    assert [ramp.advance() for _ in range(4)] == [True, True, True, False]
+    assert ramp.velocity == Twist(0.25, 0.0, 0.0)
+
+
+def test_turning_round_brakes_to_a_stop_first():
+    ramp = VelocityRamp(LIMITS, PERIOD, holonomic=False)
+    ramp.command(Twist(0.1, 0.0, 0.0))
+    ramp.advance()
+    ramp.command(Twist(-0.5, 0.0, 0.0))
+    ramp.advance()
+    assert ramp.velocity.vx == 0.0
+    ramp.advance()
+    assert ramp.velocity.vx == pytest.approx(-0.1)
+
+
+def test_only_a_holonomic_base_goes_sideways():
+    ramp = VelocityRamp(LIMITS, PERIOD, holonomic=True)
+    ramp.command(Twist(0.0, 5.0, 0.0))
+    for _ in range(20):
+        ramp.advance()
+    assert ramp.velocity == Twist(0.0, 1.0, 0.0)
