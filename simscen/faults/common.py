@@ -24,14 +24,14 @@ def inapplicable_key(fault: Fault, instance: Instance) -> tuple[str, str] | None
     return wrong, f"`{wrong}` means nothing there, {only}"
 
 
-# MERGED: What the navigator is told when the localizer's corrections do not come as they should.
+# Corrections of the localizer that arrive late, partly or not at all.
 def apply_correction(belief: Belief, correction: Pose2) -> Belief:
     """The belief of somebody who knows the odometry of now and a correction from map to odometry of another time."""
     odometry = belief.map_from_odom.between(belief.pose)
     return replace(belief, pose=correction.compose(odometry), map_from_odom=correction)
 
 
-# MERGED: Faults that befall the wheels of one side.
+# Faults of the wheels on one side of the robot.
 def side_speeds(motion: Twist, separation: float) -> tuple[float, float]:
     """How fast the wheels on the left and on the right roll over ground, in m/s."""
     half = separation / 2
@@ -52,7 +52,7 @@ def inapplicable_side(instance: Instance, key: str) -> tuple[str, str] | None:
     return None
 
 
-# MERGED: Faults that falsify increments of odometry.
+# Faults that change odometry increments.
 class OdometryDistortion(Disturbance):
     """Falsifies each increment of odometry and adds the increments up again.
 

@@ -44,7 +44,7 @@ def edges(outlines: Sequence[Array]) -> Array:
     return np.concatenate(rings) if rings else np.empty((0, 2, 2))
 
 
-# MERGED: The walls that people do not walk through: where they are near, and what they hide.
+# Walls: the nearest ones that block pedestrians, and what they hide from view.
 CELL = 1.0
 """m; what is near is remembered for each square of this size."""
 REACH = 1.2

@@ -21,7 +21,7 @@ def check_ground_clearance(spec: RobotSpec, file: Path | None) -> None:
         raise InvalidInput([Problem(str(file or spec.name), 0, 0, "SC401", message, hint)])
 
 
-# MERGED: How large a robot may be: beyond that, maps, footprints and ways of the stack take all memory and time there is.
+# A larger robot would make maps and footprints of the stack exhaust memory and time.
 FARTHEST = 10.0
 """m from the base, across and in height; the largest vehicles in ports are 15 m long."""
 

@@ -65,7 +65,7 @@ def _numbers(chosen: npt.NDArray[np.bool_]) -> tuple[int, ...]:
     return tuple(chosen.nonzero()[0].tolist())
 
 
-# MERGED: Who of those that a script moves may push something soon; what they may push is awake by then.
+# Scripted objects that may push something soon. Wake what they may push before contact.
 class BroadPhase:
     """Of scripted things and those that can be pushed; make another one when one comes or goes."""
 

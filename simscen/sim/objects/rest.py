@@ -44,7 +44,7 @@ def _rests(speeds: list[float]) -> bool:
     return slow and any(now <= before for before, now in itertools.pairwise(speeds))
 
 
-# MERGED: Where things that can be pushed are at home: where they lie, for good mostly.
+# Rest poses of movable objects.
 class RestPoses:
     """By name, the `poses` in which things lay at two looks in a row, or at the first."""
 

@@ -165,7 +165,7 @@ class OmnidirectionalDrive:
         self._rolled = (self._rolled[0] + forward, self._rolled[1] + left, self._rolled[2] + turn)
 
 
-# MERGED: Four mecanum wheels under a planar base: they roll without slip, their rollers without friction.
+# Four mecanum wheels under a planar base: the wheels roll without slip, the rollers without friction.
 class MecanumDrive(OmnidirectionalDrive):
     """Firmware that reckons with the drive's dimensions, on wheels that are where the body has them."""
 

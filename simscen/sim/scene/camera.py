@@ -43,7 +43,7 @@ def render_image(
     return np.ascontiguousarray(colors), meters.astype(np.float32)
 
 
-# MERGED: What the renderer is shown: made when the first picture is taken, for most runs take none.
+# The scene for the renderer. Built with the first image, because most runs take none.
 FACES_AT_ONCE = 20_000
 """Bullet's commands hold at most 131072 vertices, and here every face brings its own three."""
 

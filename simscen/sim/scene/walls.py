@@ -79,7 +79,7 @@ def _lots_of(mesh: TriangleMesh) -> FaceTiles:
     return tile_faces(mesh.vertices, engine.above_floor(mesh.vertices, mesh.faces), EDGE)
 
 
-# MERGED: A static mesh in parts that are near or far as a whole: solids, and tiles of those that a whole map is made of.
+# A static mesh split into parts, so that distance checks can skip a whole part.
 Indices = npt.NDArray[np.int64]
 
 

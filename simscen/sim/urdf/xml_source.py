@@ -77,7 +77,7 @@ def parse_xml(data: bytes, file: str) -> Element:
         raise InvalidInput([problem]) from error
 
 
-# MERGED: The files that a robot is made of.
+# Files that a robot description consists of.
 URDF_BYTES = 2 * 2**20
 MESH_BYTES = 20 * 2**20
 

@@ -13,8 +13,8 @@ from playground import box, shipped
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, MotionPath
-from simscen.sim.body.from_spec import robot_body
-from simscen.sim.single_robot import Alone
+from simscen.sim.body.from_spec import build_robot_body
+from simscen.sim.single_robot import SingleRobotSimulation
 from simscen.worlds.geometry.triangulation import fuse, triangulate
 
 solids = [box(f"box{{k}}", (k * 7 % 11) - 5, (k * 5 % 9) - 4, 0.3, 0.4) for k in range(60)]
@@ -25,7 +25,8 @@ bodies = [
 ]
 if {turned}:
     bodies.reverse()
-simulation = Alone(fuse(solids), bodies, robot_body(shipped({robot!r})), Pose2(0.1, 0.2, 0.3), triangulate)
+body = build_robot_body(shipped({robot!r}))
+simulation = SingleRobotSimulation(fuse(solids), bodies, body, Pose2(0.1, 0.2, 0.3), triangulate)
 for k in range(60):
     simulation.drive(Twist(0.5, 0.0, 0.4 - 0.02 * k))
     simulation.step(24)

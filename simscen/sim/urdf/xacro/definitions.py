@@ -83,7 +83,7 @@ def _parameters(text: str) -> list[Parameter]:
     return found
 
 
-# MERGED: Which macro a call means, and what its parameters are in it.
+# Resolve which macro a call means and bind its parameters.
 def resolve_macro(written: str, scope: Scope, macros: Macros) -> tuple[Macro, Scope, Macros]:
     """The macro `name` or `namespace.name` and the scopes that its own lie in; raises Refused."""
     *spaces, name = written.split(".")
@@ -134,7 +134,7 @@ def _default(parameter: Parameter, scope: Scope, macro: Macro, texts: TextEvalua
     raise ExpansionError(f"macro {macro.name!r}: {what} {parameter.name!r}")
 
 
-# MERGED: What `<xacro:property>` defines.
+# Properties that `<xacro:property>` defines.
 def define_property(source: Element, scope: Scope, texts: TextEvaluator) -> None:
     """Define, default or remove a property; raises Refused."""
     name = texts.text(required_attribute(source, "name"), scope)

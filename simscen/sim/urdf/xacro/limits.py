@@ -44,7 +44,7 @@ class Budget:
         self._depth -= 1
 
 
-# MERGED: What a property can be: plain data of bounded size.
+# Values of properties: plain data of bounded size.
 Value = Union[int, float, str, bool, None, "list[Value]", "dict[str, Value]"]
 
 MAX_BITS = 256
