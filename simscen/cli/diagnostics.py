@@ -12,8 +12,14 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from simscen.core.errors import Problem
-from simscen.report.checkout import in_checkout
-from simscen.report.text import ascii_only, no_marker, no_marker_in_json, one_line, width
+from simscen.report.display_text import (
+    ascii_only,
+    display_width,
+    escape_ci_markers,
+    escape_ci_markers_in_json,
+    one_line,
+    relative_to_checkout,
+)
 
 MAX_PROBLEMS_PER_FILE = 50
 MAX_COLUMNS = 100
@@ -44,7 +50,7 @@ def as_json(problems: Iterable[Problem], **more: Any) -> str:
     """Return a JSON object with the list `problems` and the keyword arguments."""
     keys = ("path", "line", "col", "code", "severity", "message", "hint")
     listed = [{key: getattr(problem, key) for key in keys} for problem in problems]
-    return no_marker_in_json(json.dumps({**more, "problems": listed}, indent=2))
+    return escape_ci_markers_in_json(json.dumps({**more, "problems": listed}, indent=2))
 
 
 def as_github(problems: Iterable[Problem]) -> str:
@@ -57,7 +63,7 @@ def escaped(text: str) -> str:
 
     GitHub executes `::command::` at the start of a line; a backslash prevents it.
     """
-    return no_marker(_WORKFLOW_COMMAND.sub(r"\1:\\", one_line(text)))
+    return escape_ci_markers(_WORKFLOW_COMMAND.sub(r"\1:\\", one_line(text)))
 
 
 def print_text(text: str, stream: TextIO | None = None) -> None:
@@ -97,13 +103,13 @@ def _excerpt(problem: Problem) -> list[str]:
     length = max(1, min(length, len(shown) - (start - first)))
     before, marked = shown[: start - first], shown[start - first : start - first + length]
     gutter = " " * (len(str(problem.line)) + 4)
-    carets = " " * width(before) + "^" * max(1, width(marked))
-    return [f"    {problem.line} | {no_marker(shown)}", f"{gutter} | {carets}"]
+    carets = " " * display_width(before) + "^" * max(1, display_width(marked))
+    return [f"    {problem.line} | {escape_ci_markers(shown)}", f"{gutter} | {carets}"]
 
 
 def _annotation(problem: Problem) -> str:
     level = "error" if problem.severity == "error" else "warning"
-    where = f"file={_property(in_checkout(problem.path))}"
+    where = f"file={_property(relative_to_checkout(problem.path))}"
     if problem.line:
         where += f",line={problem.line},col={problem.col}"
     message = problem.message + (f"\n{problem.hint}" if problem.hint else "")
@@ -111,7 +117,7 @@ def _annotation(problem: Problem) -> str:
 
 
 def _data(text: str) -> str:
-    return no_marker(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    return escape_ci_markers(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def _property(text: str) -> str:

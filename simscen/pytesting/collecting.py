@@ -15,7 +15,7 @@ from simscen.core.records.run_result import Outcome
 from simscen.loading.files.discovery import default_root
 from simscen.pytesting.failure import ScenarioFailed, as_seen
 from simscen.pytesting.runner import runner_of
-from simscen.report.complaints import label
+from simscen.report.violations import short_run_name
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class ScenarioRun(pytest.Item):
     def made(cls, parent: ScenarioFile, scenario: LoadedScenario, seed: int, every_seed: bool) -> ScenarioRun:
         """The item, with its tags as markers."""
         folder = scenario.id.rpartition("/")[0]
-        name = label(scenario.key(seed), every_seed, f"{folder}/" if folder else "")
+        name = short_run_name(scenario.key(seed), every_seed, f"{folder}/" if folder else "")
         item: ScenarioRun = cls.from_parent(parent, name=name, scenario=scenario, seed=seed)
         for tag in ("simscen", *scenario.spec.tags):
             if tag not in OF_PYTEST:

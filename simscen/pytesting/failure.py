@@ -6,9 +6,9 @@ from _pytest._code.code import ReprEntryNative, ReprExceptionInfo, ReprFileLocat
 
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
-from simscen.report.complaints import broken, complaints, scenario_file
-from simscen.report.line import text_of
-from simscen.report.lines import complained
+from simscen.report.session_lines import violation_lines
+from simscen.report.styled_line import plain_text
+from simscen.report.violations import error_summary, reported_violations, scenario_file
 
 
 class ScenarioFailed(AssertionError):
@@ -24,8 +24,8 @@ def as_seen(run: RunFinished) -> Any:
 
     pytest passes a failure on from worker to controller only in this form, which has no public name.
     """
-    lines = [f"{text_of(line).removeprefix('      ')}\n" for line in complained(run)]
-    first = next((complaint.line for complaint in complaints(run) if not complaint.warning), 0)
+    lines = [f"{plain_text(line).removeprefix('      ')}\n" for line in violation_lines(run)]
+    first = next((complaint.line for complaint in reported_violations(run) if not complaint.warning), 0)
     crash = ReprFileLocation(path=scenario_file(run), lineno=first or 1, message=_cause(run))
     return ReprExceptionInfo(ReprTraceback([ReprEntryNative(lines)], extraline=None, style="native"), crash)
 
@@ -33,5 +33,5 @@ def as_seen(run: RunFinished) -> Any:
 def _cause(run: RunFinished) -> str:
     """The first reason, in a line."""
     if run.outcome is Outcome.ERROR:
-        return broken(run)
-    return next((complaint.message for complaint in complaints(run) if not complaint.warning), "failed")
+        return error_summary(run)
+    return next((complaint.message for complaint in reported_violations(run) if not complaint.warning), "failed")

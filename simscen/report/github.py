@@ -7,16 +7,14 @@ from urllib.parse import quote
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.finding_text import tightest_margin
-from simscen.report.checkout import in_checkout
-from simscen.report.comparedpage import as_markdown
-from simscen.report.complaints import broken, complaints, excused, label, scenario_file
-from simscen.report.console import text_reporter
-from simscen.report.plain import Reporter
-from simscen.report.results import relative
-from simscen.report.text import one_line
+from simscen.report.comparison import as_markdown
+from simscen.report.display_text import one_line, relative_to_checkout
+from simscen.report.results_json import relative
+from simscen.report.text_reporters import Reporter, text_reporter
+from simscen.report.violations import error_summary, excuse_text, reported_violations, scenario_file, short_run_name
 
-MOST_PICTURES = 10
-_MEANINGFUL = {ord(sign): f"&#{ord(sign)};" for sign in "\\`*_[]|~#@&<>"}
+MAX_PICTURES = 10
+_MARKDOWN_ESCAPES = {ord(sign): f"&#{ord(sign)};" for sign in "\\`*_[]|~#@&<>"}
 
 
 def github_reporter(
@@ -60,18 +58,18 @@ class _GitHub:
 
 def annotations(run: RunFinished) -> list[str]:
     """The workflow commands for one run."""
-    name = label(run.key)
-    if excuse := excused(run):
-        line = next((c.line for c in complaints(run) if not c.warning), 0)
+    name = short_run_name(run.key)
+    if excuse := excuse_text(run):
+        line = next((c.line for c in reported_violations(run) if not c.warning), 0)
         return [_command("notice", run, line, name, excuse)]
     lines = [
         _command(
             "warning" if found.warning else "error", run, found.line, name, "\n".join((found.message, *found.detail))
         )
-        for found in complaints(run)
+        for found in reported_violations(run)
     ]
     if run.outcome is Outcome.ERROR:
-        lines.append(_command("error", run, 0, name, broken(run)))
+        lines.append(_command("error", run, 0, name, error_summary(run)))
     return lines
 
 
@@ -92,37 +90,38 @@ def markdown(runs: list[RunFinished], session: SessionFinished, pictures: str = 
     head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}{more}"
     compared = [] if session.comparison is None else as_markdown(session.comparison, _cell)
     rows = [
-        f"| {signs[run.outcome]} | {_cell(label(run.key))} | {run.result.simulated:.1f} s | {_why(run)} |"
+        f"| {signs[run.outcome]} | {_cell(short_run_name(run.key))} "
+        f"| {run.result.simulated:.1f} s | {_reason_cell(run)} |"
         for run in ordered
     ]
-    shown = _shown(ordered, session.folder, pictures) if pictures else []
+    shown = _picture_lines(ordered, session.folder, pictures) if pictures else []
     table = ["| | scenario | simulated | |", "|---|---|---:|---|", *rows]
     return "\n".join([head, "", *table, *compared, "", *shown, ""])
 
 
-def _shown(runs: list[RunFinished], folder: str, pictures: str) -> list[str]:
+def _picture_lines(runs: list[RunFinished], folder: str, pictures: str) -> list[str]:
     """The pictures of the first runs that did not pass."""
     bad = [run for run in runs if not run.outcome.good and run.artifacts.picture]
     lines = []
-    for run in bad[:MOST_PICTURES]:
+    for run in bad[:MAX_PICTURES]:
         address = f"{pictures.rstrip('/')}/{quote(relative(run.artifacts.picture, folder))}"
-        lines += [f"**{_cell(label(run.key))}**", "", f"![map of the run]({address})", ""]
+        lines += [f"**{_cell(short_run_name(run.key))}**", "", f"![map of the run]({address})", ""]
     return lines
 
 
-def _why(run: RunFinished) -> str:
+def _reason_cell(run: RunFinished) -> str:
     """A cell: every criterion that failed in a line of its own, or what the run came nearest to."""
     if run.outcome is Outcome.ERROR:
-        return _cell(broken(run))
-    if excuse := excused(run):
+        return _cell(error_summary(run))
+    if excuse := excuse_text(run):
         return _cell(excuse)
-    told = [_cell(complaint.message) for complaint in complaints(run)]
+    told = [_cell(complaint.message) for complaint in reported_violations(run)]
     nearest = tightest_margin(run.result.verdicts)
     return "<br>".join(told) if told or not nearest else f"tightest: {_cell(nearest)}"
 
 
 def _command(level: str, run: RunFinished, line: int, title: str, message: str) -> str:
-    file = in_checkout(scenario_file(run))
+    file = relative_to_checkout(scenario_file(run))
     where = f"file={_property(file)},line={max(line or 1, 1)},title={_property(title)}"
     return f"::{level} {where}::{_data(message)}"
 
@@ -139,4 +138,4 @@ def _property(text: str) -> str:
 
 def _cell(text: str) -> str:
     """Text that means nothing in a Markdown table or in HTML."""
-    return one_line(text).translate(_MEANINGFUL)
+    return one_line(text).translate(_MARKDOWN_ESCAPES)

@@ -15,8 +15,14 @@ from typing import Any
 from simscen.core.errors import UsageError
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import RunFinished, RunStarted, SessionEvent, SessionFinished
-from simscen.report.journaldata import FORMAT, NAME, Planned, planned_data, run_data
-from simscen.report.rebuild import session_lines
+from simscen.report.journal_reader import (
+    JOURNAL_FILE,
+    JOURNAL_FORMAT,
+    PlannedRun,
+    finished_run_to_data,
+    last_session_lines,
+    planned_run_to_data,
+)
 
 
 class Journal:
@@ -30,7 +36,7 @@ class Journal:
     def __init__(self, folder: Path, goes_on: bool = False) -> None:
         self.folder = folder
         self.error: OSError | None = None
-        self._file = os.open(folder / NAME, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        self._file = os.open(folder / JOURNAL_FILE, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         _lock(self._file, folder)
         if _whole_lines(self._file) and not goes_on:
             raise UsageError(f"the output folder {folder} holds a session already; nothing in it was touched")
@@ -38,11 +44,17 @@ class Journal:
         self._answered: set[RunKey] = set()
         self._begun = time.monotonic()
 
-    def plan(self, runs: Sequence[Planned], version: str, workers: int) -> None:
+    def plan(self, runs: Sequence[PlannedRun], version: str, workers: int) -> None:
         """Open a session of these runs; what stood in the journal before no longer counts."""
         self._numbers, self._answered = {run.key: number for number, run in enumerate(runs)}, set()
-        facts = {"format": FORMAT, "version": version, "workers": workers, "pid": os.getpid(), "cwd": str(Path.cwd())}
-        self._write({"event": "planned", **facts, "runs": [planned_data(run) for run in runs]})
+        facts = {
+            "format": JOURNAL_FORMAT,
+            "version": version,
+            "workers": workers,
+            "pid": os.getpid(),
+            "cwd": str(Path.cwd()),
+        }
+        self._write({"event": "planned", **facts, "runs": [planned_run_to_data(run) for run in runs]})
 
     def __call__(self, event: SessionEvent) -> None:
         """Write down what must not be lost."""
@@ -50,7 +62,11 @@ class Journal:
             case RunStarted():
                 self._write({"event": "started", "run": self._numbers[event.key]})
             case RunFinished():
-                answer = {"event": "finished", "run": self._numbers[event.key], **run_data(event, self.folder)}
+                answer = {
+                    "event": "finished",
+                    "run": self._numbers[event.key],
+                    **finished_run_to_data(event, self.folder),
+                }
                 if self._write(answer):
                     self._answered.add(event.key)
             case SessionFinished():
@@ -95,8 +111,8 @@ def _whole_lines(file: int) -> int:
 
 def require_free(folder: Path) -> None:
     """Raise UsageError when a session is under way in `folder`."""
-    if (folder / NAME).is_file():
-        file = os.open(folder / NAME, os.O_RDONLY)
+    if (folder / JOURNAL_FILE).is_file():
+        file = os.open(folder / JOURNAL_FILE, os.O_RDONLY)
         try:
             _lock(file, folder)
         finally:
@@ -107,6 +123,6 @@ def _lock(file: int, folder: Path) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        lines = session_lines(folder)
+        lines = last_session_lines(folder)
         by = f" by pid {lines[0]['pid']}" if lines else ""
         raise UsageError(f"the output folder {folder} is in use{by}") from None

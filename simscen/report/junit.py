@@ -13,15 +13,22 @@ from xml.etree.ElementTree import Element, SubElement
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.finding_text import disturbance_line, subject
-from simscen.report.complaints import Complaint, complaints, excused, failure, place, scenario_file
-from simscen.report.text import command, one_line, visible
+from simscen.report.display_text import escape_control, one_line, shell_command_text
+from simscen.report.violations import (
+    Violation,
+    error_details,
+    excuse_text,
+    reported_violations,
+    scenario_file,
+    source_location,
+)
 
 Family = Literal["simscen", "xunit2"]
 
 
 def to_xml(runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen") -> bytes:
     """The whole document in UTF-8, runs sorted by file, scenario and seed; the order they ended in does not show."""
-    root = Element("testsuites", {"name": visible(name)})
+    root = Element("testsuites", {"name": escape_control(name)})
     ordered = sorted(runs, key=lambda run: (run.result.path, run.key))
     for path in sorted({run.result.path for run in ordered}):
         own = [run for run in ordered if run.result.path == path]
@@ -33,9 +40,9 @@ def to_xml(runs: Sequence[RunFinished], family: Family = "simscen", name: str = 
 
 
 def _suite(root: Element, path: str, runs: list[RunFinished], family: Family) -> None:
-    suite = SubElement(root, "testsuite", {"name": visible(path)})
+    suite = SubElement(root, "testsuite", {"name": escape_control(path)})
     _count(suite, runs)
-    suite.set("skipped", str(sum(bool(excused(run)) for run in runs)))
+    suite.set("skipped", str(sum(bool(excuse_text(run)) for run in runs)))
     used: set[str] = set()
     for run in runs:
         _case(suite, run, _unique(_case_name(run), used), family)
@@ -51,8 +58,10 @@ def _count(element: Element, runs: Sequence[RunFinished]) -> None:
 def _case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
     case = SubElement(suite, "testcase", {"classname": _classname(run), "name": name, "time": f"{run.wall:.3f}"})
     if family == "simscen":
-        case.set("file", visible(scenario_file(run)))
-        case.set("line", str(next((found.line for found in complaints(run) if found.line and not found.warning), 1)))
+        case.set("file", escape_control(scenario_file(run)))
+        case.set(
+            "line", str(next((found.line for found in reported_violations(run) if found.line and not found.warning), 1))
+        )
         _properties(case, run)
     match run.outcome:
         case Outcome.FAILED:
@@ -60,9 +69,9 @@ def _case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
         case Outcome.ERROR:
             _error(case, run)
         case Outcome.SKIPPED:
-            SubElement(case, "skipped", {"type": "simscen.skip", "message": visible(run.result.reason)})
+            SubElement(case, "skipped", {"type": "simscen.skip", "message": escape_control(run.result.reason)})
         case Outcome.FAILED_AS_EXPECTED:  # as pytest writes its xfail
-            SubElement(case, "skipped", {"type": "simscen.expected-failure", "message": excused(run)})
+            SubElement(case, "skipped", {"type": "simscen.expected-failure", "message": excuse_text(run)})
         case Outcome.PASSED:
             pass
     if output := _output(run):
@@ -78,7 +87,7 @@ def _properties(case: Element, run: RunFinished) -> None:
         "stack": run.result.stack,
         "ended": run.result.ended,
         "expected": run.result.reason if run.outcome is not Outcome.SKIPPED else "",
-        "again": command(run.again),
+        "again": shell_command_text(run.again),
         "resumed": "true" if run.resumed else "",
     }
     for verdict in run.result.verdicts:
@@ -89,37 +98,41 @@ def _properties(case: Element, run: RunFinished) -> None:
                 values[f"margin.{name}"] = f"{finding.margin:.6g} {finding.unit}".rstrip()
     for key, value in values.items():
         if value:
-            SubElement(properties, "property", {"name": one_line(key), "value": visible(value)})
+            SubElement(properties, "property", {"name": one_line(key), "value": escape_control(value)})
 
 
 def _failure(case: Element, run: RunFinished) -> None:
-    serious = [complaint for complaint in complaints(run) if not complaint.warning]
+    serious = [complaint for complaint in reported_violations(run) if not complaint.warning]
     more = f" (and {len(serious) - 1} more)" if len(serious) > 1 else ""
     element = SubElement(case, "failure")
-    element.set("type", visible(serious[0].verdict.criterion) if serious else "criterion")
+    element.set("type", escape_control(serious[0].verdict.criterion) if serious else "criterion")
     element.set("message", (serious[0].message if serious else "failed") + more)
     element.text = _told(run, serious)
 
 
 def _error(case: Element, run: RunFinished) -> None:
-    kind, message, tail = failure(run)
-    element = SubElement(case, "error", {"type": visible(kind), "message": message})
-    disturbance_line = [f"{place(run)}: {message}", tail, _told(run, [c for c in complaints(run) if not c.warning])]
+    kind, message, tail = error_details(run)
+    element = SubElement(case, "error", {"type": escape_control(kind), "message": message})
+    disturbance_line = [
+        f"{source_location(run)}: {message}",
+        tail,
+        _told(run, [c for c in reported_violations(run) if not c.warning]),
+    ]
     element.text = "\n".join(part for part in disturbance_line if part)
 
 
-def _told(run: RunFinished, about: list[Complaint]) -> str:
+def _told(run: RunFinished, about: list[Violation]) -> str:
     lines = []
     for complaint in about:
-        lines.append(f"{place(run, complaint.line)}: {complaint.message}")
+        lines.append(f"{source_location(run, complaint.line)}: {complaint.message}")
         lines += [f"    {text}" for text in complaint.detail]
-    return "\n".join([*lines, *([f"again: {command(run.again)}"] if run.again else [])])
+    return "\n".join([*lines, *([f"again: {shell_command_text(run.again)}"] if run.again else [])])
 
 
 def _output(run: RunFinished) -> str:
     """Warnings, what fired when, then attachments as Jenkins and GitLab read them."""
-    warnings = [complaint for complaint in complaints(run) if complaint.warning]
-    lines = [f"{place(run, warning.line)}: warning: {warning.message}" for warning in warnings]
+    warnings = [complaint for complaint in reported_violations(run) if complaint.warning]
+    lines = [f"{source_location(run, warning.line)}: warning: {warning.message}" for warning in warnings]
     files = (run.artifacts.picture, run.artifacts.replay, run.artifacts.mcap, run.artifacts.result)
     lines += [
         one_line(f"{one.ordered.kind} {disturbance_line(one, run.result.tick_rate)}") for one in run.result.disturbances
@@ -130,7 +143,7 @@ def _output(run: RunFinished) -> str:
 
 def _classname(run: RunFinished) -> str:
     parts = [re.sub(r"[.\s]+", "_", part) for part in run.key.scenario.split("/") if part not in ("", ".", "..")]
-    return visible(".".join(parts)) or "simscen"
+    return escape_control(".".join(parts)) or "simscen"
 
 
 def _case_name(run: RunFinished) -> str:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 from simscen.core.clock import Clock
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Decision, DeferredTruth, Moment, Truth
-from simscen.record.backlog import Log
+from simscen.record.recorder import MomentSink
 from simscen.run.faults.injector import FaultInjector
 from simscen.run.live_world.director import Director
 from simscen.run.live_world.stage import LiveStage
@@ -95,7 +95,7 @@ class RobotUnderTest:
     schedule: TickSchedule
     truth_period: int
     """Ticks between two samples of the true state."""
-    logs: tuple[Log, ...] = ()
+    logs: tuple[MomentSink, ...] = ()
     is_due: bool = field(default=True, init=False)
     """Whether the current tick is a beat of this robot."""
     next_tick: int = field(default=0, init=False)

@@ -20,9 +20,8 @@ from simscen.core.geometry.meshes import drivable_solids, face_normals, upward_f
 from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.loading.plugins import fact_of, requirement_of
 from simscen.loading.resolved import resolved_text
-from simscen.record.header import CHOSEN, STACK_NAME, VARIATION, LogHeader
-from simscen.record.sceneryfile import NAME as SCENERY
-from simscen.record.sceneryfile import scenery_to_json
+from simscen.record.log_header import SCENERY_FILE as SCENERY
+from simscen.record.log_header import STACK_FACT, STACK_NAME_FACT, VARIATION_FACT, LogHeader, scenery_to_json
 from simscen.run.preparation.scenario import PreparedScenario
 from simscen.run.robot_interface import sensor_frames, sensor_kinds
 from simscen.sim.body.outline import convex_hull, footprint, outlines_in_band
@@ -62,7 +61,7 @@ def _of_one(prepared: PreparedScenario) -> LogHeader:
 def _key_facts(prepared: PreparedScenario) -> dict[str, str]:
     """Return the stack chosen on the command line, and the names of stack and variation."""
     loaded = prepared.loaded
-    told = {CHOSEN: loaded.stack, STACK_NAME: loaded.stack_name, VARIATION: loaded.variation}
+    told = {STACK_FACT: loaded.stack, STACK_NAME_FACT: loaded.stack_name, VARIATION_FACT: loaded.variation}
     return {name: value for name, value in told.items() if value}
 
 

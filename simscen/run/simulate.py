@@ -18,9 +18,8 @@ from simscen.judge.result_json import to_json
 from simscen.judge.run_result import combine_robots, judge_run
 from simscen.loading.files.discovery import default_root
 from simscen.loading.scenario import load_scenario
-from simscen.record.backlog import WAITS, Backlog, Log
-from simscen.record.recorder import Recorder
-from simscen.record.tracebuilder import TraceBuilder
+from simscen.record.recorder import MOMENT_DELAY_S, MomentBuffer, MomentSink, Recorder
+from simscen.record.trace_builder import TraceBuilder
 from simscen.run.assembly import assemble
 from simscen.run.external.build import robot_file
 from simscen.run.external.stack import ExternalStack
@@ -31,7 +30,7 @@ from simscen.run.preparation.scenario import PreparedScenario, prepare
 from simscen.sim.single_robot import NAMELESS
 from simscen.spec.registry import Entry
 
-Attach = Callable[[RunSetup, Sequence[Log]], Sequence[Log]]
+Attach = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]
 """Receives the setup and the logs of its first robot before the first beat; what it returns listens to that, too."""
 
 
@@ -69,8 +68,8 @@ def _simulated(
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
         # Plug-ins could modify an array after they returned it, so logging must not be delayed.
-        waits, written = 0 if prepared.plugins else clock.ticks(WAITS), recorder.robots if recorder else {}
-        backlog = closing.enter_context(Backlog(waits, next(iter(written.values()), None)))
+        waits, written = 0 if prepared.plugins else clock.ticks(MOMENT_DELAY_S), recorder.robots if recorder else {}
+        backlog = closing.enter_context(MomentBuffer(waits, next(iter(written.values()), None)))
         kept = {name: one.thinning for name, one in written.items()}
         builders = {name: TraceBuilder(clock, kept.get(name)) for name in prepared.each}
         setup = assemble(prepared, seed, printed)
@@ -187,7 +186,7 @@ WriteExtras = Callable[[PreparedScenario, Run, Path], None]
 
 
 def execute_run(
-    prepared: PreparedScenario, seed: int, folder: Path, logs: tuple[Log, ...], finish: WriteExtras
+    prepared: PreparedScenario, seed: int, folder: Path, logs: tuple[MomentSink, ...], finish: WriteExtras
 ) -> dict[str, Any]:
     """Execute a run and write run.mcap, result.json, scenario.yaml, and the files of `finish` to `folder`.
 

@@ -9,7 +9,7 @@ from simscen.core.records.events import Disturbance, DisturbanceOutcome
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.report.suite.history import Before, Past
+from simscen.report.suite.history import PastOutcome, PastSession
 
 EVIL = "\"'><script>document.title='owned'</script><img src=x onerror=alert(1)>"
 
@@ -62,7 +62,7 @@ def session(folder: Path) -> list[RunFinished]:
     ]
 
 
-def past(answers: list[RunFinished]) -> list[Past]:
+def past(answers: list[RunFinished]) -> list[PastSession]:
     """Two sessions in which everything passed that now failed."""
-    before = {answer.key: Before(Outcome.PASSED, answer.result.simulated * 0.9) for answer in answers}
-    return [Past("20260102T000000Z-beef", before), Past(f"20260101T000000Z-{EVIL}", before)]
+    before = {answer.key: PastOutcome(Outcome.PASSED, answer.result.simulated * 0.9) for answer in answers}
+    return [PastSession("20260102T000000Z-beef", before), PastSession(f"20260101T000000Z-{EVIL}", before)]

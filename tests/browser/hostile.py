@@ -6,8 +6,8 @@ from simscen.core.records.case import Case
 from simscen.core.records.run_result import RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.evaluation import outcome_of_verdicts
-from simscen.record.header import LogHeader
-from simscen.record.replay import Log
+from simscen.record.log_header import LogHeader
+from simscen.record.log_reader.read import Log
 from simscen.testing.sketch import sketch
 
 EVIL = "</script><img src=x onerror=pwned()>\u202eevil\u2066 \x1b[31m{{data}}"

@@ -9,7 +9,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from answers import past, run, session
 from rig import Opened, Opener
 
-from simscen.report.suite import Live, Session, to_html
+from simscen.report.suite import RunningSession, Session, to_html
 
 SHOWN = (
     "[...document.querySelectorAll('.run:not([hidden])')].filter(run => !run.closest('[hidden]')).map(run => run.id)"
@@ -151,7 +151,7 @@ def test_a_page_of_a_session_that_goes_on_comes_anew_until_it_is_over(
 ) -> None:
     page = tmp_path / "report.html"
     answers = [run("a/first"), run("a/second", left=-0.1)]
-    page.write_text(to_html(Session(answers[:1], live=Live(2, (answers[1].key,)))), encoding="utf-8")
+    page.write_text(to_html(Session(answers[:1], live=RunningSession(2, (answers[1].key,)))), encoding="utf-8")
     opened = open_page(page)
     assert "1 of 2 runs done, under way: a/second, seed 1" in opened.page.locator("#live").inner_text()
     page.write_text(to_html(Session(answers)), encoding="utf-8")

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from simscen.core.clock import Clock
+from simscen.record.log_reader.read import read_log
 from simscen.record.recorder import Recorder
-from simscen.record.replay import read_log
 
 SIMSCEN = str(Path(sys.executable).with_name("simscen"))
 SIGINT_AT_IMPORT = """

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import pytest
 from junitparser import JUnitXml
 
-from simscen.record.difference import first_difference
-from simscen.record.replay import read_log
+from simscen.record.log_reader.read import read_log
+from simscen.record.trace_difference import first_difference
 
 TELLING = Path(__file__).with_name("telling_zygote.py")
 WITH_FAULTS = f"""

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simscen.cli.main import app
-from simscen.record.foreign.wanted import TOPICS
+from simscen.record.foreign.options import TOPICS
 
 ROOT = Path(__file__).parents[2]
 GUIDE = (ROOT / "docs" / "guides" / "judge-real-robots.md").read_text(encoding="utf-8")

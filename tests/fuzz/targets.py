@@ -15,12 +15,10 @@ from simscen.cli.session.selection import Checks
 from simscen.core.errors import InvalidInput, Problem
 from simscen.judge.evaluation import judge
 from simscen.loading.resolved import spec_of_text
-from simscen.record.chunk import Channel
-from simscen.record.openlog import WholeRecords
-from simscen.record.recover import recover
-from simscen.record.replay import read_run
-from simscen.record.schemas import MessageType
-from simscen.record.writer import McapWriter
+from simscen.record.log_file import RecordReader
+from simscen.record.log_reader.read import read_run
+from simscen.record.log_reader.recover import recover
+from simscen.record.mcap_writer import Channel, McapWriter, MessageType
 from simscen.run.preparation.scenario import prepare
 
 CORPUS = Path(__file__).parent / "corpus"
@@ -110,7 +108,7 @@ def damaged_log(corpus: list[bytes], chance: random.Random) -> tuple[int, bytes]
         return mutant([data], chance)[1] if data and chance.random() < rate else data
 
     with contextlib.suppress(KeyError, ValueError, struct.error, OverflowError):  # what cannot be written is no log
-        for record in WholeRecords(io.BytesIO(corpus[0])):
+        for record in RecordReader(io.BytesIO(corpus[0])):
             match record:
                 case records.Schema():
                     kinds[record.id] = MessageType(record.name, record.data.decode(), "")

@@ -16,7 +16,7 @@ from simscen.loading.keywords import keyword_matcher
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_scenario
 from simscen.loading.yaml.parser import parse_yaml
-from simscen.report.text import visible
+from simscen.report.display_text import escape_control
 
 SCENARIO = """\
 simscen: 1
@@ -69,7 +69,7 @@ def _lie_inside(problems: list[Problem], raw: bytes) -> None:
         if problem.line:
             assert 1 <= problem.line <= len(lines)
             assert 1 <= problem.col <= len(lines[problem.line - 1]) + 1
-    assert visible(told := as_text(problems)) == told
+    assert escape_control(told := as_text(problems)) == told
 
 
 def test_the_scenario_that_is_varied_is_valid(load: Any) -> None:

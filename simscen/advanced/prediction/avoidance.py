@@ -203,7 +203,6 @@ class Avoidance:
         return np.asarray(CHANGE * (change + np.abs(commands[:, 1] - self._last.wz) / 3.0))
 
 
-# MERGED: Where a robot belongs that is to stand, and how it gets back there after it has stepped aside.
 THERE, TURNED = 0.08, 0.15
 """Meters and rad within which the robot stands where it belongs."""
 LEFT = 0.15

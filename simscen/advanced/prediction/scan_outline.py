@@ -37,7 +37,6 @@ class LidarPose(NamedTuple):
         return (points - self.at) * self.towards.conjugate()
 
 
-# MERGED: What a scan says of places: whether the lidar sees past one, and whether something still stands there.
 @dataclass(frozen=True, eq=False)
 class Sight:
     """A scan whose beams end at `ends` (n,) as its lidar sees them, which is `at` a pose in the frame of the tracks.

@@ -40,7 +40,6 @@ class ConstantVelocityFilter:
         self.covariance *= kept
 
 
-# MERGED: The tracks: what is known of each, and where it should be by now.
 LATELY = 10
 """Updates that are looked at: who turns round has not come far from where he was first seen."""
 FIRST_SPEED = 1.5

@@ -162,7 +162,6 @@ def _possible(robot: RobotModel, speed: float) -> list[Twist]:
     return [each for each in dict.fromkeys(commands) if each != STOP]
 
 
-# MERGED: Driving back the way the robot came. Nav2 has nothing like it.
 SLOWLY = 1.5
 """Times as long as the way takes at full speed it may take, for it is driven in part at half of it."""
 

@@ -16,8 +16,8 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.model.robot import Lidar, WheelOdometry
-from simscen.record.foreign.sensed import Sensed
-from simscen.record.foreign.sensedrows import TICK_RATE
+from simscen.record.localization_logs.read import LocalizationLog
+from simscen.record.localization_logs.rows import TICK_RATE_HZ
 
 CELL = 0.05
 MARGIN = 1.0
@@ -88,7 +88,7 @@ class Log:
     building: int
     number: int
     circumstance: str
-    sensed: Sensed
+    sensed: LocalizationLog
     map: OccupancyGrid
     estimate: Estimate
 
@@ -123,10 +123,10 @@ def log(number: int, which: int, circumstance: str, seconds: float = SECONDS) ->
         ranges = hidden_by(people_in(floor, len(poses), each * STEP, PEOPLE, chance), seen_from, angles, ranges)
     ranges = measured(ranges, lidar, chance)
     readings = _readings(odometry, ranges, each, lidar)
-    ticks = np.round(np.arange(len(truth)) * STEP * TICK_RATE).astype(np.int64)
+    ticks = np.round(np.arange(len(truth)) * STEP * TICK_RATE_HZ).astype(np.int64)
     whole = mapped(number)
     return Log(
-        number, which, circumstance, Sensed(readings, ticks, truth),
+        number, which, circumstance, LocalizationLog(readings, ticks, truth),
         first_half(whole, floor.middle) if circumstance == "half" else whole,
         Estimate(None if circumstance == "unknown" else Pose2(*truth[0].tolist())),
     )  # fmt: skip
@@ -161,7 +161,7 @@ def _readings(odometry: Array, ranges: Array, each: int, lidar: Lidar) -> list[O
     readings: list[Odometry | Scan] = []
     increment = lidar.field_of_view / (lidar.beams - 1)
     for row, pose in enumerate(odometry.tolist()):
-        tick = round(row * STEP * TICK_RATE)
+        tick = round(row * STEP * TICK_RATE_HZ)
         readings.append(Odometry("odom", tick, Pose2(*pose), Twist()))
         if row % each == 0:
             readings.append(

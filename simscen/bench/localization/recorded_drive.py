@@ -13,13 +13,13 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.model.stack import StackSpec
-from simscen.record.foreign.sensed import Sensed
-from simscen.record.foreign.sensedrows import TICK_RATE
+from simscen.record.localization_logs.read import LocalizationLog
+from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.installed.localizer import InstalledLocalizer
 from simscen.stack.protocols import Surroundings
 from simscen.stack.setting import Setting
 
-LONGEST_GAP = TICK_RATE
+LONGEST_GAP = TICK_RATE_HZ
 """Ticks between two poses of the reference above which nothing is said in between."""
 NEAR_S = 0.05
 """A belief this near in time to a pose of the reference is compared with it, whatever the gaps."""
@@ -74,7 +74,9 @@ class Errors:
         }
 
 
-def localize(sensed: Sensed, spec: StackSpec, surroundings: Surroundings, estimate: Estimate, seed: int) -> Localized:
+def localize(
+    sensed: LocalizationLog, spec: StackSpec, surroundings: Surroundings, estimate: Estimate, seed: int
+) -> Localized:
     """Feed a log to the localizer of a stack, reading by reading; the belief is taken after each odometry.
 
     The same arguments give the same beliefs, and those of a run of that seed: the localizer is begun as a stack does.
@@ -90,7 +92,7 @@ def localize(sensed: Sensed, spec: StackSpec, surroundings: Surroundings, estima
                 scans += 1
             case Odometry():
                 localizer.on_odometry(reading)
-                times.append(reading.tick / TICK_RATE)
+                times.append(reading.tick / TICK_RATE_HZ)
                 poses.append(tuple(localizer.belief.pose))
                 covariances.append(localizer.belief.covariance)
         took = time.process_time() - began
@@ -98,7 +100,7 @@ def localize(sensed: Sensed, spec: StackSpec, surroundings: Surroundings, estima
     return Localized(np.array(times), np.array(poses), np.array(covariances), scans, cpu, slowest)
 
 
-def errors_of(localized: Localized, sensed: Sensed, far: float) -> Errors | None:
+def errors_of(localized: Localized, sensed: LocalizationLog, far: float) -> Errors | None:
     """How far off the belief was wherever the reference says something; None where it never does.
 
     The reference is interpolated, not over gaps; within a gap, only beliefs at its ends count.
@@ -106,11 +108,11 @@ def errors_of(localized: Localized, sensed: Sensed, far: float) -> Errors | None
     """
     if len(sensed.ticks) < 2:
         return None
-    known = sensed.ticks / TICK_RATE
+    known = sensed.ticks / TICK_RATE_HZ
     inside = (localized.times >= known[0]) & (localized.times <= known[-1])
     after = np.clip(np.searchsorted(known, localized.times), 1, len(known) - 1)
     near = np.minimum(np.abs(known[after] - localized.times), np.abs(localized.times - known[after - 1])) <= NEAR_S
-    inside &= near | (known[after] - known[after - 1] <= LONGEST_GAP / TICK_RATE)
+    inside &= near | (known[after] - known[after - 1] <= LONGEST_GAP / TICK_RATE_HZ)
     times = localized.times[inside]
     if not len(times):
         return None

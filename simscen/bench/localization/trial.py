@@ -9,7 +9,7 @@ from simscen.bench.localization.generated_logs import KIDNAPPED_AT, Log
 from simscen.bench.localization.recorded_drive import errors_of, localize
 from simscen.model.localizers import Localizer
 from simscen.model.stack import StackSpec
-from simscen.record.foreign.sensedrows import TICK_RATE
+from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.protocols import RobotModel, Surroundings
 
 LOST, FOUND = 1.0, 0.5
@@ -42,7 +42,7 @@ class Trial:
 def trial(log: Log, localizer: Localizer, seed: int) -> Trial:
     """Run a log through a localizer; the same arguments give the same figures, but for the processor's time."""
     spec = StackSpec(localizer=localizer)
-    localized = localize(log.sensed, spec, Surroundings(ROBOT, log.map, TICK_RATE), log.estimate, seed)
+    localized = localize(log.sensed, spec, Surroundings(ROBOT, log.map, TICK_RATE_HZ), log.estimate, seed)
     errors = errors_of(localized, log.sensed, LOST)
     assert errors is not None  # a made log has a reference from its first reading to its last
     truth = log.sensed.truth

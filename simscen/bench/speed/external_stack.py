@@ -8,7 +8,7 @@ from simscen.bench.speed.run_speed import PATROL, SEED
 from simscen.bench.speed.stopwatch import Stopwatch
 from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
-from simscen.record.backlog import Log
+from simscen.record.recorder import MomentSink
 from simscen.run.external.build import with_external_reference
 from simscen.run.lockstep import RunSetup
 from simscen.run.preparation.scenario import PreparedScenario, prepare
@@ -43,7 +43,7 @@ def measure_external(rounds: int) -> External:
 def _each_beat(prepared: PreparedScenario) -> tuple[int, float]:
     watch, beats = Stopwatch(), _Beats()
 
-    def attach(setup: RunSetup, _: Sequence[Log]) -> Sequence[Log]:
+    def attach(setup: RunSetup, _: Sequence[MomentSink]) -> Sequence[MomentSink]:
         watch.watch("stack", setup.robots[0].stack, "decide")
         return (beats,)
 

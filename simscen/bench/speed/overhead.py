@@ -15,7 +15,7 @@ from simscen.bench.speed.run_speed import PATROL, SEED, Tell, nobody
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
-from simscen.record.backlog import Log
+from simscen.record.recorder import MomentSink
 from simscen.run.lockstep import RunSetup
 from simscen.run.preparation.scenario import prepare
 from simscen.run.process.jobs import Job, ProcessEnd
@@ -66,7 +66,7 @@ class Overhead:
 class _Beats:
     """CPU ms that a run takes from its first beat to its last: its simulation, with the first plan."""
 
-    def attach(self, rig: RunSetup, own: Sequence[Log]) -> Sequence[Log]:
+    def attach(self, rig: RunSetup, own: Sequence[MomentSink]) -> Sequence[MomentSink]:
         """The run begins."""
         self.begun = self.ended = time.process_time()
         return (self,)

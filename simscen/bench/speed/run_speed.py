@@ -16,7 +16,7 @@ from simscen.bench.speed.stopwatch import Stopwatch
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.loading.scenario import load_scenario
-from simscen.record.backlog import Log
+from simscen.record.recorder import MomentSink
 from simscen.run.lockstep import RunSetup
 from simscen.run.preparation.scenario import PreparedScenario, lidar_height, prepare
 from simscen.run.simulate import GC_THRESHOLD, simulate
@@ -123,7 +123,7 @@ def timed_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> tup
     return run.result.simulated, cpu, wall
 
 
-def _watched(watch: Stopwatch, setup: RunSetup, own: Sequence[Log]) -> Sequence[Log]:
+def _watched(watch: Stopwatch, setup: RunSetup, own: Sequence[MomentSink]) -> Sequence[MomentSink]:
     """Watch the parts of the setup, and the log and the trace that are its `own` listeners."""
     (agent,) = setup.robots
     watch.watch("physics", setup.simulation, "step")

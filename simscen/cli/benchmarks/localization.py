@@ -15,7 +15,7 @@ from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import NothingSelected
 from simscen.loading.schema.messages import quoted
-from simscen.report.look import look_of
+from simscen.report.styled_line import detect_style
 
 if TYPE_CHECKING:
     from simscen.bench.localization.campaign import Interval, Row, Share, Sureness
@@ -62,7 +62,7 @@ def command(
         logs = {name: [asdict(trial) for trial in some] for name, some in trials.items()}
         print(json.dumps({"rows": [asdict(row) for row in rows], "logs": logs}, indent=2))
     else:
-        print_text(as_text(rows, look_of(sys.stdout, os.environ).columns))
+        print_text(as_text(rows, detect_style(sys.stdout, os.environ).columns))
 
 
 def _tell(name: str, trials: "Sequence[Trial]") -> None:

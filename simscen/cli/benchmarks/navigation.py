@@ -11,7 +11,7 @@ import typer
 from simscen.cli.diagnostics import as_text as problems_as_text
 from simscen.cli.diagnostics import escaped, from_here, print_text
 from simscen.core.errors import Exit, NothingSelected
-from simscen.report.look import look_of
+from simscen.report.styled_line import detect_style
 
 if TYPE_CHECKING:
     from simscen.bench.navigation.experiment import Experiment
@@ -101,7 +101,7 @@ def command(
         for one, before, after in zip(experiments if others else [], trials, trials[len(experiments) :], strict=False)
         if driven(before) and driven(after)
     ]
-    columns = look_of(sys.stdout, os.environ).columns
+    columns = detect_style(sys.stdout, os.environ).columns
     print_text(as_json(rows, pairs) if format_ is Format.JSON else as_text(rows, pairs, columns))
     if stopped:
         count = f"{sum(len(driven(runs)) for runs in trials)} of {sum(map(len, trials))} runs"

@@ -20,11 +20,11 @@ from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionEvent
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
-from simscen.record.replay import read_log
+from simscen.record.log_reader.read import read_log
 from simscen.report.journal import Journal
-from simscen.report.line import text_of
-from simscen.report.lines import Naming, finished
-from simscen.report.sessions import UNDECIDED
+from simscen.report.journal_reader import UNDECIDED_KINDS
+from simscen.report.session_lines import RunNaming, run_lines
+from simscen.report.styled_line import plain_text
 from simscen.run.process.jobs import Job
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
@@ -90,7 +90,7 @@ def driven(trials: Sequence[Trial]) -> list[Trial]:
 
 
 def _undecided(run: RunFinished) -> bool:
-    return run.result.error is not None and run.result.error.kind in UNDECIDED
+    return run.result.error is not None and run.result.error.kind in UNDECIDED_KINDS
 
 
 Owner = tuple[int, Drive]
@@ -147,7 +147,7 @@ class _Progress:
         if event.outcome is not Outcome.PASSED:
             print_progress("")
             told = replace(event, again=repeat_command(self._jobs[event.key]))
-            print_text("\n".join(text_of(line) for line in finished(told, Naming(every_seed=True))), sys.stderr)
+            print_text("\n".join(plain_text(line) for line in run_lines(told, RunNaming(every_seed=True))), sys.stderr)
         print_progress(f"{self._done} of {self._total} runs" if self._done < self._total else "")
 
 

@@ -8,8 +8,7 @@ from simscen.bench.navigation.barn import DWA
 from simscen.bench.navigation.comparison import Difference, DriveComparison
 from simscen.bench.navigation.summary import Row
 from simscen.cli.benchmarks.navigation_runs import Localized, Measured
-from simscen.report.line import Piece, text_of
-from simscen.report.wrap import wrapped
+from simscen.report.styled_line import StyledText, plain_text, wrap_line
 
 TableRow = Sequence[str]
 Adjust = Callable[[str, int], str]
@@ -38,13 +37,13 @@ def stacked(table: Sequence[TableRow], columns: int) -> list[str]:
 
 def named(head: TableRow, row: TableRow, columns: int) -> list[str]:
     """The name of a row, then each of its numbers behind what it is, as many in a line as fit."""
-    pieces = tuple(Piece(f"  {name} {cell}") for name, cell in zip(head[1:], row[1:], strict=True))
-    return [row[0], *(text_of(line) for line in wrapped(pieces, columns))]
+    pieces = tuple(StyledText(f"  {name} {cell}") for name, cell in zip(head[1:], row[1:], strict=True))
+    return [row[0], *(plain_text(line) for line in wrap_line(pieces, columns))]
 
 
 def broken(lines: Sequence[str], columns: int | None) -> list[str]:
     """The lines, broken between words where they are too long."""
-    return [text_of(piece) for line in lines for piece in wrapped((Piece(line),), columns)]
+    return [plain_text(piece) for line in lines for piece in wrap_line((StyledText(line),), columns)]
 
 
 def widths_of(table: Sequence[TableRow]) -> list[int]:

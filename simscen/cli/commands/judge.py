@@ -17,10 +17,10 @@ from simscen.cli.session.output_files import verdict
 from simscen.core.errors import UsageError
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import result_data
-from simscen.record.foreign.wanted import TOPICS, Clock, Wanted
-from simscen.report.judged import in_a_line, in_full, summary, table
-from simscen.report.line import text_of
-from simscen.report.results import as_document, in_order
+from simscen.record.foreign.options import TOPICS, Clock, ForeignLogOptions
+from simscen.report.judged_logs import full_log_lines, margin_table, short_log_line, summary_line
+from simscen.report.results_json import as_document, in_order
+from simscen.report.styled_line import plain_text
 
 
 class Time(str, Enum):
@@ -77,7 +77,7 @@ def command(
     judging = Judging(wanted, scenario, root, world_path or [])
     lost = runs_without_log(logs)
     runs = [*((str(file), judging.judged(file, alone=len(files) + len(lost) == 1)) for file in files), *lost]
-    if wanted != Wanted() and not judging.foreign:
+    if wanted != ForeignLogOptions() and not judging.foreign:
         judging.notes.append("logs of simscen contain truth and times; options for foreign logs have no effect")
     for note in judging.notes:
         print_text(f"note: {escaped(note)}", sys.stderr)
@@ -89,24 +89,27 @@ def command(
     sys.exit(verdict([run for _, run in runs]))
 
 
-def wanted_of(truth: str | None, topic: list[str], time: Time, tick_rate: int, same_frame: bool) -> Wanted:
+def wanted_of(truth: str | None, topic: list[str], time: Time, tick_rate: int, same_frame: bool) -> ForeignLogOptions:
     """Return how to read a foreign log according to the command-line options. Raises UsageError."""
     clock: Clock = "log" if time is Time.LOG else "header"
-    wanted = Wanted(truth, _topics(topic), tick_rate, clock, same_frame)
+    wanted = ForeignLogOptions(truth, _topics(topic), tick_rate, clock, same_frame)
     _check_truth(wanted)
     return wanted
 
 
 def _print(runs: list[tuple[str, RunFinished]], one_scenario: bool) -> None:
     if len(runs) == 1:
-        lines = list(in_full(runs[0][1], runs[0][0]))
+        lines = list(full_log_lines(runs[0][1], runs[0][0]))
     elif one_scenario:
-        lines = [*table(runs), summary([run for _, run in runs])]
+        lines = [*margin_table(runs), summary_line([run for _, run in runs])]
     else:
         width = max(len(name) for name, _ in runs)
-        lines = [*(in_a_line(run, f"{name:{width}}") for name, run in runs), summary([run for _, run in runs])]
+        lines = [
+            *(short_log_line(run, f"{name:{width}}") for name, run in runs),
+            summary_line([run for _, run in runs]),
+        ]
     for line in lines:
-        print_text(text_of(line))
+        print_text(plain_text(line))
 
 
 def _document(runs: list[RunFinished], options: list[str]) -> str:
@@ -119,7 +122,7 @@ def _document(runs: list[RunFinished], options: list[str]) -> str:
     return json.dumps(document, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _options(wanted: Wanted, scenario: Path | None, root: Path | None, world_path: list[Path]) -> list[str]:
+def _options(wanted: ForeignLogOptions, scenario: Path | None, root: Path | None, world_path: list[Path]) -> list[str]:
     """Return the options of this command that affect the result."""
     given = {"--scenario": scenario, "--truth": wanted.truth, "--root": root}
     several = [("--topic", f"{name}={topic}") for name, topic in wanted.topics.items()]
@@ -127,11 +130,11 @@ def _options(wanted: Wanted, scenario: Path | None, root: Path | None, world_pat
     words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
     words += [word for pair in several for word in pair]
     words += ["--time", "log"] if wanted.clock == "log" else []
-    words += ["--tick-rate", str(wanted.tick_rate)] if wanted.tick_rate != Wanted.tick_rate else []
+    words += ["--tick-rate", str(wanted.tick_rate)] if wanted.tick_rate != ForeignLogOptions.tick_rate else []
     return [*words, *(["--same-frame"] if wanted.same_frame else [])]
 
 
-def _check_truth(wanted: Wanted) -> None:
+def _check_truth(wanted: ForeignLogOptions) -> None:
     """Raise UsageError if --truth is malformed or names the belief."""
     if wanted.truth is None:
         return

@@ -21,8 +21,8 @@ from simscen.loading.files.robotfile import load_robot_file
 from simscen.loading.files.worldfile import load_world_file
 from simscen.loading.yaml.tree import value_position
 from simscen.model.stack import StackSpec
-from simscen.record.foreign.sensed import Sensed, read_sensed
-from simscen.record.foreign.sensedrows import TICK_RATE
+from simscen.record.localization_logs.read import LocalizationLog, read_localization_log
+from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.protocols import RobotModel, Surroundings
 
 MOSTLY_COMPARED = 0.99
@@ -66,11 +66,11 @@ def command(
 
     Exit code 0: the log was processed, whatever the figures; 2: an input is unusable.
     """
-    sensed = read_sensed(log, odom, scan, reference)
+    sensed = read_localization_log(log, odom, scan, reference)
     spec, grid, model = _given(scenario, map_, robot, root)
     grid = grid.refined(spec.costmap.resolution)
     estimate = _estimate(start, sensed)
-    localized = localize(sensed, spec, Surroundings(model, grid, TICK_RATE), estimate, seed)
+    localized = localize(sensed, spec, Surroundings(model, grid, TICK_RATE_HZ), estimate, seed)
     errors = errors_of(localized, sensed, lost)
     for note in sensed.notes:
         print_text(f"note: {escaped(note)}", sys.stderr)
@@ -126,7 +126,7 @@ def _without_localizer(written: LoadedCriteria) -> Problem:
     return written.library.with_source([Problem(*place, "SC016", "this stack has no simscen localizer", hint)])[0]
 
 
-def _estimate(start: str | None, sensed: Sensed) -> Estimate:
+def _estimate(start: str | None, sensed: LocalizationLog) -> Estimate:
     """Return the initial estimate. Raises UsageError if neither the option nor the log gives one."""
     if start == "unknown":
         return Estimate(None)
@@ -145,10 +145,16 @@ def _estimate(start: str | None, sensed: Sensed) -> Estimate:
     return Estimate(Pose2(x, y, yaw))
 
 
-def _draw(grid: OccupancyGrid, localized: Localized, sensed: Sensed, picture: Path, inputs: list[Path]) -> None:
-    from simscen.report.picture.localized import write_localized
+def _draw(
+    grid: OccupancyGrid, localized: Localized, sensed: LocalizationLog, picture: Path, inputs: list[Path]
+) -> None:
+    from simscen.report.picture.drive_plots import write_localization_picture
 
-    save(picture, lambda path: write_localized(grid, localized.poses[:, :2], sensed.truth[:, :2], path), inputs)
+    save(
+        picture,
+        lambda path: write_localization_picture(grid, localized.poses[:, :2], sensed.truth[:, :2], path),
+        inputs,
+    )
 
 
 def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str]:

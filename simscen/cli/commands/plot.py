@@ -11,8 +11,8 @@ from simscen.cli.session.logs import log_file, recorded_result
 from simscen.cli.session.output_files import save
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.record.replay import Log, invalid, read_run
-from simscen.record.sceneryfile import scenery_of
+from simscen.record.log_header import scenery_from_header
+from simscen.record.log_reader.read import Log, invalid_log, read_run
 
 
 def command(
@@ -33,17 +33,17 @@ def command(
 
 
 def _draw(log: Log, file: Path, picture: Path) -> None:
-    from simscen.report.picture.compose import write_picture
-    from simscen.report.picture.scene import Scene, with_robots
+    from simscen.report.picture.map_picture import write_picture
+    from simscen.report.picture.scene import Scene, scene_with_robots
 
     try:
-        scenery = scenery_of(log.about)
+        scenery = scenery_from_header(log.about)
         map_ = scenery.map.grid if scenery.map else log.about.map or _unknown_map(log)
     except ValueError as error:
-        raise invalid(file, "SC802", f"the log is damaged: {error}") from error
+        raise invalid_log(file, "SC802", f"the log is damaged: {error}") from error
     scene = Scene(log.trace, log.about.case, map_, recorded_result(log, file), scenery)
     robots = {name: (one.trace, one.about.case) for name, one in log.robots.items()}
-    save(picture, lambda path: write_picture(with_robots(scene, robots), path), [file])
+    save(picture, lambda path: write_picture(scene_with_robots(scene, robots), path), [file])
 
 
 def _unknown_map(log: Log) -> OccupancyGrid:

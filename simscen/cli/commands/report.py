@@ -13,8 +13,8 @@ from simscen.core.errors import Exit
 from simscen.judge.metrics.session_summary import session_summary_line, summarize_session
 from simscen.judge.metrics.stack_comparison import compare_stacks
 from simscen.report.journal import require_free
-from simscen.report.rebuild import read_journal
-from simscen.report.results import results_by_stack
+from simscen.report.journal_reader import read_journal
+from simscen.report.results_json import results_by_stack
 
 
 def command(

@@ -76,7 +76,7 @@ def _checked(file: RobotFile, named: str, picture: Path | None, as_json: bool) -
         if notes:
             print_text(as_text(notes))
     if picture is not None:
-        from simscen.report.picture.drives import draw_drives
+        from simscen.report.picture.drive_plots import draw_drives
 
         panels = [(t.name, t.command.path, t.odometry.path, t.truth.path) for t in checked.trials]
         image = draw_drives(body.name, panels, body.footprint)

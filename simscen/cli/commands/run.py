@@ -13,7 +13,7 @@ from simscen.cli.session.selection import Selection, shard_of
 from simscen.cli.session.stacks import STACK_HELP
 from simscen.cli.session.terminal import Format
 from simscen.cli.session.watch import watched
-from simscen.report.journaldata import NAME
+from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.run.process.jobs import ReplayMode
 from simscen.run.sessions.run_session import SessionOptions
 
@@ -112,7 +112,7 @@ def command(
     2: an invalid scenario or an unusable output folder (nothing was run); 3: a run could not be completed; 5: nothing
     selected, or everything skipped; 129, 130, and 143: interrupted.
     """
-    if check_determinism and (earlier := [path for path in paths if (path / NAME).is_file()]):
+    if check_determinism and (earlier := [path for path in paths if (path / JOURNAL_FILE).is_file()]):
         paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]
     asked = Asked(
         paths,

@@ -20,13 +20,12 @@ from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
 from simscen.loading.resolved import criteria_of_text
 from simscen.model.criteria_file import expectation_of
-from simscen.record.foreign.mcapfile import is_own
-from simscen.record.foreign.read import ForeignLog, read_foreign
-from simscen.record.foreign.wanted import Wanted
-from simscen.record.header import LogHeader
-from simscen.record.replay import Log, read_run
-from simscen.report.journaldata import NAME
-from simscen.report.rebuild import read_journal
+from simscen.record.foreign.options import ForeignLogOptions
+from simscen.record.foreign.raw_messages import is_simscen_log
+from simscen.record.foreign.read import ForeignLog, read_foreign_log
+from simscen.record.log_header import LogHeader
+from simscen.record.log_reader.read import Log, read_run
+from simscen.report.journal_reader import JOURNAL_FILE, read_journal
 from simscen.run.sessions.output_folder import run_folder
 
 
@@ -36,7 +35,9 @@ class Judging:
     `foreign` is how many of them simscen did not write.
     """
 
-    def __init__(self, wanted: Wanted, scenario: Path | None, root: Path | None, world_path: Sequence[Path]) -> None:
+    def __init__(
+        self, wanted: ForeignLogOptions, scenario: Path | None, root: Path | None, world_path: Sequence[Path]
+    ) -> None:
         self.notes: list[str] = []
         self.foreign = 0
         self._wanted, self._scenario, self._world_path = wanted, scenario, world_path
@@ -53,7 +54,7 @@ class Judging:
     def judged(self, log: Path, alone: bool) -> RunFinished:
         """What a log says. One that cannot be used is an error of its own among several; alone it is the command's."""
         try:
-            return self._own(log) if _may_be_own(log) and is_own(log) else self._foreign(log)
+            return self._own(log) if _may_be_own(log) and is_simscen_log(log) else self._foreign(log)
         except InvalidInput as error:
             if alone or isinstance(error, UnusableScenario):
                 raise
@@ -66,12 +67,12 @@ class Judging:
 
         Raises InvalidInput.
         """
-        if _may_be_own(log) and is_own(log):
+        if _may_be_own(log) and is_simscen_log(log):
             read = read_run(log, looks=True)
             return read, recorded_result(read, log) if self._criteria is None else self._own(log).result
         self.foreign += 1
         if self._criteria is None:
-            told, case = read_foreign(log, self._wanted, looks=True), Case(Pose2(0.0, 0.0), ())
+            told, case = read_foreign_log(log, self._wanted, looks=True), Case(Pose2(0.0, 0.0), ())
             result = skipped_result(RunKey(log.stem, 0), "", "nothing was judged: --scenario says by what")
             result = replace(result, simulated=told.trace.seconds(told.trace.end), tick_rate=told.trace.tick_rate)
         else:
@@ -125,7 +126,7 @@ class Judging:
             criteria = self._criteria.of("")
         case = self._foreign_case()
         goals = tuple(goal.name for goal in case.goals if not goal.via)
-        read = read_foreign(log, replace(self._wanted, goals=goals), looks)
+        read = read_foreign_log(log, replace(self._wanted, goals=goals), looks)
         missing = dict(read.coverage.missing)
         if case.footprint:
             del missing[Evidence.FOOTPRINT]
@@ -185,7 +186,7 @@ def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
     return [
         (str(run_folder(folder, answer.key)), _without_log(answer))
         for folder in folders
-        if (folder / NAME).is_file()
+        if (folder / JOURNAL_FILE).is_file()
         for answer in read_journal(folder).answers
         if not any((run_folder(folder, answer.key) / log).exists() for log in (WHOLE, BROKEN_OFF))
     ]

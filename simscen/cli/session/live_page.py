@@ -9,7 +9,7 @@ from simscen.cli.diagnostics import print_text
 from simscen.cli.session.output_files import PAGE, Reports
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import RunFinished, RunStarted, SessionEvent, SessionStarted
-from simscen.report.suite import Live
+from simscen.report.suite import RunningSession
 
 LEAST_PAUSE = 1.0
 """Seconds from one writing of the page to the next; the page itself looks every two seconds."""
@@ -45,7 +45,7 @@ class LivePage:
 
     def _write(self) -> None:
         begun = time.monotonic()
-        self._reports.write_live(self._answers, Live(self._total, tuple(self._under_way)))
+        self._reports.write_live(self._answers, RunningSession(self._total, tuple(self._under_way)))
         now = time.monotonic()
         self._due = now + max(LEAST_PAUSE, SHARE * (now - begun))
 

@@ -12,7 +12,7 @@ from simscen.loading.files.paths import is_folder
 from simscen.loading.resolved import criteria_of_text
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
-from simscen.record.replay import Log
+from simscen.record.log_reader.read import Log
 
 WHOLE, BROKEN_OFF = "run.mcap", "run.partial.mcap"
 BAG = "metadata.yaml"

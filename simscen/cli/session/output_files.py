@@ -16,16 +16,16 @@ from simscen.core.errors import Exit, UsageError
 from simscen.core.files import require_not_input, require_regular_file
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import Comparison, RunFinished, SessionFinished
-from simscen.report.journaldata import NAME
+from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.report.junit import Family, to_xml
-from simscen.report.results import to_json
-from simscen.report.suite import Live, Session, to_html
-from simscen.report.suite.history import Past, past_sessions
+from simscen.report.results_json import to_json
+from simscen.report.suite import RunningSession, Session, to_html
+from simscen.report.suite.history import PastSession, past_sessions
 from simscen.run.reproducibility.environment import arithmetic_fingerprints, cpu_flags, software_versions
 from simscen.run.sessions.output_folder import RUNS_FOLDER, probe_writable, write_atomically
 
 PAGE = "report.html"
-OWN = ("results.json", PAGE, "run.json", NAME, RUNS_FOLDER)
+OWN = ("results.json", PAGE, "run.json", JOURNAL_FILE, RUNS_FOLDER)
 """What a session writes into its folder beside junit.xml."""
 
 
@@ -74,7 +74,7 @@ class Reports:
         self._missing = frozenset(path for path, data in documents.items() if not _written(path, data))
         return not self._missing
 
-    def write_live(self, answers: Sequence[RunFinished], live: Live) -> bool:
+    def write_live(self, answers: Sequence[RunFinished], live: RunningSession) -> bool:
         """Write the page of a session that goes on."""
         page = to_html(Session(answers, self._past, folder=str(self.folder), live=live))
         return _written(self.folder / PAGE, page.encode())
@@ -84,7 +84,7 @@ class Reports:
         return to_html(Session(answers, self._past, comparison, str(self.folder), files)).encode()
 
     @cached_property
-    def _past(self) -> Sequence[Past]:
+    def _past(self) -> Sequence[PastSession]:
         return past_sessions(self.folder)
 
     def end(self, wall: float) -> bool:
@@ -143,7 +143,7 @@ def _require_free_name(junit: Path, folder: Path | None) -> None:
     """Raise OSError where simscen writes something else of that name, in this session's folder or another's."""
     real = Path(os.path.realpath(junit))
     for home in real.parents:
-        is_output = home == (folder and Path(os.path.realpath(folder))) or (home / NAME).exists()
+        is_output = home == (folder and Path(os.path.realpath(folder))) or (home / JOURNAL_FILE).exists()
         if is_output and real.relative_to(home).parts[0] in OWN:
             raise OSError(errno.EINVAL, "the output folder has something else of that name")
 

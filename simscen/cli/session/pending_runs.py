@@ -12,9 +12,7 @@ from simscen.core.version import __version__
 from simscen.judge.result_json import result_data
 from simscen.loading.loaded import LoadedScenario
 from simscen.report.journal import Journal
-from simscen.report.journaldata import Planned
-from simscen.report.rebuild import read_journal
-from simscen.report.sessions import last_failed
+from simscen.report.journal_reader import PlannedRun, last_failed, read_journal
 from simscen.run.process.jobs import Job
 from simscen.run.reproducibility.digest import scenario_digest
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER
@@ -70,13 +68,13 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> PendingRuns:
     return PendingRuns(journal, left, kept, workers, tuple(dict.fromkeys(run.stack for run in planned if run.stack)))
 
 
-def _planned(job: Job, scenario_digest: str) -> Planned:
+def _planned(job: Job, scenario_digest: str) -> PlannedRun:
     scenario = job.scenario
     again = repeat_command(scenario, job.key.seed)
-    return Planned(job.key, scenario.path, scenario_digest, again, shown(scenario.file), scenario.stack)
+    return PlannedRun(job.key, scenario.path, scenario_digest, again, shown(scenario.file), scenario.stack)
 
 
-def _verdicts(journal: Journal) -> dict[Planned, RunFinished]:
+def _verdicts(journal: Journal) -> dict[PlannedRun, RunFinished]:
     """The verdicts that the folder holds already, by what was asked; only those whose logs are still theirs."""
     try:
         past = read_journal(journal.folder)
@@ -90,7 +88,7 @@ def _has_log(answer: RunFinished) -> bool:
     """Return whether the log of a run is still there and holds the same verdicts; True if none was written."""
     if not answer.artifacts.mcap:
         return True
-    from simscen.record.openlog import attached_result  # only a resumed session needs the library
+    from simscen.record.log_file import attached_result  # only a resumed session needs the library
 
     recorded = attached_result(Path(answer.artifacts.mcap))
     expected = json.loads(json.dumps(result_data(answer.result)))

@@ -23,7 +23,7 @@ from simscen.judge.metrics.stack_comparison import compare_stacks
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.report.journal import Journal, require_free
-from simscen.report.rebuild import read_journal
+from simscen.report.journal_reader import read_journal
 from simscen.run.reproducibility.environment import plugin_packages
 from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session, scenario_seeds

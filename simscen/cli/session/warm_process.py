@@ -13,9 +13,9 @@ from PIL import Image
 import simscen.sim.simulation
 import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
 from simscen.core.records.case import Run
-from simscen.record.replay import read_run
-from simscen.report.picture.compose import write_picture
-from simscen.report.picture.scene import Scene, with_robots
+from simscen.record.log_reader.read import read_run
+from simscen.report.picture.map_picture import write_picture
+from simscen.report.picture.scene import Scene, scene_with_robots
 from simscen.run.caching.disk_cache import DiskCache, cache_folder
 from simscen.run.caching.scenario_cache import CachedWorldBuilder, ScenarioCache
 from simscen.run.log_header import log_header, world_scenery
@@ -68,7 +68,7 @@ def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
 def _finish(prepared: PreparedScenario, run: Run, folder: Path, replay: ReplayMode) -> None:
     scene = Scene(run.trace, run.case, prepared.built.map, run.result, world_scenery(prepared))
     robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
-    write_picture(with_robots(scene, robots), folder / "map.png")
+    write_picture(scene_with_robots(scene, robots), folder / "map.png")
     if replay.wants(run.result.outcome) and run.log is not None:
         from simscen.report.replay import write_replay
 

@@ -10,18 +10,18 @@ from typing import NamedTuple
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.record.cdr import HEADER, Cursor
-from simscen.record.simtime import SECOND
+from simscen.record.messages.cdr import HEADER, CdrReader
+from simscen.record.simtime import NS_PER_SECOND
 
 Numbers = tuple[float, ...]
 
 _UPPER_TRIANGLE = (0, 1, 5, 7, 11, 35)
 _ON_THE_GROUND = (0, 1, 5)
-_ODDEST_QUATERNION = 0.1
+_MAX_QUATERNION_ERROR = 0.1
 NO_COVARIANCE: Numbers = (0.0,) * 6
 
 
-class Posed(NamedTuple):
+class StampedPose(NamedTuple):
     """Where something is: `stamp` in nanoseconds, the frame it is told in, x, y, z and a unit quaternion.
 
     `covariance` is xx, xy, xyaw, yy, yyaw, yawyaw, zeros where the message has none; `twist` vx, vy, wz in the frame
@@ -36,14 +36,14 @@ class Posed(NamedTuple):
     child: str = ""
 
 
-class Commanded(NamedTuple):
+class VelocityCommand(NamedTuple):
     """A velocity command vx, vy, wz; `stamp` is None where the message has no header."""
 
     stamp: int | None
     values: Numbers
 
 
-class Planned(NamedTuple):
+class PathMessage(NamedTuple):
     """A path of poses (n, 7)."""
 
     stamp: int
@@ -58,7 +58,7 @@ class GoalState(NamedTuple):
     status: int
 
 
-class Scanned(NamedTuple):
+class ScanMessage(NamedTuple):
     """A planar scan: angles in rad, ranges (n,) in m, inf where nothing was hit."""
 
     stamp: int
@@ -70,7 +70,7 @@ class Scanned(NamedTuple):
     ranges: Array
 
 
-def odometry(data: bytes) -> Posed:
+def odometry(data: bytes) -> StampedPose:
     """nav_msgs/msg/Odometry."""
     cursor = _cursor(data)
     stamp, frame = _header(cursor)
@@ -79,57 +79,59 @@ def odometry(data: bytes) -> Posed:
     twist = cursor.take("6d")
     cursor.take("36d")
     _end(cursor)
-    return Posed(stamp, frame, _unit(pose), _plane(covariance), tuple(twist[i] for i in _ON_THE_GROUND), _bare(child))
+    return StampedPose(
+        stamp, frame, _unit(pose), _plane(covariance), tuple(twist[i] for i in _ON_THE_GROUND), _strip_slash(child)
+    )
 
 
-def pose_stamped(data: bytes) -> Posed:
+def pose_stamped(data: bytes) -> StampedPose:
     """geometry_msgs/msg/PoseStamped."""
     cursor = _cursor(data)
     stamp, frame = _header(cursor)
     pose = cursor.take("7d")
     _end(cursor)
-    return Posed(stamp, frame, _unit(pose))
+    return StampedPose(stamp, frame, _unit(pose))
 
 
-def pose_with_covariance_stamped(data: bytes) -> Posed:
+def pose_with_covariance_stamped(data: bytes) -> StampedPose:
     """geometry_msgs/msg/PoseWithCovarianceStamped."""
     cursor = _cursor(data)
     stamp, frame = _header(cursor)
     pose, covariance = cursor.take("7d"), cursor.take("36d")
     _end(cursor)
-    return Posed(stamp, frame, _unit(pose), _plane(covariance))
+    return StampedPose(stamp, frame, _unit(pose), _plane(covariance))
 
 
-def transforms(data: bytes) -> list[Posed]:
+def transforms(data: bytes) -> list[StampedPose]:
     """tf2_msgs/msg/TFMessage: where each `child` is in its parent `frame`."""
     cursor = _cursor(data)
     links = []
     for _ in range(cursor.count()):
         stamp, frame = _header(cursor)
-        child = _bare(cursor.string())
-        links.append(Posed(stamp, frame, _unit(cursor.take("7d")), child=child))
+        child = _strip_slash(cursor.string())
+        links.append(StampedPose(stamp, frame, _unit(cursor.take("7d")), child=child))
     _end(cursor)
     return links
 
 
-def twist(data: bytes) -> Commanded:
+def twist(data: bytes) -> VelocityCommand:
     """geometry_msgs/msg/Twist."""
     cursor = _cursor(data)
     values = cursor.take("6d")
     _end(cursor)
-    return Commanded(None, tuple(values[i] for i in _ON_THE_GROUND))
+    return VelocityCommand(None, tuple(values[i] for i in _ON_THE_GROUND))
 
 
-def twist_stamped(data: bytes) -> Commanded:
+def twist_stamped(data: bytes) -> VelocityCommand:
     """geometry_msgs/msg/TwistStamped, which Nav2 sends by default since Kilted."""
     cursor = _cursor(data)
     stamp, _ = _header(cursor)
     values = cursor.take("6d")
     _end(cursor)
-    return Commanded(stamp, tuple(values[i] for i in _ON_THE_GROUND))
+    return VelocityCommand(stamp, tuple(values[i] for i in _ON_THE_GROUND))
 
 
-def path(data: bytes) -> Planned:
+def path(data: bytes) -> PathMessage:
     """nav_msgs/msg/Path."""
     cursor = _cursor(data)
     stamp, _ = _header(cursor)
@@ -138,15 +140,15 @@ def path(data: bytes) -> Planned:
         _header(cursor)
         poses.append(_unit(cursor.take("7d")))
     _end(cursor)
-    return Planned(stamp, np.array(poses, dtype=np.float64).reshape(-1, 7))
+    return PathMessage(stamp, np.array(poses, dtype=np.float64).reshape(-1, 7))
 
 
-def stamp_of_scan(data: bytes) -> int:
+def scan_stamp(data: bytes) -> int:
     """When a sensor_msgs/msg/LaserScan was taken."""
     return _header(_cursor(data))[0]
 
 
-def laser_scan(data: bytes) -> Scanned:
+def laser_scan(data: bytes) -> ScanMessage:
     """sensor_msgs/msg/LaserScan, without its intensities."""
     cursor = _cursor(data)
     stamp, frame = _header(cursor)
@@ -155,7 +157,7 @@ def laser_scan(data: bytes) -> Scanned:
     ranges = np.asarray(cursor.array("<f4" if data[1] else ">f4", (count,)), dtype=np.float64)
     cursor.array("<f4" if data[1] else ">f4", (cursor.count(),))
     _end(cursor)
-    return Scanned(stamp, frame, first, step, least, most, ranges)
+    return ScanMessage(stamp, frame, first, step, least, most, ranges)
 
 
 def goal_states(data: bytes) -> list[GoalState]:
@@ -166,12 +168,12 @@ def goal_states(data: bytes) -> list[GoalState]:
         identity = bytes(int(byte) for byte in cursor.take("16B"))
         sec, nanosec = cursor.take("iI")
         (status,) = cursor.take("b")
-        states.append(GoalState(identity, int(sec) * SECOND + int(nanosec), int(status)))
+        states.append(GoalState(identity, int(sec) * NS_PER_SECOND + int(nanosec), int(status)))
     _end(cursor)
     return states
 
 
-POSES: dict[str, Callable[[bytes], Posed]] = {
+POSES: dict[str, Callable[[bytes], StampedPose]] = {
     "nav_msgs/msg/Odometry": odometry,
     "geometry_msgs/msg/PoseStamped": pose_stamped,
     "geometry_msgs/msg/PoseWithCovarianceStamped": pose_with_covariance_stamped,
@@ -179,23 +181,23 @@ POSES: dict[str, Callable[[bytes], Posed]] = {
 """The types that say where something is."""
 
 
-def _cursor(data: bytes) -> Cursor:
+def _cursor(data: bytes) -> CdrReader:
     if len(data) < len(HEADER) or data[0] != 0 or data[1] not in (0, 1):
         raise ValueError("a message is not plain CDR")
-    return Cursor(data, "<" if data[1] else ">")
+    return CdrReader(data, "<" if data[1] else ">")
 
 
-def _header(cursor: Cursor) -> tuple[int, str]:
+def _header(cursor: CdrReader) -> tuple[int, str]:
     sec, nanosec = cursor.take("iI")
-    return int(sec) * SECOND + int(nanosec), _bare(cursor.string())
+    return int(sec) * NS_PER_SECOND + int(nanosec), _strip_slash(cursor.string())
 
 
-def _bare(frame: str) -> str:
+def _strip_slash(frame: str) -> str:
     """A frame without the slash that tf had and tf2 has not."""
     return frame.lstrip("/")
 
 
-def _end(cursor: Cursor) -> None:
+def _end(cursor: CdrReader) -> None:
     if cursor.left > 3:
         raise ValueError("a message is longer than its type")
 
@@ -207,6 +209,6 @@ def _plane(covariance: Numbers) -> Numbers:
 def _unit(pose: Numbers) -> Numbers:
     """The pose with a quaternion of length 1. Raises ValueError for one that is no rotation: nobody filled it in."""
     norm = math.hypot(*pose[3:])
-    if not abs(norm - 1.0) < _ODDEST_QUATERNION:
+    if not abs(norm - 1.0) < _MAX_QUATERNION_ERROR:
         raise ValueError("an orientation is not a quaternion of length 1")
     return (*pose[:3], *(value / norm for value in pose[3:]))

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.records.trace import Ticks
-from simscen.record.foreign.unusable import Unusable
-from simscen.record.simtime import SECOND
+from simscen.record.foreign.raw_messages import UnusableLog
+from simscen.record.simtime import NS_PER_SECOND
 
-FURTHEST_BACK = SECOND
+MAX_BACKWARD_JUMP_NS = NS_PER_SECOND
 """Nanoseconds that a stamp may lie before an earlier one of its topic: messages overtake each other, clocks do not."""
-LATEST = 10 * SECOND
+MAX_LOGGING_DELAY_NS = 10 * NS_PER_SECOND
 """Nanoseconds between the stamp of a message and its logging above which they are of different clocks."""
 
 
 @dataclass(frozen=True, eq=False)
-class Stamped:
+class StampedMessages:
     """The messages of a topic in the order they were logged: `logged` and `stamps` in nanoseconds."""
 
     topic: str
@@ -28,11 +28,11 @@ class Stamped:
     def __post_init__(self) -> None:
         newest = np.maximum.accumulate(self.stamps)
         back = newest - self.stamps
-        if len(back) and back.max() > FURTHEST_BACK:
-            at = int(np.argmax(back > FURTHEST_BACK))
-            by = back[at] / SECOND
+        if len(back) and back.max() > MAX_BACKWARD_JUMP_NS:
+            at = int(np.argmax(back > MAX_BACKWARD_JUMP_NS))
+            by = back[at] / NS_PER_SECOND
             told = f"the time of {self.topic} jumps back by {by:.1f} s at its message {at + 1}"
-            raise Unusable(told, "a clock was reset or a bag looped: cut the log there, or judge it with --time log")
+            raise UnusableLog(told, "a clock was reset or a bag looped: cut the log there, or judge it with --time log")
 
     @property
     def disorder(self) -> str:
@@ -57,13 +57,13 @@ class Timebase:
     start: int
     stop: int
     rate: int
-    anchor: Stamped | None = None
+    anchor: StampedMessages | None = None
 
     @classmethod
-    def over(cls, logged: Iterable[Ticks], rate: int, anchor: Stamped | None) -> Timebase:
+    def over(cls, logged: Iterable[Ticks], rate: int, anchor: StampedMessages | None) -> Timebase:
         """That of all messages logged at these times; there must be some."""
         everything = np.concatenate(list(logged))
-        first, last = _told(np.array([everything.min(), everything.max()]), anchor).tolist()
+        first, last = _header_times(np.array([everything.min(), everything.max()]), anchor).tolist()
         return cls(first, last, rate, anchor)
 
     @property
@@ -73,27 +73,27 @@ class Timebase:
 
     def of_logged(self, logged: Ticks) -> Ticks:
         """The ticks of messages without a stamp."""
-        return self._ticks(_told(logged, self.anchor))
+        return self._ticks(_header_times(logged, self.anchor))
 
-    def of_stamped(self, messages: Stamped) -> Ticks:
+    def of_stamped(self, messages: StampedMessages) -> Ticks:
         """The ticks of messages with one. Raises Unusable where the stamps are of another clock."""
         if self.anchor is None:
             return self._ticks(messages.logged)
-        late = np.abs(messages.stamps - _told(messages.logged, self.anchor))
-        if len(late) > 2 and np.median(late) > LATEST:
-            by = float(np.median(late)) / SECOND
+        late = np.abs(messages.stamps - _header_times(messages.logged, self.anchor))
+        if len(late) > 2 and np.median(late) > MAX_LOGGING_DELAY_NS:
+            by = float(np.median(late)) / NS_PER_SECOND
             told = f"{messages.topic} and {self.anchor.topic} do not share a clock: their stamps differ by {by:.1f} s"
-            raise Unusable(told, "is use_sim_time the same for all nodes? --time log judges by the time of logging")
+            raise UnusableLog(told, "is use_sim_time the same for all nodes? --time log judges by the time of logging")
         return self._ticks(messages.stamps)
 
     def _ticks(self, times: Ticks) -> Ticks:
         """The nearest ticks, all within the log: a latched message may be older than it, a transform newer."""
         since: Ticks = np.clip(times, self.start, self.stop) - self.start
-        ticks: Ticks = (since * self.rate + SECOND // 2) // SECOND
+        ticks: Ticks = (since * self.rate + NS_PER_SECOND // 2) // NS_PER_SECOND
         return ticks
 
 
-def _told(logged: Ticks, anchor: Stamped | None) -> Ticks:
+def _header_times(logged: Ticks, anchor: StampedMessages | None) -> Ticks:
     """What headers would say at these times of logging; before and after all of them, time goes on as it was."""
     if anchor is None:
         return logged

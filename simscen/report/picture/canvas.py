@@ -13,16 +13,16 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from simscen.core.geometry import Array
+from simscen.report.display_text import one_line
 from simscen.report.picture.palette import Color
-from simscen.report.text import one_line
 
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 Bounds = tuple[float, float, float, float]
 Fill = tuple[int, ...]
 
-SAMPLES = 2
+SUPERSAMPLING = 2
 """Supersampling: 2 is where edges look smooth; 3 costs twice the time for no visible gain."""
-COARSE = 4
+LABEL_CELL_PX = 4
 """Pixels of a cell in which labels look for room."""
 
 
@@ -33,7 +33,7 @@ def font(size: int) -> Font:
 
 
 @dataclass(frozen=True)
-class Note:
+class TextItem:
     """Text to be set at pixel (x, y): `anchor` as in Pillow; `box` paints a plate of that color behind it.
 
     Without one, `halo` rims the letters, so that they can be read on anything.
@@ -49,7 +49,7 @@ class Note:
     halo: Color | None = None
 
 
-class Part(NamedTuple):
+class DrawnPart(NamedTuple):
     """Something on a picture: what it is ("door meeting room"), and its points (n, 2) in meters of the world."""
 
     what: str
@@ -69,10 +69,10 @@ class Canvas:
         self.width, self.height = max(1, math.ceil((x1 - x0) * scale)), max(1, math.ceil((y1 - y0) * scale))
         if background is not None:
             self.lay(Image.new("RGB", self.samples, background))
-        self._busy = Image.new("L", (-(-self.width // COARSE), -(-self.height // COARSE)), 0)
+        self._busy = Image.new("L", (-(-self.width // LABEL_CELL_PX), -(-self.height // LABEL_CELL_PX)), 0)
         self._keep_off = ImageDraw.Draw(self._busy)
-        self.notes: list[Note] = []
-        self.parts: list[Part] = []
+        self.notes: list[TextItem] = []
+        self.parts: list[DrawnPart] = []
 
     def lay(self, image: Image.Image) -> None:
         """Draw from now on upon this image, which is as large as the whole canvas, supersampled: nobody copies it."""
@@ -81,7 +81,7 @@ class Canvas:
     @property
     def samples(self) -> tuple[int, int]:
         """Width and height of the supersampled image."""
-        return self.width * SAMPLES, self.height * SAMPLES
+        return self.width * SUPERSAMPLING, self.height * SUPERSAMPLING
 
     @property
     def busy(self) -> Array:
@@ -99,7 +99,7 @@ class Canvas:
 
     def tell(self, what: str, points: Array | Sequence[tuple[float, float]]) -> None:
         """Put something on the list of parts."""
-        self.parts.append(Part(what, np.array(points, dtype=np.float64).reshape(-1, 2)))
+        self.parts.append(DrawnPart(what, np.array(points, dtype=np.float64).reshape(-1, 2)))
 
     def polygon(
         self, points: Array, fill: Fill | None, outline: Color | None = None, width: float = 1.5, busy: bool = False
@@ -109,9 +109,11 @@ class Canvas:
         if fill is not None:
             self._draw.polygon(corners, fill=fill)
         if outline is not None:
-            self._draw.line([*corners, corners[0]], fill=outline, width=_wide(width), joint="curve")
+            self._draw.line([*corners, corners[0]], fill=outline, width=_line_width(width), joint="curve")
         if busy:
-            self._keep_off.polygon([(u / SAMPLES / COARSE, v / SAMPLES / COARSE) for u, v in corners], fill=255)
+            self._keep_off.polygon(
+                [(u / SUPERSAMPLING / LABEL_CELL_PX, v / SUPERSAMPLING / LABEL_CELL_PX) for u, v in corners], fill=255
+            )
 
     def hatch(
         self, outlines: Sequence[Array], color: Fill, rising: bool, gap: float = 11.0, width: float = 1.2
@@ -130,11 +132,11 @@ class Canvas:
         pen, fill = ImageDraw.Draw(lines), ImageDraw.Draw(inside)
         for outline in corners:
             fill.polygon([(u - left, v - top) for u, v in outline], fill=255)
-        step = gap * SAMPLES
+        step = gap * SUPERSAMPLING
         first = -high - ((left + (top if rising else -top)) % step)  # the same slant everywhere on the canvas
         for at in np.arange(first, wide + high, step).tolist():
             ends = [(at, 0), (at - high, high)] if rising else [(at, 0), (at + high, high)]
-            pen.line(ends, fill=color[3] if len(color) > 3 else 255, width=_wide(width))
+            pen.line(ends, fill=color[3] if len(color) > 3 else 255, width=_line_width(width))
         lines.paste(0, (0, 0), inside.point(lambda value: 255 - value))
         self._image.paste(color[:3], (int(left), int(top)), lines)
 
@@ -142,10 +144,12 @@ class Canvas:
         """A line through points (n, 2) in meters."""
         if len(points) > 1:
             corners = self._corners(points)
-            self._draw.line(corners, fill=color, width=_wide(width), joint="curve")
+            self._draw.line(corners, fill=color, width=_line_width(width), joint="curve")
             if busy:
                 self._keep_off.line(
-                    [(u / SAMPLES / COARSE, v / SAMPLES / COARSE) for u, v in corners], fill=255, width=2
+                    [(u / SUPERSAMPLING / LABEL_CELL_PX, v / SUPERSAMPLING / LABEL_CELL_PX) for u, v in corners],
+                    fill=255,
+                    width=2,
                 )
 
     def dashes(self, points: Array, color: Color, width: float = 1.5, dash: float = 5.0) -> None:
@@ -157,7 +161,7 @@ class Canvas:
         ends = np.column_stack((strokes, np.minimum(strokes + 1, way[-1]))).ravel()
         corners = self._corners(np.column_stack([np.interp(ends, way, points[:, axis]) for axis in (0, 1)]))
         for here, there in zip(corners[::2], corners[1::2], strict=True):
-            self._draw.line((here, there), fill=color, width=_wide(width))
+            self._draw.line((here, there), fill=color, width=_line_width(width))
 
     def disc(
         self,
@@ -170,47 +174,49 @@ class Canvas:
         busy: bool = False,
     ) -> None:
         """A disc of `radius` pixels at a point in meters."""
-        u, v = (SAMPLES * part for part in self.pixel(x, y))
-        reach = SAMPLES * radius
+        u, v = (SUPERSAMPLING * part for part in self.pixel(x, y))
+        reach = SUPERSAMPLING * radius
         box = (u - reach, v - reach, u + reach, v + reach)
-        self._draw.ellipse(box, fill=fill, outline=outline, width=_wide(width))
+        self._draw.ellipse(box, fill=fill, outline=outline, width=_line_width(width))
         if busy:
-            self._keep_off.ellipse([part / SAMPLES / COARSE for part in box], fill=255)
+            self._keep_off.ellipse([part / SUPERSAMPLING / LABEL_CELL_PX for part in box], fill=255)
 
     def sign(self, x: float, y: float, offsets: Sequence[tuple[float, float]], fill: Color) -> None:
         """A filled sign at a point in meters; `offsets` are its corners in pixels, y down. Labels keep off it."""
         u, v = self.pixel(x, y)
-        self._draw.polygon([((u + dx) * SAMPLES, (v + dy) * SAMPLES) for dx, dy in offsets], fill=fill)
-        self._keep_off.polygon([((u + dx) / COARSE, (v + dy) / COARSE) for dx, dy in offsets], fill=255)
+        self._draw.polygon([((u + dx) * SUPERSAMPLING, (v + dy) * SUPERSAMPLING) for dx, dy in offsets], fill=fill)
+        self._keep_off.polygon([((u + dx) / LABEL_CELL_PX, (v + dy) / LABEL_CELL_PX) for dx, dy in offsets], fill=255)
 
     def leader(self, here: tuple[float, float], there: tuple[float, float], color: Color) -> None:
         """A thin line between two pixels."""
-        self._draw.line([(u * SAMPLES, v * SAMPLES) for u, v in (here, there)], fill=color, width=_wide(0.8))
+        self._draw.line(
+            [(u * SUPERSAMPLING, v * SUPERSAMPLING) for u, v in (here, there)], fill=color, width=_line_width(0.8)
+        )
 
-    def note(self, note: Note) -> None:
+    def note(self, note: TextItem) -> None:
         """Set text once everything is drawn."""
         self.notes.append(note)
 
     def finish(self) -> Image.Image:
         """The picture at its final size."""
-        image = self._image.reduce(SAMPLES)
+        image = self._image.reduce(SUPERSAMPLING)
         draw = ImageDraw.Draw(image, "RGBA")
         for note in self.notes:
-            write(draw, note)
+            draw_text(draw, note)
         return image
 
     def _corners(self, points: Array) -> list[tuple[float, float]]:
-        u = (points[:, 0] - self.bounds[0]) * self.scale * SAMPLES
-        v = (self.bounds[3] - points[:, 1]) * self.scale * SAMPLES
+        u = (points[:, 0] - self.bounds[0]) * self.scale * SUPERSAMPLING
+        v = (self.bounds[3] - points[:, 1]) * self.scale * SUPERSAMPLING
         return list(zip(u.tolist(), v.tolist(), strict=True))
 
 
-def shown(text: str) -> str:
+def printable(text: str) -> str:
     """Text on one line in signs that Pillow's own typeface has."""
     return one_line(text).replace("≤", "<=").replace("≥", ">=")
 
 
-def write(draw: ImageDraw.ImageDraw, note: Note) -> None:
+def draw_text(draw: ImageDraw.ImageDraw, note: TextItem) -> None:
     """Set one text."""
     if note.box is not None:
         left, top, right, bottom = draw.textbbox((note.x, note.y), note.text, font(note.size), anchor=note.anchor)
@@ -232,5 +238,5 @@ def text_size(text: str, size: int) -> tuple[float, float]:
     return right - left, bottom - top
 
 
-def _wide(width: float) -> int:
-    return max(1, round(width * SAMPLES))
+def _line_width(width: float) -> int:
+    return max(1, round(width * SUPERSAMPLING))

@@ -7,17 +7,17 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.report.picture import palette
-from simscen.report.picture.canvas import COARSE, Canvas, Note, text_size
+from simscen.report.picture.canvas import LABEL_CELL_PX, Canvas, TextItem, text_size
 from simscen.report.picture.palette import Color
 
-_AWAY = (4.0, 12.0, 22.0, 36.0, 54.0, 76.0, 104.0, 140.0)
+_DISTANCES_PX = (4.0, 12.0, 22.0, 36.0, 54.0, 76.0, 104.0, 140.0)
 """Pixels between a mark's rim and its label, in the order in which they are tried."""
 _ANGLES = tuple(math.radians(degrees) for degrees in (0, 180, 90, 270, 30, 150, 330, 210, 60, 120, 300, 240))
-_LED = 16.0
+_LEADER_DISTANCE_PX = 16.0
 """Pixels from which on a line leads from the label to its mark."""
 _WALL_WEIGHT, _FAR_WEIGHT = 0.25, 0.0015
 """What a label over walls, and each pixel of distance, count against one over a way."""
-_CROWDED = 0.2
+_MAX_COVERED_SHARE = 0.2
 """Share of a label that may be over something; beyond it a label that can be missed is left out."""
 
 
@@ -39,29 +39,29 @@ class Label:
     spare: bool = False
 
 
-def place(canvas: Canvas, labels: list[Label], walls: Array) -> None:
+def place_labels(canvas: Canvas, labels: list[Label], walls: Array) -> None:
     """Set all labels; `walls` is a share 0 … 1 for each cell of the canvas's `busy`."""
     taken = canvas.busy + _WALL_WEIGHT * walls
     for label in sorted(labels, key=lambda label: label.rank):
         if not canvas.shows(label.x, label.y):
             continue
         cost, (left, top, right, low) = _best(canvas, label, taken)
-        if label.spare and cost > _CROWDED:
+        if label.spare and cost > _MAX_COVERED_SHARE:
             continue
         rows, columns = (
-            slice(int(top // COARSE), int(low // COARSE) + 1),
-            slice(int(left // COARSE), int(right // COARSE) + 1),
+            slice(int(top // LABEL_CELL_PX), int(low // LABEL_CELL_PX) + 1),
+            slice(int(left // LABEL_CELL_PX), int(right // LABEL_CELL_PX) + 1),
         )
         taken[rows, columns] = 3.0
         u, v = canvas.pixel(label.x, label.y)
         end = min(max(u, left), right), min(max(v, top), low)
         apart = math.dist((u, v), end)
-        if apart > label.rim + _LED:
+        if apart > label.rim + _LEADER_DISTANCE_PX:
             share = label.rim / apart
             canvas.leader((u + share * (end[0] - u), v + share * (end[1] - v)), end, label.plate or label.color)
         halo = None if label.plate else palette.FREE
         middle = (left + right) / 2, (top + low) / 2
-        canvas.note(Note(*middle, label.text, label.size, label.color, "mm", label.plate, halo))
+        canvas.note(TextItem(*middle, label.text, label.size, label.color, "mm", label.plate, halo))
         canvas.tell(f"label {label.text}", [(label.x, label.y)])
 
 
@@ -76,7 +76,7 @@ def _best(canvas: Canvas, label: Label, taken: Array) -> tuple[float, Box]:
     wide, high = wide + 10, high + 10
     u, v = canvas.pixel(label.x, label.y)
     best: tuple[float, Box] = (math.inf, (u, v, u + wide, v + high))
-    for away in _AWAY:
+    for away in _DISTANCES_PX:
         if best[0] <= _FAR_WEIGHT * away:
             break  # what is farther away cannot be better
         for number, angle in enumerate(_ANGLES):
@@ -100,7 +100,7 @@ def _box(canvas: Canvas, at: tuple[float, float], angle: float, away: float, siz
 
 def _covered(sums: Array, box: Box) -> float:
     """The share of a box that is taken."""
-    left, top, right, low = (int(part // COARSE) for part in box)
+    left, top, right, low = (int(part // LABEL_CELL_PX) for part in box)
     right, low = min(right + 1, sums.shape[1] - 1), min(low + 1, sums.shape[0] - 1)
     inside = float(sums[low, right] - sums[top, right] - sums[low, left] + sums[top, left])
     cells: int = max(1, (right - left) * (low - top))

@@ -50,7 +50,7 @@ SIGNS = {Status.PASS: "✓", Status.FAIL: "✗", Status.INCONCLUSIVE: "?", Statu
 _STOPS = ((40, 60, 160), (110, 40, 170), (185, 40, 130), (225, 85, 75), (240, 150, 30))
 
 
-def ramp(share: float) -> Color:
+def time_color(share: float) -> Color:
     """The color of a share 0 … 1 of the run's time, from deep blue over purple to orange."""
     at = min(max(share, 0.0), 1.0) * (len(_STOPS) - 1)
     low = min(int(at), len(_STOPS) - 2)
@@ -69,7 +69,7 @@ DARK = {
 """The pages' own, for light and dark surroundings; each of the texts has 4.5 to 1 on `page` and on `panel`."""
 
 
-def variables() -> str:
+def css_variables() -> str:
     """Both themes as variables of CSS (`--good`, …), dark where the reader's system is."""
     light, dark = ("".join(f"--{name}:{value};" for name, value in theme.items()) for theme in (LIGHT, DARK))
     return (

@@ -9,10 +9,10 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import Status
 from simscen.judge.finding_text import comparison, subject, time_and_place
 from simscen.report.picture import palette
-from simscen.report.picture.canvas import Note, font, shown, write
+from simscen.report.picture.canvas import TextItem, draw_text, font, printable
 from simscen.report.picture.palette import Color
+from simscen.report.picture.path_layer import round_time_step
 from simscen.report.picture.scene import Scene
-from simscen.report.picture.ways import round_step
 
 WIDTH = 360
 _PAD = 18
@@ -26,7 +26,7 @@ Row = tuple[Status, Color, list[str]]
 def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
     """The sidebar, at least `height` pixels tall; its legend explains what is among the `parts` of the map."""
     reasons, rows = _reasons(scene), _criteria(scene)
-    legend = [entry[1:] for entry in _legend(round_step(scene.result.simulated)) if _is_on(parts, entry[0])]
+    legend = [entry[1:] for entry in _legend(round_time_step(scene.result.simulated)) if _is_on(parts, entry[0])]
     said = len(reasons) * _LINE + (14 if reasons else 0) + sum(_LINE * len(lines) + 8 for _, _, lines in rows)
     needed = 54 + said + 26 + 20 * len(legend) + 62
     image = Image.new("RGB", (WIDTH, max(height, needed)), palette.PAGE)
@@ -36,7 +36,7 @@ def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
     for number, (text, sample) in enumerate(legend):
         y = top + 20 * number
         sample(draw, _PAD, y)
-        write(draw, Note(_PAD + 34, y, text, 12, palette.FAINT_INK))
+        draw_text(draw, TextItem(_PAD + 34, y, text, 12, palette.FAINT_INK))
     _time_bar(draw, scene, image.height - 30)
     return image
 
@@ -50,9 +50,9 @@ def _reasons(scene: Scene) -> list[str]:
     """Why the run could not be completed, or why its failure is none."""
     result = scene.result
     if result.error is not None:
-        return _wrapped(shown(f"{result.error.kind}: {result.error.message}"), _PAD)
+        return _wrapped(printable(f"{result.error.kind}: {result.error.message}"), _PAD)
     if result.outcome in (Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED):
-        return _wrapped(shown(f"{result.outcome.value.replace('-', ' ')}: {result.reason}"), _PAD)
+        return _wrapped(printable(f"{result.outcome.value.replace('-', ' ')}: {result.reason}"), _PAD)
     return []
 
 
@@ -64,28 +64,28 @@ def _criteria(scene: Scene) -> list[Row]:
         warned = verdict.severity == "warn" and verdict.status is not Status.PASS
         color = palette.AMBER if warned else palette.STATUSES[verdict.status]
         if finding is None:
-            rows.append((verdict.status, color, _wrapped(f"{shown(verdict.id)}: checked nothing")))
+            rows.append((verdict.status, color, _wrapped(f"{printable(verdict.id)}: checked nothing")))
             continue
         failed = verdict.status is not Status.PASS
         where = time_and_place(finding, scene.result.tick_rate) if failed else ""
         told = ", ".join(part for part in (f"{subject(verdict, finding)}: {comparison(finding)}", where) if part)
         texts = [f"warning: {told}" if warned else told, *(finding.detail if failed else ())]
-        rows.append((verdict.status, color, [line for text in texts for line in _wrapped(shown(text))]))
+        rows.append((verdict.status, color, [line for text in texts for line in _wrapped(printable(text))]))
     return rows
 
 
 def _criteria_list(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
     y = 24.0
     for line in reasons:
-        write(draw, Note(_PAD, y, line, 13, palette.INK))
+        draw_text(draw, TextItem(_PAD, y, line, 13, palette.INK))
         y += _LINE
     y += 14 if reasons else 0
-    write(draw, Note(_PAD, y, "criteria", 12, palette.FAINT_INK))
+    draw_text(draw, TextItem(_PAD, y, "criteria", 12, palette.FAINT_INK))
     y += 22
     for status, color, lines in rows:
         (_tick if status is Status.PASS else _cross)(draw, _PAD + 5, y, color)
         for line in lines:
-            write(draw, Note(_PAD + 20, y, line, 13, palette.INK))
+            draw_text(draw, TextItem(_PAD + 20, y, line, 13, palette.INK))
             y += _LINE
         y += 8
 
@@ -142,8 +142,8 @@ def _legend(step: float) -> list[tuple[str, str, Sample]]:
 
 def _way(draw: Pen, x: float, y: float) -> None:
     for k in range(24):
-        draw.line([(x + k, y), (x + k + 1, y)], fill=palette.ramp(k / 24), width=3)
-    draw.ellipse((x + 8, y - 4, x + 16, y + 4), fill=palette.PAGE, outline=palette.ramp(0.5), width=2)
+        draw.line([(x + k, y), (x + k + 1, y)], fill=palette.time_color(k / 24), width=3)
+    draw.ellipse((x + 8, y - 4, x + 16, y + 4), fill=palette.PAGE, outline=palette.time_color(0.5), width=2)
 
 
 def _robot(draw: Pen, x: float, y: float) -> None:
@@ -212,7 +212,7 @@ def _time_bar(draw: Pen, scene: Scene, y: float) -> None:
     """The colors of the driven way, from the start to the end of the run."""
     end = f"{scene.result.simulated:.0f} s"
     left, right = _PAD + 34, WIDTH - _PAD - math.ceil(font(12).getlength(end)) - 8
-    write(draw, Note(_PAD, y, "0 s", 12, palette.FAINT_INK))
+    draw_text(draw, TextItem(_PAD, y, "0 s", 12, palette.FAINT_INK))
     for x in range(left, right):
-        draw.line([(x, y - 4), (x, y + 4)], fill=palette.ramp((x - left) / (right - left)))
-    write(draw, Note(right + 8, y, end, 12, palette.FAINT_INK))
+        draw.line([(x, y - 4), (x, y + 4)], fill=palette.time_color((x - left) / (right - left)))
+    draw_text(draw, TextItem(right + 8, y, end, 12, palette.FAINT_INK))

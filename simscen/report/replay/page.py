@@ -18,10 +18,10 @@ from typing import Any
 
 from simscen.core.records.run_result import RunResult
 from simscen.core.version import PACKAGE
-from simscen.record.replay import Log
-from simscen.report.picture.palette import variables
-from simscen.report.replay.columns import Columns
-from simscen.report.replay.run import run_data
+from simscen.record.log_reader.read import Log
+from simscen.report.picture.palette import css_variables
+from simscen.report.replay.packed_columns import PackedColumns
+from simscen.report.replay.run_data import run_data
 
 FOLDER = PACKAGE / "data" / "replay"
 FORMAT = 1
@@ -31,7 +31,7 @@ _LEVEL = 6
 
 def replay_page(runs: Sequence[tuple[Log, RunResult]]) -> bytes:
     """The page of a run, or of two to be compared. Equal logs give equal bytes."""
-    columns = Columns()
+    columns = PackedColumns()
     described = [run_data(log, result, columns) for log, result in runs]
     whole = {"format": FORMAT, "runs": described, "leftOut": list(dict.fromkeys(columns.left_out))}
     about = json.dumps(whole, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
@@ -48,7 +48,7 @@ def page(title: str, about: bytes, numbers: bytes) -> str:
     """The file: its parts, with a policy that lets nothing but them work, and the data as one block of text."""
     packed = zlib.compress(struct.pack("<I", len(about)) + about + numbers, _LEVEL)[2:-4]  # as deflate alone
     parts = {name: (FOLDER / f"page.{name}").read_text(encoding="utf-8") for name in ("html", "css")}
-    parts = {**parts, "css": variables() + parts["css"], "js": script()}
+    parts = {**parts, "css": css_variables() + parts["css"], "js": script()}
     policy = (
         f"default-src 'none'; script-src '{_digest(parts['js'])}'; style-src '{_digest(parts['css'])}'; "
         "img-src data:; base-uri 'none'; form-action 'none'; require-trusted-types-for 'script'"

@@ -19,11 +19,12 @@ from simscen.core.records.trace import CostGrid, LogLine
 from simscen.peer import wire
 from simscen.peer.cdr import Reader
 from simscen.peer.messages import read
-from simscen.record import frames, topics, unpack
+from simscen.record import frame_names, topics
 from simscen.record.foreign import messages
-from simscen.record.foreign.messages import Posed
-from simscen.record.rows import on_the_ground
+from simscen.record.foreign.messages import StampedPose
+from simscen.record.messages import decode
 from simscen.record.simtime import SimTime
+from simscen.record.trace_builder import to_planar
 from simscen.run.external.protocol import EXACT_SUFFIX, FLOAT64_ARRAY, POSE2D, STACK_TOPICS, ProtocolViolation
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def _correction(said: MessagesByTopic) -> Pose2 | None:
     if exact is not None:
         return exact
     links = [link for part in _told(said, topics.TF.name, messages.transforms) for link in part]
-    found = [link for link in links if (link.frame, link.child) == (frames.MAP, frames.ODOM)]
+    found = [link for link in links if (link.frame, link.child) == (frame_names.MAP, frame_names.ODOM)]
     return _ground(found[-1]) if found else None
 
 
@@ -121,7 +122,7 @@ def _path(said: MessagesByTopic, name: str, tick: int, time: SimTime) -> Path | 
     if told is None and exact is None:
         return None
     made = tick if told is None else time.tick(told.stamp)
-    points = exact if exact is not None else on_the_ground(told.poses) if told is not None else np.empty((0, 3))
+    points = exact if exact is not None else to_planar(told.poses) if told is not None else np.empty((0, 3))
     if not np.isfinite(points).all():
         raise ProtocolViolation(f"a path on {name} that is not finite")
     return Path(points, made)
@@ -136,9 +137,9 @@ def _costmaps(said: MessagesByTopic) -> Iterator[CostGrid]:
 
 def _costmap(name: str, data: bytes) -> CostGrid:
     told = read(topics.MAP.type, data)
-    if told.frame not in (frames.MAP, frames.ODOM):
+    if told.frame not in (frame_names.MAP, frame_names.ODOM):
         raise ProtocolViolation(
-            f"a {name} costmap in the frame `{told.frame}` instead of `{frames.MAP}` or `{frames.ODOM}`"
+            f"a {name} costmap in the frame `{told.frame}` instead of `{frame_names.MAP}` or `{frame_names.ODOM}`"
         )
     if not (0.0 < told.resolution < math.inf and all(map(math.isfinite, told.origin))):
         raise ProtocolViolation(f"a {name} costmap of cells of {told.resolution:g} m at {tuple(told.origin)}")
@@ -155,10 +156,12 @@ def _twist(data: bytes) -> Twist:
     return command
 
 
-def _posed(data: bytes) -> Posed:
+def _posed(data: bytes) -> StampedPose:
     told = messages.pose_with_covariance_stamped(data)
-    if told.frame not in (frames.MAP, ""):
-        raise ProtocolViolation(f"a pose on {topics.BELIEF.name} in the frame `{told.frame}` instead of `{frames.MAP}`")
+    if told.frame not in (frame_names.MAP, ""):
+        raise ProtocolViolation(
+            f"a pose on {topics.BELIEF.name} in the frame `{told.frame}` instead of `{frame_names.MAP}`"
+        )
     if not all(map(math.isfinite, (*told.pose, *told.covariance))):
         raise ProtocolViolation(f"a pose on {topics.BELIEF.name} that is not finite")
     return told
@@ -173,8 +176,8 @@ def _covariance(data: bytes) -> Array:
     return np.array([numbers[i] for i in _PLANAR_INDICES], dtype=np.float64).reshape(3, 3)
 
 
-def _ground(told: Posed) -> Pose2:
-    x, y, yaw = on_the_ground(np.array([told.pose]))[0].tolist()
+def _ground(told: StampedPose) -> Pose2:
+    x, y, yaw = to_planar(np.array([told.pose]))[0].tolist()
     return Pose2(x, y, yaw)
 
 
@@ -188,7 +191,7 @@ def _particles(data: bytes) -> Array:
     poses = np.array([reader.take("8d") for _ in range(count)], dtype=np.float64).reshape(-1, 8)
     if not (np.abs(poses[:, 3:7]) <= MAX_QUATERNION_COMPONENT).all():
         raise ProtocolViolation(f"a particle on {topics.PARTICLES.name} whose orientation is no unit quaternion")
-    return np.column_stack((on_the_ground(poses[:, :7]), poses[:, 7]))
+    return np.column_stack((to_planar(poses[:, :7]), poses[:, 7]))
 
 
 def _pose2d(data: bytes) -> Pose2:
@@ -206,7 +209,7 @@ def _table(data: bytes, width: int) -> Array:
 
 
 def _event(data: bytes) -> dict[str, Any]:
-    return wire.from_json(unpack.string(data).encode())
+    return wire.from_json(decode.string(data).encode())
 
 
 def _line(data: bytes) -> LogLine:

@@ -14,12 +14,13 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Reading, Readings, Scan
 from simscen.peer import messages
-from simscen.record import frames, pack, pack_many, pack_rare, topics
-from simscen.record.out import Layouts, Line, Together
-from simscen.record.sensor_topics import SensorTopics
+from simscen.record import frame_names, topics
+from simscen.record.messages import encode, encode_arrays
+from simscen.record.publishers.channels import BatchWriter, Layouts, TopicWriter
+from simscen.record.publishers.sensors import SensorPublisher
 from simscen.record.simtime import SimTime
-from simscen.record.thinning import Thinning
 from simscen.record.topics import Topic
+from simscen.record.trace_thinning import Thinning
 from simscen.run.external.protocol import EXACT_SUFFIX, FLOAT64_ARRAY, INITIAL_POSE, POSE2D, TopicTable
 
 if TYPE_CHECKING:
@@ -39,19 +40,19 @@ class StepPublisher:
         self._listened: set[str] = set()
         self._latched: list[tuple[Topic, bytes]] = []
         self._time = SimTime(tick_rate)
-        self._sensors = SensorTopics(self, self._time, Thinning(tick_rate), mounts, sensors)
+        self._sensors = SensorPublisher(self, self._time, Thinning(tick_rate), mounts, sensors)
         self.named = self._sensors.declared
 
     def latch(self, grid: OccupancyGrid | None, topic: Topic) -> None:
         """Publish a map or mask with the first step, if there is one."""
         if grid is not None:
-            self._latched.append((topic, pack_many.occupancy_grid(frames.MAP, _START, grid)))
+            self._latched.append((topic, encode_arrays.occupancy_grid(frame_names.MAP, _START, grid)))
 
     def latch_robot(self, description: str, estimate: Estimate) -> None:
         """Publish robot description and initial pose with the first step."""
-        self._latched.append((topics.ROBOT_DESCRIPTION, pack_rare.string(description)))
+        self._latched.append((topics.ROBOT_DESCRIPTION, encode.string(description)))
         if estimate.pose is not None:
-            told = pack.pose_with_covariance(frames.MAP).packer()
+            told = encode.pose_with_covariance(frame_names.MAP).packer()
             covariance = np.diag(np.square(estimate.std)).ravel().tolist()
             self._latched.append((INITIAL_POSE, told(_START, Pose3.planar(estimate.pose), covariance)))
 
@@ -95,13 +96,13 @@ class StepPublisher:
         messages, self._waiting = self._waiting, []
         return messages
 
-    def line(self, topic: Topic) -> Line:
+    def line(self, topic: Topic) -> TopicWriter:
         """Implement record's Publisher."""
-        return Line(lambda: partial(self.publish, topic))
+        return TopicWriter(lambda: partial(self.publish, topic))
 
-    def together(self, messages: Layouts) -> Together:
+    def together(self, messages: Layouts) -> BatchWriter:
         """Implement record's Publisher."""
-        return Together(self, messages)
+        return BatchWriter(self, messages)
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
         """Publish a message if the stack wants its topic (record's Publisher)."""

@@ -29,8 +29,9 @@ from simscen.core.records.trace import Decision
 from simscen.model.stack import StackSpec
 from simscen.peer import Goal, Peer, Step, messages, wire
 from simscen.peer.client import EVENTS, Message
-from simscen.record import pack_many, topics
-from simscen.record.simtime import SECOND, SimTime
+from simscen.record import topics
+from simscen.record.messages import encode_arrays
+from simscen.record.simtime import NS_PER_SECOND, SimTime
 from simscen.run.external.protocol import EXACT_SUFFIX, KEEPOUT_MASK, SPEED_MASK
 from simscen.stack.build import build_stack
 from simscen.stack.protocols import RobotModel, Stack, Surroundings
@@ -128,7 +129,7 @@ class ReferenceStackPeer(Peer):
                     yield _NO_PIXELS
 
     def _tick(self, stamp: messages.Stamp) -> int:
-        return self._time.tick(stamp[0] * SECOND + stamp[1])
+        return self._time.tick(stamp[0] * NS_PER_SECOND + stamp[1])
 
     def _say(self, step: Step, decision: Decision, stack: Stack) -> None:
         vx, vy, wz = decision.command
@@ -152,7 +153,7 @@ class ReferenceStackPeer(Peer):
             step.publish(topics.LOCAL_PLAN.name + EXACT_SUFFIX, _numbers(decision.local_plan.points))
         for costmap in decision.costmaps:
             topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
-            step.publish(topic.name, pack_many.occupancy_grid(costmap.frame, step.stamp, costmap.grid))
+            step.publish(topic.name, encode_arrays.occupancy_grid(costmap.frame, step.stamp, costmap.grid))
         for event in decision.events:
             if event.kind is EventKind.GOAL_ACCEPTED:
                 self._under_way = event.data["index"]

@@ -14,7 +14,7 @@ from simscen.judge.result_json import from_json
 from simscen.loading.files.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.stacks.choice import StackChoice
-from simscen.record.logfile import PARTIAL_SUFFIX
+from simscen.record.log_file import PARTIAL_SUFFIX
 from simscen.run.process.captured_output import innermost_frame, output_tail
 from simscen.run.process.isolation import MAX_MEMORY_BYTES
 from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd
@@ -117,7 +117,7 @@ def _with_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
     log = folder / f"run{PARTIAL_SUFFIX}"
     if failure is None or not log.exists():
         return failure
-    from simscen.record.recover import recover
+    from simscen.record.log_reader.recover import recover
 
     how = ""
     if log.stat().st_size > MAX_RECOVER_BYTES:

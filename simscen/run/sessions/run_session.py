@@ -131,8 +131,8 @@ def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:
         return run
     if filecmp.cmp(run.artifacts.mcap, twin.artifacts.mcap, shallow=False):
         return run
-    from simscen.record.difference import first_difference
-    from simscen.record.replay import read_log
+    from simscen.record.log_reader.read import read_log
+    from simscen.record.trace_difference import first_difference
 
     logs = [read_log(Path(path)) for path in (twin.artifacts.mcap, run.artifacts.mcap)]
     pairs = zip(*(log.traces for log in logs), strict=False)
@@ -182,8 +182,8 @@ def _folder(run: RunFinished, earlier: Path) -> Path:
 
 def _disagreement(here: Path, there: Path) -> str | None:
     """Describe the first difference of two logs, or return None. Raises InvalidInput for an unreadable log."""
-    from simscen.record.agreement import first_disagreement
-    from simscen.record.replay import read_log
+    from simscen.record.log_reader.read import read_log
+    from simscen.record.trace_difference import first_disagreement
 
     now, then = read_log(here), read_log(there)
     if not then.result or not now.result:

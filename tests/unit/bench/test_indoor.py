@@ -15,7 +15,7 @@ from simscen.bench.localization.trial import MOMENTS, ROBOT, Trial
 from simscen.core.environment.occupancy_grid import FREE, UNKNOWN
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.model.stack import StackSpec
-from simscen.record.foreign.sensedrows import TICK_RATE
+from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.protocols import Surroundings
 
 
@@ -67,7 +67,7 @@ def test_a_robot_is_tracked_on_raw_odometry_and_found_on_a_floor_of_forty_meters
 ) -> None:
     made = short(circumstance)
     spec = StackSpec(localizer=ScanMatchingAmcl.model_validate({"parameters": parameters}))
-    localized = localize(made.sensed, spec, Surroundings(ROBOT, made.map, TICK_RATE), made.estimate, 1)
+    localized = localize(made.sensed, spec, Surroundings(ROBOT, made.map, TICK_RATE_HZ), made.estimate, 1)
     errors = errors_of(localized, made.sensed, 1.0)
     assert errors is not None
     assert errors.distance[-40:].max() < 0.3

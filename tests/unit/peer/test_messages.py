@@ -13,8 +13,8 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Imu, Scan
 from simscen.peer import messages
 from simscen.peer.cdr import Reader
-from simscen.record import pack, pack_many, pack_rare
 from simscen.record.foreign.messages import path
+from simscen.record.messages import encode, encode_arrays
 
 STAMP = (12, 345_000_000)
 numbers = st.floats(-1e4, 1e4)
@@ -24,13 +24,13 @@ poses = st.lists(st.tuples(numbers, numbers, st.floats(-4, 4)), max_size=5)
 
 @given(numbers, numbers, numbers)
 def test_a_twist_is_what_the_engine_packs(vx: float, vy: float, wz: float) -> None:
-    assert messages.twist(vx, vy, wz) == pack.twist().packer()(Twist(vx, vy, wz))
+    assert messages.twist(vx, vy, wz) == encode.twist().packer()(Twist(vx, vy, wz))
 
 
 @given(poses)
 def test_a_path_is_what_the_engine_packs(points) -> None:
     table = np.array(points, dtype=np.float64).reshape(-1, 3)
-    ours, theirs = messages.path(STAMP, points), pack_many.PathPacker("map")(STAMP, table)
+    ours, theirs = messages.path(STAMP, points), encode_arrays.PathPacker("map")(STAMP, table)
     assert len(ours) == len(theirs)
     assert ours[:24] == theirs[:24]
     assert np.allclose(path(ours).poses, path(theirs).poses, rtol=1e-15, atol=1e-15)  # numpy's sine is not libm's
@@ -38,7 +38,7 @@ def test_a_path_is_what_the_engine_packs(points) -> None:
 
 @given(numbers, numbers, st.floats(-4, 4), st.lists(numbers, min_size=9, max_size=9))
 def test_a_pose_with_covariance_is_what_the_engine_packs(x: float, y: float, yaw: float, covariance) -> None:
-    theirs = pack.pose_with_covariance("map").packer()
+    theirs = encode.pose_with_covariance("map").packer()
     expected = theirs(STAMP, Pose3.planar(Pose2(x, y, yaw)), covariance)
     assert messages.pose_with_covariance(STAMP, (x, y, yaw), covariance) == expected
 
@@ -47,27 +47,27 @@ def test_a_pose_with_covariance_is_what_the_engine_packs(x: float, y: float, yaw
 def test_transforms_lines_and_texts_are_what_the_engine_packs(frame: str, text: str) -> None:
     link = (frame, text, STAMP, Pose3.planar(Pose2(1.0, 2.0, 0.5)))
     ours = (STAMP, frame, text, (1.0, 2.0, 0.5))
-    assert messages.transforms([ours, ours]) == pack_many.TransformsPacker()([link, link])
-    assert messages.string(text) == pack_rare.string(text)
-    assert messages.log(STAMP, 30, frame, text) == pack_rare.log(STAMP, 30, frame, text)
+    assert messages.transforms([ours, ours]) == encode_arrays.TransformsPacker()([link, link])
+    assert messages.string(text) == encode.string(text)
+    assert messages.log(STAMP, 30, frame, text) == encode.log(STAMP, 30, frame, text)
 
 
 def test_particles_are_what_the_engine_packs() -> None:
     cloud = [(1.0, 2.0, 0.0, 0.25), (3.0, 4.0, 1.0, 0.75)]
-    assert messages.particle_cloud(STAMP, cloud) == pack_many.ParticleCloudPacker("map")(STAMP, np.array(cloud))
+    assert messages.particle_cloud(STAMP, cloud) == encode_arrays.ParticleCloudPacker("map")(STAMP, np.array(cloud))
 
 
 @given(names, st.lists(st.floats(0, 100, width=32) | st.just(float("inf")), max_size=9))
 def test_a_scan_is_read_as_it_was_packed(frame: str, ranges) -> None:
     scan = Scan("lidar", 0, np.array(ranges, dtype=np.float64), -1.5, 0.25, 0.5, 12.0)
-    read = messages.read("sensor_msgs/msg/LaserScan", pack_many.LaserScanPacker(frame)(STAMP, scan))
+    read = messages.read("sensor_msgs/msg/LaserScan", encode_arrays.LaserScanPacker(frame)(STAMP, scan))
     assert (read.stamp, read.frame, list(read.ranges)) == (STAMP, frame, ranges)
     assert (read.angle_min, read.angle_increment, read.range_min, read.range_max) == (-1.5, 0.25, 0.5, 12.0)
 
 
 @given(numbers, numbers, st.floats(-3, 3), names)
 def test_odometry_is_read_as_it_was_packed(x: float, y: float, yaw: float, frame: str) -> None:
-    packed = pack.odometry(frame, "base").packer()(STAMP, Pose3.planar(Pose2(x, y, yaw)), Twist(x, y, yaw))
+    packed = encode.odometry(frame, "base").packer()(STAMP, Pose3.planar(Pose2(x, y, yaw)), Twist(x, y, yaw))
     read = messages.read("nav_msgs/msg/Odometry", packed)
     assert (read.stamp, read.frame, read.child, read.vx, read.vy, read.wz) == (STAMP, frame, "base", x, y, yaw)
     assert read.pose == pytest.approx((x, y, yaw))
@@ -76,14 +76,14 @@ def test_odometry_is_read_as_it_was_packed(x: float, y: float, yaw: float, frame
 def test_an_imu_a_picture_and_a_map_are_read_as_they_were_packed() -> None:
     imu = Imu("imu", 0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     read = messages.read(
-        "sensor_msgs/msg/Imu", pack.imu("base").packer()(STAMP, imu.angular_velocity, imu.linear_acceleration)
+        "sensor_msgs/msg/Imu", encode.imu("base").packer()(STAMP, imu.angular_velocity, imu.linear_acceleration)
     )
     assert (read.angular_velocity, read.linear_acceleration) == ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     picture = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
-    seen = messages.read("sensor_msgs/msg/Image", pack_rare.image("eye", STAMP, picture))
+    seen = messages.read("sensor_msgs/msg/Image", encode.image("eye", STAMP, picture))
     assert (seen.height, seen.width, seen.encoding, seen.step, seen.data) == (2, 4, "rgb8", 12, picture.tobytes())
     grid = OccupancyGrid(np.array([[0, 100, -1], [1, 2, 3]], dtype=np.int8), 0.5, Pose2(1.0, 2.0, 0.5))
-    cells = messages.read("nav_msgs/msg/OccupancyGrid", pack_many.occupancy_grid("map", STAMP, grid))
+    cells = messages.read("nav_msgs/msg/OccupancyGrid", encode_arrays.occupancy_grid("map", STAMP, grid))
     assert (cells.width, cells.height, list(cells.data), cells.resolution) == (3, 2, [0, 100, -1, 1, 2, 3], 0.5)
     assert cells.origin == pytest.approx((1.0, 2.0, 0.5))
 

@@ -13,7 +13,7 @@ from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readin
 from simscen.core.records.case import Case
 from simscen.core.records.events import Event
 from simscen.core.records.trace import Decision, Moment, Truth
-from simscen.record.header import LogHeader
+from simscen.record.log_header import LogHeader
 
 CLOCK = Clock(240)
 CASE = Case(

@@ -7,8 +7,8 @@ import pytest
 from moments import CLOCK, moments
 
 from simscen.core.records.trace import Samples, Trace
-from simscen.record.agreement import first_disagreement
-from simscen.record.tracebuilder import TraceBuilder
+from simscen.record.trace_builder import TraceBuilder
+from simscen.record.trace_difference import first_disagreement
 
 
 @pytest.fixture

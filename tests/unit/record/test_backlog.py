@@ -7,7 +7,7 @@ from moments import moments
 
 from simscen.core.errors import RunError
 from simscen.core.records.trace import Moment
-from simscen.record.backlog import Backlog
+from simscen.record.recorder import MomentBuffer
 
 SOME = list(moments(2.0))
 
@@ -32,7 +32,7 @@ class Full:
 @pytest.mark.parametrize("ticks", [0, 1, 60, 10_000])
 def test_all_that_is_told_comes_once_and_in_its_order(ticks: int) -> None:
     told: list[tuple[str, int]] = []
-    backlog = Backlog(ticks)
+    backlog = MomentBuffer(ticks)
     robots = [backlog.before(Heard(name, told)) for name in "ab"]
     for moment in SOME:
         for robot in robots:
@@ -44,7 +44,7 @@ def test_all_that_is_told_comes_once_and_in_its_order(ticks: int) -> None:
 
 def test_nothing_waits_for_more_than_the_ticks_and_a_beat() -> None:
     told: list[tuple[str, int]] = []
-    log = Backlog(48).before(Heard("", told))
+    log = MomentBuffer(48).before(Heard("", told))
     for moment in SOME:
         log.append(moment)
         assert moment.tick - told[-1][1] <= 48
@@ -52,7 +52,7 @@ def test_nothing_waits_for_more_than_the_ticks_and_a_beat() -> None:
 
 def test_without_ticks_nothing_waits() -> None:
     told: list[tuple[str, int]] = []
-    log = Backlog(0).before(Heard("", told))
+    log = MomentBuffer(0).before(Heard("", told))
     for moment in SOME:
         log.append(moment)
         assert told[-1][1] == moment.tick
@@ -65,7 +65,7 @@ def test_the_file_is_told_each_time_that_all_which_waited_has_come() -> None:
         def settle(self) -> None:
             told.append(("file", told[-1][1]))
 
-    log = Backlog(48, File()).before(Heard("", told))
+    log = MomentBuffer(48, File()).before(Heard("", told))
     for moment in SOME:
         log.append(moment)
     settled = [tick for who, tick in told if who == "file"]
@@ -75,7 +75,7 @@ def test_the_file_is_told_each_time_that_all_which_waited_has_come() -> None:
 
 def test_each_log_of_a_robot_is_told_all() -> None:
     told: list[tuple[str, int]] = []
-    backlog = Backlog(60)
+    backlog = MomentBuffer(60)
     log = backlog.before(Heard("trace", told), Heard("log", told))
     for moment in SOME:
         log.append(moment)
@@ -86,7 +86,7 @@ def test_each_log_of_a_robot_is_told_all() -> None:
 
 def test_what_waits_when_a_run_breaks_off_is_written() -> None:
     told: list[tuple[str, int]] = []
-    with pytest.raises(ZeroDivisionError), Backlog(10_000) as backlog:
+    with pytest.raises(ZeroDivisionError), MomentBuffer(10_000) as backlog:
         log = backlog.before(Heard("", told))
         for moment in SOME:
             log.append(moment)
@@ -95,7 +95,7 @@ def test_what_waits_when_a_run_breaks_off_is_written() -> None:
 
 
 def test_why_a_run_broke_off_is_told_although_its_log_has_no_room_for_the_rest() -> None:
-    with pytest.raises(ZeroDivisionError), Backlog(10_000) as backlog:
+    with pytest.raises(ZeroDivisionError), MomentBuffer(10_000) as backlog:
         backlog.until = 1
         backlog.before(Full()).append(SOME[0])
         raise ZeroDivisionError

@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from simscen.record.cdr import Cursor, Template, packer_of
+from simscen.record.messages.cdr import CdrReader, Template, compile_packer
 
 
 def test_alignment_is_counted_after_the_header() -> None:
@@ -32,7 +32,7 @@ def test_a_packer_puts_fields_into_slots_and_leaves_the_constants_alone() -> Non
     assert len(first) == len(message.buffer)
     assert first[12:] == bytes(message.buffer[12:])[:-24] + struct.pack("<3d", 0.5, 0.0, 1.5)
     assert second[12:-24] == first[12:-24]
-    cursor = Cursor(second)
+    cursor = CdrReader(second)
     assert cursor.take("iI") == (3, 4)
     assert cursor.string() == "map"
     assert cursor.take("5d") == (0.0, 0.0, 2.5, 0.0, 3.5)
@@ -43,7 +43,7 @@ def test_fields_that_are_called_alike_are_asked_for_once() -> None:
     one.slot("d", "value")
     other.slot("i", "count")
     other.slot("d", "value")
-    assert packer_of((*one.parts, *other.parts))(0.5, 7) == struct.pack("<di4xd", 0.5, 7, 0.5)
+    assert compile_packer((*one.parts, *other.parts))(0.5, 7) == struct.pack("<di4xd", 0.5, 7, 0.5)
 
 
 def test_a_cursor_reads_what_a_template_wrote() -> None:
@@ -51,7 +51,7 @@ def test_a_cursor_reads_what_a_template_wrote() -> None:
     message.put("B", 7)
     message.string("odom")
     message.put("3d", 1.0, -0.0, 1e-300)
-    cursor = Cursor(bytes(message.buffer))
+    cursor = CdrReader(bytes(message.buffer))
     assert cursor.take("B") == (7,)
     assert cursor.string() == "odom"
     assert cursor.array("<f8", (3,)).tolist() == [1.0, 0.0, 1e-300]
@@ -62,14 +62,14 @@ def test_a_message_that_ends_too_early_is_an_error() -> None:
     message.put("I", 5)
     data = bytes(message.buffer)
     with pytest.raises(struct.error):
-        Cursor(data).take("d")
+        CdrReader(data).take("d")
     with pytest.raises(struct.error):
-        Cursor(data).string()
+        CdrReader(data).string()
     with pytest.raises(struct.error):
-        Cursor(data).array("i1", (9, 9))
+        CdrReader(data).array("i1", (9, 9))
 
 
 def test_arrays_are_read_without_a_copy() -> None:
-    cells = Cursor(b"\0\1\0\0" + bytes(range(6))).array("i1", (2, 3))
+    cells = CdrReader(b"\0\1\0\0" + bytes(range(6))).array("i1", (2, 3))
     assert np.array_equal(cells, np.arange(6).reshape(2, 3))
     assert not cells.flags.owndata

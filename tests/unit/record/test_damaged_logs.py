@@ -19,9 +19,9 @@ from moments import CASE, CLOCK, about, moments
 
 from simscen.core.errors import InvalidInput
 from simscen.core.records.trace import Trace
+from simscen.record.log_reader.read import Log, read_log
 from simscen.record.recorder import Recorder
-from simscen.record.replay import Log, read_log
-from simscen.record.tracebuilder import TraceBuilder
+from simscen.record.trace_builder import TraceBuilder
 
 HERE = Path(__file__).parent
 
@@ -50,10 +50,10 @@ def killed(folder: Path, seconds: float) -> Path:
         import os, signal, sys
         sys.path.insert(0, {str(HERE)!r})
         from moments import CLOCK, about, moments
-        from simscen.record.backlog import WAITS, Backlog
+        from simscen.record.recorder import MOMENT_DELAY_S, MomentBuffer
         from simscen.record.recorder import Recorder
         recorder = Recorder({str(folder / "run.mcap")!r}, CLOCK, about())
-        log = Backlog(CLOCK.ticks(WAITS), recorder).before(recorder.robots[""])
+        log = MomentBuffer(CLOCK.ticks(MOMENT_DELAY_S), recorder).before(recorder.robots[""])
         for moment in moments({seconds}):
             log.append(moment)
         os.kill(os.getpid(), signal.SIGKILL)

@@ -8,8 +8,8 @@ from moments import CLOCK, moments
 
 from simscen.core.records.events import Event
 from simscen.core.records.trace import Samples, Trace
-from simscen.record.difference import first_difference
-from simscen.record.tracebuilder import TraceBuilder
+from simscen.record.trace_builder import TraceBuilder
+from simscen.record.trace_difference import first_difference
 
 
 @pytest.fixture

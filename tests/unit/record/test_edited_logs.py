@@ -17,8 +17,8 @@ from simscen.core.records.trace import Decision, Moment
 from simscen.core.records.verdict import Evidence, Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
+from simscen.record.log_reader.read import Log, read_log
 from simscen.record.recorder import Recorder
-from simscen.record.replay import Log, read_log
 
 Keep = Callable[[str, float], bool]
 TRUTH, CLEARANCE, EVENTS = "/ground_truth/odom", "/simscen/clearance", "/simscen/events"

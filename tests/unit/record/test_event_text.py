@@ -1,7 +1,7 @@
 """Events as JSON and as lines."""
 
 from simscen.core.records.events import Event
-from simscen.record import event_text
+from simscen.record.messages import event_text
 
 
 def test_an_event_is_read_back_equal() -> None:

@@ -30,10 +30,10 @@ from rosbags.rosbag2 import StoragePlugin
 from simscen.core.errors import InvalidInput
 from simscen.core.records.events import EventKind
 from simscen.core.records.verdict import Evidence
-from simscen.record.foreign.read import ForeignLog, read_foreign
-from simscen.record.foreign.wanted import Wanted
+from simscen.record.foreign.options import ForeignLogOptions
+from simscen.record.foreign.read import ForeignLog, read_foreign_log
 
-MOCAP = Wanted(truth="/mocap")
+MOCAP = ForeignLogOptions(truth="/mocap")
 WRITERS: dict[str, Callable[[Path, list[Said]], Path]] = {
     "sqlite": lambda path, said: write_bag(path / "bag", said),
     "sqlite, files compressed": lambda path, said: write_bag(path / "bag", said, compress="file"),
@@ -54,8 +54,8 @@ WRITERS: dict[str, Callable[[Path, list[Said]], Path]] = {
 def read(tmp_path: Path) -> Callable[..., ForeignLog]:
     """Writes messages as an MCAP file and reads it."""
 
-    def call(said: list[Said], wanted: Wanted = MOCAP, **options: Any) -> ForeignLog:
-        return read_foreign(write_mcap(tmp_path / "a.mcap", said, **options), wanted)
+    def call(said: list[Said], wanted: ForeignLogOptions = MOCAP, **options: Any) -> ForeignLog:
+        return read_foreign_log(write_mcap(tmp_path / "a.mcap", said, **options), wanted)
 
     return call
 
@@ -64,7 +64,7 @@ def read(tmp_path: Path) -> Callable[..., ForeignLog]:
 def refused(read: Callable[..., ForeignLog]) -> Callable[..., str]:
     """Why a log cannot be used."""
 
-    def call(said: list[Said], wanted: Wanted = MOCAP, **options: Any) -> str:
+    def call(said: list[Said], wanted: ForeignLogOptions = MOCAP, **options: Any) -> str:
         with pytest.raises(InvalidInput) as raised:
             read(said, wanted, **options)
         (problem,) = raised.value.problems
@@ -75,7 +75,7 @@ def refused(read: Callable[..., ForeignLog]) -> Callable[..., str]:
 
 @pytest.mark.parametrize("writer", WRITERS)
 def test_every_container_gives_the_same_trace(tmp_path: Path, writer: str) -> None:
-    log = read_foreign(WRITERS[writer](tmp_path, drive()), MOCAP)
+    log = read_foreign_log(WRITERS[writer](tmp_path, drive()), MOCAP)
     trace = log.trace
     assert not log.notes
     assert (trace.tick_rate, trace.seconds(trace.end)) == (1000, pytest.approx(10.0, abs=0.1))
@@ -99,7 +99,7 @@ def test_stamps_count_not_when_the_log_got_the_message(read: Callable[..., Forei
         log.trace.belief.ticks, log.trace.truth.ticks, log.trace.truth.values[:, 0]
     )
     assert np.abs(error).max() < 1e-3
-    by_log = read(drive(off=0.0), Wanted(truth="/mocap", clock="log"))
+    by_log = read(drive(off=0.0), ForeignLogOptions(truth="/mocap", clock="log"))
     late = by_log.trace.belief.values[:, 0] - np.interp(
         by_log.trace.belief.ticks, by_log.trace.truth.ticks, by_log.trace.truth.values[:, 0]
     )
@@ -117,12 +117,12 @@ def test_what_has_no_stamp_is_placed_by_the_clock_of_what_has(read: Callable[...
 def test_without_a_truth_nothing_is_known_of_it_and_the_reason_names_what_could_be(
     read: Callable[..., ForeignLog],
 ) -> None:
-    log = read(drive(), Wanted())
+    log = read(drive(), ForeignLogOptions())
     assert len(log.trace.truth) == 0
     assert log.coverage.missing[Evidence.TRUTH] == (
         "nothing counts as the truth: name a topic or two frames with --truth; poses are on: /amcl_pose, /mocap, /odom"
     )
-    assert "no topic /vicon" in read(drive(), Wanted(truth="/vicon")).coverage.missing[Evidence.TRUTH]
+    assert "no topic /vicon" in read(drive(), ForeignLogOptions(truth="/vicon")).coverage.missing[Evidence.TRUTH]
 
 
 def test_two_frames_of_tf_can_be_the_truth(read: Callable[..., ForeignLog]) -> None:
@@ -134,13 +134,13 @@ def test_two_frames_of_tf_can_be_the_truth(read: Callable[..., ForeignLog]) -> N
     for at, offset in ((0, 1.0), (5, 2.0)):
         said.append(Said("/tf", BEGIN + at * SECOND, link(BEGIN + at * SECOND, "map", "odom", 0.0, offset, 1.5707963)))
     said.append(Said("/tf_static", BEGIN, link(0, "/base_link", "/marker", 0.25)))
-    trace = read(said, Wanted(truth="map:marker")).trace
+    trace = read(said, ForeignLogOptions(truth="map:marker")).trace
     x, y, yaw = trace.truth.values.T
     np.testing.assert_allclose(x, 0.0, atol=1e-6)
     offset = np.where(trace.truth.ticks < 5000, 1.0, 2.0)
     np.testing.assert_allclose(y, offset + 0.25 + SPEED * trace.truth.ticks / 1000, atol=2e-3)
     np.testing.assert_allclose(yaw, np.pi / 2, atol=1e-6)
-    lost = read(said, Wanted(truth="map:wheel")).coverage.missing[Evidence.TRUTH]
+    lost = read(said, ForeignLogOptions(truth="map:wheel")).coverage.missing[Evidence.TRUTH]
     assert lost == "tf does not connect map with wheel; frames: base_link, map, marker, odom"
 
 
@@ -148,7 +148,7 @@ def test_a_truth_in_a_frame_of_its_own_is_not_compared_with_the_map(read: Callab
     log = read(drive(mocap="vicon"))
     assert "frame `vicon`, the map's is `map`" in log.coverage.missing[Evidence.ALIGNMENT]
     assert Evidence.TRUTH not in log.coverage.missing
-    same = read(drive(mocap="vicon"), Wanted(truth="/mocap", same_frame=True))
+    same = read(drive(mocap="vicon"), ForeignLogOptions(truth="/mocap", same_frame=True))
     assert Evidence.ALIGNMENT not in same.coverage.missing
 
 
@@ -172,7 +172,7 @@ def test_topics_of_different_clocks_are_refused(refused: Callable[..., str], rea
     said = [one for one in drive() if one.topic == "/mocap"]
     said += [Said("/amcl_pose", BEGIN + k * SECOND, believed(k * SECOND, SPEED * k)) for k in range(10)]
     assert "/amcl_pose and /mocap do not share a clock" in refused(said)
-    assert len(read(said, Wanted(truth="/mocap", clock="log")).trace.belief) == 10
+    assert len(read(said, ForeignLogOptions(truth="/mocap", clock="log")).trace.belief) == 10
 
 
 def test_stamps_that_nobody_set_are_not_used(read: Callable[..., ForeignLog]) -> None:
@@ -199,7 +199,7 @@ def test_a_belief_that_begins_after_a_meter_of_driving_leaves_room_for_doubt(rea
 def test_a_twist_that_nobody_filled_in_is_no_standstill(read: Callable[..., ForeignLog]) -> None:
     said = [Said("/gps", BEGIN + k * SECOND // 20, odometry(BEGIN + k * SECOND // 20, "map", SPEED * k / 20, 0.0))
             for k in range(201)]  # fmt: skip
-    log = read(said, Wanted(truth="/gps"))
+    log = read(said, ForeignLogOptions(truth="/gps"))
     assert log.notes == ["/gps: its twist is zero though the robot moves; its poses say how fast"]
     np.testing.assert_allclose(log.trace.velocity.values[:, 0], SPEED, atol=1e-6)
 
@@ -209,7 +209,7 @@ def test_a_log_that_breaks_off_has_no_end(tmp_path: Path, size: float) -> None:
     file = write_mcap(tmp_path / "a.mcap", drive(), **UNINDEXED)
     data = file.read_bytes()
     file.write_bytes(data[: int(len(data) * size)])
-    log = read_foreign(file, MOCAP)
+    log = read_foreign_log(file, MOCAP)
     assert not log.trace.events
     assert log.notes == ["the log breaks off, so nothing passes on it"]
 
@@ -219,7 +219,7 @@ def test_a_log_of_ros_1_is_refused(refused: Callable[..., str], tmp_path: Path) 
     assert refused(drive(), profile="", encoding="ros1").startswith("SC804 it is a log of ROS 1 (")
     (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0\n")
     with pytest.raises(InvalidInput, match="it is a bag of ROS 1"):
-        read_foreign(tmp_path / "a.bag", MOCAP)
+        read_foreign_log(tmp_path / "a.bag", MOCAP)
 
 
 def test_what_is_of_another_type_is_left_out_and_told(read: Callable[..., ForeignLog]) -> None:
@@ -251,23 +251,25 @@ def replace_orientation(message: Any) -> Any:
 
 def test_big_endian_messages_are_read(tmp_path: Path) -> None:
     said = [one for one in drive() if one.topic == "/mocap"]
-    little = read_foreign(write_mcap(tmp_path / "l.mcap", said), MOCAP)
+    little = read_foreign_log(write_mcap(tmp_path / "l.mcap", said), MOCAP)
     big = [bytes(STORE.serialize_cdr(one.message, one.message.__msgtype__, little_endian=False)) for one in said]
     rest = iter(big)
-    log = read_foreign(write_mcap(tmp_path / "b.mcap", said, change=lambda _: next(rest)), MOCAP)
+    log = read_foreign_log(write_mcap(tmp_path / "b.mcap", said, change=lambda _: next(rest)), MOCAP)
     assert np.array_equal(log.trace.truth.values, little.trace.truth.values)
 
 
 def test_a_log_of_none_of_the_topics_is_refused_with_those_it_has(refused: Callable[..., str]) -> None:
     told = refused([replace(one, topic="/robot1" + one.topic) for one in drive()])
     assert told.startswith("SC804 it holds nothing that could be judged (its topics: /robot1/amcl_pose, ")
-    other = refused([], Wanted())
+    other = refused([], ForeignLogOptions())
     assert "its topics: none at all" in other
 
 
 def test_topics_may_have_other_names(read: Callable[..., ForeignLog]) -> None:
     names = {name: f"/robot1/{name}" for name in ("odom", "amcl_pose", "scan", "cmd_vel")}
-    log = read([replace(one, topic="/robot1" + one.topic) for one in drive()], Wanted("/robot1/mocap", names))
+    log = read(
+        [replace(one, topic="/robot1" + one.topic) for one in drive()], ForeignLogOptions("/robot1/mocap", names)
+    )
     assert len(log.trace.belief) == 21 and len(log.trace.truth) == 201
 
 
@@ -280,13 +282,13 @@ def test_an_action_says_what_became_of_goals(read: Callable[..., ForeignLog]) ->
         Said(topic, BEGIN + 5 * SECOND, statuses((1, BEGIN + SECOND, 4), (2, BEGIN + 5 * SECOND, 2))),
         Said(topic, BEGIN + 8 * SECOND, statuses((2, BEGIN + 5 * SECOND, 6))),
     ]
-    log = read(said, Wanted(truth="/mocap", goals=("shelf", "dock")))
+    log = read(said, ForeignLogOptions(truth="/mocap", goals=("shelf", "dock")))
     told = [(str(event.kind), event.name, round(log.trace.seconds(event.tick))) for event in log.trace.events]
     assert told == [
         ("goal.accepted", "shelf", 1), ("goal.reached", "shelf", 4), ("goal.accepted", "dock", 5),
         ("goal.failed", "dock", 8), ("navigation.ended", "FAILED", 8), ("run.ended", "the recording ends", 10),
     ]  # fmt: skip
-    one = read(said, Wanted(truth="/mocap", goals=("shelf",)))
+    one = read(said, ForeignLogOptions(truth="/mocap", goals=("shelf",)))
     assert one.coverage.missing[Evidence.NAVIGATION] == "the log has 2 goals, the scenario 1 goal"
 
 
@@ -294,7 +296,7 @@ def test_a_bag_without_rosbags_says_what_to_install(tmp_path: Path, monkeypatch:
     bag = write_bag(tmp_path / "bag", drive(1.0))
     monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
     with pytest.raises(InvalidInput) as raised:
-        read_foreign(bag, MOCAP)
+        read_foreign_log(bag, MOCAP)
     assert raised.value.problems[0].hint == "pip install 'rosbags>=0.10,<1'"
 
 
@@ -312,5 +314,5 @@ def test_a_damaged_bag_is_told_without_a_traceback(tmp_path: Path, spoil: str) -
         case "not yaml":
             (bag / "metadata.yaml").write_text("[")
     with pytest.raises(InvalidInput) as raised:
-        read_foreign(bag, MOCAP)
+        read_foreign_log(bag, MOCAP)
     assert raised.value.problems[0].code in ("SC800", "SC804")

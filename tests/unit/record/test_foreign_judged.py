@@ -29,8 +29,8 @@ from simscen.core.records.verdict import Evidence, LogCoverage, Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge, required_evidence
 from simscen.loading.yaml.parser import parse_yaml
-from simscen.record.foreign.read import read_foreign
-from simscen.record.foreign.wanted import Wanted
+from simscen.record.foreign.options import ForeignLogOptions
+from simscen.record.foreign.read import read_foreign_log
 
 STATUS = "/navigate_to_pose/_action/status"
 
@@ -94,7 +94,9 @@ def test_no_criterion_passes_on_a_log_without_what_decides_it(tmp_path: Path, ex
     entry = AnyCriterion.model_validate(example)
     goals = (Goal("shelf", Pose2(SPEED * 10, 0.0)),)
     case = Case(Pose2(0.0, 0.0), goals, {"shelf": SPEED * 10}, {"aisle": ((50, 50), (51, 50), (51, 51))})
-    log = read_foreign(write_mcap(tmp_path / "a.mcap", drive()), Wanted(truth="/mocap", goals=("shelf",)))
+    log = read_foreign_log(
+        write_mcap(tmp_path / "a.mcap", drive()), ForeignLogOptions(truth="/mocap", goals=("shelf",))
+    )
     assert required_evidence(entry), "something decides it"
     for evidence in required_evidence(entry):
         (verdict,) = judge([entry], log.trace, case, LogCoverage({evidence: "taken away"}))

@@ -13,11 +13,11 @@ from simscen.core.errors import InvalidInput
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.record.foreign.mcapfile import is_own
-from simscen.record.foreign.read import read_foreign
-from simscen.record.foreign.wanted import Wanted
-from simscen.record.openlog import WholeRecords, open_log
-from simscen.record.replay import read_log
+from simscen.record.foreign.options import ForeignLogOptions
+from simscen.record.foreign.raw_messages import is_simscen_log
+from simscen.record.foreign.read import read_foreign_log
+from simscen.record.log_file import RecordReader, open_log
+from simscen.record.log_reader.read import read_log
 from simscen.run.simulate import simulate_file
 
 SCENARIO = """\
@@ -27,7 +27,7 @@ robot: {pose: {x: 1, y: 1}}
 goals: [{pose: {x: 4, y: 3}}]
 pass: [{goals_reached: {}}]
 """
-TRUTH = Wanted(truth="/ground_truth/odom", tick_rate=240)
+TRUTH = ForeignLogOptions(truth="/ground_truth/odom", tick_rate=240)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def disguised(own: Path) -> Path:
         writer = Writer(stream)
         writer.start("ros2", "somebody")
         schemas, channels = {}, {}
-        for record in WholeRecords(source):
+        for record in RecordReader(source):
             match record:
                 case records.Schema():
                     schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
@@ -63,8 +63,8 @@ def disguised(own: Path) -> Path:
 
 def test_the_signals_are_the_same_to_the_last_bit(own: Path, disguised: Path) -> None:
     """But for the normalized quaternions' last one; ticks are found exactly."""
-    assert is_own(own) and not is_own(disguised)
-    ours, theirs = read_log(own).trace, read_foreign(disguised, TRUTH).trace
+    assert is_simscen_log(own) and not is_simscen_log(disguised)
+    ours, theirs = read_log(own).trace, read_foreign_log(disguised, TRUTH).trace
     for name in ("truth", "velocity", "belief", "odometry", "command"):
         mine, its = getattr(ours, name), getattr(theirs, name)
         np.testing.assert_array_equal(mine.ticks, its.ticks, name)
@@ -85,7 +85,7 @@ def test_the_signals_are_the_same_to_the_last_bit(own: Path, disguised: Path) ->
 )
 def test_verdicts_and_margins_agree(own: Path, disguised: Path, text: dict[str, object]) -> None:
     entry = AnyCriterion.model_validate(text)
-    log, foreign = read_log(own), read_foreign(disguised, TRUTH)
+    log, foreign = read_log(own), read_foreign_log(disguised, TRUTH)
     (mine,) = judge([entry], log.trace, log.about.case)
     (its,) = judge([entry], foreign.trace, log.about.case, foreign.coverage)
     assert [finding.status for finding in mine.findings] == [finding.status for finding in its.findings]
@@ -104,9 +104,9 @@ def test_a_log_with_wrong_bytes_is_read_or_refused(tmp_path: Path, compressed: b
         for _ in range(chance.choice((1, 3, 20))):
             spoilt[chance.randrange(8, len(data))] = chance.randrange(256)
         file.write_bytes(spoilt[: chance.choice((len(data), chance.randrange(8, len(data))))])
-        is_own(file)
+        is_simscen_log(file)
         try:
-            read_foreign(file, Wanted(truth="/mocap"))
+            read_foreign_log(file, ForeignLogOptions(truth="/mocap"))
         except InvalidInput as error:
             refused += 1
             assert error.problems[0].code in ("SC802", "SC804")

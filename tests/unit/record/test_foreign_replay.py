@@ -12,8 +12,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from foreign_logs import BEGIN, Said, T, drive, header, link, write_bag, write_mcap
 
 from simscen.cli.main import main
-from simscen.record.foreign.read import read_foreign
-from simscen.record.foreign.wanted import Wanted
+from simscen.record.foreign.options import ForeignLogOptions
+from simscen.record.foreign.read import read_foreign_log
 
 
 class Ended(NamedTuple):
@@ -58,7 +58,7 @@ def mounted() -> Said:
 @pytest.mark.parametrize("write", [write_mcap, write_bag])
 def test_scans_the_map_and_where_lidars_sit_are_read(tmp_path: Path, write: Callable[..., object]) -> None:
     write(tmp_path / "log.mcap", [a_map(), mounted(), *drive(2.0)])
-    read = read_foreign(tmp_path / "log.mcap", Wanted("/mocap"), looks=True)
+    read = read_foreign_log(tmp_path / "log.mcap", ForeignLogOptions("/mocap"), looks=True)
     assert read.map is not None and read.map.shape == (3, 4) and read.map.origin[:2] == (-1.0, -2.0)
     (messages,) = read.seen.scans.values()
     assert [tick for tick, _ in messages] == sorted(tick for tick, _ in messages) and len(messages) == 5

@@ -12,7 +12,7 @@ from simscen.core.geometry.kinematics import STOP
 from simscen.core.geometry.scripted_poses import PredictedPoses
 from simscen.core.records.trace import Decision, Moment, Trace, Truth
 from simscen.record.recorder import Recorder
-from simscen.record.tracebuilder import TraceBuilder
+from simscen.record.trace_builder import TraceBuilder
 
 EVERY, AHEAD = 6, 20
 STAYS = {"a shelf": Pose3(1.0, 2.0), "the door": Pose3(3.0, 4.0)}

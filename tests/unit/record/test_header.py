@@ -10,8 +10,8 @@ from moments import CASE, about
 from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
 from simscen.core.records.case import Case
-from simscen.record import header
-from simscen.record.header import LogHeader
+from simscen.record import log_header
+from simscen.record.log_header import LogHeader
 
 
 def refuse(constant: str) -> float:
@@ -19,35 +19,35 @@ def refuse(constant: str) -> float:
 
 
 def test_a_case_is_read_back_equal_with_infinite_distances() -> None:
-    assert header.case_from_json(header.case_to_json(CASE)) == CASE
+    assert log_header.case_from_json(log_header.case_to_json(CASE)) == CASE
 
 
 @given(st.floats(allow_nan=False), st.floats(allow_nan=False, allow_infinity=False))
 def test_numbers_of_a_case_are_read_back_exactly(shortest: float, x: float) -> None:
     case = Case(Pose2(x, 0.0), (), {"a": shortest}, time_limit=x)
-    again = header.case_from_json(header.case_to_json(case))
+    again = log_header.case_from_json(log_header.case_to_json(case))
     assert repr(again.start.x) == repr(again.time_limit) == repr(x)
     assert repr(again.shortest["a"]) == repr(shortest)
 
 
 def test_a_case_is_written_as_strict_json() -> None:
-    json.loads(header.case_to_json(CASE), parse_constant=refuse)
+    json.loads(log_header.case_to_json(CASE), parse_constant=refuse)
 
 
 def test_something_else_than_a_case_is_refused() -> None:
     with pytest.raises(ValueError, match="not a case"):
-        header.case_from_json('{"start": "here"}')
+        log_header.case_from_json('{"start": "here"}')
 
 
 def test_facts_of_a_run_are_told_apart_from_the_log_s_own() -> None:
-    facts = header.facts(about(), Clock(240))
+    facts = log_header.run_metadata(about(), Clock(240))
     assert facts["seed"] == "7"
-    assert header.extra_facts(facts) == {"simscen": "0.1.0"}
+    assert log_header.extra_facts(facts) == {"simscen": "0.1.0"}
 
 
 def test_a_file_cannot_take_the_place_of_the_log_s_own() -> None:
     with pytest.raises(ValueError, match=r"case\.json"):
-        header.attachments(LogHeader("a", 1, Case(Pose2(0, 0), ()), files={"case.json": b""}))
+        log_header.attachments(LogHeader("a", 1, Case(Pose2(0, 0), ()), files={"case.json": b""}))
 
 
 @pytest.mark.parametrize(
@@ -55,4 +55,4 @@ def test_a_file_cannot_take_the_place_of_the_log_s_own() -> None:
     [("map.pgm", "image/x-portable-graymap"), ("a/b.json", "application/json"), ("x", "application/octet-stream")],
 )
 def test_media_types_are_told_by_suffix(name: str, expected: str) -> None:
-    assert header.media_type(name) == expected
+    assert log_header.media_type(name) == expected

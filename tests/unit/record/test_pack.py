@@ -12,7 +12,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Scan
-from simscen.record import pack, pack_many, pack_rare
+from simscen.record.messages import encode, encode_arrays
 from simscen.record.simtime import Stamp
 
 STORE = humble()
@@ -59,20 +59,20 @@ def pose3(rng: np.random.Generator) -> Pose3:
 
 @given(stamps)
 def test_clock_is_what_rosbags_writes(stamp: Stamp) -> None:
-    assert pack.clock().packer()(stamp) == serialized(
+    assert encode.clock().packer()(stamp) == serialized(
         make("rosgraph_msgs/Clock", make("builtin_interfaces/Time", *stamp))
     )
 
 
 @given(st.floats(allow_nan=False))
 def test_float64_is_what_rosbags_writes(value: float) -> None:
-    assert pack.float64().packer()(value) == serialized(make("std_msgs/Float64", value))
+    assert encode.float64().packer()(value) == serialized(make("std_msgs/Float64", value))
 
 
 @given(seeds)
 def test_twist_is_what_rosbags_writes(seed: int) -> None:
     twist = Twist(*np.random.default_rng(seed).normal(size=3).tolist())
-    assert pack.twist().packer()(twist) == serialized(ros_twist(twist))
+    assert encode.twist().packer()(twist) == serialized(ros_twist(twist))
 
 
 @given(seeds, stamps, names, names)
@@ -86,7 +86,7 @@ def test_odometry_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, ch
         make("geometry_msgs/PoseWithCovariance", ros_pose(pose), np.zeros(36)),
         make("geometry_msgs/TwistWithCovariance", ros_twist(twist), np.zeros(36)),
     )
-    assert pack.odometry(frame, child).packer()(stamp, pose, twist) == serialized(expected)
+    assert encode.odometry(frame, child).packer()(stamp, pose, twist) == serialized(expected)
 
 
 @given(seeds, stamps, names)
@@ -105,7 +105,7 @@ def test_imu_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str) -> None
         vector(*force),
         np.zeros(9),
     )
-    assert pack.imu(frame).packer()(stamp, turn, force) == serialized(expected)
+    assert encode.imu(frame).packer()(stamp, turn, force) == serialized(expected)
 
 
 @given(seeds, stamps, names)
@@ -116,14 +116,14 @@ def test_pose_with_covariance_is_what_rosbags_writes(seed: int, stamp: Stamp, fr
     full[np.ix_([0, 1, 5], [0, 1, 5])] = covariance
     with_covariance = make("geometry_msgs/PoseWithCovariance", ros_pose(pose), full.ravel())
     expected = make("geometry_msgs/PoseWithCovarianceStamped", header(stamp, frame), with_covariance)
-    assert pack.pose_with_covariance(frame).packer()(stamp, pose, covariance.ravel().tolist()) == serialized(expected)
+    assert encode.pose_with_covariance(frame).packer()(stamp, pose, covariance.ravel().tolist()) == serialized(expected)
 
 
 @given(seeds, stamps, names)
 def test_pose_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str) -> None:
     pose = pose3(np.random.default_rng(seed))
     expected = make("geometry_msgs/PoseStamped", header(stamp, frame), ros_pose(pose))
-    assert pack.pose_stamped(frame).packer()(stamp, pose) == serialized(expected)
+    assert encode.pose_stamped(frame).packer()(stamp, pose) == serialized(expected)
 
 
 @given(seeds, stamps, names, st.integers(0, 40))
@@ -138,7 +138,7 @@ def test_scan_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, beams:
         ranges.astype(np.float32),
         np.empty(0, dtype=np.float32),
     )
-    assert pack_many.LaserScanPacker(frame)(stamp, scan) == serialized(expected)
+    assert encode_arrays.LaserScanPacker(frame)(stamp, scan) == serialized(expected)
 
 
 @given(seeds, stamps, names, st.integers(0, 12))
@@ -146,7 +146,7 @@ def test_path_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, length
     points = np.random.default_rng(seed).normal(size=(length, 3))
     poses = [make("geometry_msgs/PoseStamped", header(stamp, frame), ros_pose(planar(row))) for row in points]
     expected = make("nav_msgs/Path", header(stamp, frame), poses)
-    assert pack_many.PathPacker(frame)(stamp, points) == serialized(expected)
+    assert encode_arrays.PathPacker(frame)(stamp, points) == serialized(expected)
 
 
 @given(seeds, stamps, names, st.integers(1, 12))
@@ -154,7 +154,7 @@ def test_particles_are_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, 
     rows = np.random.default_rng(seed).normal(size=(count, 4))
     particles = [make("nav2_msgs/Particle", ros_pose(planar(row)), float(row[3])) for row in rows]
     expected = make("nav2_msgs/ParticleCloud", header(stamp, frame), particles)
-    assert pack_many.ParticleCloudPacker(frame)(stamp, rows) == serialized(expected)
+    assert encode_arrays.ParticleCloudPacker(frame)(stamp, rows) == serialized(expected)
 
 
 @given(seeds, st.lists(st.tuples(names, names, stamps), max_size=5))
@@ -170,7 +170,7 @@ def test_transforms_are_what_rosbags_writes(seed: int, links: list[tuple[str, st
         )
         for frame, child, stamp, pose in placed
     ]
-    assert pack_many.TransformsPacker()(placed) == serialized(make("tf2_msgs/TFMessage", transforms))
+    assert encode_arrays.TransformsPacker()(placed) == serialized(make("tf2_msgs/TFMessage", transforms))
 
 
 @given(seeds, stamps, names, st.integers(0, 9), st.integers(0, 9))
@@ -180,23 +180,23 @@ def test_grid_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, height
     time = make("builtin_interfaces/Time", *stamp)
     info = make("nav_msgs/MapMetaData", time, 0.05, width, height, ros_pose(Pose3.planar(origin)))
     expected = make("nav_msgs/OccupancyGrid", header(stamp, frame), info, cells.ravel())
-    assert pack_many.occupancy_grid(frame, stamp, OccupancyGrid(cells, 0.05, origin)) == serialized(expected)
+    assert encode_arrays.occupancy_grid(frame, stamp, OccupancyGrid(cells, 0.05, origin)) == serialized(expected)
 
 
 @given(st.text(max_size=40))
 def test_text_is_what_rosbags_writes(text: str) -> None:
-    assert pack_rare.string(text) == serialized(make("std_msgs/String", text))
+    assert encode.string(text) == serialized(make("std_msgs/String", text))
 
 
 @pytest.mark.parametrize("value", [True, False])
 def test_a_bumper_is_what_rosbags_writes(value: bool) -> None:
-    assert pack_rare.boolean(value) == serialized(make("std_msgs/Bool", value))
+    assert encode.boolean(value) == serialized(make("std_msgs/Bool", value))
 
 
 @given(stamps, st.integers(0, 255), names, st.text(max_size=40))
 def test_log_lines_are_what_rosbags_writes(stamp: Stamp, level: int, name: str, text: str) -> None:
     expected = make("rcl_interfaces/Log", make("builtin_interfaces/Time", *stamp), level, name, text, "", "", 0)
-    assert pack_rare.log(stamp, level, name, text) == serialized(expected)
+    assert encode.log(stamp, level, name, text) == serialized(expected)
 
 
 @settings(deadline=None)
@@ -209,4 +209,4 @@ def test_pictures_are_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, h
         data = np.frombuffer(pixels.tobytes(), dtype=np.uint8)
         row = step if height else 0
         expected = make("sensor_msgs/Image", header(stamp, frame), height, width, encoding, 0, row, data)
-        assert pack_rare.image(frame, stamp, pixels) == serialized(expected)
+        assert encode.image(frame, stamp, pixels) == serialized(expected)

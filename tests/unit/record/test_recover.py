@@ -9,9 +9,9 @@ from mcap.reader import make_reader
 from moments import CLOCK, about, moments
 
 from simscen.core.errors import InvalidInput
+from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader.recover import recover
 from simscen.record.recorder import Recorder
-from simscen.record.recover import recover
-from simscen.record.replay import read_log
 
 
 def messages(path: Path) -> list[tuple[str, int, bytes]]:

@@ -12,9 +12,9 @@ from moments import CASE, CLOCK, about, moments
 
 from simscen.core.messages.navigation import Path as Plan
 from simscen.core.records.trace import Moment, Samples, Trace
+from simscen.record.log_reader.read import read_log
 from simscen.record.recorder import Recorder
-from simscen.record.replay import read_log
-from simscen.record.tracebuilder import TraceBuilder
+from simscen.record.trace_builder import TraceBuilder
 
 HERE = Path(__file__).parent
 RESULT = '{"status": "pass"}'

@@ -16,9 +16,9 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Decision, Moment
+from simscen.record.log_header import SCENERY_FILE, scenery_to_json
+from simscen.record.log_reader.read import read_log
 from simscen.record.recorder import Recorder
-from simscen.record.replay import read_log
-from simscen.record.sceneryfile import NAME, scenery_to_json
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 SCENERY = Scenery(
@@ -36,7 +36,7 @@ SCENERY = Scenery(
 def said(topic: str, *beats: tuple[int, list[Event]]) -> list[tuple[float, list[Any]]]:
     """The markers on a topic, each time with the seconds at which they were said."""
     stream = io.BytesIO()
-    files = {NAME: scenery_to_json(SCENERY)}
+    files = {SCENERY_FILE: scenery_to_json(SCENERY)}
     recorder = Recorder(stream, CLOCK, replace(about(), files=files))
     for tick, events in beats:
         recorder.append(Moment(tick, None, (), Decision(STOP), tuple(events)))

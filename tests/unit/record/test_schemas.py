@@ -5,7 +5,7 @@ import json
 from schemas_from_rosbags import SCHEMAS, expected
 
 from simscen.record import topics
-from simscen.record.schemas import load
+from simscen.record.mcap_writer import load
 from simscen.record.topics import Topic
 
 

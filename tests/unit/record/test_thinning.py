@@ -4,7 +4,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.sensor_data import Odometry
 from simscen.core.records.trace import Truth
-from simscen.record.thinning import Thinning, Throttle
+from simscen.record.trace_thinning import Thinning, Throttle
 
 
 def test_a_command_is_kept_when_it_changes() -> None:

@@ -9,7 +9,7 @@ from simscen.core.geometry.kinematics import STOP
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.records.events import Event
 from simscen.core.records.trace import Decision, Moment, Trace, Truth
-from simscen.record.tracebuilder import TraceBuilder
+from simscen.record.trace_builder import TraceBuilder
 
 RUN = list(moments(2.0))
 

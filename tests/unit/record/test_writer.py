@@ -12,10 +12,10 @@ from mcap.writer import CompressionType, Writer
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.kinematics import Twist
-from simscen.record import pack, topics
-from simscen.record.out import Publisher, Together
-from simscen.record.schemas import load
-from simscen.record.writer import McapWriter
+from simscen.record import topics
+from simscen.record.mcap_writer import McapWriter, load
+from simscen.record.messages import encode
+from simscen.record.publishers.channels import BatchWriter, LogPublisher
 
 TEXT = load()["std_msgs/msg/String"]
 MESSAGES = [(1 + i % 3, 1000 * (i // 2), random.Random(i).randbytes(300)) for i in range(2000)]
@@ -126,14 +126,14 @@ def test_the_same_calls_give_the_same_bytes() -> None:
 
 def test_messages_that_are_packed_together_give_the_bytes_of_single_ones() -> None:
     """Also where a chunk ends among them, as it does here every few times, and where another is between them."""
-    layouts = (topics.TRUTH, pack.odometry("map", "base")), (topics.CLEARANCE, pack.float64())
+    layouts = (topics.TRUTH, encode.odometry("map", "base")), (topics.CLEARANCE, encode.float64())
     pose, twist = Pose3(1.0, 2.0), Twist(0.5)
 
     def written(together: bool) -> bytes:
         stream = io.BytesIO()
         writer = McapWriter(stream, "ros2", "simscen", chunk_size=5000)
-        out = Publisher(writer)
-        block = out.together(layouts) if together else Together(out, layouts)
+        out = LogPublisher(writer)
+        block = out.together(layouts) if together else BatchWriter(out, layouts)
         for time in range(100):
             block.write(time, (time, 0), pose, twist, 0.25)
             if time % 7 == 0:

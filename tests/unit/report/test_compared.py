@@ -15,12 +15,12 @@ from simscen.core.records.session_events import (
     SessionFinished,
     SessionStarted,
 )
-from simscen.report.compared import compared, numbers, shortened
-from simscen.report.console import text_reporter
+from simscen.report.comparison import comparison_lines, difference_columns, shorten
 from simscen.report.github import markdown
-from simscen.report.line import text_of
-from simscen.report.results import to_json
+from simscen.report.results_json import to_json
+from simscen.report.styled_line import plain_text
 from simscen.report.suite import Session, to_html
+from simscen.report.text_reporters import text_reporter
 
 FLIP = Flip("navigation/goal", 3, "ref", "mine", "clearance: 0.03 m < 0.05 m, at t = 4.10 s, (2.59, 4.42)")
 TIME = MetricDifference("time_to_goal", "s", 8, 25.341, 28.23, 2.889, (0.78, 4.954), 1, 0, 7, 0.070)
@@ -58,7 +58,7 @@ def comparison() -> Comparison:
 
 
 def lines(comparison: Comparison, columns: int | None = None) -> list[str]:
-    return [text_of(line) for line in compared(comparison, "", columns)]
+    return [plain_text(line) for line in comparison_lines(comparison, "", columns)]
 
 
 def test_on_the_console_it_is_exactly_this(comparison) -> None:
@@ -75,8 +75,8 @@ def test_tables_fit_into_the_columns_of_a_terminal_and_use_a_wider_one(compariso
 
 
 def test_a_long_name_keeps_its_ends() -> None:
-    assert shortened("navigation-stack-of-january", 16) == "navigat…-january"
-    assert shortened("short", 16) == "short"
+    assert shorten("navigation-stack-of-january", 16) == "navigat…-january"
+    assert shorten("short", 16) == "short"
 
 
 def test_of_many_flips_the_first_are_told_and_the_rest_counted(comparison) -> None:
@@ -124,6 +124,6 @@ def test_in_results_json_it_is_data(comparison, passed) -> None:
 
 def test_what_is_small_has_a_digit_more() -> None:
     near = MetricDifference("min_clearance", "m", 6, 0.0716, 0.0309, -0.0407, (-0.0512, -0.0298), 6, 0, 0, 0.03)
-    assert numbers(near) == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
-    assert numbers(TIME) == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")
-    assert numbers(REPLANS)[0] == "3.00"
+    assert difference_columns(near) == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
+    assert difference_columns(TIME) == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")
+    assert difference_columns(REPLANS)[0] == "3.00"

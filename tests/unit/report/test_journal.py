@@ -9,10 +9,9 @@ from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunStarted, SessionFinished
 from simscen.report.journal import Journal, require_free
-from simscen.report.journaldata import NAME, Planned
+from simscen.report.journal_reader import JOURNAL_FILE, PlannedRun, read_journal
 from simscen.report.junit import to_xml
-from simscen.report.rebuild import read_journal
-from simscen.report.results import to_json
+from simscen.report.results_json import to_json
 
 
 @pytest.fixture
@@ -21,7 +20,7 @@ def runs(passed, failed, crashed):
 
 
 def planned(runs):
-    return [Planned(run.key, run.result.path) for run in runs]
+    return [PlannedRun(run.key, run.result.path) for run in runs]
 
 
 def written(folder, runs, finished, ended=True):
@@ -73,7 +72,7 @@ def test_what_was_planned_but_not_answered_is_an_error(tmp_path, runs):
 @pytest.mark.parametrize("lost", [1, 10, 200])
 def test_a_line_that_was_cut_short_never_was(tmp_path, runs, lost):
     written(tmp_path, runs, runs, ended=False)
-    file = tmp_path / NAME
+    file = tmp_path / JOURNAL_FILE
     file.write_bytes(file.read_bytes()[:-lost])
     assert [run.result.error.kind if run.result.error else "" for run in read_journal(tmp_path).answers][
         -1
@@ -82,13 +81,13 @@ def test_a_line_that_was_cut_short_never_was(tmp_path, runs, lost):
 
 def test_the_next_session_goes_on_behind_the_last_whole_line(tmp_path, runs):
     written(tmp_path, runs, runs, ended=False)
-    with (tmp_path / NAME).open("ab") as file:
+    with (tmp_path / JOURNAL_FILE).open("ab") as file:
         file.write(b'{"event": "fini')
     journal = Journal(tmp_path, goes_on=True)
     journal.plan(planned(runs[:1]), "0.1.0", 1)
     journal(runs[0])
     journal.close()
-    assert all(json.loads(line) for line in (tmp_path / NAME).read_bytes().splitlines())
+    assert all(json.loads(line) for line in (tmp_path / JOURNAL_FILE).read_bytes().splitlines())
     assert [run.key for run in read_journal(tmp_path).answers] == [runs[0].key]
 
 
@@ -139,7 +138,7 @@ def test_a_full_disk_costs_lines_but_never_half_a_line(tmp_path, runs, monkeypat
 )
 def test_other_files_are_no_journals(tmp_path, content, told):
     if content is not None:
-        (tmp_path / NAME).write_bytes(content)
+        (tmp_path / JOURNAL_FILE).write_bytes(content)
     with pytest.raises(InvalidInput, match=told):
         read_journal(tmp_path)
 
@@ -151,5 +150,5 @@ def test_answers_that_an_interrupt_kept_from_the_journal_are_added_once(tmp_path
     journal.complete(runs)
     journal.complete(runs)
     journal.close()
-    finished = [line for line in (tmp_path / NAME).read_text().splitlines() if '"finished"' in line]
+    finished = [line for line in (tmp_path / JOURNAL_FILE).read_text().splitlines() if '"finished"' in line]
     assert [json.loads(line)["run"] for line in finished] == [1, 0, 2]

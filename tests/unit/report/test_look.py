@@ -4,7 +4,7 @@ import io
 
 import pytest
 
-from simscen.report.look import Look, look_of
+from simscen.report.styled_line import TerminalStyle, detect_style
 
 
 class Stream(io.StringIO):
@@ -23,29 +23,31 @@ class Stream(io.StringIO):
 @pytest.mark.parametrize(
     ("terminal", "environ", "look"),
     [
-        (True, {}, Look(color=True, live=True, terminal=True)),
-        (False, {}, Look(color=False, live=False, terminal=False)),
-        (True, {"NO_COLOR": "1"}, Look(color=False, live=True, terminal=True)),
-        (True, {"NO_COLOR": ""}, Look(color=True, live=True, terminal=True)),
-        (True, {"TERM": "dumb"}, Look(color=False, live=False, terminal=True)),
-        (True, {"CLICOLOR": "0"}, Look(color=False, live=True, terminal=True)),
-        (False, {"FORCE_COLOR": "1"}, Look(color=True, live=False, terminal=False)),
-        (False, {"FORCE_COLOR": "0"}, Look(color=False, live=False, terminal=False)),
-        (False, {"CLICOLOR_FORCE": "1"}, Look(color=True, live=False, terminal=False)),
-        (False, {"FORCE_COLOR": "1", "NO_COLOR": "1"}, Look(color=False, live=False, terminal=False)),
-        (False, {"FORCE_COLOR": "1", "TERM": "dumb"}, Look(color=True, live=False, terminal=False)),
+        (True, {}, TerminalStyle(color=True, live=True, terminal=True)),
+        (False, {}, TerminalStyle(color=False, live=False, terminal=False)),
+        (True, {"NO_COLOR": "1"}, TerminalStyle(color=False, live=True, terminal=True)),
+        (True, {"NO_COLOR": ""}, TerminalStyle(color=True, live=True, terminal=True)),
+        (True, {"TERM": "dumb"}, TerminalStyle(color=False, live=False, terminal=True)),
+        (True, {"CLICOLOR": "0"}, TerminalStyle(color=False, live=True, terminal=True)),
+        (False, {"FORCE_COLOR": "1"}, TerminalStyle(color=True, live=False, terminal=False)),
+        (False, {"FORCE_COLOR": "0"}, TerminalStyle(color=False, live=False, terminal=False)),
+        (False, {"CLICOLOR_FORCE": "1"}, TerminalStyle(color=True, live=False, terminal=False)),
+        (False, {"FORCE_COLOR": "1", "NO_COLOR": "1"}, TerminalStyle(color=False, live=False, terminal=False)),
+        (False, {"FORCE_COLOR": "1", "TERM": "dumb"}, TerminalStyle(color=True, live=False, terminal=False)),
     ],
     ids=str,
 )
 def test_the_environment_decides_before_the_terminal_does(terminal, environ, look):
-    assert look_of(Stream(terminal), environ) == look
+    assert detect_style(Stream(terminal), environ) == look
 
 
 def test_a_stream_that_knows_only_ascii_gets_no_escapes():
-    assert look_of(Stream(True, "ascii"), {"FORCE_COLOR": "1"}) == Look(color=False, live=False, terminal=True)
+    assert detect_style(Stream(True, "ascii"), {"FORCE_COLOR": "1"}) == TerminalStyle(
+        color=False, live=False, terminal=True
+    )
 
 
 def test_only_a_terminal_has_columns(monkeypatch):
     monkeypatch.setenv("COLUMNS", "57")
-    assert Look(color=True, live=False, terminal=False).columns is None
-    assert Look(color=True, live=True, terminal=True).columns == 57
+    assert TerminalStyle(color=True, live=False, terminal=False).columns is None
+    assert TerminalStyle(color=True, live=True, terminal=True).columns == 57

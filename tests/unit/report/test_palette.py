@@ -50,5 +50,5 @@ def test_good_and_bad_differ_for_who_does_not_see_green():
 
 
 def test_the_colors_of_time_grow_lighter():
-    steps = [luminance(palette.ramp(k / 8)) for k in range(9)]
+    steps = [luminance(palette.time_color(k / 8)) for k in range(9)]
     assert steps == sorted(steps)

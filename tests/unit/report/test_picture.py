@@ -10,13 +10,19 @@ from simscen.core.geometry import Pose2
 from simscen.core.records.run_result import RunKey
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
-from simscen.report.picture import grid, palette
+from simscen.report.picture import map_layer, palette
 from simscen.report.picture.canvas import Canvas
-from simscen.report.picture.compose import _EDGE, HEADER, LARGEST, draw, parts, write_picture
-from simscen.report.picture.ground import MARGIN, extent, lay
-from simscen.report.picture.outline import of_event, outlines
-from simscen.report.picture.scene import Scene
-from simscen.report.picture.ways import round_step
+from simscen.report.picture.map_layer import MARGIN_M, draw_map, map_extent
+from simscen.report.picture.map_picture import (
+    _MARGIN_PX,
+    HEADER_HEIGHT_PX,
+    MAX_MAP_SIZE_PX,
+    draw_map_picture,
+    drawn_parts,
+    write_picture,
+)
+from simscen.report.picture.path_layer import round_time_step
+from simscen.report.picture.scene import Scene, object_outlines, outlines_of_event
 from simscen.testing.sketch import sketch, sketch_case
 
 WIDE, TALL, RESOLUTION = 200, 120, 0.05
@@ -53,8 +59,13 @@ def scene(**changes):
 
 def pixel(image, x, y):
     """The color at a point of the world: the map fills its area from the margin around the known cells on."""
-    scale = min(LARGEST[0] / (WIDE * RESOLUTION + 2 * MARGIN), LARGEST[1] / (TALL * RESOLUTION + 2 * MARGIN))
-    u, v = (x + MARGIN) * scale + grid.LEFT, (TALL * RESOLUTION + MARGIN - y) * scale + HEADER + _EDGE
+    scale = min(
+        MAX_MAP_SIZE_PX[0] / (WIDE * RESOLUTION + 2 * MARGIN_M), MAX_MAP_SIZE_PX[1] / (TALL * RESOLUTION + 2 * MARGIN_M)
+    )
+    u, v = (
+        (x + MARGIN_M) * scale + map_layer.LEFT_MARGIN_PX,
+        (TALL * RESOLUTION + MARGIN_M - y) * scale + HEADER_HEIGHT_PX + _MARGIN_PX,
+    )
     return image.getpixel((int(u), int(v)))
 
 
@@ -63,39 +74,39 @@ def near(color, wanted, tolerance=30):
 
 
 def test_free_space_and_walls_are_where_the_map_has_them():
-    image = draw(scene())
+    image = draw_map_picture(scene())
     assert near(pixel(image, 5.1, 0.5), palette.WALL)
     assert near(pixel(image, 2.0, 4.0), palette.FREE)
     assert near(pixel(image, -0.2, 3.0), palette.UNKNOWN)
 
 
 def test_the_driven_way_runs_through_the_door_and_changes_color_with_time():
-    image = draw(scene())
+    image = draw_map_picture(scene())
     early, late = pixel(image, 1.0, 1.75), pixel(image, 7.0, 2.5)
-    assert near(early, palette.ramp(0.25), 40)
-    assert near(late, palette.ramp(0.93), 40)
+    assert near(early, palette.time_color(0.25), 40)
+    assert near(late, palette.time_color(0.93), 40)
     assert early[2] > late[2]
 
 
 def test_a_spawned_object_stands_where_its_event_says():
-    assert not near(pixel(draw(scene()), 7.3, 4.6), palette.FREE)
+    assert not near(pixel(draw_map_picture(scene()), 7.3, 4.6), palette.FREE)
     without = scene(events=[[1, "goal.accepted", "end"]])
-    assert near(pixel(draw(without), 6.8, 4.2), palette.FREE)
+    assert near(pixel(draw_map_picture(without), 6.8, 4.2), palette.FREE)
 
 
 def test_a_collision_has_a_red_star():
-    assert near(pixel(draw(scene()), 3.0, 5.0), palette.RED)
+    assert near(pixel(draw_map_picture(scene()), 3.0, 5.0), palette.RED)
 
 
 def test_a_mark_has_a_flag_where_the_robot_was():
     marked = scene(events=[[7.5, "mark", "now"]])
-    assert dict(parts(marked))["mark now"].tolist() == [pytest.approx([4.5, 2.5])]
-    assert near(pixel(draw(marked), 4.53, 2.66), palette.AMBER)
-    assert near(pixel(draw(scene()), 4.5, 2.5), palette.ramp(0.75), 60), "the robot is there then"
+    assert dict(drawn_parts(marked))["mark now"].tolist() == [pytest.approx([4.5, 2.5])]
+    assert near(pixel(draw_map_picture(marked), 4.53, 2.66), palette.AMBER)
+    assert near(pixel(draw_map_picture(scene()), 4.5, 2.5), palette.time_color(0.75), 60), "the robot is there then"
 
 
 def test_the_verdict_is_on_the_picture_in_its_color():
-    image = draw(scene())
+    image = draw_map_picture(scene())
     assert near(image.getpixel((20, 31)), palette.RED)
 
 
@@ -110,15 +121,15 @@ def test_the_same_run_gives_the_same_picture(tmp_path):
 @pytest.mark.parametrize("seconds", [0, 0.025, 1])
 def test_a_run_that_hardly_began_has_a_picture_too(seconds):
     short = scene(seconds=seconds, truth=[[0, 1, 1]], ended=None, events=[])
-    assert draw(short).width > 300
+    assert draw_map_picture(short).width > 300
 
 
 def test_a_turned_map_is_painted_turned():
-    grid = room(yaw=np.pi / 2)
-    bounds = extent(grid, np.empty((0, 2)))
+    map_layer = room(yaw=np.pi / 2)
+    bounds = map_extent(map_layer, np.empty((0, 2)))
     assert bounds == pytest.approx((-6.4, -0.4, 0.4, 10.4))
     canvas = Canvas(bounds, 40.0, palette.UNKNOWN)
-    lay(canvas, grid)
+    draw_map(canvas, map_layer)
     image = canvas.finish()
     u, v = canvas.pixel(-1.0, 5.1)
     assert near(image.getpixel((int(u), int(v))), palette.WALL)
@@ -129,9 +140,9 @@ def test_a_turned_map_is_painted_turned():
 def test_thin_walls_of_a_huge_map_stay_whole():
     cells = np.zeros((2000, 2000), dtype=np.int8)
     cells[:, 1000] = 100
-    grid = OccupancyGrid(cells, 0.01)
-    canvas = Canvas(extent(grid, np.empty((0, 2))), 10.0, palette.UNKNOWN)
-    lay(canvas, grid)
+    map_layer = OccupancyGrid(cells, 0.01)
+    canvas = Canvas(map_extent(map_layer, np.empty((0, 2))), 10.0, palette.UNKNOWN)
+    draw_map(canvas, map_layer)
     image = np.asarray(canvas.finish()).astype(int)
     row = image[100:110, 95:115].sum(axis=2).min(axis=1)
     assert (row < 3 * 200).all()
@@ -140,7 +151,7 @@ def test_thin_walls_of_a_huge_map_stay_whole():
 def test_all_parts_of_a_thing_are_its_outline_and_the_unknown_is_a_disc():
     legs = (((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), ((2.0, 0.0), (3.0, 0.0), (2.0, 1.0)))
     trace = sketch({"seconds": 1, "truth": [[0, 0, 0]], "objects": {"ghost": [[0, 1, 1, 0]]}})
-    found = outlines(trace, [MovableObject("table", Pose2(0, 0), legs)])
+    found = object_outlines(trace, [MovableObject("table", Pose2(0, 0), legs)])
     assert [outline[:, 0].max() for outline in found["table"]] == [1.0, 3.0]
     assert np.hypot(*found["ghost"][0].T) == pytest.approx(np.full(32, 0.2))
 
@@ -148,11 +159,11 @@ def test_all_parts_of_a_thing_are_its_outline_and_the_unknown_is_a_disc():
 @pytest.mark.parametrize("data", [{}, {"shape": "mesh", "size": []}, {"shape": "box", "size": "big"}])
 def test_an_event_that_does_not_describe_a_shape_still_gives_one(data):
     event = sketch({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "object.spawned", "x", data]]}).events[0]
-    assert len(of_event(event)[0]) == 32
+    assert len(outlines_of_event(event)[0]) == 32
 
 
 @pytest.mark.parametrize(
     ("seconds", "step"), [(0, 1), (3, 1), (10, 1), (11, 2), (31, 5), (94, 10), (101, 20), (450, 50)]
 )
 def test_time_marks_stand_at_round_seconds_and_are_at_most_ten(seconds, step):
-    assert round_step(seconds) == step
+    assert round_time_step(seconds) == step

@@ -14,12 +14,12 @@ from simscen.core.records.run_result import RunKey
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
 from simscen.loading.scenario import load_scenario
-from simscen.record.replay import read_log
-from simscen.record.sceneryfile import scenery_of
-from simscen.report.picture import compose, sidebar
-from simscen.report.picture.canvas import COARSE
-from simscen.report.picture.compose import draw, parts
-from simscen.report.picture.scene import Scene, with_robots
+from simscen.record.log_header import scenery_from_header
+from simscen.record.log_reader.read import read_log
+from simscen.report.picture import map_picture, sidebar
+from simscen.report.picture.canvas import LABEL_CELL_PX
+from simscen.report.picture.map_picture import draw_map_picture, drawn_parts
+from simscen.report.picture.scene import Scene, scene_with_robots
 from simscen.run.log_header import world_scenery as scenery_in
 from simscen.run.preparation.scenario import prepare
 from simscen.run.simulate import simulate
@@ -89,7 +89,7 @@ def everything(**changes):
 def told(scene):
     """The parts, one a line: what, then where in meters."""
     lines = []
-    for what, points in parts(scene):
+    for what, points in drawn_parts(scene):
         rounded = np.round(points, 2) + 0.0
         lines.append(f"{what}: " + " ".join(f"({x:.2f}, {y:.2f})" for x, y in rounded[:8].tolist()))
     return lines
@@ -97,7 +97,7 @@ def told(scene):
 
 def of(scene, what):
     """The points of the parts that are called so."""
-    return [points for name, points in parts(scene) if name.startswith(what)]
+    return [points for name, points in drawn_parts(scene) if name.startswith(what)]
 
 
 def test_the_picture_has_every_part_where_the_world_has_it():
@@ -129,7 +129,7 @@ def test_a_belief_that_jumps_is_not_a_line_through_walls():
 
 @pytest.mark.parametrize(("goal", "fate"), [("shelf", "failed"), ("never", "not tried"), ("late", "reached")])
 def test_a_goal_says_what_came_of_it(goal, fate):
-    assert [name for name, _ in parts(everything()) if name.startswith(f"goal {goal}")] == [f"goal {goal} {fate}"]
+    assert [name for name, _ in drawn_parts(everything()) if name.startswith(f"goal {goal}")] == [f"goal {goal} {fate}"]
 
 
 def test_a_goal_that_was_never_sent_is_not_there():
@@ -138,21 +138,21 @@ def test_a_goal_that_was_never_sent_is_not_there():
 
 def test_a_goal_that_only_the_robot_believes_reached_has_failed():
     events = [[0, "goal.accepted", "shelf"], [9, "goal.reached", "shelf"]]
-    assert "goal shelf failed" in {name for name, _ in parts(everything(events=events))}
+    assert "goal shelf failed" in {name for name, _ in drawn_parts(everything(events=events))}
 
 
 def test_a_failure_is_told_with_the_code_and_name_that_nav2_gives_it():
-    assert compose.ended(everything()) == "navigation ended, FAILED NO_VALID_PATH (208)"
-    assert any("shelf: failed, NO_VALID_PATH (208)" in name for name, _ in parts(everything()))
+    assert map_picture.end_reason(everything()) == "navigation ended, FAILED NO_VALID_PATH (208)"
+    assert any("shelf: failed, NO_VALID_PATH (208)" in name for name, _ in drawn_parts(everything()))
 
 
 def test_labels_keep_off_ways_robots_goals_and_each_other():
-    canvas = compose._map(everything())
+    canvas = map_picture._map(everything())
     busy, boxes = canvas.busy, []
     for note in canvas.notes:
-        wide = compose.font(note.size).getlength(note.text)
-        left, right = (note.x - wide / 2) / COARSE, (note.x + wide / 2) / COARSE
-        top, low = (note.y - note.size / 2) / COARSE, (note.y + note.size / 2) / COARSE
+        wide = map_picture.font(note.size).getlength(note.text)
+        left, right = (note.x - wide / 2) / LABEL_CELL_PX, (note.x + wide / 2) / LABEL_CELL_PX
+        top, low = (note.y - note.size / 2) / LABEL_CELL_PX, (note.y + note.size / 2) / LABEL_CELL_PX
         covered = busy[max(0, int(top)) : int(low) + 1, max(0, int(left)) : int(right) + 1]
         assert covered.mean() < 0.15, note.text
         assert not any(left < r and a < right and top < b and t < low for a, t, r, b in boxes), note.text
@@ -167,12 +167,15 @@ def test_no_reason_is_cut_off_beside_the_map():
         replace(v, findings=tuple(replace(f, detail=(long,) * 5) for f in v.findings)) for v in scene.result.verdicts
     )
     tall = replace(scene, result=replace(scene.result, verdicts=verdicts))
-    assert draw(tall).height > draw(scene).height + 400
+    assert draw_map_picture(tall).height > draw_map_picture(scene).height + 400
 
 
 def test_each_of_several_robots_is_drawn_with_its_name():
     one = everything()
-    names = {name for name, _ in parts(with_robots(one, {"a": (one.trace, one.case), "b": (one.trace, one.case)}))}
+    names = {
+        name
+        for name, _ in drawn_parts(scene_with_robots(one, {"a": (one.trace, one.case), "b": (one.trace, one.case)}))
+    }
     assert {"a: way", "b: way", "goal a: late reached", "a: robot at the end", "b: belief"} <= names
 
 
@@ -201,7 +204,7 @@ def test_a_picture_from_the_log_alone_has_the_parts_of_that_of_the_run(tmp_path)
     run = simulate(prepared, log=tmp_path / "run.mcap")
     scene = Scene(run.trace, run.case, prepared.built.map, run.result, scenery_in(prepared))
     log = read_log(tmp_path / "run.mcap")
-    found = scenery_of(log.about)
+    found = scenery_from_header(log.about)
     assert found.map is not None
     again = Scene(log.trace, log.about.case, found.map.grid, run.result, found)
     assert told(again) == told(scene)

@@ -6,7 +6,7 @@ import pytest
 
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import RunStarted, SessionStarted
-from simscen.report.remaining import Remaining, _rounded
+from simscen.report.live_console import ProgressEstimate, _round_duration
 
 
 class Clock:
@@ -22,7 +22,7 @@ def session(passed):
 
     def told(done, kept=0):
         clock = Clock()
-        remaining = Remaining(clock)
+        remaining = ProgressEstimate(clock)
         remaining(SessionStarted("0.1.0", 10, 10, 1))
         for number in range(kept + done):
             run = replace(passed, result=replace(passed.result, key=RunKey("navigation/goal", number + 1)))
@@ -49,7 +49,7 @@ def test_after_one_run_it_is_too_early_to_say(session):
 
 
 def test_a_single_run_counts_nothing():
-    remaining = Remaining(Clock())
+    remaining = ProgressEstimate(Clock())
     remaining(SessionStarted("0.1.0", 1, 1, 1))
     assert remaining.told == ""
 
@@ -58,4 +58,4 @@ def test_a_single_run_counts_nothing():
     ("seconds", "told"), [(0.4, "5 s"), (42, "40 s"), (89, "90 s"), (100, "2 min"), (5000, "83 min"), (9000, "2.5 h")]
 )
 def test_times_are_told_in_steps(seconds, told):
-    assert _rounded(seconds) == told
+    assert _round_duration(seconds) == told

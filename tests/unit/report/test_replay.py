@@ -19,17 +19,16 @@ from simscen.core.messages.navigation import Goal
 from simscen.core.records.case import Case
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.record.header import LogHeader
-from simscen.record.pack_many import occupancy_grid
-from simscen.record.replay import Log
-from simscen.record.seen import Seen
+from simscen.record.log_header import LogHeader
+from simscen.record.log_reader.read import Log
+from simscen.record.log_reader.sensor_messages import SensorMessages
+from simscen.record.messages.encode_arrays import occupancy_grid
 from simscen.record.simtime import SimTime
 from simscen.record.topics import GLOBAL_COSTMAP
 from simscen.report.replay import replay_page
-from simscen.report.replay.columns import Columns
+from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, keep_extremes, spaced_in_time
 from simscen.report.replay.page import FOLDER, script
-from simscen.report.replay.sensed import costmaps_of, map_from_odom
-from simscen.report.replay.thin import evenly, paced, with_extremes
+from simscen.report.replay.robot_data import costmaps_of, map_from_odom
 from simscen.testing.sketch import sketch
 
 TEXT = """\
@@ -90,7 +89,7 @@ class Read:
 @pytest.mark.parametrize("step", [1.0, 0.01, 1e-5])
 def test_numbers_come_back_to_within_half_a_step(step: float) -> None:
     values = np.concatenate(([0.0, -1e3, 1e3, math.inf, -math.inf], np.random.default_rng(3).normal(0, 50, 500)))
-    columns = Columns()
+    columns = PackedColumns()
     columns.add([1.0])
     where = columns.add(values, step)
     read = Read.__new__(Read)
@@ -102,7 +101,7 @@ def test_numbers_come_back_to_within_half_a_step(step: float) -> None:
 
 
 def test_what_is_no_number_stays_none() -> None:
-    columns = Columns()
+    columns = PackedColumns()
     where = columns.add([1.0, math.nan, 2.0])
     read = Read.__new__(Read)
     read._numbers = columns.data
@@ -166,13 +165,13 @@ def test_equal_runs_give_equal_bytes_and_two_runs_one_page() -> None:
 
 
 def test_what_is_thinned_keeps_ends_pauses_and_extremes() -> None:
-    assert evenly(3, 10).tolist() == [0, 1, 2] and evenly(100, 3).tolist() == [0, 50, 99]
+    assert evenly_spaced(3, 10).tolist() == [0, 1, 2] and evenly_spaced(100, 3).tolist() == [0, 50, 99]
     ticks = np.array([0, 6, 12, 18, 24, 264, 504, 510])
-    kept = ticks[paced(ticks, 12)].tolist()
+    kept = ticks[spaced_in_time(ticks, 12)].tolist()
     assert kept == [0, 12, 24, 264, 504, 510]
     values = np.zeros(10_000)
     values[[1234, 7777]] = 5.0, -5.0
-    chosen = with_extremes(values, 100)
+    chosen = keep_extremes(values, 100)
     assert len(chosen) <= 100 and {1234, 7777} <= set(chosen.tolist())
 
 
@@ -198,14 +197,14 @@ def test_a_local_costmap_lies_where_the_robot_believes_that_its_odometry_began()
 def test_grids_of_one_place_are_kept_as_their_differences() -> None:
     cells = np.zeros((3, 4), dtype=np.int8)
     near = np.full((2, 2), 50, dtype=np.int8)
-    seen = Seen(SimTime(240))
+    seen = SensorMessages(SimTime(240))
     packed = [(0, cells), (240, cells + 7), (480, cells)]
     take = seen.taker(GLOBAL_COSTMAP.name, GLOBAL_COSTMAP.type)
     assert take is not None
     for tick, grid in packed:
         take(tick, occupancy_grid("map", (tick // 240, 0), OccupancyGrid(grid, 0.05, Pose2(1.0, 2.0))))
     take(720, occupancy_grid("map", (3, 0), OccupancyGrid(near, 0.05, Pose2(1.0, 2.0))))
-    columns = Columns()
+    columns = PackedColumns()
     log = log_of({"seconds": 4, "truth": [[0, 0, 0], [4, 0, 0]]})
     (costmap,) = costmaps_of(seen, log.trace, columns)
     read = Read.__new__(Read)

@@ -2,7 +2,7 @@ import json
 from dataclasses import replace
 
 from simscen.judge.result_json import from_data
-from simscen.report.results import as_document, to_json
+from simscen.report.results_json import as_document, to_json
 
 
 def test_every_run_is_in_it_once_with_its_result(passed, failed, crashed):

@@ -7,8 +7,7 @@ import pytest
 
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey
 from simscen.report.journal import Journal
-from simscen.report.journaldata import Planned
-from simscen.report.sessions import last_failed, sessions_in
+from simscen.report.journal_reader import PlannedRun, last_failed, sessions_in
 
 
 @pytest.fixture
@@ -20,7 +19,7 @@ def session(tmp_path, passed, failed, crashed):
         folder = tmp_path / f"s{number}"
         folder.mkdir()
         journal = Journal(folder)
-        journal.plan([Planned(key(name), "x") for name in outcomes], "0.1.0", 1)
+        journal.plan([PlannedRun(key(name), "x") for name in outcomes], "0.1.0", 1)
         for name, outcome in outcomes.items():
             broken = replace(crashed, result=replace(crashed.result, error=RunFailure(outcome, "")))
             run = made.get(outcome, broken)
@@ -80,7 +79,7 @@ def test_a_journal_that_cannot_be_read_and_the_link_to_the_newest_are_passed_ove
 
 def test_what_failed_as_expected_did_not_fail(session, tmp_path, failed):
     journal = Journal(session(1, a="failed"), goes_on=True)
-    journal.plan([Planned(key("a"), "x")], "0.1.0", 1)
+    journal.plan([PlannedRun(key("a"), "x")], "0.1.0", 1)
     journal(replace(failed, result=replace(failed.result, key=key("a"), outcome=Outcome.FAILED_AS_EXPECTED)))
     journal.close()
     assert failed_in(tmp_path) == set()

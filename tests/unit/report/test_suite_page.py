@@ -10,11 +10,11 @@ from PIL import Image
 
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import Artifacts
-from simscen.report.results import to_json
-from simscen.report.suite import Live, Session, pictures, to_html
-from simscen.report.suite.bits import anchor
+from simscen.report.results_json import to_json
+from simscen.report.suite import RunningSession, Session, elements, to_html
+from simscen.report.suite.elements import anchor
 from simscen.report.suite.history import past_sessions
-from simscen.report.suite.run import share_left, theme
+from simscen.report.suite.run_entry import relative_margin, theme
 
 VOID = ("meta", "img", "input", "rect", "polyline", "circle")
 
@@ -137,8 +137,8 @@ def test_runs_tell_what_they_are_filtered_and_sorted_by(failed):
 
 
 def test_the_least_margin_is_a_share_of_its_limit(passed, failed):
-    assert share_left(passed) == pytest.approx(0.014)
-    assert share_left(failed) == pytest.approx(-0.68)
+    assert relative_margin(passed) == pytest.approx(0.014)
+    assert relative_margin(failed) == pytest.approx(-0.68)
     assert theme(RunKey("navigation/goal", 1)) == "navigation"
     assert theme(RunKey("goal", 1)) == ""
 
@@ -176,7 +176,7 @@ def test_a_picture_that_is_gone_is_left_out(failed):
 def test_pictures_fill_the_page_only_so_far_and_those_of_failures_first(passed, failed, tmp_path, monkeypatch):
     picture = tmp_path / "map.png"
     Image.new("L", (8, 8)).save(picture)
-    monkeypatch.setattr(pictures, "MOST_BYTES", picture.stat().st_size)
+    monkeypatch.setattr(elements, "MAX_EMBEDDED_BYTES", picture.stat().st_size)
     runs = [replace(run, artifacts=Artifacts(picture=str(picture))) for run in (passed, failed)]
     html = to_html(Session(runs))
     assert [tag for tag, _ in parsed(html)].count("img") == 1
@@ -217,14 +217,14 @@ def test_a_session_that_left_no_results_or_damaged_ones_is_passed_over(sessions,
 
 
 def test_a_page_of_a_session_that_goes_on_says_how_far_it_is_and_comes_again(passed, failed):
-    html = to_html(Session([passed], live=Live(3, (failed.key,))))
+    html = to_html(Session([passed], live=RunningSession(3, (failed.key,))))
     assert "1 of 3 runs done, under way: faults/lidar_off, seed 7" in html
     assert "<noscript><meta http-equiv=refresh" in html
     assert "refresh" not in to_html(Session([passed])).replace("refreshing", "").partition("<script>")[0]
 
 
 def test_a_session_without_a_run_has_a_page_too():
-    assert "<h1>✓ 0 passed</h1>" in to_html(Session([], live=Live(5)))
+    assert "<h1>✓ 0 passed</h1>" in to_html(Session([], live=RunningSession(5)))
 
 
 def test_every_outcome_has_a_sign_beside_its_color(passed):

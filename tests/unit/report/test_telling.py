@@ -10,11 +10,9 @@ import pytest
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey
 from simscen.core.records.session_events import SessionFinished, SessionStarted, session_started
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.report.console import text_reporter
-from simscen.report.line import text_of
-from simscen.report.live import ColorReporter, LiveReporter
-from simscen.report.look import Look
-from simscen.report.telling import Telling
+from simscen.report.live_console import ColorReporter, LiveReporter
+from simscen.report.styled_line import TerminalStyle, plain_text
+from simscen.report.text_reporters import SessionFormatter, text_reporter
 
 
 def of(run, **changes):
@@ -22,8 +20,8 @@ def of(run, **changes):
 
 
 def told(events, slow=None, columns=None):
-    telling = Telling(slow, lambda: columns)
-    return [text_of(line) for event in events for line in telling(event)]
+    telling = SessionFormatter(slow, lambda: columns)
+    return [plain_text(line) for event in events for line in telling(event)]
 
 
 def keyed(run, number, name="faults/lidar_off", again=False):
@@ -194,14 +192,14 @@ def shown(events, look, reporter):
 
 
 def test_forced_colors_come_without_moving_the_cursor(session):
-    text = shown(session, Look(color=True, live=False, terminal=False), ColorReporter)
+    text = shown(session, TerminalStyle(color=True, live=False, terminal=False), ColorReporter)
     assert "\x1b[32m✓\x1b[0m" in text
     assert set(re.findall(r"\x1b\[[0-9;?]*([a-zA-Z])", text)) == {"m"}
     assert "\x1b]8" not in text
 
 
 def test_what_a_ci_might_obey_has_no_colors_that_could_hide_it(session):
-    text = shown(session, Look(color=True, live=False, terminal=False), ColorReporter)
+    text = shown(session, TerminalStyle(color=True, live=False, terminal=False), ColorReporter)
     assert not re.search(r"^\s*::|##\[", text, re.MULTILINE)
 
 
@@ -212,20 +210,22 @@ def a_terminal_that_can(monkeypatch):
 
 
 def test_a_terminal_without_colors_is_live_all_the_same(session):
-    text = shown(session, Look(color=False, live=True, terminal=True), LiveReporter)
+    text = shown(session, TerminalStyle(color=False, live=True, terminal=True), LiveReporter)
     assert "\x1b[?25l" in text
     assert not re.search(r"\x1b\[[0-9;]*m", text)
 
 
 def test_paths_can_be_clicked_where_there_are_colors(session, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    text = shown(session, Look(color=True, live=True, terminal=True), LiveReporter)
+    text = shown(session, TerminalStyle(color=True, live=True, terminal=True), LiveReporter)
     assert re.search(rf"\x1b\]8;[^;]*;file://{re.escape(str(tmp_path))}/out/report.html\x1b\\", text)
 
 
 def test_progress_says_how_many_are_done(session, monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
-    text = shown([session[0], session[1], session[2]], Look(color=True, live=True, terminal=True), LiveReporter)
+    text = shown(
+        [session[0], session[1], session[2]], TerminalStyle(color=True, live=True, terminal=True), LiveReporter
+    )
     rows = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "\n", text).splitlines()
     assert any("0 of 3" in row for row in rows)
     assert all(len(row.rstrip()) <= 40 for row in rows if "…" in row)

@@ -7,21 +7,20 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from simscen.report.line import Piece, text_of
-from simscen.report.text import width
-from simscen.report.wrap import wrapped
+from simscen.report.display_text import display_width
+from simscen.report.styled_line import StyledText, plain_text, wrap_line
 
 RUN = (
-    Piece("  "),
-    Piece("✓", "good"),
-    Piece(" navigation/goal ", "name"),
-    Piece("  18.2 s simulated in 0.21 s", "quiet"),
-    Piece("   tightest: path_length +0.14 m, 1 % of its limit", "quiet"),
+    StyledText("  "),
+    StyledText("✓", "good"),
+    StyledText(" navigation/goal ", "name"),
+    StyledText("  18.2 s simulated in 0.21 s", "quiet"),
+    StyledText("   tightest: path_length +0.14 m, 1 % of its limit", "quiet"),
 )
 
 
 def texts(line, columns):
-    return [text_of(part) for part in wrapped(line, columns)]
+    return [plain_text(part) for part in wrap_line(line, columns)]
 
 
 def test_what_stands_in_a_column_of_its_own_moves_as_a_whole():
@@ -41,14 +40,14 @@ def test_what_is_too_long_even_then_is_broken_between_words():
 
 
 def test_behind_a_label_the_text_goes_on_below_itself():
-    line = (Piece("      happened  ", "quiet"), Piece("the pallet falls: t = 10.00 s, it fell"))
+    line = (StyledText("      happened  ", "quiet"), StyledText("the pallet falls: t = 10.00 s, it fell"))
     assert texts(line, 42) == ["      happened  the pallet falls: t =", "              10.00 s, it fell"]
 
 
 @pytest.mark.parametrize("columns", [40, 60, 80])
 def test_a_command_that_goes_on_in_the_next_line_is_still_the_command(columns):
     words = ["simscen", "run", "a b.yaml", "--stack", "mine=./my_nav --verbose", "--world-path", "worlds", "--lenient"]
-    lines = texts((Piece("      again     ", "quiet"), Piece(shlex.join(words), shell=True)), columns)
+    lines = texts((StyledText("      again     ", "quiet"), StyledText(shlex.join(words), shell=True)), columns)
     assert len(lines) > 1
     assert all(len(line) <= columns for line in lines)
     text = "\n".join(lines).replace("again", "", 1).strip()
@@ -58,18 +57,23 @@ def test_a_command_that_goes_on_in_the_next_line_is_still_the_command(columns):
 
 def test_a_path_is_longer_than_a_line_rather_than_broken():
     path = "simscen-out/20261122T074142Z-09d4/runs/scenarios/faults/lidar_off/seed-1/map.png"
-    line = (Piece("      picture   ", "quiet"), Piece(path, file=path))
+    line = (StyledText("      picture   ", "quiet"), StyledText(path, file=path))
     assert texts(line, 40)[-1] == path
     assert texts(line, len(path) + 2) == ["      picture", f"  {path}"]
 
 
 def test_what_follows_a_word_without_a_blank_stays_with_it():
-    line = (Piece("1 passed", "good"), Piece(", "), Piece("1 failed", "bad"), Piece(" · and a good deal more"))
+    line = (
+        StyledText("1 passed", "good"),
+        StyledText(", "),
+        StyledText("1 failed", "bad"),
+        StyledText(" · and a good deal more"),
+    )
     assert all(not text.lstrip().startswith(",") for n in range(9, 40) for text in texts(line, n))
 
 
 def test_a_line_without_a_terminal_is_as_long_as_it_is():
-    assert wrapped(RUN, None) == [RUN]
+    assert wrap_line(RUN, None) == [RUN]
 
 
 TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=("C", "Zl", "Zp")), max_size=60)
@@ -78,8 +82,8 @@ TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=("C", "Zl", "Zp"
 @given(st.lists(TEXTS, min_size=1, max_size=4), st.integers(20, 100))
 @example(["  ", "", " a ", "b"], 20)
 def test_the_words_are_the_same_in_the_same_order_and_fit_unless_one_alone_does_not(parts, columns):
-    line = tuple(Piece(part) for part in parts)
+    line = tuple(StyledText(part) for part in parts)
     lines = texts(line, columns)
-    assert "".join("".join(lines).split()) == "".join(text_of(line).split())
+    assert "".join("".join(lines).split()) == "".join(plain_text(line).split())
     for text in lines:
-        assert width(text) <= columns or len(text.split()) == 1
+        assert display_width(text) <= columns or len(text.split()) == 1

@@ -74,7 +74,7 @@ def test_a_belief_without_a_transform_corrects_the_odometry(play, tmp_path: Path
     )
     from mcap.reader import make_reader
 
-    from simscen.record.unpack import transforms
+    from simscen.record.messages.decode import transforms
 
     run = play(text, time_limit="1")
     assert run.trace.belief.values[-1][:2] == pytest.approx(
@@ -111,7 +111,7 @@ def test_a_stack_that_is_told_the_truth_corrects_the_odometry_of_its_wheels(play
     """The true pose comes as an odometry, too, but is none of the frame `odom`."""
     from mcap.reader import make_reader
 
-    from simscen.record.unpack import transforms
+    from simscen.record.messages.decode import transforms
 
     text = 'peer = Peer("mine", topics=["/sensor_ground_truth/odom"])\nfor step in peer:\n' + (
         "    x, y, yaw = step.get('/sensor_ground_truth/odom').pose\n"

@@ -93,8 +93,8 @@ events = st.fixed_dictionaries(
 
 @given(events)
 def test_an_event_of_any_kind_is_heard_or_refused_and_can_be_logged(said) -> None:
-    from simscen.record.event_text import sentence, to_json
-    from simscen.record.pack_rare import log, string
+    from simscen.record.messages.encode import log, string
+    from simscen.record.messages.event_text import sentence, to_json
 
     goals = GoalTracker(True, 240)
     with suppress(ProtocolViolation):

@@ -1,0 +1,1 @@
+"""Odometry, scans and reference poses from recorded logs, for `simscen localize`."""

@@ -1,0 +1,172 @@
+"""Logs as CSV: one row for each reading, its kind first.
+
+    odom,TIME,X,Y,YAW
+    scan,TIME,ANGLE_MIN,ANGLE_INCREMENT,RANGE_MIN,RANGE_MAX,R0,R1,…
+    truth,TIME,X,Y,YAW
+    mount,X,Y,YAW
+
+Seconds, meters, radians; `inf` where a beam hit nothing, `nan` where it gave no answer. `mount` is where the lidar is
+on the robot, for all scans after it. Rows that are empty or begin with `#` mean nothing.
+"""
+
+import csv
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from simscen.record.foreign.raw_messages import UnusableLog
+from simscen.record.localization_logs.rows import (
+    MAX_COORDINATE_M,
+    MAX_TIME_S,
+    LocalizationRows,
+    PoseRow,
+    ScanRow,
+    Triple,
+    all_within,
+)
+
+
+def read_csv_rows(path: Path) -> LocalizationRows:
+    """The rows of a CSV log. Raises Unusable for one that is none of these."""
+    rows, mount = LocalizationRows(hint="see `simscen localize --help` for its columns"), (0.0, 0.0, 0.0)
+    with path.open(encoding="utf-8", newline="") as lines:
+        for number, row in _numbered_rows(lines, rows.hint):
+            words = [word.strip() for word in row]
+            if not words or not words[0] or words[0].startswith("#"):
+                continue
+            try:
+                values = [float(word) for word in words[1:] if word]
+                if words[0] == "mount":
+                    mount = _finite(values, 3)
+                else:
+                    _add_row(rows, words[0], number, values, mount)
+            except ValueError as error:
+                raise UnusableLog(f"line {number}: {error}", rows.hint) from error
+    return rows
+
+
+def _numbered_rows(lines: Iterable[str], hint: str) -> Iterator[tuple[int, list[str]]]:
+    """The rows of a file from 1 on."""
+    reader = csv.reader(lines)
+    try:
+        yield from enumerate(reader, 1)
+    except csv.Error as error:
+        raise UnusableLog(f"line {reader.line_num} is not CSV: {error}", hint) from error
+
+
+def _add_row(rows: LocalizationRows, kind: str, order: int, values: list[float], mount: Triple) -> None:
+    match kind:
+        case "odom" | "truth":
+            time, pose = (values or [math.nan])[0], values[1:]
+            told = rows.odometry if kind == "odom" else rows.truth
+            _check_time(time)
+            told.append(PoseRow(time, order, _finite(pose, 3)))
+        case "scan":
+            if len(values) < 6 or not all(math.isfinite(value) for value in values[:5]):
+                raise ValueError("a scan has a time, four numbers that describe it, and ranges")
+            time, first, step, least, most = values[:5]
+            _check_time(time)
+            rows.scans.append(ScanRow(time, order, np.array(values[5:]), (first, step, least, most), mount))
+        case _:
+            raise ValueError(f"no kind of row is called {kind!r}; known: odom, scan, truth, mount")
+
+
+def _check_time(time: float) -> None:
+    if not all_within((time,), MAX_TIME_S):
+        raise ValueError(f"{time} is not a time")
+
+
+def _finite(values: list[float], count: int) -> Triple:
+    if len(values) != count or not all(math.isfinite(value) for value in values):
+        raise ValueError(f"expected {count} numbers, got {values}")
+    if not all_within(values, MAX_COORDINATE_M):
+        raise ValueError(f"no place is at {values}")
+    x, y, yaw = values
+    return x, y, yaw
+
+
+# CARMEN is the format of most published lidar data (Radish, the SLAM benchmarks of Freiburg and Bonn). Source: the
+# logger of CARMEN (log_format of each message in its header). Angles are in rad and lengths in m. The time is the third
+# field from the end of each line.
+DEFAULT_MAX_RANGE_M = 81.9
+"""What a SICK LMS says where nothing was hit, in m: FLASER lines do not tell."""
+
+
+def read_carmen_rows(path: Path) -> LocalizationRows:
+    """The odometry (ODOM and what the lasers repeat of it), scans (FLASER, ROBOTLASER1) and TRUEPOS of a log."""
+    rows = LocalizationRows(hint="its lines should begin with ODOM, FLASER or ROBOTLASER1")
+    with path.open(encoding="utf-8", errors="strict") as lines:
+        for number, line in enumerate(lines, 1):
+            words = line.split()
+            if words and words[0] in _LINES:
+                try:
+                    _LINES[words[0]](rows, number, words)
+                except (ValueError, IndexError) as error:
+                    raise UnusableLog(f"line {number} is not a {words[0]} line: {error}") from error
+    return rows
+
+
+def _odom(rows: LocalizationRows, order: int, words: list[str]) -> None:
+    rows.odometry.append(PoseRow(_time(words[-3]), order, _pose(words[1:4])))
+
+
+def _truepos(rows: LocalizationRows, order: int, words: list[str]) -> None:
+    rows.truth.append(PoseRow(_time(words[-3]), order, _pose(words[1:4])))
+
+
+def _flaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
+    """FLASER n r… x y theta odom_x odom_y odom_theta time host logger_time."""
+    count = int(words[1])
+    ranges, rest = _ranges(words[2 : 2 + count], count), words[2 + count :]
+    time = _time(rest[6])
+    step = math.pi / max(1, count - 1) if count % 2 else math.pi / count
+    rows.odometry.append(PoseRow(time, order, _pose(rest[3:6])))
+    mount = _relative_pose(_pose(rest[3:6]), _pose(rest[:3]))
+    mounted = mount if math.hypot(*mount[:2]) < 1.0 else (0.0, 0.0, 0.0)  # a corrected pose is not the lidar's mount
+    rows.scans.append(ScanRow(time, order, ranges, (-math.pi / 2, step, 0.0, DEFAULT_MAX_RANGE_M), mounted))
+
+
+def _robotlaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
+    """ROBOTLASER1 type first fov step most accuracy mode n r… m remission… laser, robot, …, time host time."""
+    first, _, step, most = (_parse_finite(word) for word in words[2:6])
+    count = int(words[8])
+    ranges = _ranges(words[9 : 9 + count], count)
+    rest = words[10 + count + int(words[9 + count]) :]
+    time, laser, robot = _time(words[-3]), _pose(rest[:3]), _pose(rest[3:6])
+    rows.odometry.append(PoseRow(time, order, robot))
+    rows.scans.append(ScanRow(time, order, ranges, (first, step, 0.0, most), _relative_pose(robot, laser)))
+
+
+def _ranges(words: list[str], count: int) -> "np.ndarray[tuple[int, ...], np.dtype[np.float64]]":
+    if len(words) != count or count < 1:
+        raise ValueError(f"expected {count} ranges, got {len(words)}")
+    return np.array([float(word) for word in words])
+
+
+def _pose(words: list[str]) -> Triple:
+    x, y, yaw = (_parse_finite(word) for word in words)
+    if not all_within((x, y, yaw), MAX_COORDINATE_M):
+        raise ValueError(f"no place is at {x:g}, {y:g}")
+    return x, y, yaw
+
+
+def _relative_pose(base: Triple, other: Triple) -> Triple:
+    dx, dy, c, s = other[0] - base[0], other[1] - base[1], math.cos(base[2]), math.sin(base[2])
+    return c * dx + s * dy, c * dy - s * dx, math.remainder(other[2] - base[2], 2 * math.pi)
+
+
+def _time(word: str) -> float:
+    if not all_within((value := _parse_finite(word),), MAX_TIME_S):
+        raise ValueError(f"{word} is not a time")
+    return value
+
+
+def _parse_finite(word: str) -> float:
+    if not math.isfinite(value := float(word)):
+        raise ValueError(f"{word} is not a number")
+    return value
+
+
+_LINES = {"ODOM": _odom, "FLASER": _flaser, "ROBOTLASER1": _robotlaser, "TRUEPOS": _truepos}

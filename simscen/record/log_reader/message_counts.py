@@ -1,0 +1,71 @@
+"""Compares the messages in a log of simscen with the counts that the recorder wrote at its end."""
+
+from collections.abc import Mapping
+
+from simscen.core.records.verdict import Evidence, LogCoverage
+from simscen.record import log_header, topics
+
+NO_COUNTS = "the log does not say how many messages were recorded: an older simscen wrote it, or its end was edited"
+
+_EVENTS = frozenset(
+    {Evidence.CONTACTS, Evidence.NAVIGATION, Evidence.ERROR_CODES, Evidence.PLANNING, Evidence.RECOVERIES}
+) | {Evidence.DISTURBANCES, Evidence.OBJECTS}
+_EVIDENCE: dict[str, frozenset[Evidence]] = {
+    topics.TRUTH.name: frozenset({Evidence.TRUTH, Evidence.VELOCITY}),
+    topics.CLEARANCE.name: frozenset({Evidence.CLEARANCE}),
+    topics.BELIEF.name: frozenset({Evidence.BELIEF, Evidence.COVARIANCE}),
+    topics.COMMAND.name: frozenset({Evidence.COMMANDS}),
+    topics.PLAN.name: frozenset({Evidence.PLANS}),
+    topics.EVENTS.name: _EVENTS,
+    topics.TF.name: frozenset({Evidence.OBJECTS}),
+}
+
+
+class MessageCounts:
+    """Counts the messages of each topic and checks that they are in the order of time."""
+
+    def __init__(self) -> None:
+        self._topics: dict[int, str] = {}
+        self._scans: set[str] = set()
+        self._found: dict[int, int] = {}
+        self._newest: dict[int, int] = {}
+        self._expected: dict[str, int] | None = None
+
+    def open(self, channel: int, topic: str, kind: str) -> None:
+        """Take in a channel."""
+        self._topics[channel] = topic
+        if kind == topics.SCAN_TYPE:
+            self._scans.add(topic)
+
+    def add(self, channel: int, time: int) -> None:
+        """Take in a message. Raises ValueError if an earlier one of its topic has a later time."""
+        if time < self._newest.get(channel, time):
+            raise ValueError(f"the messages of {self._topics.get(channel, 'a topic')} are not in the order of time")
+        self._newest[channel] = time
+        self._found[channel] = self._found.get(channel, 0) + 1
+
+    def expect(self, end: Mapping[str, str], robot: str = "") -> None:
+        """Take in the end record. Of one of several robots, only topics in its namespace count."""
+        prefix = log_header.COUNT_PREFIX + (f"/{robot}" if robot else "")
+        counts = {name: int(count) for name, count in end.items() if name.startswith(log_header.COUNT_PREFIX)}
+        if counts:
+            self._expected = {
+                name.removeprefix(prefix): count for name, count in counts.items() if name.startswith(f"{prefix}/")
+            }
+
+    def coverage(self) -> LogCoverage:
+        """Return the evidence of which messages are missing, with the numbers."""
+        if self._expected is None:
+            return LogCoverage(partial=dict.fromkeys(Evidence, NO_COUNTS))
+        found = {topic: self._found.get(channel, 0) for channel, topic in self._topics.items()}
+        missing: dict[Evidence, str] = {}
+        partial: dict[Evidence, str] = {}
+        for topic, count in self._expected.items():
+            held = found.get(topic, 0)
+            if held == count:
+                continue
+            lacking = partial if held else missing
+            is_scan = topic in self._scans or topic.endswith("scan")  # the type of a topic that is gone is not known
+            evidence = _EVIDENCE.get(topic, frozenset({Evidence.SCANS} if is_scan else ()))
+            lacking |= dict.fromkeys(evidence, f"{topic} holds {held} of {count} recorded messages")
+        return LogCoverage(missing, partial)

@@ -1,0 +1,205 @@
+"""ROS 2 messages that hold many of something: numpy lays them out, no Python runs per beam, cell, pose or particle."""
+
+import struct
+from collections.abc import Callable, Sequence
+from struct import calcsize
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.geometry import Array, Pose3
+from simscen.core.messages.sensor_data import Scan
+from simscen.record.messages.cdr import HEADER, Template
+from simscen.record.simtime import Stamp
+
+Link = tuple[str, str, Stamp, Pose3]
+
+
+def planar_quaternions(headings: Array) -> Array:
+    """(n, 4) quaternions x, y, z, w of headings (n,) in radians."""
+    halves = headings / 2
+    quaternions = np.zeros((len(halves), 4))
+    quaternions[:, 2] = np.sin(halves)
+    quaternions[:, 3] = np.cos(halves)
+    return quaternions
+
+
+def planar_poses(points: Array) -> Array:
+    """(n, 7) positions and quaternions of points (n, 3) x, y, yaw."""
+    poses = np.zeros((len(points), 7))
+    poses[:, :2] = points[:, :2]
+    poses[:, 3:] = planar_quaternions(points[:, 2])
+    return poses
+
+
+class LaserScanPacker:
+    """sensor_msgs/msg/LaserScan without intensities."""
+
+    def __init__(self, frame: str) -> None:
+        head = Template()
+        head.slot("iI", "*stamp")
+        head.string(frame)
+        head.slot("7fI", "*numbers")
+        self._pack = head.packer()
+
+    def __call__(self, stamp: Stamp, scan: Scan) -> bytes:
+        """The message for a scan that was taken at `stamp`."""
+        n = len(scan.ranges)
+        last = scan.angle_min + scan.angle_increment * (n - 1)
+        angles = scan.angle_min, last, scan.angle_increment
+        head = self._pack(stamp, (*angles, 0.0, 0.0, scan.range_min, scan.range_max, n))
+        return head + scan.ranges.astype("<f4").tobytes() + b"\0\0\0\0"
+
+
+class PathPacker:
+    """nav_msgs/msg/Path; every pose carries the path's own header.
+
+    A pose ends on a multiple of eight bytes, so all but the first are laid out alike.
+    """
+
+    def __init__(self, frame: str) -> None:
+        head = Template()
+        head.slot("iI", "*stamp")
+        head.string(frame)
+        head.slot("I", "count")
+        self._pack = head.packer()
+        self._first = self._pose(frame, len(head.buffer) - len(HEADER))
+        self._next = self._pose(frame, 0)
+
+    @staticmethod
+    def _pose(frame: str, start: int) -> bytes:
+        """A pose up to its numbers, without its stamp."""
+        pose = Template(prefix=b"", start=start)
+        pose.put("iI", 0, 0)
+        pose.string(frame)
+        pose.align(8)
+        return bytes(pose.buffer[8:])
+
+    def __call__(self, stamp: Stamp, points: Array) -> bytes:
+        """`points` (n, 3) hold x, y, yaw in the packer's frame."""
+        head = self._pack(stamp, len(points))
+        if not len(points):
+            return head
+        poses, when = planar_poses(points).astype("<f8"), struct.pack("<iI", *stamp)
+        first, other = when + self._first, when + self._next
+        rest = np.empty((len(points) - 1, len(other) + 56), dtype=np.uint8)
+        rest[:, : len(other)] = np.frombuffer(other, dtype=np.uint8)
+        rest[:, len(other) :] = poses[1:].view(np.uint8).reshape(-1, 56)
+        return b"".join((head, first, poses[0].tobytes(), rest.tobytes()))
+
+
+class ParticleCloudPacker:
+    """nav2_msgs/msg/ParticleCloud."""
+
+    def __init__(self, frame: str) -> None:
+        head = Template()
+        head.slot("iI", "*stamp")
+        head.string(frame)
+        head.slot("I", "count")
+        head.align(8)
+        self._pack = head.packer()
+
+    def __call__(self, stamp: Stamp, particles: Array) -> bytes:
+        """`particles` (n, 4) hold x, y, yaw, weight; n > 0."""
+        cloud = np.empty((len(particles), 8), dtype="<f8")
+        cloud[:, :7] = planar_poses(particles)
+        cloud[:, 7] = particles[:, 3]
+        return self._pack(stamp, len(particles)) + cloud.tobytes()
+
+
+class TransformsPacker:
+    """tf2_msgs/msg/TFMessage. A transform ends on a multiple of eight bytes, so only the first is laid out apart."""
+
+    def __init__(self) -> None:
+        self._firsts: dict[tuple[str, str, int], Callable[[Stamp, Pose3], bytes]] = {}
+        self._others: dict[tuple[str, str], Callable[[Stamp, Pose3], bytes]] = {}
+
+    def __call__(self, links: list[Link]) -> bytes:
+        """Each link is (frame, child frame, stamp, pose of the child in the frame)."""
+        if not links:
+            return HEADER + bytes(4)
+        frame, child, stamp, pose = links[0]
+        key = frame, child, len(links)
+        known = self._firsts.get(key)
+        if known is None:
+            known = self._firsts[key] = _transform(frame, child, HEADER + struct.pack("<I", len(links)), 4)
+        message = known(stamp, pose)
+        return message if len(links) == 1 else b"".join((message, *map(self._other, links[1:])))
+
+    def _other(self, link: Link) -> bytes:
+        frame, child, stamp, pose = link
+        known = self._others.get((frame, child))
+        if known is None:
+            known = self._others[frame, child] = _transform(frame, child, b"", 0)
+        return known(stamp, pose)
+
+
+def _transform(frame: str, child: str, before: bytes, start: int) -> Callable[[Stamp, Pose3], bytes]:
+    """Packs geometry_msgs/msg/TransformStamped in a sequence, beginning `start` bytes after a multiple of eight."""
+    message = Template(prefix=before, start=start)
+    message.slot("iI", "*stamp")
+    message.string(frame)
+    message.string(child)
+    message.slot("7d", "*pose")
+    return message.packer()
+
+
+def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
+    """nav_msgs/msg/OccupancyGrid."""
+    height, width = grid.shape
+    message = Template()
+    message.put("iI", *stamp)
+    message.string(frame)
+    message.put("iI", *stamp)
+    message.put("f", grid.resolution)
+    message.put("2I", width, height)
+    message.put("7d", *Pose3.planar(grid.origin))
+    message.put("I", grid.cells.size)
+    return bytes(message.buffer) + grid.cells.astype(np.int8).tobytes()
+
+
+def pose_array(frame: str, stamp: Stamp, points: Array) -> bytes:
+    """geometry_msgs/msg/PoseArray of points (n, 3 or more) x, y, yaw, rounded to 32 bits, which packs well; n > 0."""
+    message = Template()
+    message.put("iI", *stamp)
+    message.string(frame)
+    message.put("I", len(points))
+    message.align(8)
+    return bytes(message.buffer) + planar_poses(points).astype("<f4").astype("<f8").tobytes()
+
+
+Bytes = npt.NDArray[np.uint8]
+
+
+class PrecomputedTransforms:
+    """What stands behind the first transform of a tf2_msgs/msg/TFMessage, for links that are always the same."""
+
+    def __init__(self, links: Sequence[tuple[str, str]]) -> None:
+        """Each link is (frame, child frame)."""
+        # A transform ends on a multiple of eight bytes, so that these begin on one.
+        message = Template(prefix=b"")
+        self._places = list[tuple[slice, slice]]()
+        for frame, child in links:
+            stamp = _reserve(message, "iI")
+            message.string(frame)
+            message.string(child)
+            self._places.append((stamp, _reserve(message, "7d")))
+        self._empty = np.frombuffer(message.buffer, np.uint8)
+        self.size = len(self._empty)
+        """Bytes of a moment."""
+
+    def __call__(self, stamps: Sequence[Stamp], poses: Array) -> Bytes:
+        """(n, size) bytes of n moments; `poses` (n, links, 7) are those of the children in their frames."""
+        packed = np.tile(self._empty, (len(poses), 1))
+        times, numbers = np.array(stamps, "<u4").view(np.uint8), np.ascontiguousarray(poses, "<f8").view(np.uint8)
+        for column, (stamp, pose) in enumerate(self._places):
+            packed[:, stamp], packed[:, pose] = times, numbers[:, column]
+        return packed
+
+
+def _reserve(message: Template, codes: str) -> slice:
+    """Where in a message some numbers stand that come next."""
+    message.slot(codes, "*numbers")
+    end = len(message.buffer)
+    return slice(end - calcsize(f"<{codes}"), end)

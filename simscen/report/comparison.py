@@ -1,0 +1,237 @@
+"""Stacks side by side, as lines for the console."""
+
+from collections.abc import Callable, Iterator, Sequence
+from html import escape
+
+from simscen.core.records.session_events import BaselineComparison, Comparison, MetricDifference, OutcomeCounts
+from simscen.report.display_text import one_line
+from simscen.report.styled_line import StyledLine, StyledText
+
+MAX_FLIPS = 10
+MIN_NAME_COLUMNS = 24
+"""Columns that a scenario's name has at least, however narrow the terminal."""
+MAX_STACK_NAME = 16
+
+
+def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | None = None) -> Iterator[StyledLine]:
+    """Outcomes of each scenario with each stack, then each stack against the first.
+
+    `prefix` is what all ids begin with. Names of scenarios are cut to fit into `columns`; None = as long as they are.
+    """
+    yield ()
+    yield from _outcomes(comparison, prefix, columns)
+    for against in comparison.against:
+        yield ()
+        yield from _against(comparison.baseline, against, prefix)
+    yield ()
+
+
+def outcome_text(outcomes: OutcomeCounts) -> str:
+    """3/5: passed of those that came to an end; then, with an exclamation mark, how many did not."""
+    errors = f" {outcomes.errors}!" if outcomes.errors else ""
+    return f"{outcomes.passed}/{outcomes.decided}{errors}"
+
+
+def excluded_text(against: BaselineComparison) -> str:
+    """What is not compared, and why; "" for nothing."""
+    told = []
+    if against.broken:
+        told.append(f"{_pairs(against.broken)} with an error")
+    if against.alone:
+        told.append(f"{against.alone} {'run' if against.alone == 1 else 'runs'} without a partner")
+    return "left out: " + ", ".join(told) if told else ""
+
+
+def unfinished_text(against: BaselineComparison) -> str:
+    """Of how many pairs only one arrived; "" for none."""
+    if not against.parted:
+        return ""
+    return f"of {_pairs(against.parted)} only one run arrived, so how these drove is not compared"
+
+
+def comparison_headline(baseline: str, against: BaselineComparison) -> str:
+    """Dwb against ref: 10 pairs, passed 8 and 9 …"""
+    won = sum(flip.passed == against.stack for flip in against.flips)
+    lost = len(against.flips) - won
+    told = f"{against.stack} against {baseline}: {_pairs(against.pairs)} of the same scenario and seed"
+    if not against.pairs:
+        return f"{against.stack} against {baseline}: nothing to compare"
+    if not against.flips:
+        return f"{told}, none came out otherwise"
+    return f"{told}, {won} better, {lost} worse (p = {against.p:.2g})"
+
+
+def difference_columns(one: MetricDifference) -> tuple[str, str, str, str]:
+    """The two means, their difference, and its interval; what is below 1 m or 1 s with a digit more."""
+    digits = 3 if one.unit and max(abs(one.baseline), abs(one.value)) < 1 else 2
+    interval = "" if one.interval is None else " … ".join(f"{bound:+.{digits}f}" for bound in one.interval)
+    return f"{one.baseline:.{digits}f}", f"{one.value:.{digits}f}", f"{one.difference:+.{digits}f}", interval
+
+
+def _outcomes(comparison: Comparison, prefix: str, columns: int | None) -> Iterator[StyledLine]:
+    rows = [
+        (one_line(scenario.removeprefix(prefix)), [outcome_text(row[name]) for name in comparison.stacks])
+        for scenario, row in comparison.outcomes.items()
+    ]
+    if len(rows) > 1:
+        rows.append(("all", [outcome_text(comparison.total(name)) for name in comparison.stacks]))
+    heads = [shorten(name) for name in comparison.stacks]
+    widths = [max(len(head), *(len(cells[number]) for _, cells in rows)) + 3 for number, head in enumerate(heads)]
+    room = None if columns is None else max(MIN_NAME_COLUMNS, columns - 2 - sum(widths))
+    names = [shorten(name, room) if room else name for name, _ in rows]
+    longest = max(len(name) for name in ("passed", *names))
+
+    def row(name: str, cells: Sequence[str]) -> str:
+        return f"  {name:{longest}}" + "".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
+
+    yield (StyledText(row("passed", heads), "quiet"),)
+    for name, (_, cells) in zip(names, rows, strict=True):
+        yield (StyledText(row(name, cells)),)
+    if any(row[name].errors for row in comparison.outcomes.values() for name in row):
+        yield (StyledText("  ! = could not be completed, and counts neither way", "quiet"),)
+
+
+def _against(baseline: str, against: BaselineComparison, prefix: str) -> Iterator[StyledLine]:
+    yield (StyledText(f"  {comparison_headline(baseline, against)}", "name"),)
+    for flip in against.flips[:MAX_FLIPS]:
+        better = flip.passed == against.stack
+        yield (
+            StyledText("    "),
+            StyledText("better" if better else "worse ", "good" if better else "bad"),
+            StyledText(f" {one_line(flip.scenario.removeprefix(prefix))}, seed {flip.seed}: "),
+            StyledText(one_line(f"passed with {flip.passed}, failed with {flip.failed}: {flip.why}"), "quiet"),
+        )
+    if len(against.flips) > MAX_FLIPS:
+        yield (StyledText(f"    and {len(against.flips) - MAX_FLIPS} more, in results.json", "quiet"),)
+    yield from _differences(baseline, against)
+    for note in (unfinished_text(against), excluded_text(against)):
+        if note:
+            yield (StyledText(f"    {note}", "quiet"),)
+
+
+def _differences(baseline: str, against: BaselineComparison) -> Iterator[StyledLine]:
+    if not against.differences:
+        return
+    stacks = shorten(baseline), shorten(against.stack)
+    head = ("mean over pairs", *stacks, "difference", "95 % interval", "- / = / +")
+    rows = [
+        (
+            f"{one.metric}, {one.unit}".removesuffix(", "),
+            *difference_columns(one),
+            f"{one.lower} / {one.equal} / {one.higher}",
+        )
+        for one in against.differences
+    ]
+    columns = list(zip(head, *rows, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    for number, row in enumerate((head, *rows)):
+        first, *cells = (
+            f"{cell:{'>' if place else ''}{width}}" for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        yield (StyledText(f"    {'  '.join((first, *cells))}".rstrip(), "plain" if number else "quiet"),)
+
+
+def shorten(text: str, most: int = MAX_STACK_NAME) -> str:
+    """Text of at most so many columns: beginnings and ends are what names differ in."""
+    return text if len(text) <= most else f"{text[: (most - 1) // 2]}…{text[-(most // 2) :]}"
+
+
+def _pairs(number: int) -> str:
+    return f"{number} pair" if number == 1 else f"{number} pairs"
+
+
+EXPLANATION = (
+    "Runs are paired by scenario and seed. Passed: of those that came to an end. Differences are means over pairs, "
+    "with 95 % intervals by bootstrap; p is the sign test. - / = / + are pairs in which it was less, the same, more."
+)
+_HEAD = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "- / = / +", "p")
+
+
+def as_html(comparison: Comparison) -> str:
+    """A section of the page: outcomes of each scenario, then each stack against the first."""
+    names = "".join(
+        f"<th>{_html_text(name)}<div class='quiet'>{_html_text(given)}</div></th>"
+        for name, given in comparison.stacks.items()
+    )
+    rows = "".join(
+        f"<tr><td>{_html_text(scenario)}</td>{''.join(_cell(row[name]) for name in comparison.stacks)}</tr>"
+        for scenario, row in comparison.outcomes.items()
+    )
+    total = "".join(_cell(comparison.total(name)) for name in comparison.stacks)
+    whole = f"<tr><td><b>all</b></td>{total}</tr>" if len(comparison.outcomes) > 1 else ""
+    return (
+        f'<section class="in"><h2>{_html_text(" and ".join(comparison.stacks))}</h2><p class="quiet">{EXPLANATION}</p>'
+        f"<table><tr><th>passed</th>{names}</tr>{rows}{whole}</table>"
+        f"{''.join(_against_html(comparison.baseline, one) for one in comparison.against)}</section>"
+    )
+
+
+def as_markdown(comparison: Comparison, cell: Callable[[str], str]) -> list[str]:
+    """The same as lines of Markdown; `cell` makes text harmless that others wrote."""
+    names = [cell(name) for name in comparison.stacks]
+    lines = ["", f"| passed | {' | '.join(names)} |", f"|---|{'---:|' * len(names)}"]
+    rows = [*comparison.outcomes.items(), ("all", {name: comparison.total(name) for name in comparison.stacks})]
+    lines += [f"| {cell(name)} | {' | '.join(outcome_text(row[stack]) for stack in row)} |" for name, row in rows]
+    for against in comparison.against:
+        lines += ["", f"**{cell(comparison_headline(comparison.baseline, against))}**", ""]
+        lines += [
+            f"- {cell(flip.scenario)}, seed {flip.seed}: passed with {cell(flip.passed)}, failed with "
+            f"{cell(flip.failed)}: {cell(flip.why)}"
+            for flip in against.flips[:MAX_FLIPS]
+        ]
+        more = len(against.flips) - MAX_FLIPS
+        lines += [f"- and {more} more, in results.json"] if more > 0 else []
+        heads = [cell(head.format(comparison.baseline, against.stack)) for head in _HEAD]
+        lines += ["", f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
+        lines += [f"| {' | '.join(_cells(one))} |" for one in against.differences]
+        lines += [f"\n{cell(note)}" for note in (unfinished_text(against), excluded_text(against)) if note]
+    return [*lines, "", EXPLANATION]
+
+
+def _cell(outcomes: OutcomeCounts) -> str:
+    look = "odd" if outcomes.errors else "bad" if outcomes.failed else "good"
+    return f'<td class="count {look}">{outcome_text(outcomes)}</td>'
+
+
+def _against_html(baseline: str, against: BaselineComparison) -> str:
+    flips = "".join(
+        f'<tr class="{"" if flip.passed == against.stack else "bad"}">'
+        f"<td>{'better' if flip.passed == against.stack else 'worse'}</td><td>{_html_text(flip.scenario)}</td>"
+        f"<td>seed {flip.seed}</td>"
+        f"<td>passed with {_html_text(flip.passed)}, failed with {_html_text(flip.failed)}</td>"
+        f"<td>{_html_text(flip.why)}</td></tr>"
+        for flip in against.flips
+    )
+    _, *named = (_html_text(head.format(baseline, against.stack)) for head in _HEAD)
+    heads = "<th></th>" + "".join(f'<th class="margin">{head}</th>' for head in named)
+    rows = "".join(_difference(one) for one in against.differences)
+    notes = "".join(
+        f'<p class="quiet">{_html_text(note)}</p>'
+        for note in (unfinished_text(against), excluded_text(against))
+        if note
+    )
+    return (
+        f"<h3>{_html_text(comparison_headline(baseline, against))}</h3>"
+        + (f"<table>{flips}</table>" if flips else "")
+        + (f"<table><tr>{heads}</tr>{rows}</table>" if rows else "")
+        + notes
+    )
+
+
+def _difference(one: MetricDifference) -> str:
+    name, *cells = _cells(one)
+    clear = one.interval is not None and not one.interval[0] <= 0.0 <= one.interval[1]
+    listed = "".join(f'<td class="margin">{cell}</td>' for cell in cells)
+    return f"<tr{' class=clear' if clear else ''}><td>{name}</td>{listed}</tr>"
+
+
+def _cells(one: MetricDifference) -> tuple[str, ...]:
+    """A row of the table of differences."""
+    before, after, difference, interval = difference_columns(one)
+    name = f"{one.metric}, {one.unit}".removesuffix(", ")
+    signs = f"{one.lower} / {one.equal} / {one.higher}"
+    return name, str(one.pairs), before, after, difference, interval, signs, f"{one.p:.2g}"
+
+
+def _html_text(text: str) -> str:
+    return escape(one_line(text))

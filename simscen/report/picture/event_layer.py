@@ -1,0 +1,204 @@
+"""Goals and what came of each: reached, failed with which code, canceled, or never tried."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.messages.goal_names import matches_goal_name
+from simscen.core.messages.navigation import Goal
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.verdict import Status
+from simscen.judge.finding_text import comparison, subject
+from simscen.report.picture import palette
+from simscen.report.picture.canvas import Canvas, printable
+from simscen.report.picture.labels import Label
+from simscen.report.picture.palette import Color
+from simscen.report.picture.path_layer import driven_segments
+from simscen.report.picture.scene import Scene
+
+_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
+
+
+@dataclass(frozen=True)
+class GoalOutcome:
+    """What came of a goal, in a word, its color, and what its label says of it."""
+
+    word: str
+    color: Color
+    told: str = ""
+
+
+def error_code_text(event: Event) -> str:
+    """An error in Nav2's words: "NO_VALID_PATH (208)"; "" where the event names none."""
+    name, code = event.data.get("error_name"), event.data.get("error_code")
+    if not name or name == "NONE":
+        return ""
+    return f"{name} ({code})" if code else str(name)
+
+
+def goal_outcome(goal: Goal, scene: Scene) -> GoalOutcome:
+    """What the robot said of a goal; one that it claims to have reached and a criterion denies is failed."""
+    ends = [event for event in scene.trace.of_kind(*_ENDS) if event.name == goal.name]
+    if not ends:
+        begun = any(event.name == goal.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED))
+        return (
+            GoalOutcome("not reached", palette.AMBER, "not reached")
+            if begun
+            else GoalOutcome("not tried", palette.GRAY, "not tried")
+        )
+    match ends[-1].kind:
+        case EventKind.GOAL_FAILED:
+            expected = "as expected" if goal.name in scene.case.expected else ""
+            told = ", ".join(part for part in (f"failed {expected}".strip(), error_code_text(ends[-1])) if part)
+            return GoalOutcome("failed", palette.AMBER if expected else palette.RED, told)
+        case EventKind.GOAL_CANCELED:
+            return GoalOutcome("canceled", palette.GRAY, "canceled")
+        case _:
+            denied = _denied(goal, scene)
+            return GoalOutcome("failed", palette.RED, "not there") if denied else GoalOutcome("reached", palette.GREEN)
+
+
+def _denied(goal: Goal, scene: Scene) -> bool:
+    findings = [f for v in scene.result.verdicts if v.criterion == "goals_reached" for f in v.findings]
+    return any(f.status is Status.FAIL and f.what.endswith(f"goal {goal.name}") for f in findings)
+
+
+def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """Each goal: its tolerance as a ring, its heading, its name, and what came of it."""
+    sent = {event.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)}
+    goals = [goal for goal in scene.case.every_goal if goal.name in sent or goal not in scene.case.sent]
+    names: dict[tuple[float, float], list[str]] = {}
+    for goal in goals:
+        fate = goal_outcome(goal, scene)
+        there = names.setdefault((goal.pose.x, goal.pose.y), [])
+        known = any(matches_goal_name(goal.name, other.partition(":")[0]) for other in there)
+        if not known or fate.told:  # the second loop comes to the same place
+            there.append(f"{goal.name}: {fate.told}" if fate.told else goal.name)
+    for goal in goals:
+        fate = goal_outcome(goal, scene)
+        x, y, yaw = goal.pose
+        reach = max(goal.xy_tolerance * canvas.scale, 5.0)
+        hollow = fate.word in ("not tried", "canceled")
+        canvas.disc(x, y, reach, None if hollow else (*fate.color, 46), fate.color, 1.8, busy=True)
+        tip = (reach + 10) / canvas.scale
+        heading = np.array([(x, y), (x + tip * math.cos(yaw), y + tip * math.sin(yaw))])
+        canvas.line(heading, fate.color, 2.2, busy=True)
+        if fate.word == "failed":
+            bar = 0.72 * reach / canvas.scale
+            for dy in (bar, -bar):
+                canvas.line(np.array([(x - bar, y - dy), (x + bar, y + dy)]), fate.color, 2.0)
+        else:
+            canvas.disc(x, y, 2.6, fate.color)
+        canvas.tell(f"goal {scene.called(goal.name)} {fate.word}", heading)
+        if told := names.pop((x, y), None):
+            rim = max(reach, 8.0)
+            yield Label(1, x, y, printable(scene.called(", ".join(told))), fate.color, 14, rim)
+
+
+_STAR = [(r * math.cos(a), r * math.sin(a)) for k in range(16) for r, a in [((16, 7)[k % 2], k * math.pi / 8)]]
+_CROSS = [(1.6, 0), (5.4, 3.8), (3.8, 5.4), (0, 1.6), (-3.8, 5.4), (-5.4, 3.8), (-1.6, 0)]
+_CROSS += [(-5.4, -3.8), (-3.8, -5.4), (0, -1.6), (3.8, -5.4), (5.4, -3.8)]
+_FLAG = [(0, 0), (0, -18), (12, -13), (1.5, -9), (1.5, 0)]
+_BOLT = [(1, -10), (-6, 2), (-1, 2), (-2, 10), (6, -3), (1, -3)]
+_DIAMOND = [(0, -6), (6, 0), (0, 6), (-6, 0)]
+
+
+def draw_fault_bands(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """A broad band under the way where a fault was on."""
+    for begun, ended, name in _faults(scene):
+        for piece in driven_segments(scene):
+            on = (piece.ticks >= begun) & (piece.ticks <= ended)
+            canvas.line(piece.values[on, :2], palette.FAULTY, 11.0)
+            if on.any():
+                canvas.tell(f"fault {scene.called(name)}", piece.values[on][[0, -1], :2])
+    yield from ()
+
+
+def draw_faults(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """A bolt where the robot was when a fault began, a gray one where it was when that was over."""
+    trace = scene.trace
+    for begun, ended, name in _faults(scene):
+        ends = [(begun, f"{name} from", palette.AMBER), (ended, f"{name} over,", palette.FAINT_INK)]
+        for tick, told, color in ends if ended < trace.end else ends[:1]:
+            x, y = trace.place(tick)
+            canvas.disc(x, y, 11, (255, 255, 255, 225), color, 1.4, busy=True)
+            canvas.sign(x, y, _BOLT, color)
+            text = printable(scene.called(f"{told} {trace.seconds(tick):.1f} s"))
+            yield Label(2, x, y, text, palette.AMBER, 12, 12.0)
+
+
+def _faults(scene: Scene) -> list[tuple[int, int, str]]:
+    """When each fault began and ended, and its name."""
+    ended = list(scene.trace.of_kind(EventKind.FAULT_ENDED))
+    found = []
+    for event in scene.trace.of_kind(EventKind.FAULT_STARTED):
+        own = [end for end in ended if end.name == event.name and end.tick >= event.tick]
+        found.append((event.tick, own[0].tick if own else scene.trace.end, event.name))
+        if own:
+            ended.remove(own[0])
+    return found
+
+
+def draw_events(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """A diamond where the robot was when an event of the scenario began, and where it got a new goal."""
+    trace = scene.trace
+    told = [(event.tick, event.name) for event in trace.of_kind(EventKind.EVENT_STARTED) if event.name]
+    sent = {goal.name for goal in scene.case.sent}
+    told += [(e.tick, f"new goal {e.name}") for e in trace.of_kind(EventKind.GOAL_ACCEPTED) if e.name in sent]
+    for tick, name in told:
+        x, y = trace.place(tick)
+        canvas.sign(x, y, _DIAMOND, palette.INK)
+        canvas.tell(f"event {scene.called(name)}", [(x, y)])
+        yield Label(3, x, y, printable(scene.called(f"{name}, {trace.seconds(tick):.1f} s")), palette.INK, 12, 7.0)
+
+
+def draw_marks(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """A flag with its name where the robot was when an event set a mark."""
+    for event in scene.trace.of_kind(EventKind.MARK):
+        x, y = scene.trace.place(event.tick)
+        canvas.sign(x, y, _FLAG, palette.AMBER)
+        canvas.tell(f"mark {scene.called(event.name)}", [(x, y)])
+        yield Label(3, x, y, printable(event.name), palette.AMBER, 12, 10.0)
+
+
+def draw_collisions(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """A star at every contact."""
+    for event in scene.trace.of_kind(EventKind.COLLISION_STARTED):
+        x, y = event.data.get("x"), event.data.get("y")
+        if not isinstance(x, int | float) or not isinstance(y, int | float):
+            x, y = scene.trace.place(event.tick)
+        canvas.sign(float(x), float(y), _STAR, palette.RED)
+        canvas.tell(f"collision {scene.called(event.name)}", [(x, y)])
+    yield from ()
+
+
+def draw_violations(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """A cross in a circle where each criterion failed, with what it says."""
+    for verdict in scene.result.verdicts:
+        finding = verdict.tightest
+        if verdict.status is Status.PASS or finding is None or finding.place is None:
+            continue
+        x, y = finding.place
+        canvas.disc(x, y, 10, (255, 255, 255, 215), palette.RED, 2.0, busy=True)
+        canvas.sign(x, y, _CROSS, palette.RED)
+        canvas.tell(f"violation {verdict.id}", [(x, y)])
+        text = _truncate(printable(f"{subject(verdict, finding)}: {comparison(finding)}"))
+        yield Label(0, x, y, text, palette.PAGE, 12, 11.0, palette.RED)
+
+
+def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """Named places that are no goals: a small diamond and the name."""
+    goals = [goal.pose for robot in scene.each for goal in robot.case.every_goal]
+    taken = {(round(pose.x, 3), round(pose.y, 3)) for pose in goals}
+    for name, pose in sorted(scene.scenery.places.items()):
+        if (round(pose.x, 3), round(pose.y, 3)) not in taken and canvas.shows(pose.x, pose.y):
+            canvas.sign(pose.x, pose.y, [(0, -4), (4, 0), (0, 4), (-4, 0)], palette.PLACE)
+            canvas.tell(f"place {name}", np.array([(pose.x, pose.y)]))
+            yield Label(9, pose.x, pose.y, printable(name), palette.FAINT_INK, 11, 5.0, spare=True)
+
+
+def _truncate(text: str, limit: int = 60) -> str:
+    """The beginning of a text; the whole of it is beside the map."""
+    return text if len(text) <= limit else f"{text[: limit - 1].rstrip()}…"

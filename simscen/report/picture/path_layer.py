@@ -1,0 +1,129 @@
+"""Where a robot was: truth and belief, in one piece only where it drove."""
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Samples
+from simscen.report.picture import palette
+from simscen.report.picture.canvas import Canvas, printable
+from simscen.report.picture.labels import Label
+from simscen.report.picture.scene import Scene
+
+MAX_SPEED_M_S, MIN_JUMP_M = 8.0, 0.3
+"""Between two samples a thing that came so far (m) faster than that (m/s) did not drive there."""
+_BANDS = 48
+_DOT = 0.15 * np.column_stack((np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)))
+_LIFTED = [(-6, -2), (0, -9), (6, -2), (2, -2), (2, 6), (-2, 6), (-2, -2)]
+_SET_DOWN = [(-6, 2), (0, 9), (6, 2), (2, 2), (2, -6), (-2, -6), (-2, 2)]
+
+
+def split_at_jumps(samples: Samples, tick_rate: int, placed: tuple[int, ...] = ()) -> list[Samples]:
+    """The signal cut where it jumps, and where it changed most about each of the ticks at which it was `placed`."""
+    if len(samples) < 2:
+        return [samples] if len(samples) else []
+    far = np.hypot(*np.diff(samples.values[:, :2], axis=0).T)
+    seconds = np.diff(samples.ticks) / tick_rate
+    cuts = {*(np.flatnonzero((far > MIN_JUMP_M) & (far > MAX_SPEED_M_S * seconds)) + 1).tolist()}
+    for tick in placed:
+        near = max(0, int(np.searchsorted(samples.ticks, tick)) - 1)
+        cuts.add(near + 1 + int(far[near : near + 2].argmax()) if near < len(far) else len(samples))
+    edges = sorted({0, *cuts, len(samples)})
+    return [Samples(samples.ticks[a:b], samples.values[a:b]) for a, b in pairwise(edges)]
+
+
+def driven_segments(scene: Scene) -> list[Samples]:
+    """The true way, cut where the robot was set down elsewhere."""
+    placed = tuple(event.tick for event in scene.trace.of_kind(EventKind.ROBOT_PLACED))
+    return split_at_jumps(scene.trace.truth, scene.trace.tick_rate, placed)
+
+
+def draw_plans(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """All plans, faint; the newer the stronger."""
+    plans = scene.trace.plans
+    for k, plan in enumerate(plans):
+        weight = 0.45 + 0.55 * (k + 1) / len(plans)
+        color = tuple(round(255 + weight * (part - 255)) for part in palette.PLAN)
+        canvas.line(plan.points[:, :2], (color[0], color[1], color[2]), 3.0)
+    yield from ()
+
+
+def draw_truth(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """The driven way, colored by time, with a dot at round seconds; there is a gap where it was carried."""
+    trace, pieces = scene.trace, driven_segments(scene)
+    edges = np.linspace(0, trace.end, _BANDS + 1)
+    for piece in pieces:
+        points = piece.values[:, :2]
+        canvas.tell(scene.called("way"), points[[0, -1]])
+        if len(scene.robots) > 1:
+            canvas.line(_thinned(points, canvas), palette.ROBOTS[scene.number % len(palette.ROBOTS)], 6.4)
+        for k in range(_BANDS):
+            first, last = np.searchsorted(piece.ticks, (edges[k], edges[k + 1]), side="left")
+            band = points[max(first - 1, 0) : last + 1]
+            canvas.line(_thinned(band, canvas), palette.time_color((k + 0.5) / _BANDS), 3.2, busy=True)
+    step = round_time_step(trace.seconds(trace.end))
+    for number in range(1, int(trace.seconds(trace.end) / step) + 1) if pieces else ():
+        tick = round(number * step * trace.tick_rate)
+        x, y = trace.place(tick)
+        canvas.disc(x, y, 3.6, palette.PAGE, palette.time_color(tick / max(trace.end, 1)), 1.6)
+    yield from ()
+
+
+def draw_kidnapping(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """An arrow up where the robot was lifted, and one down where it was set down."""
+    for before, after in pairwise(driven_segments(scene)):
+        when = f"{scene.trace.seconds(int(before.ticks[-1])):.1f} s"
+        for place, sign, told in ((before.values[-1], _LIFTED, "lifted"), (after.values[0], _SET_DOWN, "set down")):
+            x, y = place[:2].tolist()
+            canvas.disc(x, y, 12, (255, 255, 255, 225), palette.AMBER, 1.6, busy=True)
+            canvas.sign(x, y, sign, palette.AMBER)
+            canvas.tell(scene.called(told), [(x, y)])
+            yield Label(1, x, y, printable(scene.called(f"{told} at {when}")), palette.AMBER, 12, 13.0)
+
+
+def draw_belief(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """Where the robot thought it was; where that jumped there is no line."""
+    for piece in split_at_jumps(scene.trace.belief, scene.trace.tick_rate):
+        canvas.dashes(_thinned(piece.values[:, :2], canvas), palette.BELIEF, 1.2, 4.0)
+        canvas.tell(scene.called("belief"), piece.values[[0, -1], :2])
+    yield from ()
+
+
+def draw_robot(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """The robot's hull where it began and where it ended."""
+    if not len(scene.trace.truth):
+        return
+    first, last = (Pose2(*row) for row in scene.trace.truth.values[[0, -1]].tolist())
+    hull = np.array(scene.case.footprint) if len(scene.case.footprint) > 2 else _DOT
+    reach = float(np.hypot(*hull.T).max()) * canvas.scale
+    nose = np.array([(0.35, -0.4), (0.85, 0.0), (0.35, 0.4)]) * (float(hull[:, 0].max()), float(hull[:, 1].max()))
+    moved = first.distance(last) * canvas.scale > reach
+    for pose, color, strength, told in ((first, palette.START, 40, "start"), (last, palette.ROBOT, 170, "end")):
+        canvas.polygon(pose.apply(hull), (*color, strength), color, busy=True)
+        canvas.polygon(pose.apply(nose), palette.PAGE if strength > 100 else color)
+        canvas.tell(scene.called(f"robot at the {told}"), pose.apply(hull))
+        if told == "end" or moved:
+            yield Label(3, pose.x, pose.y, printable(scene.called(told)), color, 12, reach + 1)
+
+
+def round_time_step(seconds: float) -> float:
+    """A round number of seconds that divides a run into at most ten parts: 1, 2, 5, 10, …"""
+    if seconds <= 0:
+        return 1.0
+    power = 10 ** math.floor(math.log10(seconds / 10)) if seconds > 10 else 1.0
+    return next(power * factor for factor in (1, 2, 5, 10) if seconds / (power * factor) <= 10)
+
+
+def _thinned(points: Array, canvas: Canvas) -> Array:
+    """Points at least a pixel apart, and the last one: more would only cost time."""
+    if len(points) < 3:
+        return points
+    pixels = np.floor(points * canvas.scale)
+    keep = np.concatenate(([True], np.any(np.diff(pixels, axis=0) != 0, axis=1)))
+    keep[-1] = True
+    kept: Array = points[keep]
+    return kept
