@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from simscen.bench.localization.recorded_drive import Localized, errors_of
-from simscen.record.foreign.sensed import Sensed
-from simscen.record.foreign.sensedrows import TICK_RATE
+from simscen.record.localization_logs.read import LocalizationLog
+from simscen.record.localization_logs.rows import TICK_RATE_HZ
 
 
 def errors(reference_times, offset=0.2):
@@ -15,7 +15,7 @@ def errors(reference_times, offset=0.2):
     localized = Localized(times, poses, np.zeros((len(times), 3, 3)), 0, 0.0, 0.0)
     known = np.asarray(reference_times, dtype=float)
     truth = np.column_stack([known, np.zeros(len(known)), np.zeros(len(known))])
-    sensed = Sensed((), np.round(known * TICK_RATE).astype(int), truth)
+    sensed = LocalizationLog((), np.round(known * TICK_RATE_HZ).astype(int), truth)
     return errors_of(localized, sensed, 1.0)
 
 
