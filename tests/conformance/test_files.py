@@ -158,9 +158,11 @@ def test_26_what_is_not_a_regular_file_is_not_read(refused, folder: Path, kind: 
     assert re.match(r"odd.scenario.yaml: error\[SC0(01|20)\] (not a regular file|the file is outside)", told)
 
 
-def test_26_a_folder_with_the_name_of_a_scenario_is_searched(simscen, folder: Path) -> None:
+def test_26_a_folder_with_the_name_of_a_scenario_is_an_error_with_its_name(simscen, folder: Path) -> None:
     (folder / "odd.scenario.yaml").mkdir()
-    assert simscen("validate", "odd.scenario.yaml").code == 5
+    ended = simscen("validate", "odd.scenario.yaml")
+    assert ended.code == 2
+    assert "odd.scenario.yaml: error[SC001] is a folder" in ended.err
     assert simscen("validate", ".").code == 0
 
 

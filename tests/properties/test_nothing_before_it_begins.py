@@ -66,7 +66,7 @@ LONG = 2.5
 VALUES = {
     ("noise", "Odometry"): "{linear: 5 cm, angular: 5 deg}",
     ("noise", "Imu"): "{gyro: 0.1 rad/s, accelerometer: 0.5}",
-    ("noise", "Image"): "{std: 5 cm, color: 10 %}",
+    ("noise", "Image"): "{std: 5 cm, colour: 10 %}",
     ("noise", "Belief"): "{linear: 5 cm, angular: 2 deg}",
     ("bias", "Scan"): "{range: 5 cm}",
     ("bias", "Imu"): "{gyro: 0.05 rad/s}",

@@ -135,7 +135,7 @@ def test_an_unknown_key_of_a_mask_is_noted_and_ignored(tmp_path):
     mask(tmp_path, "corner", gray, more="kind: keepout\n")
     ((path, line, code, severity, text),) = told(scenario(tmp_path, "  keepout_mask: corner.yaml\n"))
     assert (path, line, code, severity) == ("corner.yaml", 8, "SC311", "warning")
-    assert "`kind` means nothing" in text
+    assert "`kind` has no meaning in a ROS map" in text
 
 
 def test_a_goal_in_a_masked_cell_is_told_with_the_code_to_expect_and_the_stack_gives_that_code(tmp_path):

@@ -21,7 +21,7 @@ export const KEYS = [
 /** A dialog with all keys. */
 export function helpWindow() {
   const rows = KEYS.map(([keys, does]) => el("tr", {}, el("th", { scope: "row" }, ...keys.split(" ").flatMap((key) => [el("kbd", {}, key), " "])), el("td", {}, does)));
-  const dialog = el("dialog", { class: "help", "aria-labeledby": "help-title" },
+  const dialog = el("dialog", { class: "help", "aria-labelledby": "help-title" },
     el("h2", { id: "help-title" }, "Keys"), el("table", {}, el("tbody", {}, ...rows)),
     el("p", { class: "quiet" }, "Wheel or pinch zooms the map, dragging moves it. The wheel over the timeline zooms time. The address of this page names the moment that is shown."),
     el("form", { method: "dialog" }, el("button", {}, "Close")));

@@ -11,9 +11,9 @@ export class Panel {
     this.runs = runs;
     this.chosen = chosen;
     this.cards = [];
-    this.now = el("div", { class: "view", id: "view-now", role: "tabpanel", "aria-labeledby": "tab-now", tabindex: "0" });
-    this.text = el("div", { class: "view code", id: "view-text", role: "tabpanel", "aria-labeledby": "tab-text", tabindex: "0" });
-    this.list = el("div", { class: "view", id: "view-events", role: "tabpanel", "aria-labeledby": "tab-events", tabindex: "0" });
+    this.now = el("div", { class: "view", id: "view-now", role: "tabpanel", "aria-labelledby": "tab-now", tabindex: "0" });
+    this.text = el("div", { class: "view code", id: "view-text", role: "tabpanel", "aria-labelledby": "tab-text", tabindex: "0" });
+    this.list = el("div", { class: "view", id: "view-events", role: "tabpanel", "aria-labelledby": "tab-events", tabindex: "0" });
     this.views = { text: ["Scenario", this.text], now: ["Now", this.now], events: ["Events", this.list] };
     this.tabs = Object.entries(this.views).map(([id, [name]]) => this.#tab(id, name));
     const bar = el("div", { role: "tablist", class: "tabs", "aria-label": "Details" }, ...this.tabs);
