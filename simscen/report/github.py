@@ -8,9 +8,10 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.finding_text import tightest_margin
 from simscen.report.comparison import as_markdown
+from simscen.report.console import text_reporter
 from simscen.report.display_text import one_line, relative_to_checkout
 from simscen.report.results_json import relative
-from simscen.report.text_reporters import Reporter, text_reporter
+from simscen.report.text_reporters import Reporter
 from simscen.report.violations import error_summary, excuse_text, reported_violations, scenario_file, short_run_name
 
 MAX_PICTURES = 10

@@ -1,8 +1,7 @@
 """A session as it is told to people, event by event; its end says once more what matters most."""
 
-import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Protocol, TextIO
 
@@ -32,7 +31,6 @@ from simscen.report.styled_line import (
     StyledText,
     TerminalStyle,
     can_encode,
-    detect_style,
     plain_text,
     wrap_line,
 )
@@ -146,20 +144,3 @@ class PlainReporter:
     def _print(self, line: StyledLine) -> None:
         text = escape_ci_commands(plain_text(line))
         self._out.write(f"{ascii_only(text) if self._ascii else text}\n")
-
-
-def text_reporter(
-    out: TextIO, live: bool | None = None, slow: int | None = None, environ: Mapping[str, str] = os.environ
-) -> Reporter:
-    """For people: live on a terminal, plain lines elsewhere, in color where that is wanted.
-
-    `live` overrides what `out` says it is. `slow` is how many of the slowest runs to list in the end; 0 = all.
-    """
-    look = detect_style(out, environ)
-    if live is not None:
-        look = TerminalStyle(live or look.color, live, look.terminal)
-    if not look.live and not look.color:
-        return PlainReporter(out, look, slow)
-    from simscen.report.live_console import ColorReporter, LiveReporter  # rich, which lists and pipes need not wait for
-
-    return LiveReporter(out, look, slow) if look.live else ColorReporter(out, look, slow)
