@@ -11,8 +11,7 @@ import numpy as np
 from simscen.core.geometry import Pose3
 from simscen.core.messages.sensor_data import Image, Imu, Reading, Scan
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
-from simscen.faults.common import inapplicable_key
-from simscen.faults.range_readings import ranges_with_scan_errors
+from simscen.faults.common import inapplicable_key, ranges_with_scan_errors
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Length
 

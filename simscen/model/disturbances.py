@@ -6,12 +6,12 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from simscen.actions.action import AnyAction
-from simscen.faults.fault import AnyFault
+from simscen.actions.registry import AnyAction
+from simscen.faults.registry import AnyFault
 from simscen.spec.base import Spec
 from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration
-from simscen.triggers.trigger import Trigger
+from simscen.triggers.registry import Trigger
 
 
 def _one_or_several(value: Any) -> str:

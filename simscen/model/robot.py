@@ -273,7 +273,7 @@ class InertialUnit(SensorSpec):
 class Bumper(SensorSpec):
     """Pressed while the base touches something."""
 
-    component: ClassVar[str] = "simscen.sensors.bumper:BumperSensor"
+    component: ClassVar[str] = "simscen.sensors.camera_and_bumper:BumperSensor"
     says: ClassVar[str] = "Bump"
 
     rate: Frequency = 40.0
@@ -283,7 +283,7 @@ class Bumper(SensorSpec):
 class Camera(SensorSpec):
     """A color and depth camera."""
 
-    component: ClassVar[str] = "simscen.sensors.camera:CameraSensor"
+    component: ClassVar[str] = "simscen.sensors.camera_and_bumper:CameraSensor"
     says: ClassVar[str] = "Image"
 
     rate: Frequency = 5.0

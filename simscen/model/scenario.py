@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from simscen.criteria.plugin_metric import AnyMeasure
     from simscen.model.disturbances import EventEntry, FaultEntry, Step
     from simscen.model.variations import Variations
-    from simscen.triggers.trigger import Trigger
+    from simscen.triggers.registry import Trigger
 else:
     AnyMeasure = Annotated[Spec, LazySpec("simscen.criteria.plugin_metric", "AnyMeasure")]
     EventEntry = Annotated[Spec, LazySpec("simscen.model.disturbances", "EventEntry")]

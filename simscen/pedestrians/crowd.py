@@ -10,8 +10,7 @@ import numpy.typing as npt
 from simscen.core.environment.world_model import PedestrianAction, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2
 from simscen.pedestrians import forces
-from simscen.pedestrians.forces import RELAXATION_TIME, Numbers
-from simscen.pedestrians.move_limits import MoveLimits, clip_moves, move_limits
+from simscen.pedestrians.forces import RELAXATION_TIME, MoveLimits, Numbers, clip_moves, move_limits
 from simscen.pedestrians.pedestrian import SCARED_FORCE, THREATENING_SPEED, Intent, Pedestrian
 from simscen.pedestrians.surroundings import REACH, Near, ObservedRobot, Surroundings, Walls, edges, nearest_on
 

@@ -28,7 +28,7 @@ from simscen.run.robot_interface import (
     sensor_latencies,
     with_robot_latency,
 )
-from simscen.sensors.build import build_sensors
+from simscen.sensors.factory import build_sensors
 from simscen.sensors.sensor import Sensor
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Placed, Simulation

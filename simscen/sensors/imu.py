@@ -5,7 +5,7 @@ import math
 from simscen.core.geometry import rotated
 from simscen.core.messages.sensor_data import Imu
 from simscen.model.robot import InertialUnit
-from simscen.sensors.normals import Normals
+from simscen.sensors.normals import NormalStream
 from simscen.sensors.sensor import SensorSetting, Vector
 
 GRAVITY = 9.81
@@ -25,7 +25,7 @@ class ImuSensor:
         self._gyro, self._force = spec.gyro_noise, spec.accelerometer_noise
         self._seconds, self._view = setting.seconds, setting.view
         self._bias: list[float] = setting.chance.normal(0.0, spec.gyro_bias, 3).tolist()
-        self._normals = Normals(setting.chance)
+        self._normals = NormalStream(setting.chance)
         self._velocity, _ = self._view.base_velocity()
         self._position = self._view.base_pose()[:3]
 

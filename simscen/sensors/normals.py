@@ -5,7 +5,7 @@ import numpy as np
 AT_ONCE = 384
 
 
-class Normals:
+class NormalStream:
     """Standard normal numbers of a stream that nobody else draws from: those that single draws would give."""
 
     def __init__(self, chance: np.random.Generator) -> None:

@@ -1,14 +1,14 @@
-"""Wheel odometry: encoder increments added up along arcs, with errors that grow like a random walk."""
+"""Wheel odometry: encoder increments integrated along arcs, with random-walk errors."""
 
 import math
+from collections.abc import Callable
 from operator import sub
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Odometry
-from simscen.model.robot import WheelOdometry
-from simscen.sensors.kinematics import kinematics_of
-from simscen.sensors.normals import Normals
+from simscen.model.robot import Drive, Mecanum, Omnidirectional, SkidSteer, WheelOdometry
+from simscen.sensors.normals import NormalStream
 from simscen.sensors.sensor import SensorSetting
 
 _made = tuple.__new__  # poses and twists without the calls of their classes
@@ -26,7 +26,7 @@ class WheelOdometrySensor:
         self._seconds, self._view = setting.seconds, setting.view
         # Standard deviation along the way, and variances of the heading, after one meter or radian.
         self._spread, self._twist, self._drift = spec.translation_noise, spec.rotation_noise**2, spec.drift_noise**2
-        self._normals = Normals(setting.chance)
+        self._normals = NormalStream(setting.chance)
         self._motion = kinematics_of(setting.drive)
         self._rolled = self._view.encoders()
         self._pose = Pose2(0.0, 0.0, 0.0)
@@ -59,3 +59,41 @@ def along_arc(step: Twist) -> Pose2:
         return _made(Pose2, (vx, vy, turn))
     sine, cosine = math.sin(turn) / turn, (1 - math.cos(turn)) / turn
     return _made(Pose2, (vx * sine - vy * cosine, vx * cosine + vy * sine, turn))
+
+
+Rolled = tuple[float, ...]
+Kinematics = Callable[[Rolled], Twist]
+
+
+def kinematics_of(drive: Drive) -> Kinematics:
+    """Turns an increment of `SensorView.encoders` into a motion of the base in its own frame (m, m, rad).
+
+    Siegwart, Nourbakhsh and Scaramuzza, Introduction to Autonomous Mobile Robots, section 3.2; mecanum wheels: see
+    MecanumWheels.
+    """
+    if isinstance(drive, Omnidirectional):
+        return _omnidirectional
+    if isinstance(drive, Mecanum):
+        return _mecanum(drive)
+    separation = drive.wheel_separation * (drive.turning_scale if isinstance(drive, SkidSteer) else 1.0)
+    return _sided(drive.wheel_radius, separation)
+
+
+def _sided(radius: float, separation: float) -> Kinematics:
+    def motion(rolled: Rolled) -> Twist:
+        left, right = rolled[0] * radius, rolled[1] * radius
+        return _made(Twist, ((left + right) / 2, 0.0, (right - left) / separation))
+
+    return motion
+
+
+def _mecanum(drive: Mecanum) -> Kinematics:
+    def motion(rolled: Rolled) -> Twist:
+        front_left, front_right, rear_left, rear_right = rolled
+        return drive.wheels.motion((front_left, front_right, rear_left, rear_right))
+
+    return motion
+
+
+def _omnidirectional(rolled: Rolled) -> Twist:
+    return Twist(*rolled)

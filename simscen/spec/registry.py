@@ -59,14 +59,14 @@ GROUPS: dict[str, Group] = {
         "simscen.criteria.base:Criterion", "simscen.criteria.registry:AnyCriterion", ("id", "severity", "then")
     ),
     "fault": Group(
-        "simscen.faults.base:Fault", "simscen.faults.fault:AnyFault", ("sensor", "when", "for", "name", "required")
+        "simscen.faults.base:Fault", "simscen.faults.registry:AnyFault", ("sensor", "when", "for", "name", "required")
     ),
     "trigger": Group(
         "simscen.triggers.base:Condition",
-        "simscen.triggers.trigger:Test",
+        "simscen.triggers.registry:Test",
         ("for", "robot", "edge", "delay", "times", "probability", "all", "any", "not"),
     ),
-    "action": Group("simscen.actions.base:Action", "simscen.actions.action:AnyAction", ("robot",)),
+    "action": Group("simscen.actions.base:Action", "simscen.actions.registry:AnyAction", ("robot",)),
     "sensor": Group("simscen.model.robot:SensorSpec", "simscen.model.robot:Sensor"),
     "metric": Group("simscen.criteria.plugin_metric:Measure", "simscen.judge.metrics.catalog:ADDRESSES", ("metrics",)),
 }

@@ -15,7 +15,7 @@ from simscen.core.geometry.shapes import Box, Solid
 from simscen.core.messages.sensor_data import Bump, Image, Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.model.robot import RobotSpec
-from simscen.sensors.build import build_sensors
+from simscen.sensors.factory import build_sensors
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.single_robot import SingleRobotSimulation
 from simscen.worlds.geometry.triangulation import fuse, triangulate

@@ -6,15 +6,15 @@ from collections.abc import Iterator
 import pytest
 import yaml
 
-from simscen.actions.action import AnyAction
+from simscen.actions.registry import AnyAction
 from simscen.criteria.registry import AnyCriterion
-from simscen.faults.fault import AnyFault
+from simscen.faults.registry import AnyFault
 from simscen.model.robot import Bumper, Camera, InertialUnit, Lidar, WheelOdometry
 from simscen.spec.choice import Choice
 from simscen.spec.lazy import annotation_of
 from simscen.testing import Promise, promises_of
 from simscen.testing.subjects import named
-from simscen.triggers.trigger import Trigger
+from simscen.triggers.registry import Trigger
 
 
 def examples(choice: type[Choice], below: str = "", skipped: tuple[str, ...] = ()) -> Iterator[Promise]:

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from simscen.actions.action import AnyAction
+from simscen.actions.registry import AnyAction
 from simscen.criteria.registry import AnyCriterion
-from simscen.faults.fault import AnyFault
-from simscen.triggers.trigger import Trigger
+from simscen.faults.registry import AnyFault
+from simscen.triggers.registry import Trigger
 
 GUIDE = (Path(__file__).parents[2] / "docs" / "guides" / "words.md").read_text(encoding="utf-8")
 PARTS = dict(re.findall(r"^## ([^\n]+)\n(.*?)(?=^## |\Z)", GUIDE, re.MULTILINE | re.DOTALL))

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simscen.actions.action import AnyAction
+from simscen.actions.registry import AnyAction
 from simscen.core.records.events import KIND_BY_INSTANCE, MAP, EventKind
 from simscen.core.records.trace import Moment
-from simscen.faults.fault import AnyFault
+from simscen.faults.registry import AnyFault
 from simscen.loading.checks.faults import instances, unfit_faults, unknown_sensors
 from simscen.loading.checks.registry import NameScope
 from simscen.loading.scenario import load_scenario

@@ -11,9 +11,9 @@ from pydantic import BaseModel, RootModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from simscen.actions.action import AnyAction
+from simscen.actions.registry import AnyAction
 from simscen.criteria.registry import AnyCriterion
-from simscen.faults.fault import AnyFault
+from simscen.faults.registry import AnyFault
 from simscen.model import (
     anystack,
     checkers,
@@ -46,7 +46,7 @@ from simscen.spec.named_places import OrPlace, PlaceAlone
 from simscen.spec.places import PoseSpec
 from simscen.spec.quantities import UNITS, Quantity
 from simscen.spec.speedmask import SpeedMask
-from simscen.triggers.trigger import Test, Trigger
+from simscen.triggers.registry import Test, Trigger
 
 _EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
 OPTIONAL = "–"

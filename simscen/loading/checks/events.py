@@ -12,7 +12,7 @@ from simscen.loading.known_names import own_goal_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.disturbances import Step
 from simscen.model.stack import StackSpec
-from simscen.triggers.trigger import Test, Trigger
+from simscen.triggers.registry import Test, Trigger
 
 Reason = tuple[Keys, str]
 """Keys of what keeps a trigger from firing, and the reason as words after "can never happen: "."""

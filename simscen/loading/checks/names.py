@@ -8,7 +8,7 @@ from simscen.loading.checks.registry import NAMES, Finding, Keys, NameScope
 from simscen.loading.known_names import NOUNS, event_names, known_names, own_goal_names, world_object_names
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import Reference, references, walk
-from simscen.triggers.trigger import Test
+from simscen.triggers.registry import Test
 
 RENAME_HINT = "rename one of them"
 

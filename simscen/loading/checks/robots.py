@@ -2,15 +2,15 @@
 
 from collections.abc import Container, Iterator
 
-from simscen.actions.action import AnyAction
 from simscen.actions.base import Action
+from simscen.actions.registry import AnyAction
 from simscen.criteria.registry import verdict_names
 from simscen.loading.checks.registry import ROBOT_NAMES, Finding, Keys, WrittenScenario
 from simscen.loading.multirobot import ROBOTS
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import walk
 from simscen.triggers.base import Condition
-from simscen.triggers.trigger import Test
+from simscen.triggers.registry import Test
 
 
 @ROBOT_NAMES.check("SC030")

@@ -24,7 +24,7 @@ from simscen.loading.yaml.tree import (
     value_position,
 )
 from simscen.spec.choice import Choice
-from simscen.triggers.trigger import Test, Trigger
+from simscen.triggers.registry import Test, Trigger
 
 Model = TypeVar("Model", bound=BaseModel)
 LANGUAGE_VERSION = 1

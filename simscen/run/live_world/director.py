@@ -11,8 +11,8 @@ from simscen.model.disturbances import FaultEntry, Step
 from simscen.run.faults.injector import FaultInjector
 from simscen.run.live_world.random_streams import stream_names
 from simscen.run.live_world.stage import LiveStage
-from simscen.triggers.time import Time
-from simscen.triggers.trigger import Test, Trigger
+from simscen.triggers.registry import Test, Trigger
+from simscen.triggers.timing import Time
 
 _AT_ONCE = Trigger(time=Time(0.0))
 

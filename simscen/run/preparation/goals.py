@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from simscen.actions.goals import NewGoal
+from simscen.actions.robot import NewGoal
 from simscen.core.messages.goal_names import loop_goal_name
 from simscen.core.messages.navigation import Goal
 from simscen.model.navigation import failure_of

@@ -78,7 +78,7 @@ def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
     entry = loaded.spec.own
     if entry.payload is None and entry.motor_torque == 1.0:
         return body
-    from simscen.sim.body.payload import add_payload, center, hull_height, is_stable, scale_motor_torque
+    from simscen.sim.body.robot_body import add_payload, center, hull_height, is_stable, scale_motor_torque
 
     body = scale_motor_torque(body, entry.motor_torque)
     if entry.payload is not None:

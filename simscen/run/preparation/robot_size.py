@@ -9,8 +9,7 @@ from simscen.core.geometry.shapes import Solid
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.robot import RobotSpec
 from simscen.run.preparation.loaders import load_robot
-from simscen.sim.body.checks import check_ground_clearance
-from simscen.sim.body.robot_body import RobotBody
+from simscen.sim.body.robot_body import RobotBody, check_ground_clearance
 from simscen.worlds.geometry.prisms import is_flat
 
 CIRCLE_CORNERS = 24

@@ -29,7 +29,7 @@ from simscen.run.preparation.robot_size import blocking_solids, inscribed_radius
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.single_robot import NAMELESS
 from simscen.spec.registry import Entry
-from simscen.triggers.clearance_below import ClearanceBelow
+from simscen.triggers.position import ClearanceBelow
 from simscen.worlds.build import build
 from simscen.worlds.geometry.triangulation import fuse
 from simscen.worlds.routes.shortest_paths import Leg, legs_between

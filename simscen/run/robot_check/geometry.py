@@ -11,8 +11,7 @@ from simscen.loading.loaded import LoadedRobot
 from simscen.loading.yaml.tree import value_position
 from simscen.model.robot import RobotSpec
 from simscen.run.preparation.loaders import read_mesh, robot_from_file
-from simscen.sim.body.checks import check_ground_clearance
-from simscen.sim.body.robot_body import RobotBody
+from simscen.sim.body.robot_body import RobotBody, check_ground_clearance
 from simscen.sim.body.undercarriage import Wheel
 
 DIMENSION_TOLERANCE = 0.01
@@ -24,7 +23,7 @@ def geometry_warnings(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, root
     if robot.urdf is None:
         return []
     from simscen.sim.urdf.body import read_spec_tree
-    from simscen.sim.urdf.wheel_alignment import alignment_warnings
+    from simscen.sim.urdf.wheels import alignment_warnings
     from simscen.sim.urdf.xml_source import RobotFiles
 
     tree = read_spec_tree(spec, robot.path, roots, read_mesh, RobotFiles(robot.urdf, robot.packages))

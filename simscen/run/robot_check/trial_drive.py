@@ -8,8 +8,7 @@ from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.robot import Ackermann
 from simscen.run.robot_interface import robot_model
-from simscen.sensors.kinematics import kinematics_of
-from simscen.sensors.odometry import along_arc
+from simscen.sensors.odometry import along_arc, kinematics_of
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.simulation import FIRMWARE_RATE
 from simscen.sim.single_robot import SingleRobotSimulation

@@ -5,11 +5,9 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations, product
 
 from simscen.actions.doors import CloseDoor, OpenDoor, panel_path
-from simscen.actions.kidnap import Kidnap
-from simscen.actions.move import Move
+from simscen.actions.objects import Move, Spawn, Teleport
 from simscen.actions.pedestrian import Pedestrian
-from simscen.actions.spawn import Spawn
-from simscen.actions.teleport import Teleport
+from simscen.actions.robot import Kidnap
 from simscen.core.environment.world_model import Polygon
 from simscen.core.errors import Problem
 from simscen.core.geometry import Pose2, Pose3
@@ -21,8 +19,8 @@ from simscen.loading.yaml.tree import MappingNode
 from simscen.run.worldchecks.scene import SILL_M, START, TOUCH_M, WORLD, Scene, expects_start_failure
 from simscen.sim.body.outline import radius_and_height
 from simscen.spec.motions import Motion
-from simscen.triggers.time import Time
-from simscen.triggers.trigger import Trigger
+from simscen.triggers.registry import Trigger
+from simscen.triggers.timing import Time
 from simscen.worlds.geometry.overlaps import first_blocking, placed, polygons_overlap
 from simscen.worlds.geometry.prisms import upright_prism
 

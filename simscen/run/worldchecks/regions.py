@@ -18,9 +18,8 @@ from simscen.loading.checks.registry import Finding, Keys
 from simscen.run.caching.world_cache import bounds_with
 from simscen.run.worldchecks.placement import blocked_poses
 from simscen.run.worldchecks.scene import START, WORLD, Scene
-from simscen.triggers.robot_in import RobotIn
-from simscen.triggers.robot_within import RobotWithin
-from simscen.triggers.trigger import Test
+from simscen.triggers.position import RobotIn, RobotWithin
+from simscen.triggers.registry import Test
 from simscen.worlds.geometry.overlaps import placed, polygons_overlap
 from simscen.worlds.routes.simple_paths import SimplePaths, simple_paths_between
 

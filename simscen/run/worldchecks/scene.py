@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import BaseModel
 
-from simscen.actions.kidnap import Kidnap
+from simscen.actions.robot import Kidnap
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import Polygon, World
 from simscen.core.geometry import Pose2

@@ -6,9 +6,8 @@ from pathlib import Path
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Solid
 from simscen.model.robot import RobotSpec
-from simscen.sim.body.checks import check_ground_clearance, check_robot_size
 from simscen.sim.body.inertia import MassProperties, inertia_of_solids
-from simscen.sim.body.robot_body import RobotBody, assemble
+from simscen.sim.body.robot_body import RobotBody, assemble, check_ground_clearance, check_robot_size
 from simscen.sim.body.undercarriage import wheels_for_drive
 from simscen.sim.urdf.body import body_from_urdf
 from simscen.sim.urdf.elements import MeshReader

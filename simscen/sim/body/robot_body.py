@@ -1,14 +1,19 @@
-"""A robot made ready for physics: one rigid hull, wheels where its drive needs them. Needs no engine."""
+"""Rigid-body model of a robot, independent of the physics engine: hull, wheels, masses, and limits."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
 
 from simscen.core.environment.world_model import Polygon
+from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
+from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Solid, Sphere
-from simscen.model.robot import Drive, Limits, RobotSpec
-from simscen.sim.body.inertia import MassProperties
-from simscen.sim.body.outline import circle, footprint
+from simscen.model.robot import Drive, Limits, Omnidirectional, RobotSpec
+from simscen.sim.body.inertia import MassProperties, combine
+from simscen.sim.body.outline import circle, convex_hull, footprint, hull_points, radius_and_height
 from simscen.sim.body.undercarriage import Wheel, add_casters, add_motors, wheel_guards
 
 
@@ -73,3 +78,66 @@ def _anticlockwise(polygon: Polygon) -> Polygon:
     ends = (*polygon[1:], polygon[0])
     area = sum(ax * by - bx * ay for (ax, ay), (bx, by) in zip(polygon, ends, strict=True))
     return polygon if area > 0 else polygon[::-1]
+
+
+Vector = tuple[float, float, float]
+
+
+def add_payload(body: RobotBody, mass: float, at: Vector) -> RobotBody:
+    """The robot with a load of `mass` kg in one point `at` in its base frame; its motors stay as they are."""
+    load = MassProperties(mass, np.array(at), np.zeros((3, 3)))
+    return replace(body, chassis=combine([body.chassis, load]))
+
+
+def scale_motor_torque(body: RobotBody, share: float) -> RobotBody:
+    """The robot with a share of the torque of its motors."""
+    wheels = tuple(replace(wheel, torque=share * wheel.torque) for wheel in body.wheels)
+    return replace(body, wheels=wheels, power=share * body.power)
+
+
+def hull_height(body: RobotBody) -> float:
+    """How high the hull is, in m."""
+    return max(float(solid.pose.apply(hull_points(solid.shape))[:, 2].max()) for solid in body.hull)
+
+
+def center(body: RobotBody) -> Vector:
+    """The center of mass of the whole robot in its base frame."""
+    wheels = [wheel.inertia.mass * np.array((wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
+    x, y, z = (np.sum([body.chassis.mass * body.chassis.center, *wheels], axis=0) / body.mass).tolist()
+    return x, y, z
+
+
+def is_stable(body: RobotBody) -> bool:
+    """Whether its center of mass is above what its wheels and casters span; a base without wheels never tips."""
+    feet = [(wheel.x, wheel.y) for wheel in body.wheels] + [(c.pose.x, c.pose.y) for c in body.casters]
+    x, y, _ = center(body)
+    return len(feet) < 3 or body.drive.type == "mecanum" or polygon_contains(convex_hull(np.array(feet)), (x, y))
+
+
+GROUND_CLEARANCE = 0.005
+"""m that a hull must be above the ground."""
+
+
+def check_ground_clearance(spec: RobotSpec, file: Path | None) -> None:
+    """Raises InvalidInput for a robot on wheels with a part of its `body` on the ground."""
+    on_wheels = not isinstance(spec.drive, Omnidirectional)
+    if on_wheels and any(part.z < GROUND_CLEARANCE for part in spec.body or ()):
+        message = f"a part of the body of {spec.name!r} reaches the ground: it would drag instead of roll"
+        hint = f"give each part a `z` of at least {GROUND_CLEARANCE:g} m"
+        raise InvalidInput([Problem(str(file or spec.name), 0, 0, "SC401", message, hint)])
+
+
+# A larger robot would make maps and footprints of the stack exhaust memory and time.
+FARTHEST = 10.0
+"""m from the base, across and in height; the largest vehicles in ports are 15 m long."""
+
+
+def check_robot_size(body: RobotBody, file: Path | None) -> None:
+    """Raises InvalidInput for a robot that extends farther than FARTHEST from its base frame."""
+    across, up = radius_and_height(body.solid)
+    wheels = max((math.hypot(wheel.x, wheel.y) + wheel.radius for wheel in body.wheels), default=0.0)
+    farthest = max(across, up, wheels, body.circumscribed_radius)
+    if farthest > FARTHEST:
+        message = f"robot {body.name!r} reaches {farthest:.4g} m from its base, more than {FARTHEST:g} m"
+        hint = "are lengths in millimeters? they are in meters here"
+        raise InvalidInput([Problem(str(file or body.name), 0, 0, "SC402", message, hint)])

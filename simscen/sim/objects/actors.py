@@ -22,13 +22,11 @@ from simscen.sim.body.inertia import inertia_of_solids
 from simscen.sim.body.outline import radius_and_height
 from simscen.sim.bullet import engine
 from simscen.sim.bullet.divergence import divergence_reason
-from simscen.sim.contact.winding_number import encloses
-from simscen.sim.objects.actor import FALLING, Actor, Vector
+from simscen.sim.contact.static_distance import encloses
+from simscen.sim.objects.actor import FALLING, Actor, ScheduledPoses, Vector
 from simscen.sim.objects.broad_phase import BroadPhase
-from simscen.sim.objects.deferred import DeferredActors, ProximityQuery
-from simscen.sim.objects.nearby import NearbyActors, find_nearby
+from simscen.sim.objects.proximity import DeferredActors, NearbyActors, ProximityQuery, find_nearby
 from simscen.sim.objects.rest import RestDetector, RestPoses
-from simscen.sim.objects.scheduled_poses import ScheduledPoses
 
 FRICTION = 0.6
 """Of pushable things on the ground: about that of wood or cardboard on concrete."""

@@ -18,13 +18,12 @@ from simscen.sim.bullet.divergence import divergence_reason
 from simscen.sim.contact.clearance import Clearance
 from simscen.sim.contact.collisions import BaseMotion, CollisionTracker, PreStepMotion, contact_points, enclosed_contact
 from simscen.sim.objects.actors import NEVER, Actors
-from simscen.sim.objects.deferred import REQUERY_DISTANCE_M, ProximityQuery
+from simscen.sim.objects.proximity import REQUERY_DISTANCE_M, ProximityQuery
 from simscen.sim.robots.drive_factory import build_drive
 from simscen.sim.robots.robot_state import CachedState, RobotState
 from simscen.sim.robots.truth_samples import TruthSampler
 from simscen.sim.scene.camera import RenderScene, render_image
-from simscen.sim.scene.floor_friction import FloorFriction
-from simscen.sim.scene.terrain import Terrain, is_ground_contact
+from simscen.sim.scene.terrain import FloorFriction, Terrain, is_ground_contact
 from simscen.sim.scene.walls import Walls
 
 Vector = tuple[float, float, float]

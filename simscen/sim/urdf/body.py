@@ -11,10 +11,9 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Solid
 from simscen.model.robot import Mecanum, Omnidirectional, RobotSpec
-from simscen.sim.body.checks import GROUND_CLEARANCE
 from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.outline import hull_points
-from simscen.sim.body.robot_body import RobotBody, assemble
+from simscen.sim.body.robot_body import GROUND_CLEARANCE, RobotBody, assemble
 from simscen.sim.body.undercarriage import Wheel, wheel_inertia
 from simscen.sim.urdf.elements import MeshReader, MeshSource
 from simscen.sim.urdf.tree import Tree, build_tree

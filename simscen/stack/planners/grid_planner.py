@@ -4,6 +4,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
+from simscen.grid_graph import EIGHT_NEIGHBORS, SIXTEEN_NEIGHBORS, GridGraph
 from simscen.model.planners import Navfn, Smac2d
 from simscen.stack.planners.corners import around_corners
 from simscen.stack.planners.ends import Ends, find_ends
@@ -13,7 +14,6 @@ from simscen.stack.planners.rates import MAX_NON_OBSTACLE, Rates
 from simscen.stack.planners.tube import smoothed
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
-from simscen.ways.lattice import KING, MOVES, Lattice
 
 COST_FACTOR, COST_NEUTRAL = 0.8, 50
 """nav2_navfn_planner/navfn.hpp: a cell costs 50 + 0.8 times its cost."""
@@ -24,13 +24,18 @@ BORDER = 2
 def navfn(spec: Navfn, setting: Setting) -> Planner:
     """Moves in 16 directions, in place of the descent along navfn's potential."""
     multiplier = COST_FACTOR * MAX_NON_OBSTACLE / COST_NEUTRAL
-    return GridPlanner(spec.tolerance, multiplier, spec.allow_unknown, MOVES, True, setting.robot)
+    return GridPlanner(spec.tolerance, multiplier, spec.allow_unknown, SIXTEEN_NEIGHBORS, True, setting.robot)
 
 
 def smac_2d(spec: Smac2d, setting: Setting) -> Planner:
     """Moves to the eight neighbors, as SmacPlanner2D's Moore neighborhood."""
     return GridPlanner(
-        spec.tolerance, spec.cost_travel_multiplier, spec.allow_unknown, KING, spec.smooth_path, setting.robot
+        spec.tolerance,
+        spec.cost_travel_multiplier,
+        spec.allow_unknown,
+        EIGHT_NEIGHBORS,
+        spec.smooth_path,
+        setting.robot,
     )
 
 
@@ -70,7 +75,7 @@ class GridPlanner:
 
     def _over(self, rates: Rates, ends: Ends) -> Array:
         """The middles (n, 2) of the cells of the cheapest way."""
-        lattice = Lattice(np.pad(ends.reachable, BORDER), self._moves, np.pad(rates.rates, BORDER))
+        lattice = GridGraph(np.pad(ends.reachable, BORDER), self._moves, np.pad(rates.rates, BORDER))
         first, last = (
             tuple(int((point[axis] - rates.origin[axis]) / rates.resolution) + BORDER for axis in (1, 0))
             for point in (ends.start, ends.goal)

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
+from simscen.grid_graph import resample_polyline
 from simscen.stack.planners.rates import STEP, Rates
-from simscen.ways.polyline import resampled
 
 ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
 """Meters between stations, meters to either side, points across."""
@@ -30,7 +30,9 @@ def eased(rates: Rates, points: Array) -> Array:
     cost = rates.along(points)
     for station, side, across in ROUNDS:
         for stride in (rates.stride, STEP * rates.resolution):
-            other = _through(rates, resampled(points, station, LEAST_LEGS), np.linspace(-side, side, across), stride)
+            other = _through(
+                rates, resample_polyline(points, station, LEAST_LEGS), np.linspace(-side, side, across), stride
+            )
             if math.isfinite(moved := rates.along(other)):
                 break
         if moved < cost:
@@ -40,7 +42,7 @@ def eased(rates: Rates, points: Array) -> Array:
 
 def _cut_short(rates: Rates, points: Array) -> Array:
     """From each kept point straight on to the farthest that it costs no more to go straight to, found by doubling."""
-    places = resampled(points, ROUNDS[0][0], LEAST_LEGS)
+    places = resample_polyline(points, ROUNDS[0][0], LEAST_LEGS)
     rows = places.tolist()
     cost = [0.0]
     for (ax, ay), (bx, by) in pairwise(rows):

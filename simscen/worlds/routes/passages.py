@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.records.case import Passage, Point
-from simscen.ways.polyline import resampled
+from simscen.grid_graph import resample_polyline
 from simscen.worlds.routes.clearance import ClearanceField
 from simscen.worlds.routes.path_tightening import length
 
@@ -28,7 +28,7 @@ def passages(way: Array, goal: str, field: ClearanceField) -> tuple[Passage, ...
     """The passages of a way (n, 2) to `goal`, in its direction; widths are exact to some 2 cm."""
     if field.outline is None:
         return ()
-    points = resampled(way, max(SPACING, length(way) / MOST))
+    points = resample_polyline(way, max(SPACING, length(way) / MOST))
     found: dict[tuple[int, int], float] = {}
     for point in points:
         places = ((pair, _crossed(field.outline.data[list(pair)], points)) for pair in _pairs(point, field))

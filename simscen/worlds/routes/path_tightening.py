@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.ways.polyline import resampled
+from simscen.grid_graph import resample_polyline
 from simscen.worlds.routes.clearance import ClearanceField
 
 SETTLED = 0.001
@@ -24,7 +24,7 @@ def tighten(way: Array, field: ClearanceField, radius: float) -> Array:
     allowed = radius - 0.1 * field.grid.resolution
     for _ in range(MOST_ROUNDS):
         before = length(way)
-        way = _slide(resampled(_straighten(way, field, allowed), field.grid.resolution), field, radius)
+        way = _slide(resample_polyline(_straighten(way, field, allowed), field.grid.resolution), field, radius)
         if length(way) > (1 - SETTLED) * before:
             break
     return _straighten(way, field, allowed)

@@ -13,7 +13,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.navigation import Goal
 from simscen.core.records.case import Passage
-from simscen.ways.lattice import Lattice, Numbers
+from simscen.grid_graph import CellIndices, GridGraph
 from simscen.worlds.maps.occupancy_map import empty_grid
 from simscen.worlds.routes.clearance import HALF_DIAGONAL, clearance_field
 from simscen.worlds.routes.narrow_gaps import narrowest_gap_in
@@ -116,16 +116,16 @@ class ShortestPaths:
         return any(arrived(Pose2(x, y)) <= slack for x, y in grid.center_of(cells).tolist())
 
     @cached_property
-    def _bold_lattice(self) -> Lattice:
+    def _bold_lattice(self) -> GridGraph:
         """Every cell that the disc may pass, if not over its middle: no gap is missed, some are too narrow."""
-        return Lattice(self._field.free_cells(self._radius - HALF_DIAGONAL * self._field.grid.resolution))
+        return GridGraph(self._field.free_cells(self._radius - HALF_DIAGONAL * self._field.grid.resolution))
 
     @cached_property
-    def _strict_lattice(self) -> Lattice:
+    def _strict_lattice(self) -> GridGraph:
         """The cells over whose middle the disc may pass: gaps less than a cell wider than the disc may be missed."""
-        return Lattice(self._field.free_cells(self._radius))
+        return GridGraph(self._field.free_cells(self._radius))
 
-    def _over(self, lattice: Lattice, ends: Array) -> Array | None:
+    def _over(self, lattice: GridGraph, ends: Array) -> Array | None:
         first, last = (self._free_cell(lattice, end) for end in ends)
         cells = lattice.way(first, last) if first and last else None
         if cells is None:
@@ -136,11 +136,11 @@ class ShortestPaths:
     def _is_clear(self, way: Array) -> bool:
         return all(is_clear(a, b, self._field, self._allowed) for a, b in pairwise(way))
 
-    def _free_cell(self, lattice: Lattice, point: Array) -> tuple[int, int] | None:
+    def _free_cell(self, lattice: GridGraph, point: Array) -> tuple[int, int] | None:
         """The free cell nearest to a point, which may itself lie in a cell whose middle is too near a wall."""
         grid = self._field.grid
         around = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3), indexing="ij"), axis=-1).reshape(-1, 2)
-        cells: Numbers = grid.cell_of(point[None]) + around
+        cells: CellIndices = grid.cell_of(point[None]) + around
         cells = cells[grid.inside(cells)]
         cells = cells[lattice.is_free(cells)]
         if not len(cells):

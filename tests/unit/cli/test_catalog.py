@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from simscen.actions.action import AnyAction
+from simscen.actions.registry import AnyAction
 from simscen.cli.catalog.topics import Topic, fields_of, kind_of, topics
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.yaml.parser import parse_yaml
@@ -22,7 +22,7 @@ from simscen.model.stackbase import GoalTolerances
 from simscen.spec import registry
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Probability
-from simscen.triggers import trigger
+from simscen.triggers import registry as trigger_registry
 
 TOPICS = topics()
 WORDS = [topic for topic in TOPICS if topic.group in ("trigger", "action", "fault", "criterion") and topic.model]
@@ -57,7 +57,7 @@ def test_every_key_of_a_word_is_described(topic: Topic) -> None:
 def test_every_word_has_an_example_that_is_valid_and_about_it(topic: Topic) -> None:
     example = plain(topic.example)
     models: dict[str, tuple[type[BaseModel], str | None]] = {
-        "trigger": (trigger.Trigger, "when"),
+        "trigger": (trigger_registry.Trigger, "when"),
         "action": (AnyAction, "do"),
         "fault": (FaultEntry, None),
         "criterion": (AnyCriterion, None),
@@ -89,9 +89,9 @@ def test_defaults_are_told_and_what_is_required_has_none() -> None:
 
 
 def test_modifiers_are_listed_apart_from_the_choices() -> None:
-    assert {"edge", "delay", "times", "probability"} <= {field.key for field in fields_of(trigger.Trigger)}
-    assert {field.key for field in fields_of(trigger.Trigger)}.isdisjoint(trigger.Trigger.choices())
-    assert {topic.name for topic in TOPICS if topic.group == "trigger"} == {*trigger.Test.choices(), "when"}
+    assert {"edge", "delay", "times", "probability"} <= {field.key for field in fields_of(trigger_registry.Trigger)}
+    assert {field.key for field in fields_of(trigger_registry.Trigger)}.isdisjoint(trigger_registry.Trigger.choices())
+    assert {topic.name for topic in TOPICS if topic.group == "trigger"} == {*trigger_registry.Test.choices(), "when"}
 
 
 def test_every_key_of_the_language_says_what_it_means() -> None:

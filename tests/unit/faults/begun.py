@@ -10,7 +10,7 @@ from simscen.core.geometry.kinematics import STOP
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Odometry, Scan
 from simscen.faults.base import FaultSetting, Instance
-from simscen.faults.fault import AnyFault
+from simscen.faults.registry import AnyFault
 
 
 class Hand:

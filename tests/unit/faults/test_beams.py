@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from begun import begun, image, scan, senseless
 
-from simscen.faults.rain import MM_PER_HOUR
+from simscen.faults.lidar_environment import MM_PER_HOUR
 from simscen.model.robot import Lidar
 
 DEG = math.pi / 180

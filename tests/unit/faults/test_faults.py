@@ -7,7 +7,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.faults.base import FaultSetting
-from simscen.faults.fault import AnyFault
+from simscen.faults.registry import AnyFault
 
 
 def begun(fault: dict, separation=0.3, seed=1):

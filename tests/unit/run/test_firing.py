@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.run.live_world.director import ConditionState, TriggerState
 from simscen.testing.puppetstage import PuppetStage
-from simscen.triggers.trigger import Trigger
+from simscen.triggers.registry import Trigger
 
 
 @dataclass

@@ -6,7 +6,7 @@ from simscen.core.clock import Clock
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.model.robot import RobotSpec
-from simscen.sensors.build import build_sensors
+from simscen.sensors.factory import build_sensors
 
 SENSORS = {
     "zed": {"camera": {"rate": 5.0, "width": 16, "height": 8}},

@@ -15,7 +15,7 @@ from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.core.records.events import EventKind
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.objects.actor import Actor
-from simscen.sim.objects.deferred import REQUERY_DISTANCE_M, DeferredActors, ProximityQuery
+from simscen.sim.objects.proximity import REQUERY_DISTANCE_M, DeferredActors, ProximityQuery
 from simscen.sim.simulation import Placed, Simulation
 from simscen.worlds.geometry.triangulation import fuse, triangulate
 

@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
 from simscen.sim.body.climb import compute_climb_limits
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.body.payload import add_payload, center, is_stable, scale_motor_torque
+from simscen.sim.body.robot_body import add_payload, center, is_stable, scale_motor_torque
 from simscen.worlds.geometry.ramp_wedges import wedge
 
 TICKS, GRAVITY = 240, 9.81

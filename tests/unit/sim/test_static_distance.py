@@ -12,8 +12,13 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.bullet.engine import fixed, hull_shape, tiles
-from simscen.sim.contact.static_distance import StaticDistance, max_displacement, point_to_triangles
-from simscen.sim.contact.winding_number import encloses, encloses_along_line
+from simscen.sim.contact.static_distance import (
+    StaticDistance,
+    encloses,
+    encloses_along_line,
+    max_displacement,
+    point_to_triangles,
+)
 from simscen.worlds.geometry.triangulation import fuse
 
 

@@ -5,13 +5,13 @@ from typing import Annotated
 import pytest
 from pydantic import ValidationError
 
-from simscen.actions.action import AnyAction
+from simscen.actions.registry import AnyAction
 from simscen.criteria.registry import AnyCriterion
-from simscen.faults.fault import AnyFault
+from simscen.faults.registry import AnyFault
 from simscen.model.world import Wall
 from simscen.spec.base import Spec
 from simscen.spec.lazy import LazySpec, annotation_of
-from simscen.triggers.trigger import Test as AnyTest
+from simscen.triggers.registry import Test as AnyTest
 
 
 class Site(Spec):

@@ -5,7 +5,7 @@ import pytest
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Cylinder, Solid
-from simscen.ways.polyline import resampled
+from simscen.grid_graph import resample_polyline
 from simscen.worlds.geometry.triangulation import fuse
 from simscen.worlds.maps.occupancy_map import empty_grid
 from simscen.worlds.routes.clearance import clearance_field
@@ -20,7 +20,7 @@ def test_a_wild_detour_around_a_post_becomes_the_taut_string_on_its_side():
     arc = 0.8 * (math.pi - 2 * math.acos(0.8 / 2.0))
     for side in (1, -1):
         detour = np.array([(-2.0, 0.0), (-2.5, 1.5 * side), (-1.0, 2.5 * side), (1.5, 1.4 * side), (2.0, 0.0)])
-        taut = tighten(resampled(detour, 0.05), FIELD, 0.3)
+        taut = tighten(resample_polyline(detour, 0.05), FIELD, 0.3)
         assert length(taut) == pytest.approx(tangents + arc, rel=0.005)
         assert np.all(taut[:, 1] * side > -1e-9)
 
@@ -33,7 +33,7 @@ def test_a_line_is_clear_if_all_of_it_keeps_its_distance():
 
 def test_resampling_keeps_ends_and_length():
     way = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)])
-    fine = resampled(way, 0.03)
+    fine = resample_polyline(way, 0.03)
     assert np.array_equal(fine[[0, -1]], way[[0, -1]])
     assert np.linalg.norm(np.diff(fine, axis=0), axis=1).max() <= 0.03 + 1e-12
     assert length(fine) == pytest.approx(2.0, rel=0.01)

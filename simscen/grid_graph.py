@@ -1,0 +1,104 @@
+"""Shortest paths over the cells of an occupancy grid (Dijkstra), and resampling of polylines."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array
+
+CellMask = npt.NDArray[np.bool_]
+CellIndices = npt.NDArray[np.int64]
+EIGHT_NEIGHBORS = tuple((a, b) for a in range(-1, 2) for b in range(-1, 2) if (a, b) != (0, 0))
+"""(rows, columns) to the eight neighbors: at most 8.2 % longer than the straight line."""
+SIXTEEN_NEIGHBORS = tuple((a, b) for a in range(-2, 3) for b in range(-2, 3) if math.gcd(a, b) == 1)
+"""These and a knight's move away: at most 2.8 % longer."""
+
+
+class GridGraph:
+    """The free cells of a grid and the moves between them; the outermost two rows and columns are never free.
+
+    A move costs its length in cells, times the mean of the `prices` (rows, columns) of its two ends.
+    """
+
+    def __init__(
+        self,
+        free: CellMask,
+        moves: Sequence[tuple[int, int]] = SIXTEEN_NEIGHBORS,
+        prices: npt.NDArray[np.floating] | None = None,
+    ) -> None:
+        from scipy.sparse import csr_array
+
+        inner = np.zeros_like(free)
+        inner[2:-2, 2:-2] = free[2:-2, 2:-2]
+        self._width: int = free.shape[1]
+        flat = inner.ravel()
+        self._cells = np.flatnonzero(flat)
+        self._number: npt.NDArray[np.int32] = np.full(flat.size, -1, dtype=np.int32)
+        self._number[self._cells] = np.arange(len(self._cells), dtype=np.int32)
+        possible = np.empty((len(self._cells), len(moves)), dtype=np.bool_)
+        for k, move in enumerate(moves):
+            possible[:, k] = flat[self._cells + self._step(move)]
+            for passed in _passed(move):
+                possible[:, k] &= flat[self._cells + self._step(passed)]
+        targets = self._number[self._cells[:, None] + np.array([self._step(move) for move in moves])]
+        lengths: npt.NDArray[np.floating] = np.array([math.hypot(*move) for move in moves])
+        if prices is not None:
+            price = prices.ravel()[self._cells]
+            lengths = 0.5 * (price[:, None] + price[targets]) * lengths
+        begins: npt.NDArray[np.int32] = np.zeros(len(self._cells) + 1, dtype=np.int32)
+        np.cumsum(possible.sum(axis=1), out=begins[1:])
+        data = np.broadcast_to(lengths, possible.shape)[possible]
+        self._graph = csr_array((data, targets[possible], begins), shape=(len(self._cells),) * 2)
+
+    def way(self, start: tuple[int, int], goal: tuple[int, int]) -> CellIndices | None:
+        """The cells (n, 2) of a shortest way between two free cells (row, column), ends included; None if none."""
+        from scipy.sparse.csgraph import dijkstra
+
+        first, last = self._index(start), self._index(goal)
+        if first < 0 or last < 0:
+            return None
+        lengths, before = dijkstra(self._graph, indices=np.array([first]), return_predecessors=True)
+        if not np.isfinite(lengths[0, last]):
+            return None
+        way = [last]
+        while way[-1] != first:
+            way.append(int(before[0, way[-1]]))
+        return np.column_stack(np.divmod(self._cells[way[::-1]], self._width))
+
+    def joined(self, cells: Sequence[tuple[int, int] | None]) -> CellIndices:
+        """The free cells (n, 2) that a way joins with one of `cells`."""
+        from scipy.sparse.csgraph import connected_components
+
+        _, labels = connected_components(self._graph, directed=False)
+        wanted = [labels[self._index(cell)] for cell in cells if cell is not None and self._index(cell) >= 0]
+        return np.column_stack(np.divmod(self._cells[np.isin(labels, wanted)], self._width))
+
+    def is_free(self, cells: CellIndices) -> CellMask:
+        """Which of the cells (n, 2) of the grid are free."""
+        free: CellMask = self._number[cells[:, 0] * self._width + cells[:, 1]] >= 0
+        return free
+
+    def _step(self, move: tuple[int, int]) -> int:
+        return move[0] * self._width + move[1]
+
+    def _index(self, cell: tuple[int, int]) -> int:
+        return int(self._number[self._step(cell)])
+
+
+def _passed(move: tuple[int, int]) -> list[tuple[int, int]]:
+    """The cells that a move runs between or over besides its ends."""
+    a, b = move
+    if abs(a) == 2:
+        return [(a // 2, 0), (a // 2, b)]
+    if abs(b) == 2:
+        return [(0, b // 2), (a, b // 2)]
+    return [(a, 0), (0, b)] if a and b else []
+
+
+def resample_polyline(way: Array, spacing: float, least: int = 1) -> Array:
+    """The way (n, 2) with points evenly spaced, at most `spacing` meters apart, in at least so many legs."""
+    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
+    wanted = np.linspace(0.0, along[-1], max(least, math.ceil(along[-1] / spacing)) + 1)
+    return np.column_stack((np.interp(wanted, along, way[:, 0]), np.interp(wanted, along, way[:, 1])))

@@ -1,0 +1,30 @@
+"""Camera and bumper: sensors that report what the simulation provides without noise."""
+
+from simscen.core.messages.sensor_data import Bump, Image
+from simscen.model.robot import Bumper, Camera
+from simscen.sensors.sensor import SensorSetting
+
+
+class CameraSensor:
+    """A pinhole without noise or distortion; costs milliseconds a picture, so robots have none unless asked."""
+
+    def __init__(self, spec: Camera, setting: SensorSetting) -> None:
+        self.name, self.period, self._spec, self._view = setting.name, setting.period, spec, setting.view
+        self._mount = spec.mount.pose
+
+    def read(self, tick: int) -> Image:
+        """Take a picture."""
+        spec = self._spec
+        rgb, depth = self._view.image(self._mount, spec.width, spec.height, spec.field_of_view, spec.max_range)
+        return Image(self.name, tick, rgb, depth, self._mount, spec.field_of_view)
+
+
+class BumperSensor:
+    """Pressed while the hull touches something, and for a tenth of a second after."""
+
+    def __init__(self, spec: Bumper, setting: SensorSetting) -> None:
+        self.name, self.period, self._view = setting.name, setting.period, setting.view
+
+    def read(self, tick: int) -> Bump:
+        """Whether it is pressed now."""
+        return Bump(self.name, tick, self._view.touching())
