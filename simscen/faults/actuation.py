@@ -11,19 +11,42 @@ from pydantic import Field, model_validator
 
 from simscen.core.geometry.kinematics import Twist
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
-from simscen.faults.common import OdometryDistortion, inapplicable_side, side_speeds, twist_from_sides
+from simscen.faults.common import OdometryDistortion
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, PositiveAcceleration, PositiveAngularAcceleration, PositiveSpeed, Quantity
 
 SlipRatio = Annotated[float, Field(ge=0, lt=1), Quantity("ratio")]
+GainFactor = Annotated[float, Field(ge=-10, le=10), Quantity("ratio")]
+SpeedLimit = Annotated[float, Field(ge=0, le=100), Quantity("speed")]
+TurnRateLimit = Annotated[float, Field(ge=0, le=100), Quantity("angular speed")]
+
+
+def side_speeds(motion: Twist, separation: float) -> tuple[float, float]:
+    """Return the speeds in m/s at which the left and the right wheels roll over the ground."""
+    half = separation / 2
+    return motion.vx - half * motion.wz, motion.vx + half * motion.wz
+
+
+def twist_from_sides(left: float, right: float, lateral: float, separation: float) -> Twist:
+    """Return the velocity of a base from the speeds of its left and right wheels."""
+    return Twist((left + right) / 2, lateral, (right - left) / separation)
+
+
+def inapplicable_side(target: Instance, key: str) -> tuple[str, str] | None:
+    """Return the key of a wheel side and a reason if the target has no sides."""
+    if target.kind != "Wheels":
+        return key, f"`{key}` does not apply there: a command has no sides; set it on `wheels`"
+    if target.spec is not None and not getattr(target.spec, "wheel_separation", 0.0):
+        return key, f"`{key}` does not apply there: this drive has no left and right wheels"
+    return None
 
 
 class Slip(Spec, Fault):
-    """Wheels slip: of each meter a wheel rolls, its slip ratio is lost; odometry counts it all the same.
+    """Wheels slip: a share of each meter that a wheel rolls is lost on the ground, but counted by the odometry.
 
-    The slip ratio is that of vehicle dynamics when driving, s = 1 - v / (ω r) (Wong, Theory of Ground Vehicles,
-    ch. 2). Left and right may differ; then the robot also turns without noticing. On `wheels` all odometry that counts
-    how they turn is wrong; on a sensor only that one is.
+    The slip ratio is that of vehicle dynamics for driving wheels, s = 1 - v / (ω r) (Wong, Theory of Ground Vehicles,
+    ch. 2). With different values for left and right, the robot also turns without measuring it. On `wheels`, all wheel
+    odometry is affected; on a sensor, only that one.
 
     Example: `{sensor: odom, slip: {left: 30 %, right: 10 %}, when: {time: 5 s}, for: 4 s}`
     """
@@ -31,16 +54,16 @@ class Slip(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Odometry", "Wheels"})
     idle: ClassVar[Mapping[str, object]] = {"left": 0.0, "right": 0.0}
     left: SlipRatio = 0.0
-    """Slip ratio of the wheels on the left."""
+    """Slip ratio of the left wheels."""
     right: SlipRatio = 0.0
-    """Slip ratio of the wheels on the right."""
+    """Slip ratio of the right wheels."""
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """The ground gets less than the wheels turn."""
-        return _Slipping(self, setting.separation)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Reduce the motion of the robot and increase the reported increments."""
+        return _SlippingWheels(self, setting.separation)
 
 
-class _Slipping(OdometryDistortion):
+class _SlippingWheels(OdometryDistortion):
     drives = True
 
     def __init__(self, slip: Slip, separation: float) -> None:
@@ -48,59 +71,54 @@ class _Slipping(OdometryDistortion):
         self._left, self._right, self._separation = 1 - slip.left, 1 - slip.right, separation
 
     def increment(self, step: Twist) -> Twist:
-        """What the wheels turned for a true increment."""
         return self._scaled(step, 1 / self._left, 1 / self._right)
 
     def command(self, command: Twist) -> Twist | None:
-        """What the ground gets of a commanded velocity."""
-        return command if self._over else self._scaled(command, self._left, self._right)
+        return command if self._ended else self._scaled(command, self._left, self._right)
 
     def _scaled(self, motion: Twist, left: float, right: float) -> Twist:
-        half = self._separation / 2
-        rolled_left, rolled_right = (
-            (motion.vx - half * motion.wz) * left,
-            (motion.vx + half * motion.wz) * right,
-        )
-        turn = (rolled_right - rolled_left) / self._separation if half else motion.wz * (left + right) / 2
-        return Twist((rolled_left + rolled_right) / 2, motion.vy * (left + right) / 2, turn)
-
-
-Factor = Annotated[float, Field(ge=-10, le=10), Quantity("ratio")]
+        """Return the motion with each side scaled by its factor."""
+        left_speed, right_speed = side_speeds(motion, self._separation)
+        left_speed, right_speed = left_speed * left, right_speed * right
+        lateral = motion.vy * (left + right) / 2
+        if not self._separation:
+            return Twist((left_speed + right_speed) / 2, lateral, motion.wz * (left + right) / 2)
+        return twist_from_sides(left_speed, right_speed, lateral, self._separation)
 
 
 class Gain(Spec, Fault):
-    """The base drives a multiple of what it is told: a wrong scaling in the driver, a motor with worn brushes.
+    """The base drives a multiple of the commanded velocity: wrong scaling in the driver, worn motor brushes.
 
-    On `cmd_vel` the command is scaled on its way; on `wheels` each side can be scaled alone, so that the robot pulls to
-    the weaker one. Odometry measures what is really driven. A negative gain is a motor that is wired the wrong way.
+    On `cmd_vel` the command is scaled; on `wheels` each side can be scaled separately, so that the robot pulls to the
+    weaker side. Odometry measures the actual motion. A negative gain is a motor with reversed polarity.
 
     Example: `{sensor: wheels, gain: {left: 80 %}}`
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Command", "Wheels"})
     idle: ClassVar[Mapping[str, object]] = dict.fromkeys(("linear", "angular", "left", "right"), 1.0)
-    linear: Factor = 1.0
-    """Driven over commanded speed, forward and sideways."""
-    angular: Factor = 1.0
-    """Turned over commanded turn rate."""
-    left: Factor = 1.0
-    """The same of the wheels on the left; of `wheels` only."""
-    right: Factor = 1.0
-    """Of those on the right."""
+    linear: GainFactor = 1.0
+    """Driven over commanded linear velocity, forward and lateral."""
+    angular: GainFactor = 1.0
+    """Driven over commanded angular velocity."""
+    left: GainFactor = 1.0
+    """The same for the left wheels; only on `wheels`."""
+    right: GainFactor = 1.0
+    """The same for the right wheels; only on `wheels`."""
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """Sides of what has none."""
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Reject sides on targets without sides."""
         for key in ("left", "right"):
-            if key in self.model_fields_set and (why := inapplicable_side(instance, key)):
-                return why
+            if key in self.model_fields_set and (finding := inapplicable_side(target, key)):
+                return finding
         return None
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """From now on."""
-        return _Scaled(self, setting.separation)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Scale all further commands."""
+        return _ScaledCommands(self, setting.separation)
 
 
-class _Scaled(Disturbance):
+class _ScaledCommands(Disturbance):
     def __init__(self, gain: Gain, separation: float) -> None:
         self._gain, self._separation = gain, separation
 
@@ -113,15 +131,11 @@ class _Scaled(Disturbance):
         return twist_from_sides(gain.left * left, gain.right * right, scaled.vy, separation)
 
 
-SpeedLimit = Annotated[float, Field(ge=0, le=100), Quantity("speed")]
-TurnLimit = Annotated[float, Field(ge=0, le=100), Quantity("angular speed")]
-
-
 class Saturation(Spec, Fault):
-    """Speeds and accelerations are limited more than they should be: a motor too weak or too hot, a low battery.
+    """Speeds and accelerations have lower limits than normal: a motor that is too weak or too hot.
 
-    On `cmd_vel` commands are limited on their way; on `wheels` each side can be limited alone, so that the robot turns
-    towards the weaker one when it drives fast. Odometry measures what is really driven.
+    On `cmd_vel` the commands are limited; on `wheels` each side can be limited separately, so that the robot turns
+    towards the weaker side at high speed. Odometry measures the actual motion.
 
     Example: `{sensor: wheels, saturation: {left: 0.2 m/s}}`
     """
@@ -131,109 +145,109 @@ class Saturation(Spec, Fault):
         ("linear", "angular", "linear_acceleration", "angular_acceleration", "left", "right")
     )
     linear: SpeedLimit | None = None
-    """Largest speed over ground, in any direction."""
-    angular: TurnLimit | None = None
-    """Largest turn rate."""
+    """Maximum speed over ground, in any direction."""
+    angular: TurnRateLimit | None = None
+    """Maximum angular speed."""
     linear_acceleration: PositiveAcceleration | None = None
-    """Largest change of speed, faster or slower."""
+    """Maximum acceleration and deceleration."""
     angular_acceleration: PositiveAngularAcceleration | None = None
-    """Largest change of the turn rate."""
+    """Maximum angular acceleration and deceleration."""
     left: SpeedLimit | None = None
-    """Largest speed at which the wheels on the left roll, either way; of `wheels` only."""
+    """Maximum speed of the left wheels in both directions; only on `wheels`."""
     right: SpeedLimit | None = None
-    """Of those on the right."""
+    """Maximum speed of the right wheels in both directions; only on `wheels`."""
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """Sides of what has none."""
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Reject sides on targets without sides."""
         for key in ("left", "right"):
-            if getattr(self, key) is not None and (why := inapplicable_side(instance, key)):
-                return why
+            if getattr(self, key) is not None and (finding := inapplicable_side(target, key)):
+                return finding
         return None
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """From now on."""
-        return _Weak(self, setting)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Limit all further commands."""
+        return _LimitedCommands(self, setting)
 
 
-class _Weak(Disturbance):
+class _LimitedCommands(Disturbance):
     def __init__(self, spec: Saturation, setting: FaultSetting) -> None:
         self._spec, self._setting = spec, setting
         self._last: tuple[int, Twist] | None = None
 
     def command(self, command: Twist) -> Twist | None:
         limited = self._within_speeds(command)
-        now = self._setting.now()
         if self._last is not None:
-            seconds = self._setting.clock.seconds(now - self._last[0])
-            limited = self._within_accelerations(self._last[1], limited, seconds)
-        self._last = now, limited
+            tick, before = self._last
+            limited = self._within_accelerations(before, limited, self._setting.seconds_since(tick))
+        self._last = self._setting.now(), limited
         return limited
 
     def _within_speeds(self, wanted: Twist) -> Twist:
         spec, separation = self._spec, self._setting.separation
-        ahead, aside = _short((wanted.vx, wanted.vy), spec.linear)
-        (turn,) = _short((wanted.wz,), spec.angular)
-        limited = Twist(ahead, aside, turn)
+        vx, vy = _shorten((wanted.vx, wanted.vy), spec.linear)
+        (wz,) = _shorten((wanted.wz,), spec.angular)
+        limited = Twist(vx, vy, wz)
         if not separation or (spec.left is None and spec.right is None):
             return limited
         left, right = side_speeds(limited, separation)
-        (left,), (right,) = _short((left,), spec.left), _short((right,), spec.right)
+        (left,), (right,) = _shorten((left,), spec.left), _shorten((right,), spec.right)
         return twist_from_sides(left, right, limited.vy, separation)
 
     def _within_accelerations(self, before: Twist, wanted: Twist, seconds: float) -> Twist:
         spec = self._spec
-        ahead, aside = _short((wanted.vx - before.vx, wanted.vy - before.vy), spec.linear_acceleration, seconds)
-        (turn,) = _short((wanted.wz - before.wz,), spec.angular_acceleration, seconds)
-        return Twist(before.vx + ahead, before.vy + aside, before.wz + turn)
+        vx, vy = _shorten((wanted.vx - before.vx, wanted.vy - before.vy), spec.linear_acceleration, seconds)
+        (wz,) = _shorten((wanted.wz - before.wz,), spec.angular_acceleration, seconds)
+        return Twist(before.vx + vx, before.vy + vy, before.wz + wz)
 
 
-def _short(vector: tuple[float, ...], limit: float | None, times: float = 1.0) -> tuple[float, ...]:
-    """The vector, no longer than a limit times something."""
+def _shorten(vector: tuple[float, ...], limit: float | None, seconds: float = 1.0) -> tuple[float, ...]:
+    """Return the vector with its length limited to `limit * seconds`."""
     length = math.hypot(*vector)
-    if limit is None or length <= limit * times:
+    if limit is None or length <= limit * seconds:
         return vector
-    return tuple(value * limit * times / length for value in vector)
+    return tuple(value * limit * seconds / length for value in vector)
 
 
 class LowBattery(Spec, Fault):
-    """The top speed falls as the battery drains: motors turn no faster than its voltage lets them, untold to the stack.
+    """The maximum speed falls as the battery drains and the motor voltage drops; the stack is not informed.
 
-    The limit falls evenly from `start` to `end` within `drain`, and stays there. Commands above it are scaled down,
-    turn rate and all: the robot drives the same curves more slowly. Odometry measures what is really driven.
+    The limit falls linearly from `start` to `end` within `drain` and then stays there. Faster commands are scaled down
+    including the angular velocity, so that the robot drives the same curves more slowly. Odometry measures the actual
+    motion.
 
     Example: `{sensor: cmd_vel, low_battery: {start: 0.4 m/s, end: 0.15 m/s, drain: 20 s}}`
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Command"})
     start: PositiveSpeed
-    """The top speed when the fault begins."""
+    """Maximum speed when the fault begins."""
     end: PositiveSpeed
-    """The top speed when the battery is as good as empty."""
+    """Maximum speed when the battery is nearly empty."""
     drain: Duration = Field(default=0.0)
-    """How long it takes to get there; 0 = it is that low from the start."""
+    """Time until the maximum speed has fallen to `end`; 0 = at once."""
 
     @model_validator(mode="after")
-    def _drains(self) -> LowBattery:
+    def _check_order(self) -> LowBattery:
         if self.end > self.start:
-            raise ValueError("`end` is above `start`: no battery charges itself")
+            raise ValueError("`end` is above `start`: a battery does not charge itself")
         return self
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """It drains from now on."""
-        return _Draining(self, setting)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Start to drain the battery."""
+        return _DrainingBattery(self, setting)
 
 
-class _Draining(Disturbance):
+class _DrainingBattery(Disturbance):
     def __init__(self, spec: LowBattery, setting: FaultSetting) -> None:
-        self._spec, self._setting, self._since = spec, setting, setting.now()
+        self._spec, self._setting, self._start_tick = spec, setting, setting.now()
 
     def command(self, command: Twist) -> Twist | None:
-        speed, most = math.hypot(command.vx, command.vy), self._most()
-        if speed <= most:
+        speed, max_speed = math.hypot(command.vx, command.vy), self._max_speed()
+        if speed <= max_speed:
             return command
-        return Twist(*(value * most / speed for value in command))
+        return Twist(*(value * max_speed / speed for value in command))
 
-    def _most(self) -> float:
-        spec, seconds = self._spec, self._setting.clock.seconds(self._setting.now() - self._since)
+    def _max_speed(self) -> float:
+        spec, seconds = self._spec, self._setting.seconds_since(self._start_tick)
         drained = min(1.0, seconds / spec.drain) if spec.drain > 0 else 1.0
         return spec.start + (spec.end - spec.start) * drained

@@ -1,4 +1,4 @@
-"""What a fault is."""
+"""Base classes of faults: the specification (`Fault`) and the running fault (`Disturbance`)."""
 
 from __future__ import annotations
 
@@ -23,55 +23,59 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Wheels:
-    """What a fault may know of the drive: distance between left and right wheels in meters (0 = has none)."""
+    """Geometry of the drive: distance between left and right wheels in meters, 0 for a drive without sides."""
 
     separation: float = 0.0
 
 
 class Sight(Protocol):
-    """What a sensor would see now if it sat elsewhere, or if something were not there."""
+    """View of the simulation for faults: what a sensor would measure from another pose or without some objects."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """True distances (n,) in meters along the beams of a scan of now; inf where nothing is within its range.
+        """Return true distances (n,) in meters along the beams of the current scan; inf beyond its range.
 
-        `error` is where the lidar really is in the frame in which it is thought to be; beams that point down end at
-        the floor. What is called as in `without` lets them through.
+        `error` is the true pose of the lidar in the frame of its nominal pose; beams that point down end at the floor.
+        Beams pass through the objects named in `without`.
         """
         ...
 
     def image(self, error: Pose3) -> Image:
-        """What a camera shows now that is off by `error`."""
+        """Return the current picture of a camera whose true pose differs from the nominal pose by `error`."""
         ...
 
 
-def _start() -> int:
+def _tick_zero() -> int:
     return 0
 
 
 @dataclass(frozen=True, eq=False)
 class FaultSetting(Wheels):
-    """All that a fault may know besides its specification.
+    """Everything that a fault may know besides its specification.
 
-    separation:  between left and right wheels in meters (0 = has none)
-    clock:       what makes seconds of ticks
-    now:         the tick of this beat
-    kind:        what it affects: one of its `affects`
-    sight:       what a lidar or camera would see otherwise; None on anything else
+    separation:  distance between left and right wheels in meters (0 for a drive without sides)
+    clock:       conversion between ticks and seconds
+    now:         returns the current tick
+    kind:        kind of the target, one of the fault's `affects`
+    sight:       what a lidar or camera would measure otherwise; None for other targets
     """
 
     clock: Clock = field(default_factory=Clock)
-    now: Callable[[], int] = _start
+    now: Callable[[], int] = _tick_zero
     kind: str = ""
     sight: Sight | None = None
+
+    def seconds_since(self, tick: int) -> float:
+        """Return the simulated seconds between `tick` and now."""
+        return self.clock.seconds(self.now() - tick)
 
 
 @dataclass(frozen=True)
 class Instance:
-    """What a fault is written on, as far as it is known before a run.
+    """Target of a fault, as far as it is known before the run.
 
     kind:  one of the fault's `affects`
-    rate:  messages a second; 0 = unknown
-    spec:  the specification of the sensor, or of the drive for wheels; None where there is none
+    rate:  messages per second; 0 if unknown
+    spec:  specification of the sensor, or of the drive for `wheels`; None for other targets
     """
 
     kind: str
@@ -80,68 +84,68 @@ class Instance:
 
 
 class Disturbance:
-    """A fault at work, from its start to its end. The default changes nothing.
+    """A running fault, from its start to its end. The default implementation changes nothing.
 
-    *Given* the same readings and generator *then* the same answers. It never changes a reading it was handed; it
-    answers with another one.
+    *Given* the same readings and generator *then* the results are the same. A disturbance never modifies a reading;
+    it returns another one.
     """
 
     drives: ClassVar[bool] = False
-    """Whether a fault on a sensor changes what is driven, too: then its `command` is asked at each beat."""
+    """Whether a fault on a sensor also changes the motion of the robot; then `command` is called at each beat."""
 
     def reading(self, reading: Reading) -> Reading | None:
-        """What the stack gets instead of `reading`; None = it never arrives, or later."""
+        """Return the reading that the stack receives instead; None to drop or hold it back."""
         return reading
 
     def arriving(self) -> Sequence[Reading]:
-        """Readings that it kept back and that arrive at this beat, oldest first; asked before those of this beat."""
+        """Return held readings that arrive at this beat, oldest first; called before `reading`."""
         return ()
 
     def command(self, command: Twist) -> Twist | None:
-        """What the wheels do instead of `command`; None = that message never arrives, or later (cmd_vel only)."""
+        """Return the command that the wheels follow instead; None to drop or hold it back (cmd_vel only)."""
         return command
 
     def arriving_command(self) -> Twist | None:
-        """The newest command that it kept back and that arrives at this beat; None = none. Asked before `command`."""
+        """Return the newest held command that arrives at this beat, or None; called before `command`."""
         return None
 
     def belief(self, belief: Belief) -> Belief:
-        """What the navigator is told instead of the localizer's belief; asked once for each new one and each beat."""
+        """Return the belief that the navigator receives; called for each new belief and at each beat."""
         return belief
 
     def map(self, grid: OccupancyGrid) -> OccupancyGrid:
-        """What the stack is given instead of its map, before it starts."""
+        """Return the map that the stack receives; called before the stack starts."""
         return grid
 
     def end(self) -> Disturbance | None:
-        """What stays when the fault is over; None = nothing."""
+        """Return what remains in effect after the fault has ended, or None."""
         return None
 
 
 class Fault(ABC):
-    """A fault as specified in a scenario; `affects` are the kinds of instance it makes sense on.
+    """Specification of a fault in a scenario; `affects` are the kinds of target that it can be applied to.
 
-    Kinds are the class names of core.sensing readings ("Scan", "Odometry", …), "Command" for cmd_vel, "Wheels" for
-    wheels, "Belief" for the localizer and "Map" for the map. Of a fault with keys that mean something on some kinds
-    only, `keys_of` names them: kind → keys.
+    Kinds are the class names of readings ("Scan", "Odometry", …), "Command" for cmd_vel, "Wheels" for wheels, "Belief"
+    for the localizer, and "Map" for the map. If some keys only apply to some kinds, `keys_of` maps each kind to its
+    keys.
     """
 
     affects: ClassVar[frozenset[str]]
     keys_of: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     idle: ClassVar[Mapping[str, object]] = {}
-    """Values of its keys with which it changes nothing; {} = it always changes something."""
+    """Values of the keys with which the fault has no effect; {} if it always has one."""
 
     @classmethod
     def broken_promise(cls) -> str:
-        """Why it is no specification of a fault; "" for one that is."""
+        """Return why the class is not a valid fault specification, or ""."""
         affects: object = getattr(cls, "affects", None)
-        fine = isinstance(affects, frozenset) and affects and affects <= set(FAULT_TARGET_KINDS)
-        return "" if fine else f"its `affects` is no set of {', '.join(FAULT_TARGET_KINDS)}"
+        is_valid = isinstance(affects, frozenset) and affects and affects <= set(FAULT_TARGET_KINDS)
+        return "" if is_valid else f"its `affects` is not a set of {', '.join(FAULT_TARGET_KINDS)}"
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """A key ("" = the whole) that makes no sense on an instance of a kind that it affects, and why."""
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Return a key that makes no sense on this target ("" for the whole fault) and the reason, or None."""
         return None
 
     @abstractmethod
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Start it. `chance` is the fault's own stream."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Start the fault. `rng` belongs to this fault alone."""

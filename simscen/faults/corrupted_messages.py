@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Literal, TypeVar
 
@@ -20,81 +20,80 @@ from simscen.spec.quantities import Probability
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-NUMBERS = {"nan": math.nan, "inf": math.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
+VALUES = {"nan": math.nan, "inf": math.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
+WRONG_SIZES = ("empty", "short")
 T = TypeVar("T", bound="np.generic")
-SIZES = ("empty", "short")
-What = Literal["nan", "inf", "zero", "negative", "huge", "empty", "short", "anything"]
 
 
 class Garbage(Spec, Fault):
-    """Messages that say nonsense: nan, inf, negative, huge or no values at all, or too few of them.
+    """Messages with meaningless content: nan, inf, negative or huge values, no values at all, or too few.
 
-    Real drivers send them when they start, when a frame is cut off, or when a checksum is not looked at. A stack has
-    to survive them; one that takes them for measurements drives by them.
+    Real drivers send them while they start, when a frame is cut off, or when a checksum is not verified. A stack must
+    tolerate them and must not treat them as measurements.
 
     Example: `{sensor: lidar, garbage: {value: nan, probability: 20 %}}`
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Image"})
     idle: ClassVar[Mapping[str, object]] = {"probability": 0.0}
-    value: What = "anything"
-    """What stands in all values of such a message: nan, inf, zero, negative (-1) or huge (1e30). A scan or image can be
-    empty (no values at all) or short (half of them), too. Anything draws one of these for each message."""
+    value: Literal["nan", "inf", "zero", "negative", "huge", "empty", "short", "anything"] = "anything"
+    """Content of all values of such a message: nan, inf, zero, negative (-1), or huge (1e30). A scan or image can also
+    be empty (no values) or short (half of the values). `anything` draws one of these for each message."""
     probability: Probability = 1.0
-    """The chance that a message is garbage."""
+    """Probability that a message is garbage."""
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """Sizes of what has none."""
-        if self.value not in SIZES or instance.kind in ("Scan", "Image"):
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Allow a wrong size only for messages of variable size."""
+        if self.value not in WRONG_SIZES or target.kind in ("Scan", "Image"):
             return None
         return "value", f"its messages cannot be {self.value}: they have a fixed number of values"
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
         """Draw for each message."""
-        return _Nonsense(chance, self)
+        return _Garbled(rng, self)
 
 
-class _Nonsense(Disturbance):
-    def __init__(self, chance: np.random.Generator, garbage: Garbage) -> None:
-        self._chance, self._garbage = chance, garbage
+class _Garbled(Disturbance):
+    def __init__(self, rng: np.random.Generator, garbage: Garbage) -> None:
+        self._rng, self._garbage = rng, garbage
 
     def reading(self, reading: Reading) -> Reading | None:
-        sized = isinstance(reading, Scan | Image)
-        possible = (*NUMBERS, *(SIZES if sized else ()))
-        drawn, which = self._chance.random(), possible[int(self._chance.integers(len(possible)))]
-        if drawn >= self._garbage.probability:
+        has_size = isinstance(reading, Scan | Image)
+        contents = (*VALUES, *(WRONG_SIZES if has_size else ()))
+        draw, random_content = self._rng.random(), contents[int(self._rng.integers(len(contents)))]
+        if draw >= self._garbage.probability:
             return reading
-        what = which if self._garbage.value == "anything" else self._garbage.value
+        content = random_content if self._garbage.value == "anything" else self._garbage.value
         match reading:
             case Scan(ranges=ranges):
-                return replace(reading, ranges=_spoilt(ranges, what))
+                return replace(reading, ranges=_garbled(ranges, content))
             case Image(rgb=rgb, depth=depth):
-                colors = rgb if what in NUMBERS else _spoilt(rgb, what)
-                return replace(reading, rgb=colors, depth=_spoilt(depth, what))
+                colors = rgb if content in VALUES else _garbled(rgb, content)
+                return replace(reading, rgb=colors, depth=_garbled(depth, content))
             case Odometry():
-                value = NUMBERS[what]
+                value = VALUES[content]
                 return replace(reading, pose=Pose2(value, value, value), twist=Twist(value, value, value))
             case Imu():
-                three = (NUMBERS[what],) * 3
-                return replace(reading, angular_velocity=three, linear_acceleration=three)
+                vector = (VALUES[content],) * 3
+                return replace(reading, angular_velocity=vector, linear_acceleration=vector)
             case _:
                 return reading
 
 
-def _spoilt(values: npt.NDArray[T], what: str) -> npt.NDArray[T]:
-    """The values, or rows of them, as a broken driver sends them."""
-    sizes: dict[str, Callable[[], npt.NDArray[T]]] = {
-        "empty": lambda: values[:0],
-        "short": lambda: values[: len(values) // 2],
-    }
-    return sizes[what]() if what in sizes else np.full_like(values, NUMBERS[what])
+def _garbled(values: npt.NDArray[T], content: str) -> npt.NDArray[T]:
+    """Return the values, or rows of values, with meaningless content or a wrong size."""
+    if content == "empty":
+        return values[:0]
+    if content == "short":
+        return values[: len(values) // 2]
+    return np.full_like(values, VALUES[content])
 
 
 class Stuck(Spec, Fault):
-    """The same message again and again, with a fresh stamp: a driver that hangs and repeats its last buffer.
+    """The same message is repeated with a fresh time stamp: a driver that hangs and sends its last buffer again.
 
-    It is the first message after the fault began. On cmd_vel the base keeps that command, whatever the stack says; on
-    the localizer the navigator is told to be at one place; wheels are blocked.
+    The repeated message is the first one after the fault began. On `cmd_vel` the base keeps that command whatever the
+    stack sends; on `localizer` the navigator always receives the same pose; `wheels` are blocked.
 
     Example: `{sensor: lidar, stuck: {}, when: {time: 5 s}, for: 2 s}`
     """
@@ -103,8 +102,8 @@ class Stuck(Spec, Fault):
         {"Scan", "Odometry", "Imu", "Bump", "Image", "Command", "Wheels", "Belief"}
     )
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """With what comes next."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Repeat the next message."""
         return _Repeated(STOP if setting.kind == "Wheels" else None)
 
 

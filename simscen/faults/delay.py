@@ -1,4 +1,4 @@
-"""`delay`: messages come late."""
+"""`delay`: messages arrive late."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ T = TypeVar("T")
 
 
 class Delay(Spec, Fault):
-    """Messages arrive late, in order: a slow driver, a bus or a network that is busy.
+    """Messages arrive late and in order: a slow driver, or a busy bus or network.
 
-    A message arrives at the first beat at or after its time, stamped with when it was measured. Each takes `latency`
-    and a random part of `jitter` besides, but none overtakes the one before it. What is under way when the fault ends
-    still arrives, and holds up what comes after it. Of the localizer the correction of the odometry comes late.
+    A message arrives at the first beat at or after its due time, with the time stamp of its measurement. The delay is
+    `latency` plus a random share of `jitter`, but no message overtakes an earlier one. Messages in transit when the
+    fault ends still arrive, and delay those that follow. On `localizer`, the odometry correction is late.
 
     Example: `{sensor: lidar, delay: {latency: 200 ms, jitter: 50 ms}}`
     """
@@ -33,57 +33,57 @@ class Delay(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command", "Belief"})
     idle: ClassVar[Mapping[str, object]] = {"latency": 0.0, "jitter": 0.0}
     latency: Duration = 0.0
-    """What every message takes."""
+    """Delay of every message."""
     jitter: Duration = 0.0
-    """What a message may take besides; drawn uniformly."""
+    """Largest additional delay; drawn uniformly for each message."""
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """With the next message."""
-        return _Late(chance, self, setting)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Delay all further messages."""
+        return _DelayedMessages(rng, self, setting)
 
 
-class _Late(Disturbance):
-    def __init__(self, chance: np.random.Generator, delay: Delay, setting: FaultSetting) -> None:
-        self._chance, self._delay, self._setting = chance, delay, setting
-        self._readings, self._commands = _Line[Reading](), _Line[Twist]()
-        self._corrections = _Line[Pose2]()
+class _DelayedMessages(Disturbance):
+    def __init__(self, rng: np.random.Generator, delay: Delay, setting: FaultSetting) -> None:
+        self._rng, self._delay, self._setting = rng, delay, setting
+        self._readings, self._commands = _LatencyQueue[Reading](), _LatencyQueue[Twist]()
+        self._corrections = _LatencyQueue[Pose2]()
         self._correction: Pose2 | None = None
-        self._over = False
+        self._ended = False
 
-    def _due(self) -> int:
-        if self._over:
+    def _due_tick(self) -> int:
+        if self._ended:
             return self._setting.now()
-        late = self._delay.latency + self._delay.jitter * self._chance.random()
-        return self._setting.now() + self._setting.clock.ticks(late)
+        delay = self._delay.latency + self._delay.jitter * self._rng.random()
+        return self._setting.now() + self._setting.clock.ticks(delay)
 
     def reading(self, reading: Reading) -> Reading | None:
-        return self._readings.pass_on(reading, self._due(), self._setting.now())
+        return self._readings.pass_or_hold(reading, self._due_tick(), self._setting.now())
 
     def arriving(self) -> list[Reading]:
-        return self._readings.take(self._setting.now())
+        return self._readings.pop_due(self._setting.now())
 
     def command(self, command: Twist) -> Twist | None:
-        return self._commands.pass_on(command, self._due(), self._setting.now())
+        return self._commands.pass_or_hold(command, self._due_tick(), self._setting.now())
 
     def arriving_command(self) -> Twist | None:
-        return next(reversed(self._commands.take(self._setting.now())), None)
+        return next(reversed(self._commands.pop_due(self._setting.now())), None)
 
     def belief(self, belief: Belief) -> Belief:
         now, newest = self._setting.now(), belief.map_from_odom
-        arrived = self._corrections.take(now)
-        if (fresh := self._corrections.pass_on(newest, self._due(), now)) is not None:
+        arrived = self._corrections.pop_due(now)
+        if (fresh := self._corrections.pass_or_hold(newest, self._due_tick(), now)) is not None:
             arrived.append(fresh)
         self._correction = arrived[-1] if arrived else self._correction or newest
         return apply_correction(belief, self._correction)
 
     def end(self) -> Disturbance | None:
-        """What is under way still arrives."""
-        self._over = True
+        """Deliver the messages in transit."""
+        self._ended = True
         return self if self._readings or self._commands or self._corrections else None
 
 
-class _Line(Generic[T]):
-    """Messages under way, none of which overtakes another."""
+class _LatencyQueue(Generic[T]):
+    """Messages in transit in their order of arrival."""
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[int, T]] = deque()
@@ -91,16 +91,16 @@ class _Line(Generic[T]):
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def pass_on(self, message: T, due: int, now: int) -> T | None:
-        """The message, if nothing is before it and it is due now; else it waits."""
+    def pass_or_hold(self, message: T, due: int, now: int) -> T | None:
+        """Return the message if it is due and no other is waiting; otherwise hold it and return None."""
         if not self._waiting and due <= now:
             return message
         self._waiting.append((max(due, self._waiting[-1][0]) if self._waiting else due, message))
         return None
 
-    def take(self, now: int) -> list[T]:
-        """What is due, oldest first."""
-        taken: list[T] = []
+    def pop_due(self, now: int) -> list[T]:
+        """Remove and return the messages that are due, oldest first."""
+        due: list[T] = []
         while self._waiting and self._waiting[0][0] <= now:
-            taken.append(self._waiting.popleft()[1])
-        return taken
+            due.append(self._waiting.popleft()[1])
+        return due

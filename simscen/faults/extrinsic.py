@@ -1,4 +1,4 @@
-"""`extrinsic`: a sensor does not sit where everybody thinks it does."""
+"""`extrinsic`: the pose of a sensor on the robot differs from its calibration."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ ANGLES = ("roll", "pitch", "yaw")
 
 
 class Extrinsic(Spec, Fault):
-    """A sensor is knocked out of its place, or was never calibrated: it measures from elsewhere, and nobody is told.
+    """The mounting pose of a sensor is wrong: it was knocked out of place or never calibrated, and no node knows.
 
-    The error is where it really is in the frame in which it is thought to be. A lidar that is pitched down sees the
-    floor as a wall; an inertial unit that is tilted feels gravity ahead.
+    The error is the true pose of the sensor in the frame of its nominal pose. A lidar that is pitched down sees the
+    floor as a wall; an IMU that is tilted measures a part of gravity as forward acceleration.
 
     Example: `{sensor: lidar, extrinsic: {yaw: 3 deg, x: 1 cm}}`
     """
@@ -45,32 +45,32 @@ class Extrinsic(Spec, Fault):
     pitch: Angle = 0.0
     """Front down."""
     yaw: Angle = 0.0
-    """Anticlockwise."""
+    """Counterclockwise."""
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """Keys that mean nothing there."""
-        return inapplicable_key(self, instance)
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Reject keys that do not apply to the sensor."""
+        return inapplicable_key(self, target)
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """From now on it measures from there."""
-        return _Knocked(Pose3.from_rpy(self.x, self.y, self.z, self.roll, self.pitch, self.yaw), setting)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Measure from the wrong pose from now on."""
+        return _WrongPose(Pose3.from_rpy(self.x, self.y, self.z, self.roll, self.pitch, self.yaw), setting)
 
 
-class _Knocked(Disturbance):
+class _WrongPose(Disturbance):
     def __init__(self, error: Pose3, setting: FaultSetting) -> None:
         self._error, self._sight = error, setting.sight
 
     def reading(self, reading: Reading) -> Reading | None:
         match reading:
             case Scan() if self._sight is not None:
-                there, elsewhere = self._sight.distances(reading), self._sight.distances(reading, self._error)
-                return replace(reading, ranges=ranges_with_scan_errors(reading, elsewhere, there))
+                nominal, actual = self._sight.distances(reading), self._sight.distances(reading, self._error)
+                return replace(reading, ranges=ranges_with_scan_errors(reading, actual, nominal))
             case Image() if self._sight is not None:
-                seen = self._sight.image(self._error)
-                return replace(reading, rgb=seen.rgb, depth=seen.depth)
-            case Imu(angular_velocity=turning, linear_acceleration=pushing):
-                turned = np.array([turning, pushing]) @ self._error.rotation()
-                (x, y, z), (a, b, c) = turned.tolist()
+                image = self._sight.image(self._error)
+                return replace(reading, rgb=image.rgb, depth=image.depth)
+            case Imu(angular_velocity=angular, linear_acceleration=linear):
+                rotated = np.array([angular, linear]) @ self._error.rotation()
+                (x, y, z), (a, b, c) = rotated.tolist()
                 return replace(reading, angular_velocity=(x, y, z), linear_acceleration=(a, b, c))
             case _:
                 return reading

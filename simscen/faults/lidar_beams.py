@@ -17,7 +17,7 @@ from simscen.spec.quantities import Angle, PositiveAngle, PositiveLength, Probab
 
 
 class BeamDropout(Spec, Fault):
-    """Each beam of each scan gives no answer (nan) with a probability, as over dark or wet surfaces.
+    """Each beam of each scan returns nothing (nan) with a fixed probability, as over dark or wet surfaces.
 
     Example: `{sensor: lidar, beam_dropout: {probability: 40 %}}`
     """
@@ -25,103 +25,103 @@ class BeamDropout(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
     idle: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     probability: Probability
-    """The chance that a beam gives no answer."""
+    """Probability that a beam returns nothing."""
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
         """Draw once for each beam."""
-        return _Holes(chance, self.probability)
+        return _LostBeams(rng, self.probability)
 
 
-class _Holes(Disturbance):
-    def __init__(self, chance: np.random.Generator, probability: float) -> None:
-        self._chance, self._probability = chance, probability
+class _LostBeams(Disturbance):
+    def __init__(self, rng: np.random.Generator, probability: float) -> None:
+        self._rng, self._probability = rng, probability
 
     def reading(self, reading: Reading) -> Reading | None:
         if not isinstance(reading, Scan):
             return reading
-        lost = self._chance.random(len(reading.ranges)) < self._probability
-        return replace(reading, ranges=np.where(lost, np.nan, reading.ranges))
+        is_lost = self._rng.random(len(reading.ranges)) < self._probability
+        return replace(reading, ranges=np.where(is_lost, np.nan, reading.ranges))
 
 
 class Sector(Spec, Fault):
-    """Beams of some directions give no answer (nan): dirt on the cover, a cable or a load in front of it, a mask.
+    """Beams in a range of directions return nothing (nan): dirt on the cover, a cable or a load in front of it.
 
     Example: `{sensor: lidar, sector: {from: -30 deg, to: 30 deg}}`
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
     from_: Angle = Field(alias="from")
-    """The first blind direction in the lidar's frame (0 = where it looks)."""
+    """First blind direction in the lidar's frame (0 = forward)."""
     to: Angle
-    """The last one, going anticlockwise."""
+    """Last blind direction, counterclockwise from the first."""
 
     @property
     def width(self) -> float:
-        """Radians from the first to the last, anticlockwise; a whole turn for a whole turn."""
+        """Angle from the first to the last direction in rad, counterclockwise; 2 pi for a whole turn."""
         turn = 2 * math.pi
         return turn if self.to - self.from_ >= turn - 1e-9 else (self.to - self.from_) % turn
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """A sector of no width."""
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Reject a sector without width."""
         return ("to", "the sector ends where it begins") if not self.width else None
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """The same beams of each scan."""
-        return _Blind(self.from_, self.width)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Drop the same beams of each scan."""
+        return _BlindSector(self.from_, self.width)
 
 
-class _Blind(Disturbance):
+class _BlindSector(Disturbance):
     def __init__(self, first: float, width: float) -> None:
         self._first, self._width = first, width
 
     def reading(self, reading: Reading) -> Reading | None:
         if not isinstance(reading, Scan):
             return reading
-        after = np.remainder(reading.angles() - self._first + 1e-9, 2 * math.pi)
-        return replace(reading, ranges=np.where(after <= self._width + 2e-9, np.nan, reading.ranges))
+        offsets = np.remainder(reading.angles() - self._first + 1e-9, 2 * math.pi)
+        return replace(reading, ranges=np.where(offsets <= self._width + 2e-9, np.nan, reading.ranges))
 
 
 class RangeLimit(Spec, Fault):
-    """What is farther away than this returns nothing (inf), as if nothing were there: dark surfaces, a weak laser.
+    """Objects beyond a distance return nothing (inf), as if they did not exist: dark surfaces, a weak laser.
 
     Example: `{sensor: lidar, range_limit: {max: 3 m}}`
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Image"})
     max: PositiveLength
-    """The largest range or depth that is still measured."""
+    """Largest range or depth that is still measured."""
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """A limit beyond the sensor's own."""
-        own = getattr(instance.spec, "max_range", None)
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Require a limit below the sensor's own maximum."""
+        own = getattr(target.spec, "max_range", None)
         if own is None or self.max < own:
             return None
-        return "max", f"{self.max:g} m limits nothing: the sensor's own range is {own:g} m"
+        return "max", f"{self.max:g} m is no limit: the range of the sensor is {own:g} m"
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """From now on."""
-        return _Short(self.max)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Limit all further readings."""
+        return _LimitedRange(self.max)
 
 
-class _Short(Disturbance):
-    def __init__(self, most: float) -> None:
-        self._most = most
+class _LimitedRange(Disturbance):
+    def __init__(self, max_range: float) -> None:
+        self._max_range = max_range
 
     def reading(self, reading: Reading) -> Reading | None:
         match reading:
             case Scan(ranges=ranges):
                 with np.errstate(invalid="ignore"):
-                    return replace(reading, ranges=np.where(ranges > self._most, np.inf, ranges))
+                    return replace(reading, ranges=np.where(ranges > self._max_range, np.inf, ranges))
             case Image(depth=depth):
-                return replace(reading, depth=np.where(depth > self._most, np.float32(np.inf), depth))
+                return replace(reading, depth=np.where(depth > self._max_range, np.float32(np.inf), depth))
             case _:
                 return reading
 
 
 class Ghost(Spec, Fault):
-    """Beams of a window return something that is not there, nearer than what is: a mirror, a vest, the own cover.
+    """Beams in a window of directions hit an object that does not exist: a reflection, a vest, the sensor's own cover.
 
-    It keeps its place in the lidar's frame, and so drives along with the robot.
+    The ghost is fixed in the lidar's frame and therefore moves with the robot.
 
     Example: `{sensor: lidar, ghost: {range: 1 m, direction: 0 deg, width: 10 deg}}`
     """
@@ -129,35 +129,34 @@ class Ghost(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
     idle: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     range: PositiveLength
-    """Where the ghost is; beams that meet something nearer tell that."""
+    """Distance of the ghost; beams that hit something nearer report that instead."""
     direction: Angle = 0.0
-    """Of the window's middle in the lidar's frame."""
+    """Center of the window in the lidar's frame."""
     width: PositiveAngle = 0.17453292519943295
-    """Of the window."""
+    """Width of the window."""
     probability: Probability = 1.0
-    """The chance that a beam of the window sees it, anew for each scan."""
+    """Probability that a beam of the window hits the ghost, drawn again for each scan."""
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """A ghost that the lidar cannot see."""
-        least, most = (getattr(instance.spec, key, None) for key in ("min_range", "max_range"))
-        if least is None or most is None or least <= self.range <= most:
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Require a range that the lidar can measure."""
+        nearest, farthest = (getattr(target.spec, key, None) for key in ("min_range", "max_range"))
+        if nearest is None or farthest is None or nearest <= self.range <= farthest:
             return None
-        return "range", f"the sensor measures from {least:g} m to {most:g} m"
+        return "range", f"the sensor measures from {nearest:g} m to {farthest:g} m"
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
         """Draw for each beam of the window."""
-        return _Haunted(chance, self)
+        return _GhostHits(rng, self)
 
 
-class _Haunted(Disturbance):
-    def __init__(self, chance: np.random.Generator, ghost: Ghost) -> None:
-        self._chance, self._ghost = chance, ghost
+class _GhostHits(Disturbance):
+    def __init__(self, rng: np.random.Generator, ghost: Ghost) -> None:
+        self._rng, self._ghost = rng, ghost
 
     def reading(self, reading: Reading) -> Reading | None:
         if not isinstance(reading, Scan):
             return reading
         ghost = self._ghost
-        off = np.remainder(reading.angles() - ghost.direction + math.pi, 2 * math.pi) - math.pi
-        seen = (np.abs(off) <= ghost.width / 2) & (self._chance.random(len(off)) < ghost.probability)
-        nearer = np.fmin(reading.ranges, ghost.range)
-        return replace(reading, ranges=np.where(seen, nearer, reading.ranges))
+        offsets = np.remainder(reading.angles() - ghost.direction + math.pi, 2 * math.pi) - math.pi
+        is_hit = (np.abs(offsets) <= ghost.width / 2) & (self._rng.random(len(offsets)) < ghost.probability)
+        return replace(reading, ranges=np.where(is_hit, np.fmin(reading.ranges, ghost.range), reading.ranges))

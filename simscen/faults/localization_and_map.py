@@ -20,12 +20,14 @@ from simscen.spec.quantities import Angle, Length
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+Rings = Annotated[list[Ring], Field(max_length=100)]
+
 
 class Jump(Spec, Fault):
-    """The navigator is told to be elsewhere from one moment to the next: a localizer that takes one aisle for another.
+    """The estimated pose jumps to another place, as when a localizer mistakes one aisle for another.
 
-    The jump is that of the robot's pose when the fault begins, in its own frame; from then on the map is off by it as
-    seen from the robot, until the fault ends and the belief jumps back. The localizer itself goes on undisturbed.
+    The jump is given in the frame of the believed pose at the start of the fault. The estimate keeps this error until
+    the fault ends, and then jumps back. The localizer itself continues undisturbed.
 
     Example: `{sensor: localizer, jump: {x: 1 m, yaw: 10 deg}, when: {time: 5 s}, for: 3 s}`
     """
@@ -37,29 +39,29 @@ class Jump(Spec, Fault):
     y: Length = 0.0
     """To the left."""
     yaw: Angle = 0.0
-    """Anticlockwise."""
+    """Counterclockwise."""
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """With the next belief."""
-        return _Jumped(Pose2(self.x, self.y, self.yaw))
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Jump with the next belief."""
+        return _ShiftedBelief(Pose2(self.x, self.y, self.yaw))
 
 
-class _Jumped(Disturbance):
-    def __init__(self, by: Pose2) -> None:
-        self._by = by
-        self._moved: Pose2 | None = None
+class _ShiftedBelief(Disturbance):
+    def __init__(self, jump: Pose2) -> None:
+        self._jump = jump
+        self._error: Pose2 | None = None
 
     def belief(self, belief: Belief) -> Belief:
-        if self._moved is None:
-            self._moved = belief.pose.compose(self._by).compose(belief.pose.inverse())
-        moved = self._moved
-        return replace(belief, pose=moved.compose(belief.pose), map_from_odom=moved.compose(belief.map_from_odom))
+        if self._error is None:
+            self._error = belief.pose.compose(self._jump).compose(belief.pose.inverse())
+        error = self._error
+        return replace(belief, pose=error.compose(belief.pose), map_from_odom=error.compose(belief.map_from_odom))
 
 
 class Shift(Spec, Fault):
-    """The map that the stack gets is shifted and turned: a wrong origin in its YAML file, another survey's frame.
+    """The map of the stack is rotated and shifted: a wrong origin in its YAML file, or the frame of another survey.
 
-    Goals and the initial estimate stay where they are. The whole is turned about the map frame's origin, then shifted.
+    Goals and the initial pose do not change. The map is first rotated about the origin of the map frame, then shifted.
 
     Example: `{sensor: map, shift: {x: 20 cm, yaw: 1 deg}}`
     """
@@ -67,30 +69,27 @@ class Shift(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Map"})
     idle: ClassVar[Mapping[str, object]] = {"x": 0.0, "y": 0.0, "yaw": 0.0}
     x: Length = 0.0
-    """Along the map's x."""
+    """Along the x axis of the map."""
     y: Length = 0.0
-    """Along the map's y."""
+    """Along the y axis of the map."""
     yaw: Angle = 0.0
-    """Anticlockwise."""
+    """Counterclockwise."""
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Before the stack gets it."""
-        return _Moved(Pose2(self.x, self.y, self.yaw))
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Shift the map before the stack receives it."""
+        return _ShiftedMap(Pose2(self.x, self.y, self.yaw))
 
 
-class _Moved(Disturbance):
-    def __init__(self, by: Pose2) -> None:
-        self._by = by
+class _ShiftedMap(Disturbance):
+    def __init__(self, shift: Pose2) -> None:
+        self._shift = shift
 
     def map(self, grid: OccupancyGrid) -> OccupancyGrid:
-        return replace(grid, origin=self._by.compose(grid.origin))
-
-
-Rings = Annotated[list[Ring], Field(max_length=100)]
+        return replace(grid, origin=self._shift.compose(grid.origin))
 
 
 class Outdated(Spec, Fault):
-    """The map that the stack gets shows nothing where something stands, or something where nothing is any more.
+    """The map of the stack misses existing obstacles, or shows obstacles that no longer exist.
 
     Example: `{sensor: map, outdated: {extra: [[[3, 1], [4, 1], [4, 2], [3, 2]]]}}`
     """
@@ -98,16 +97,16 @@ class Outdated(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Map"})
     idle: ClassVar[Mapping[str, object]] = {"missing": [], "extra": []}
     missing: Rings = []
-    """Areas, by their corners, in which the map shows free space, whatever stands there."""
+    """Polygons, given by their corners, in which the map shows free space."""
     extra: Rings = []
-    """Areas in which the map shows an obstacle, whatever stands there."""
+    """Polygons in which the map shows an obstacle."""
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Before the stack gets it."""
-        return _Drawn(self)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Change the map before the stack receives it."""
+        return _EditedMap(self)
 
 
-class _Drawn(Disturbance):
+class _EditedMap(Disturbance):
     def __init__(self, spec: Outdated) -> None:
         self._spec = spec
 
@@ -117,16 +116,16 @@ class _Drawn(Disturbance):
         cells = grid.cells.copy()
         for rings, value in ((self._spec.missing, FREE), (self._spec.extra, OCCUPIED)):
             for ring in rings:
-                within = covered([(x, y) for x, y in ring], centers).reshape(grid.shape)
-                cells[within] = value
+                is_inside = points_in_polygon([(x, y) for x, y in ring], centers).reshape(grid.shape)
+                cells[is_inside] = value
         return replace(grid, cells=cells)
 
 
-def covered(corners: list[tuple[float, float]], points: Array) -> npt.NDArray[np.bool_]:
-    """Which of the points (n, 2) lie inside the polygon (even-odd rule)."""
-    within = np.zeros(len(points), dtype=np.bool_)
+def points_in_polygon(corners: list[tuple[float, float]], points: Array) -> npt.NDArray[np.bool_]:
+    """Return which of the points (n, 2) lie inside the polygon (even-odd rule)."""
+    is_inside = np.zeros(len(points), dtype=np.bool_)
     for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
         if ay != by:
             crosses = (ay > points[:, 1]) != (by > points[:, 1])
-            within ^= crosses & (points[:, 0] < ax + (points[:, 1] - ay) / (by - ay) * (bx - ax))
-    return within
+            is_inside ^= crosses & (points[:, 0] < ax + (points[:, 1] - ay) / (by - ay) * (bx - ax))
+    return is_inside

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -16,32 +17,45 @@ from simscen.faults.common import apply_correction
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Frequency, PositiveDuration, Probability
 
+MESSAGES = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command"})
+
+
+class _MessageLoss(Disturbance):
+    """Drops readings and commands; between two corrections, the belief follows the odometry."""
+
+    def __init__(self) -> None:
+        self._correction: Pose2 | None = None
+
+    @abstractmethod
+    def is_lost(self) -> bool:
+        """Return whether the message at hand is lost; called once for each message."""
+
+    def reading(self, reading: Reading) -> Reading | None:
+        return None if self.is_lost() else reading
+
+    def command(self, command: Twist) -> Twist | None:
+        return None if self.is_lost() else command
+
 
 class Off(Spec, Fault):
-    """No message arrives any more, as when a cable comes loose or a node dies.
+    """No message arrives any more, as if a cable came loose or a node died.
 
-    A base that hears no command stops after its `command_timeout`. Without its localizer a robot goes on by odometry:
-    the correction from map to odometry stays what it was, as it does on /tf.
+    A base that receives no command stops after its `command_timeout`. Without its localizer, the robot continues by
+    odometry: the transform from map to odometry keeps its last value, as on /tf.
 
     Example: `{sensor: lidar, off: {}, when: {time: 10 s}, for: 3 s}`
     """
 
-    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command", "Belief"})
+    affects: ClassVar[frozenset[str]] = MESSAGES | {"Belief"}
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Silence."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Drop everything."""
         return _Silence()
 
 
-class _Silence(Disturbance):
-    def __init__(self) -> None:
-        self._correction: Pose2 | None = None
-
-    def reading(self, reading: Reading) -> Reading | None:
-        return None
-
-    def command(self, command: Twist) -> Twist | None:
-        return None
+class _Silence(_MessageLoss):
+    def is_lost(self) -> bool:
+        return True
 
     def belief(self, belief: Belief) -> Belief:
         if self._correction is None:
@@ -50,130 +64,114 @@ class _Silence(Disturbance):
 
 
 class Dropout(Spec, Fault):
-    """Each message is lost with a probability, independently of the others, as over a bad radio link.
+    """Each message is lost with a fixed probability, independently of the others, as over a bad radio link.
 
-    A base that hears no command keeps the last one, and stops after its `command_timeout`.
+    A base that receives no command keeps the last one and stops after its `command_timeout`.
 
     Example: `{sensor: lidar, dropout: {probability: 30 %}}`
     """
 
-    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command"})
+    affects: ClassVar[frozenset[str]] = MESSAGES
     idle: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     probability: Probability
-    """The chance that a message is lost."""
+    """Probability that a message is lost."""
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
         """Draw once for each message."""
-        return _Loss(chance, self.probability)
+        return _RandomLoss(rng, self.probability)
 
 
-class _Loss(Disturbance):
-    def __init__(self, chance: np.random.Generator, probability: float) -> None:
-        self._chance, self._probability = chance, probability
+class _RandomLoss(_MessageLoss):
+    def __init__(self, rng: np.random.Generator, probability: float) -> None:
+        super().__init__()
+        self._rng, self._probability = rng, probability
 
-    def _lost(self) -> bool:
-        return bool(self._chance.random() < self._probability)
-
-    def reading(self, reading: Reading) -> Reading | None:
-        return None if self._lost() else reading
-
-    def command(self, command: Twist) -> Twist | None:
-        return None if self._lost() else command
+    def is_lost(self) -> bool:
+        return bool(self._rng.random() < self._probability)
 
 
 class Intermittent(Spec, Fault):
-    """Messages come and stay away in turns of random length, as with a loose contact or a radio link with fading.
+    """Messages arrive and fail in bursts of random length, as with a loose contact or a fading radio link.
 
-    The turns have exponential lengths (a Gilbert channel: Gilbert, Capacity of a burst-noise channel, 1960), so that
-    in the long run the share down / (up + down) is lost, in bursts. It begins with a gap.
+    The bursts have exponentially distributed lengths (a Gilbert channel: Gilbert, Capacity of a burst-noise channel,
+    1960), so that on average the share down / (up + down) of all messages is lost. The fault begins with a gap.
 
     Example: `{sensor: lidar, intermittent: {up: 1 s, down: 0.5 s}}`
     """
 
-    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command", "Belief"})
+    affects: ClassVar[frozenset[str]] = MESSAGES | {"Belief"}
     up: PositiveDuration
-    """Mean time for which messages come."""
+    """Mean length of the periods in which messages arrive."""
     down: PositiveDuration
-    """Mean time for which they stay away."""
+    """Mean length of the gaps."""
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """With a gap."""
-        return _LooseContact(chance, self, setting)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Begin with a gap."""
+        return _GilbertChannel(rng, self, setting)
 
 
-class _LooseContact(Disturbance):
-    def __init__(self, chance: np.random.Generator, spec: Intermittent, setting: FaultSetting) -> None:
-        self._chance, self._spec, self._setting = chance, spec, setting
-        self._gap = True
-        self._correction: Pose2 | None = None
-        self._until = setting.clock.seconds(setting.now()) + chance.exponential(spec.down)
+class _GilbertChannel(_MessageLoss):
+    def __init__(self, rng: np.random.Generator, spec: Intermittent, setting: FaultSetting) -> None:
+        super().__init__()
+        self._rng, self._spec, self._setting = rng, spec, setting
+        self._is_down = True
+        self._until = setting.clock.seconds(setting.now()) + rng.exponential(spec.down)
 
-    def _away(self) -> bool:
+    def is_lost(self) -> bool:
         now = self._setting.clock.seconds(self._setting.now())
         while self._until <= now:
-            self._gap = not self._gap
-            self._until += self._chance.exponential(self._spec.down if self._gap else self._spec.up)
-        return self._gap
-
-    def reading(self, reading: Reading) -> Reading | None:
-        return None if self._away() else reading
-
-    def command(self, command: Twist) -> Twist | None:
-        return None if self._away() else command
+            self._is_down = not self._is_down
+            self._until += self._rng.exponential(self._spec.down if self._is_down else self._spec.up)
+        return self._is_down
 
     def belief(self, belief: Belief) -> Belief:
-        if self._correction is None or not self._away():
+        if self._correction is None or not self.is_lost():
             self._correction = belief.map_from_odom
         return apply_correction(belief, self._correction)
 
 
 class Slow(Spec, Fault):
-    """Fewer messages come than should: an overloaded computer, a sensor in its energy-saving mode.
+    """Messages arrive at a lower rate than normal: an overloaded computer, a sensor in its energy-saving mode.
 
-    The first comes through, then the first of each further period; all others are lost. Of cmd_vel the base keeps the
-    last command, and stops after its `command_timeout`; the localizer corrects the odometry less often.
+    The first message arrives, then the first of each further period; all others are lost. The base keeps the last
+    velocity command and stops after its `command_timeout`; the localizer corrects the odometry less often.
 
     Example: `{sensor: lidar, slow: {rate: 2 Hz}}`
     """
 
-    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command", "Belief"})
+    affects: ClassVar[frozenset[str]] = MESSAGES | {"Belief"}
     rate: Frequency
-    """Messages a second that come through."""
+    """Messages per second that arrive."""
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """A rate that is not lower than the instance's own."""
-        if not instance.rate or self.rate < instance.rate:
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Require a rate below that of the target."""
+        if not target.rate or self.rate < target.rate:
             return None
-        return "rate", f"{self.rate:g} Hz is not slow: {instance.rate:g} messages a second are all there are"
+        return "rate", f"{self.rate:g} Hz is not slower than its normal rate of {target.rate:g} messages per second"
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """With the next message."""
-        return _Seldom(self.rate, setting)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Let the next message through."""
+        return _RateLimit(self.rate, setting)
 
 
-class _Seldom(Disturbance):
+class _RateLimit(_MessageLoss):
     def __init__(self, rate: float, setting: FaultSetting) -> None:
-        self._period, self._now = setting.clock.rate / rate, setting.now
-        self._first: int | None = None
-        self._let = 0
-        self._correction: Pose2 | None = None
+        super().__init__()
+        self._period_ticks, self._now = setting.clock.rate / rate, setting.now
+        self._first_tick: int | None = None
+        self._periods = 0
+        """Number of periods of which the first message has arrived or was skipped."""
 
-    def _due(self) -> bool:
+    def is_lost(self) -> bool:
         now = self._now()
-        if self._first is None:
-            self._first = now
-        if now - self._first < self._let * self._period - 1e-6:
-            return False
-        self._let = int((now - self._first) / self._period + 1e-6) + 1
-        return True
-
-    def reading(self, reading: Reading) -> Reading | None:
-        return reading if self._due() else None
-
-    def command(self, command: Twist) -> Twist | None:
-        return command if self._due() else None
+        if self._first_tick is None:
+            self._first_tick = now
+        if now - self._first_tick < self._periods * self._period_ticks - 1e-6:
+            return True
+        self._periods = int((now - self._first_tick) / self._period_ticks + 1e-6) + 1
+        return False
 
     def belief(self, belief: Belief) -> Belief:
-        if self._due() or self._correction is None:
+        if not self.is_lost() or self._correction is None:
             self._correction = belief.map_from_odom
         return apply_correction(belief, self._correction)

@@ -1,4 +1,4 @@
-"""`noise`: a sensor gets noisier than it should be."""
+"""`noise`: additional Gaussian noise on a sensor or on the localizer."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from simscen.spec.quantities import (
 
 
 class Noise(Spec, Fault):
-    """Gaussian noise is added, on top of the sensor's own: a failing or ill-shielded sensor, vibration, bad light.
+    """Gaussian noise in addition to that of the sensor: a failing or badly shielded sensor, vibration, poor light.
 
-    On a lidar and on a camera's depths `std` is added to every range, which stays within the sensor's limits; `colour`
-    to every pixel. On odometry `linear` and `angular` grow with the square root of the way, so that they do not depend
-    on the rate. On the localizer every belief is off by another draw.
+    On a lidar and on the depths of a camera, `std` applies to every range, which stays within the limits of the sensor;
+    `colour` applies to every pixel. On odometry, the errors of `linear` and `angular` grow with the square root of the
+    distance, so that they do not depend on the rate. On the localizer, each belief has an independent error.
 
     Example: `{sensor: lidar, noise: {std: 10 cm}}`
     """
@@ -49,75 +49,75 @@ class Noise(Spec, Fault):
     std: NonNegativeLength = 0.0
     """Standard deviation of a range or depth."""
     colour: Probability = 0.0
-    """Standard deviation of a pixel's red, green and blue, of their full scale."""
+    """Standard deviation of red, green, and blue of each pixel, relative to full scale."""
     linear: NonNegativeLength = 0.0
-    """Standard deviation of odometry's distance after one meter; of a belief, in x and in y."""
+    """Standard deviation of the odometry distance after one meter; for the localizer, in x and in y."""
     angular: NonNegativeAngle = 0.0
-    """Standard deviation of odometry's heading after one radian turned; of a belief's heading."""
+    """Standard deviation of the odometry heading after a turn of one radian; for the localizer, of the heading."""
     gyro: NonNegativeAngularSpeed = 0.0
-    """Standard deviation of each turn rate."""
+    """Standard deviation of the angular velocity about each axis."""
     accelerometer: NonNegativeAcceleration = 0.0
-    """Standard deviation of each acceleration."""
+    """Standard deviation of the acceleration along each axis."""
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """Keys that mean nothing there."""
-        return inapplicable_key(self, instance)
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Reject keys that do not apply to the target."""
+        return inapplicable_key(self, target)
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Draw anew for each message."""
-        return _NoisyOdometry(chance, self, setting) if setting.kind == "Odometry" else _Noise(chance, self)
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Draw again for each message."""
+        return _NoisyOdometry(rng, self, setting) if setting.kind == "Odometry" else _NoisyValues(rng, self)
 
 
-class _Noise(Disturbance):
-    def __init__(self, chance: np.random.Generator, noise: Noise) -> None:
-        self._chance, self._noise = chance, noise
+class _NoisyValues(Disturbance):
+    def __init__(self, rng: np.random.Generator, noise: Noise) -> None:
+        self._rng, self._noise = rng, noise
 
     def reading(self, reading: Reading) -> Reading | None:
         match reading:
             case Scan(ranges=ranges):
-                noisy = ranges + self._chance.normal(0.0, self._noise.std, len(ranges))
-                within = np.clip(noisy, reading.range_min, reading.range_max)
-                return replace(reading, ranges=np.where(np.isfinite(noisy), within, noisy))
+                noisy = ranges + self._rng.normal(0.0, self._noise.std, len(ranges))
+                limited = np.clip(noisy, reading.range_min, reading.range_max)
+                return replace(reading, ranges=np.where(np.isfinite(noisy), limited, noisy))
             case Image(rgb=rgb, depth=depth):
-                colors = rgb + self._chance.normal(0.0, 255 * self._noise.colour, rgb.shape)
-                depths = depth + self._chance.normal(0.0, self._noise.std, depth.shape)
-                seen = np.clip(np.rint(colors), 0, 255).astype(np.uint8)
-                return replace(reading, rgb=seen, depth=np.maximum(depths, 0.0).astype(np.float32))
-            case Imu(angular_velocity=turning, linear_acceleration=pushing):
-                draws = self._chance.standard_normal((2, 3))
-                x, y, z = (np.array(turning) + self._noise.gyro * draws[0]).tolist()
-                a, b, c = (np.array(pushing) + self._noise.accelerometer * draws[1]).tolist()
+                colors = rgb + self._rng.normal(0.0, 255 * self._noise.colour, rgb.shape)
+                depths = depth + self._rng.normal(0.0, self._noise.std, depth.shape)
+                rgb = np.clip(np.rint(colors), 0, 255).astype(np.uint8)
+                return replace(reading, rgb=rgb, depth=np.maximum(depths, 0.0).astype(np.float32))
+            case Imu(angular_velocity=angular, linear_acceleration=linear):
+                draws = self._rng.standard_normal((2, 3))
+                x, y, z = (np.array(angular) + self._noise.gyro * draws[0]).tolist()
+                a, b, c = (np.array(linear) + self._noise.accelerometer * draws[1]).tolist()
                 return replace(reading, angular_velocity=(x, y, z), linear_acceleration=(a, b, c))
             case _:
                 return reading
 
     def belief(self, belief: Belief) -> Belief:
-        x, y, turn = self._chance.standard_normal(3).tolist()
-        spread = self._noise.linear
+        x, y, turn = self._rng.standard_normal(3).tolist()
+        std = self._noise.linear
         pose = belief.pose
-        off = Pose2(pose.x + spread * x, pose.y + spread * y, pose.yaw + self._noise.angular * turn)
+        noisy = Pose2(pose.x + std * x, pose.y + std * y, pose.yaw + self._noise.angular * turn)
         odometry = belief.map_from_odom.between(pose)
-        return replace(belief, pose=off, map_from_odom=off.compose(odometry.inverse()))
+        return replace(belief, pose=noisy, map_from_odom=noisy.compose(odometry.inverse()))
 
 
 class _NoisyOdometry(OdometryDistortion):
-    def __init__(self, chance: np.random.Generator, noise: Noise, setting: FaultSetting) -> None:
+    def __init__(self, rng: np.random.Generator, noise: Noise, setting: FaultSetting) -> None:
         super().__init__()
-        self._chance, self._noise, self._clock = chance, noise, setting.clock
+        self._rng, self._noise, self._clock = rng, noise, setting.clock
 
     def increment(self, step: Twist) -> Twist:
         driven, turned = math.hypot(step.vx, step.vy), abs(step.wz)
-        along, turn = self._chance.standard_normal(2).tolist()
+        along, turn = self._rng.standard_normal(2).tolist()
         return Twist(
             step.vx + self._noise.linear * math.sqrt(driven) * along,
             step.vy,
             step.wz + self._noise.angular * math.sqrt(turned) * turn,
         )
 
-    def reported(self, step: Twist, twist: Twist, ticks: int) -> tuple[Twist, Twist]:
+    def reported(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
         noisy = self.increment(step)
         if not ticks:
-            return noisy, twist
+            return noisy, velocity
         seconds = self._clock.seconds(ticks)
         along, turn = (noisy.vx - step.vx) / seconds, (noisy.wz - step.wz) / seconds
-        return noisy, Twist(twist.vx + along, twist.vy, twist.wz + turn)
+        return noisy, Twist(velocity.vx + along, velocity.vy, velocity.wz + turn)

@@ -8,7 +8,7 @@ from simscen.spec.lazy import LazySpec
 
 
 class AnyFault(Choice):
-    """One thing that goes wrong."""
+    """One fault, chosen by its key."""
 
     group: ClassVar[str] = "fault"
 
@@ -41,7 +41,7 @@ class AnyFault(Choice):
 
     @property
     def fault(self) -> Fault:
-        """The fault that was chosen."""
+        """The chosen fault."""
         fault = self.chosen
         assert isinstance(fault, Fault)
         return fault

@@ -14,7 +14,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Reading
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
-from simscen.faults.common import OdometryDistortion, inapplicable_key, with_distances
+from simscen.faults.common import OdometryDistortion, change_distances, inapplicable_key
 from simscen.spec.base import Spec
 from simscen.spec.quantities import (
     Acceleration,
@@ -29,10 +29,10 @@ from simscen.spec.quantities import (
 
 
 class Bias(Spec, Fault):
-    """A sensor is off by the same amount all the time: wrong wheel radii, a gyroscope not zeroed, a lidar too warm.
+    """A constant error: wrong wheel radii, a gyroscope that was not zeroed, a lidar that is too warm.
 
-    Odometry reports a scaled distance and turn, plus a steady turn for each meter driven; ranges are too long or too
-    short; a gyroscope turns while it stands; a picture is too bright or too dark.
+    Odometry reports a scaled distance and turn, plus a turn for each meter driven; ranges are too long or too short; a
+    gyroscope reports a rotation at rest; a picture is too bright or too dark.
 
     Example: `{sensor: odom, bias: {linear_scale: 1.1, turn_per_metre: 0.05}}`
     """
@@ -49,25 +49,25 @@ class Bias(Spec, Fault):
         "Image": ("range", "brightness"),
     }
     linear_scale: Ratio = 1.0
-    """Reported distance per driven distance: a worn wheel of 95 % radius reports 1.05."""
+    """Reported distance over driven distance: a wheel worn to 95 % of its radius reports 1.05."""
     angular_scale: Ratio = 1.0
-    """Reported turn per true turn."""
+    """Reported turn over true turn."""
     turn_per_metre: Angle = 0.0
-    """Radians of turn reported for each meter driven forward: unequal wheel radii."""
+    """Turn reported for each meter driven forward, in rad: unequal wheel radii."""
     range: Length = 0.0
     """Added to each range or depth."""
     gyro: AngularSpeed = 0.0
-    """Added to the turn rate about the vertical axis."""
+    """Added to the angular velocity about the vertical axis."""
     accelerometer: Acceleration = 0.0
-    """Added to the acceleration forward."""
+    """Added to the forward acceleration."""
     brightness: Annotated[float, Field(ge=-1, le=1), Quantity("ratio")] = 0.0
-    """Added to each pixel's red, green and blue, of their full scale."""
+    """Added to red, green, and blue of each pixel, relative to full scale."""
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """Keys that mean nothing there."""
-        return inapplicable_key(self, instance)
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Reject keys that do not apply to the target."""
+        return inapplicable_key(self, target)
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
         """Scale each increment, or add to each value."""
         return _BiasedReadings(self) if setting.kind in ("Scan", "Imu", "Image") else _BiasedOdometry(self)
 
@@ -94,31 +94,28 @@ class _BiasedReadings(Disturbance):
             return replace(
                 reading, angular_velocity=(x, y, z + bias.gyro), linear_acceleration=(a + bias.accelerometer, b, c)
             )
-        told = with_distances(reading, lambda distances: distances + bias.range)
-        if isinstance(told, Image) and bias.brightness:
-            return replace(told, rgb=np.clip(np.rint(told.rgb + 255 * bias.brightness), 0, 255).astype(np.uint8))
-        return told
-
-
-Factor = Annotated[float, Field(gt=0, le=100), Quantity("ratio")]
+        changed = change_distances(reading, lambda distances: distances + bias.range)
+        if isinstance(changed, Image) and bias.brightness:
+            return replace(changed, rgb=np.clip(np.rint(changed.rgb + 255 * bias.brightness), 0, 255).astype(np.uint8))
+        return changed
 
 
 class Scale(Spec, Fault):
-    """Everything that a sensor measures is too large or too small by a factor.
+    """All values of a sensor are too large or too small by a factor.
 
-    Ranges and depths: a clock that runs fast or slow. Odometry: tires with too little air, a wrong gear ratio in the
-    driver; both distances and turns. An inertial unit: a wrong full-scale setting; what it measures at rest, too.
+    For ranges and depths: a clock that runs fast or slow. For odometry, distances and turns: low tire pressure, or a
+    wrong gear ratio in the driver. For an IMU, gravity included: a wrong full-scale setting.
 
     Example: `{sensor: odom, scale: {factor: 105 %}}`
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Image"})
     idle: ClassVar[Mapping[str, object]] = {"factor": 1.0}
-    factor: Factor
-    """What is said over what is true."""
+    factor: Annotated[float, Field(gt=0, le=100), Quantity("ratio")]
+    """Reported value over true value."""
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Multiply."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Scale each value or each odometry increment."""
         return _ScaledOdometry(self.factor) if setting.kind == "Odometry" else _ScaledReadings(self.factor)
 
 
@@ -140,14 +137,14 @@ class _ScaledReadings(Disturbance):
             x, y, z = (self._factor * value for value in reading.angular_velocity)
             a, b, c = (self._factor * value for value in reading.linear_acceleration)
             return replace(reading, angular_velocity=(x, y, z), linear_acceleration=(a, b, c))
-        return with_distances(reading, lambda distances: distances * self._factor)
+        return change_distances(reading, lambda distances: distances * self._factor)
 
 
 class Drift(Spec, Fault):
-    """A sensor's error grows from nothing, second by second: electronics that warm up, a gyroscope's bias that walks.
+    """An error that starts at zero and grows with time: electronics that warm up, a gyroscope bias that drifts.
 
-    Odometry creeps: it reports to drive and turn while the robot stands. The localizer slides off along the robot's
-    heading of when it began, as a scan matcher does in a corridor without features; the navigator believes it.
+    Odometry reports motion while the robot stands still. The belief moves along the heading that the robot had when
+    the fault began, as with a scan matcher in a corridor without features.
 
     Example: `{sensor: imu, drift: {gyro: 0.01 rad/s^2}, when: {time: 2 s}, for: 10 s}`
     """
@@ -162,20 +159,20 @@ class Drift(Spec, Fault):
         "Belief": ("linear", "angular"),
     }
     range: Speed = 0.0
-    """By which each range or depth grows."""
+    """Growth of the error of each range or depth."""
     linear: Speed = 0.0
-    """Meters a second forward that odometry adds, or that the belief slides."""
+    """Forward velocity that the odometry adds, or with which the belief moves."""
     angular: AngularSpeed = 0.0
-    """Radians a second that odometry adds, or that the belief turns."""
+    """Angular velocity that the odometry adds, or with which the belief turns."""
     gyro: AngularAcceleration = 0.0
-    """By which the bias of the turn rate about the vertical axis grows."""
+    """Growth of the bias of the angular velocity about the vertical axis."""
 
-    def senseless(self, instance: Instance) -> tuple[str, str] | None:
-        """Keys that mean nothing there."""
-        return inapplicable_key(self, instance)
+    def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
+        """Reject keys that do not apply to the target."""
+        return inapplicable_key(self, target)
 
-    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """From nothing, now."""
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
+        """Begin with an error of zero."""
         return _DriftingOdometry(self, setting) if setting.kind == "Odometry" else _DriftingValues(self, setting)
 
 
@@ -187,32 +184,31 @@ class _DriftingOdometry(OdometryDistortion):
     def increment(self, step: Twist) -> Twist:
         return Twist(step.vx + self._drift.linear, step.vy, step.wz + self._drift.angular)
 
-    def reported(self, step: Twist, twist: Twist, ticks: int) -> tuple[Twist, Twist]:
+    def reported(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
         seconds = self._clock.seconds(ticks)
-        crept = Twist(step.vx + self._drift.linear * seconds, step.vy, step.wz + self._drift.angular * seconds)
-        return crept, self.increment(twist)
+        drifted = Twist(step.vx + self._drift.linear * seconds, step.vy, step.wz + self._drift.angular * seconds)
+        return drifted, self.increment(velocity)
 
 
 class _DriftingValues(Disturbance):
     def __init__(self, drift: Drift, setting: FaultSetting) -> None:
-        self._drift, self._setting, self._began = drift, setting, setting.now()
-        self._odom: tuple[Pose2, Pose2] | None = None
+        self._drift, self._setting, self._start_tick = drift, setting, setting.now()
+        self._start_pose: Pose2 | None = None
 
-    def _since(self, tick: int) -> float:
-        return self._setting.clock.seconds(max(0, tick - self._began))
+    def _elapsed(self, tick: int) -> float:
+        return self._setting.clock.seconds(max(0, tick - self._start_tick))
 
     def reading(self, reading: Reading) -> Reading | None:
-        since = self._since(reading.tick)
+        elapsed = self._elapsed(reading.tick)
         if isinstance(reading, Imu):
             x, y, z = reading.angular_velocity
-            return replace(reading, angular_velocity=(x, y, z + self._drift.gyro * since))
-        return with_distances(reading, lambda distances: distances + self._drift.range * since)
+            return replace(reading, angular_velocity=(x, y, z + self._drift.gyro * elapsed))
+        return change_distances(reading, lambda distances: distances + self._drift.range * elapsed)
 
     def belief(self, belief: Belief) -> Belief:
-        since = self._since(self._setting.now())
-        if self._odom is None:
-            self._odom = belief.pose, belief.pose.inverse()
-        start, back = self._odom
-        slid = Pose2(self._drift.linear * since, 0.0, self._drift.angular * since)
-        moved = start.compose(slid).compose(back)
-        return replace(belief, pose=moved.compose(belief.pose), map_from_odom=moved.compose(belief.map_from_odom))
+        elapsed = self._elapsed(self._setting.now())
+        if self._start_pose is None:
+            self._start_pose = belief.pose
+        drift = Pose2(self._drift.linear * elapsed, 0.0, self._drift.angular * elapsed)
+        error = self._start_pose.compose(drift).compose(self._start_pose.inverse())
+        return replace(belief, pose=error.compose(belief.pose), map_from_odom=error.compose(belief.map_from_odom))

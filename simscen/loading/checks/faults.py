@@ -77,7 +77,7 @@ def unfit_faults(scope: NameScope) -> Iterator[Finding]:
             what = NOUNS.get(instance.kind) or _with_article(loaded.robot.spec.sensors[entry.sensor].kind)
             message = f"fault `{entry.kind}` cannot affect {what} (`{entry.sensor}`)"
             yield Finding(keys, message, hint, at_key=True)
-        elif why := entry.fault.senseless(instance):
+        elif why := entry.fault.unsuitable_key(instance):
             below = (why[0],) if why[0] else ()
             message = f"fault `{entry.kind}` does not fit `{entry.sensor}`: {why[1]}"
             yield Finding((*keys, *below), message, at_key=True)
@@ -88,7 +88,7 @@ def faults_out_of_reach(scope: NameScope) -> Iterator[Finding]:
     """Find faults on the localizer of an external stack, on a map that is not used, or during part of a run."""
     loaded = scope.loaded
     for index, entry, instance in _listed(loaded):
-        if instance is None or instance.kind not in entry.fault.affects or entry.fault.senseless(instance):
+        if instance is None or instance.kind not in entry.fault.affects or entry.fault.unsuitable_key(instance):
             continue
         if instance.kind == BELIEF and not isinstance(loaded.spec.stack, StackSpec):
             message = "only the localizer of simscen's own stacks can have faults"

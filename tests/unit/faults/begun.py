@@ -27,8 +27,8 @@ def begun(fault: dict, kind: str, now=lambda: 0, separation=0.3, seed=1, sight=N
     return AnyFault.model_validate(fault).fault.begin(np.random.default_rng(seed), setting)
 
 
-def senseless(fault: dict, kind: str, rate=0.0, spec=None):
-    return AnyFault.model_validate(fault).fault.senseless(Instance(kind, rate, spec))
+def unsuitable_key(fault: dict, kind: str, rate=0.0, spec=None):
+    return AnyFault.model_validate(fault).fault.unsuitable_key(Instance(kind, rate, spec))
 
 
 def scan(ranges, tick=0, least=0.1, most=12.0) -> Scan:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from begun import begun, image, scan, senseless
+from begun import begun, image, scan, unsuitable_key
 
 from simscen.faults.lidar_environment import MM_PER_HOUR
 from simscen.model.robot import Lidar
@@ -28,14 +28,14 @@ def test_a_sector_may_go_through_the_back():
 
 
 def test_a_sector_of_no_width_makes_no_sense():
-    assert senseless({"sector": {"from": 1, "to": 1}}, "Scan")[0] == "to"
+    assert unsuitable_key({"sector": {"from": 1, "to": 1}}, "Scan")[0] == "to"
 
 
 def test_beyond_its_limit_a_lidar_sees_nothing_and_thinks_that_nothing_is_there():
     told = begun({"range_limit": {"max": 3}}, "Scan").reading(scan([1.0, 3.0, 3.01, np.inf, np.nan])).ranges
     assert told == pytest.approx([1.0, 3.0, np.inf, np.inf, np.nan], nan_ok=True)
     assert begun({"range_limit": {"max": 3}}, "Image").reading(image([[2.0, 4.0]])).depth.tolist() == [[2.0, np.inf]]
-    assert senseless({"range_limit": {"max": 12}}, "Scan", spec=Lidar())[0] == "max"
+    assert unsuitable_key({"range_limit": {"max": 12}}, "Scan", spec=Lidar())[0] == "max"
 
 
 def test_a_ghost_is_in_its_window_and_behind_what_is_nearer():
@@ -44,7 +44,7 @@ def test_a_ghost_is_in_its_window_and_behind_what_is_nearer():
     told = begun({"ghost": {"range": 1, "width": "10 deg"}}, "Scan").reading(scan(ranges)).ranges
     assert told[180:183].tolist() == [0.5, 1.0, 1.0]
     assert np.flatnonzero(told == 1.0).tolist() == [175, 176, 177, 178, 179, 181, 182, 183, 184, 185]
-    assert senseless({"ghost": {"range": 20}}, "Scan", spec=Lidar())[0] == "range"
+    assert unsuitable_key({"ghost": {"range": 20}}, "Scan", spec=Lidar())[0] == "range"
 
 
 def test_dust_ends_beams_early_as_a_poisson_process_along_them_does():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from begun import Hand, begun, odometry, senseless
+from begun import Hand, begun, odometry, unsuitable_key
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -63,9 +63,9 @@ def test_wheels_that_slip_mislead_every_odometry_of_theirs_each_by_its_own_sum()
 
 @pytest.mark.parametrize("word", ["gain", "saturation"])
 def test_sides_are_those_of_wheels(word):
-    assert senseless({word: {"left": 0.5}}, "Command")[0] == "left"
-    assert senseless({word: {"right": 0.5}}, "Wheels", spec=Omnidirectional(type="omnidirectional"))[0] == "right"
-    assert senseless({word: {"right": 0.5}}, "Wheels", spec=WHEELED) is None
+    assert unsuitable_key({word: {"left": 0.5}}, "Command")[0] == "left"
+    assert unsuitable_key({word: {"right": 0.5}}, "Wheels", spec=Omnidirectional(type="omnidirectional"))[0] == "right"
+    assert unsuitable_key({word: {"right": 0.5}}, "Wheels", spec=WHEELED) is None
 
 
 def test_a_battery_drains_evenly_and_the_robot_keeps_to_its_curve():
@@ -78,5 +78,5 @@ def test_a_battery_drains_evenly_and_the_robot_keeps_to_its_curve():
 
 
 def test_a_battery_that_charges_itself_is_none():
-    with pytest.raises(ValueError, match="no battery charges itself"):
+    with pytest.raises(ValueError, match="a battery does not charge itself"):
         begun({"low_battery": {"start": 0.1, "end": 0.5}}, "Command")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from begun import begun, image, imu, odometry, scan, senseless
+from begun import begun, image, imu, odometry, scan, unsuitable_key
 
 VALUES = {"nan": np.nan, "inf": np.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
 
@@ -20,7 +20,7 @@ def test_a_message_can_be_cut_off_or_empty():
     assert begun({"garbage": {"value": "empty"}}, "Scan").reading(scan([1.0] * 9)).ranges.tolist() == []
     assert begun({"garbage": {"value": "short"}}, "Scan").reading(scan([1.0] * 9)).ranges.tolist() == [1.0] * 4
     assert begun({"garbage": {"value": "short"}}, "Image").reading(image(np.ones((6, 4)))).rgb.shape == (3, 4, 3)
-    assert senseless({"garbage": {"value": "short"}}, "Odometry")[0] == "value"
+    assert unsuitable_key({"garbage": {"value": "short"}}, "Odometry")[0] == "value"
 
 
 def test_the_share_of_garbage_is_what_is_said_and_all_else_is_untouched():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from begun import Hand, begun, belief, image, imu, odometry, scan, senseless
+from begun import Hand, begun, belief, image, imu, odometry, scan, unsuitable_key
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -72,8 +72,8 @@ def test_a_rate_that_does_not_divide_the_sensors_own_is_kept_on_average():
 
 
 def test_slow_is_slower_than_the_sensor():
-    assert senseless({"slow": {"rate": 10}}, "Scan", rate=10.0)[0] == "rate"
-    assert senseless({"slow": {"rate": 9}}, "Scan", rate=10.0) is None
+    assert unsuitable_key({"slow": {"rate": 10}}, "Scan", rate=10.0)[0] == "rate"
+    assert unsuitable_key({"slow": {"rate": 9}}, "Scan", rate=10.0) is None
 
 
 def test_a_loose_contact_is_away_for_its_share_of_time_in_bursts_of_its_mean_length():

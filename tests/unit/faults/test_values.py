@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from begun import Hand, begun, belief, image, imu, odometry, scan, senseless
+from begun import Hand, begun, belief, image, imu, odometry, scan, unsuitable_key
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -129,4 +129,4 @@ def test_a_belief_that_drifts_slides_along_the_heading_of_when_it_began():
     ],
 )
 def test_a_key_of_another_sensor_makes_no_sense(fault, kind, key):
-    assert senseless(fault, kind)[0] == key
+    assert unsuitable_key(fault, kind)[0] == key
