@@ -1,1 +1,1 @@
-"""What a scenario does to the world: one file for each action, its specification and its meaning together."""
+"""Actions that events of a scenario perform on the world, each with its specification and implementation."""

@@ -1,4 +1,4 @@
-"""What an action is."""
+"""Base classes of actions."""
 
 from __future__ import annotations
 
@@ -10,13 +10,22 @@ if TYPE_CHECKING:
 
 
 class Action(ABC):
-    """Something a scenario does to the running world."""
+    """Change that an event of a scenario makes to the running world."""
 
     @property
-    def of_a_robot(self) -> bool:
-        """Whether it depends on which of several robots it is about."""
+    def is_robot_specific(self) -> bool:
+        """Whether the effect depends on which of several robots the action is for."""
         return True
 
     @abstractmethod
     def perform(self, stage: Stage) -> Effect:
-        """Do it now, and say what came of it. Everything it does is in the log by way of the stage."""
+        """Perform the action and return its effect. Every change is made, and logged, through the stage."""
+
+
+class WorldAction(Action):
+    """Action that is the same for all robots."""
+
+    @property
+    def is_robot_specific(self) -> bool:
+        """Always False."""
+        return False

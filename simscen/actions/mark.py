@@ -1,36 +1,31 @@
-"""`mark`: a name for this moment."""
+"""`mark`: gives the current moment a name in the log."""
 
 from typing import Annotated
 
 from pydantic import Field
 
-from simscen.actions.base import Action
+from simscen.actions.base import WorldAction
 from simscen.core.records.events import Event, EventKind
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
 from simscen.spec.places import Name
 
 
-class Mark(Spec, Action):
-    """Write a name for this moment into the log; nothing else changes.
+class Mark(Spec, WorldAction):
+    """Give the current moment a name in the log; nothing else changes.
 
-    The trigger `event`, and criteria with `after`, know it by that name, and pictures show where the robot was. Stands
-    for what a test engineer would call out while watching: "now it sees the door". Several events may set the same one.
+    The trigger `event` and criteria with `after` can refer to the name, and pictures show where the robot was. Several
+    events can set the same mark.
 
     Example: `do: {mark: {name: in the aisle}}`
     """
 
     name: Name
-    """What this moment is called."""
+    """Name of the moment."""
     note: Annotated[str, Field(max_length=1000)] = ""
-    """More about it, for people who read the log."""
-
-    @property
-    def of_a_robot(self) -> bool:
-        """It is about the world."""
-        return False
+    """A remark for people who read the log."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Write it down."""
+        """Log the mark."""
         stage.tell(Event(0, EventKind.MARK, self.name, {"note": self.note} if self.note else {}))
         return Effect(True, f"marked {self.name}")

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from simscen.actions.base import Action
+from simscen.actions.base import Action, WorldAction
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.shapes import Body
 from simscen.core.messages.navigation import Path
@@ -21,49 +21,52 @@ from simscen.spec.places import Name
 from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength, PositiveDuration
 from simscen.spec.references import MovableName
 
+POSE_TOLERANCE = 1e-3
+"""Meters and radians within which an object is already at the requested pose."""
+
 
 class Spawn(Shaped, Action):
-    """Put an object into the world: at a pose, relative to the robot, or on the plan it is following.
+    """Add an object to the world: at a pose, relative to the robot, or on its current plan.
 
-    With `mass` the robot can push it; without, only the scenario moves it.
+    The robot can push an object that has a `mass`; other objects are only moved by the scenario.
 
     Example: `do: {spawn: {name: pallet, box: [1.2, 0.8, 0.3], on_plan: 1.5 m}}`
     """
 
     name: Name
-    """What it is called from now on."""
+    """Name of the new object."""
     pose: PlaceOrPose | None = None
-    """In the world frame: a pose, or a place by name."""
+    """Pose in the world frame, or a place by name."""
     ahead: Annotated[list[Length], Field(min_length=2, max_length=2)] | None = None
-    """In the robot's frame: [meters ahead, meters to the left]."""
+    """Position in the robot's frame: [meters forward, meters to the left]."""
     on_plan: NonNegativeLength | None = None
-    """On the robot's plan, so far ahead along it, turned across it; at its end where the plan is shorter. Where the
-    robot has no plan, ahead of it by as much, which does not count as having happened."""
+    """Distance ahead of the robot along its plan, at most to the end of the plan; the object lies across the plan.
+    Without a plan, the object is placed at this distance straight ahead, and the event counts as failed."""
     yaw: Angle = 0.0
-    """Turn relative to the robot's heading or the plan's direction."""
+    """Rotation relative to the heading of the robot or the direction of the plan."""
     mass: Mass = 0.0
-    """In kg; 0 = immovable for the robot."""
+    """Mass in kg; 0 = cannot be pushed."""
 
     @model_validator(mode="after")
-    def _one_place(self) -> Spawn:
+    def _check_place(self) -> Spawn:
         if sum(place is not None for place in (self.pose, self.ahead, self.on_plan)) != 1:
             raise ValueError("expected exactly one of: pose, ahead, on_plan")
         return self
 
     @property
-    def of_a_robot(self) -> bool:
-        """At a pose of the world it is the same for all."""
+    def is_robot_specific(self) -> bool:
+        """Whether the place depends on the robot."""
         return self.pose is None
 
     def perform(self, stage: Stage) -> Effect:
-        """Spawn it; without a plan to put it on, it is put ahead of the robot instead."""
-        planned = self.on_plan is None or _has_plan(stage)
-        pose = self._place(stage)
+        """Spawn the object; without a plan for `on_plan`, spawn it ahead of the robot."""
+        is_as_requested = self.on_plan is None or _has_plan(stage)
+        pose = self._spawn_pose(stage)
         stage.spawn(Body(self.name, (self.solid(self.name),), Pose3.planar(pose), self.mass))
         what = f"spawned {self.name} at ({pose.x:.2f}, {pose.y:.2f})"
-        return Effect(planned, what if planned else f"{what} as the robot had no plan to put it on")
+        return Effect(is_as_requested, what if is_as_requested else f"{what} as the robot had no plan to put it on")
 
-    def _place(self, stage: Stage) -> Pose2:
+    def _spawn_pose(self, stage: Stage) -> Pose2:
         if self.pose is not None:
             return self.pose.pose
         if self.ahead is not None:
@@ -71,29 +74,29 @@ class Spawn(Shaped, Action):
         assert self.on_plan is not None
         if stage.plan is None or not _has_plan(stage):
             return stage.robot.compose(Pose2(self.on_plan, 0.0, self.yaw))
-        return along(stage.plan, stage.robot, self.on_plan).compose(Pose2(0.0, 0.0, self.yaw))
+        return pose_on_plan(stage.plan, stage.robot, self.on_plan).compose(Pose2(0.0, 0.0, self.yaw))
 
 
 def _has_plan(stage: Stage) -> bool:
     return stage.plan is not None and len(stage.plan.points) > 1
 
 
-def along(plan: Path, robot: Pose2, ahead: float) -> Pose2:
-    """The pose on `plan` that is `ahead` meters further along it than its point nearest to the robot."""
+def pose_on_plan(plan: Path, robot: Pose2, distance: float) -> Pose2:
+    """Return the pose on `plan` that is `distance` meters further along than the point nearest to the robot."""
     points = plan.points[:, :2]
     steps = np.hypot(*np.diff(points, axis=0).T)
-    travelled = np.concatenate(([0.0], np.cumsum(steps)))
+    lengths = np.concatenate(([0.0], np.cumsum(steps)))
     nearest = int(np.argmin(np.hypot(points[:, 0] - robot.x, points[:, 1] - robot.y)))
-    target = min(travelled[nearest] + ahead, travelled[-1])
-    segment = min(int(np.searchsorted(travelled, target, side="right")) - 1, len(steps) - 1)
+    target = min(lengths[nearest] + distance, lengths[-1])
+    segment = min(int(np.searchsorted(lengths, target, side="right")) - 1, len(steps) - 1)
     direction = points[segment + 1] - points[segment]
-    fraction = (target - travelled[segment]) / steps[segment] if steps[segment] else 0.0
+    fraction = (target - lengths[segment]) / steps[segment] if steps[segment] else 0.0
     x, y = points[segment] + fraction * direction
     return Pose2(float(x), float(y), float(np.arctan2(direction[1], direction[0])))
 
 
-class Remove(Spec, Action):
-    """Take an object out of the world, at once.
+class Remove(Spec, WorldAction):
+    """Remove an object from the world.
 
     Example: `do: {remove: {name: pallet}}`
     """
@@ -101,25 +104,20 @@ class Remove(Spec, Action):
     name: MovableName
     """The object to remove."""
 
-    @property
-    def of_a_robot(self) -> bool:
-        """It is about the world."""
-        return False
-
     def perform(self, stage: Stage) -> Effect:
-        """Remove it; nothing comes of it when it is not there."""
+        """Remove the object; has no effect if it does not exist."""
         if stage.object(self.name) is None:
             return Effect(False, f"there is nothing called {self.name}")
         stage.remove(self.name)
         return Effect(True, f"removed {self.name}")
 
 
-class Move(Motion, Action):
-    """Let an object drive through waypoints at a speed, or be where it is said when, along timed keyframes.
+class Move(Motion, WorldAction):
+    """Move an object through waypoints at a speed, or along timed keyframes.
 
-    It does not stop for the robot, and nothing can push it from then on. Imitates a cart, a forklift or a person on
-    a fixed course, and worlds of moving obstacles like those of DynaBARN (Nair et al., 2022), which are given by
-    where each obstacle is when.
+    It does not stop for the robot, and from then on nothing can push it. Use it for a cart, a forklift, or a person on
+    a fixed course, and for worlds with moving obstacles like DynaBARN (Nair et al., 2022), which give the pose of each
+    obstacle over time.
 
     Example: `do: {move: {name: cart, keyframes: [[0, 4, 1, 0], [3, 4, 5, 90 deg], [6, 4, 1, 0]], repeat: loop}}`
     """
@@ -127,64 +125,48 @@ class Move(Motion, Action):
     name: MovableName
     """The object to move."""
 
-    @property
-    def of_a_robot(self) -> bool:
-        """It is about the world."""
-        return False
-
     def perform(self, stage: Stage) -> Effect:
-        """Set it going; nothing comes of it when it is not there, or stands at its only waypoint."""
-        here = stage.object(self.name)
-        if here is None:
+        """Start the motion; has no effect if the object does not exist, or is already at its only waypoint."""
+        pose = stage.object(self.name)
+        if pose is None:
             return Effect(False, f"there is nothing called {self.name}")
-        path = self.path(here)
+        path = self.path(pose)
         if len(path.poses) == 1 and self.keyframes is None:
             return Effect(False, f"{self.name} stands at its waypoint already")
         stage.move(self.name, path)
         return Effect(True, f"moved {self.name}")
 
 
-SAME = 1e-3
-"""Meters and radians within which a thing is where it shall be."""
+class Teleport(Spec, WorldAction):
+    """Move an object to another pose, at once and at rest. For the robot, use `kidnap`.
 
-
-class Teleport(Spec, Action):
-    """Set an object down somewhere else, at once and at rest; for the robot there is `kidnap`.
-
-    Imitates what changes while the robot does not look: the pallet of this morning stands an aisle further, and the
-    costmap still shows it where it was. What a script moved stands still from then on.
+    Use it for changes that the robot does not see: the pallet of this morning is now one aisle further, and the costmap
+    still shows it at its old place. A scripted motion of the object ends.
 
     Example: `do: {teleport: {name: pallet, pose: {x: 4, y: 2, yaw: 90 deg}}}`
     """
 
     name: MovableName
-    """The object to set down."""
+    """The object to move."""
     pose: PlaceOrPose
-    """Where it stands from now on, in the world frame: a pose, or a place by name."""
-
-    @property
-    def of_a_robot(self) -> bool:
-        """It is about the world."""
-        return False
+    """New pose in the world frame, or a place by name."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Set it down; nothing comes of it when it is not there, or stands there already."""
-        here, there = stage.object(self.name), self.pose.pose
-        if here is None:
+        """Move the object; has no effect if it does not exist or already rests there."""
+        current, target = stage.object(self.name), self.pose.pose
+        if current is None:
             return Effect(False, f"there is nothing called {self.name}")
-        moves = stage.motion(self.name) is not None
-        if here.distance(there) < SAME and abs(wrap(here.yaw - there.yaw)) < SAME and not moves:
+        distance, is_moving = current.distance(target), stage.motion(self.name) is not None
+        if distance < POSE_TOLERANCE and abs(wrap(current.yaw - target.yaw)) < POSE_TOLERANCE and not is_moving:
             return Effect(False, f"{self.name} stood there already")
-        stage.place(self.name, there)
-        return Effect(
-            True, f"set {self.name} down {here.distance(there):.2f} m away, at ({there.x:.2f}, {there.y:.2f})"
-        )
+        stage.place(self.name, target)
+        return Effect(True, f"set {self.name} down {distance:.2f} m away, at ({target.x:.2f}, {target.y:.2f})")
 
 
-class Stop(Spec, Action):
-    """Stop an object where it is, a person, or a door half-way; with `for` a script goes on as if nothing had been.
+class Stop(Spec, WorldAction):
+    """Stop a moving object, pedestrian, or door; with `for`, its motion continues afterwards where it was.
 
-    Imitates a person who stops in front of the robot to look at it, a cart that waits, a door that jams.
+    Use it for a person who stops in front of the robot, a cart that waits, or a door that jams.
 
     Example: `do: {stop: {name: cart, for: 3 s}}`
     """
@@ -192,24 +174,19 @@ class Stop(Spec, Action):
     name: MovableName
     """The object to stop."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
-    """How long it stands; default: until something else moves it."""
-
-    @property
-    def of_a_robot(self) -> bool:
-        """It is about the world."""
-        return False
+    """How long it stops; default: until another action moves it."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Stop it; nothing comes of it when it is not there, or no script moves it now."""
-        here, motion = stage.object(self.name), stage.motion(self.name)
-        if here is None:
+        """Stop the object; has no effect if it does not exist or no script moves it."""
+        pose, motion = stage.object(self.name), stage.motion(self.name)
+        if pose is None:
             return Effect(False, f"there is nothing called {self.name}")
         if motion is None:
             return Effect(False, f"{self.name} was not moving")
-        path, since = motion
+        path, elapsed = motion
         if self.for_ is None:
-            stage.place(self.name, here)
+            stage.place(self.name, pose)
             return Effect(True, f"stopped {self.name}")
-        waits = self.for_ + max(0.0, path.start - since)
-        stage.move(self.name, replace(path, phase=path.elapsed(since), start=waits))
+        delay = self.for_ + max(0.0, path.start - elapsed)
+        stage.move(self.name, replace(path, phase=path.elapsed(elapsed), start=delay))
         return Effect(True, f"stopped {self.name} for {self.for_:g} s")

@@ -1,7 +1,7 @@
 """Registry of the action types, and checks on the effects of actions from plugins."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
+from typing import Annotated, Any, ClassVar, cast
 
 from simscen.actions.base import Action
 from simscen.core.errors import BROKEN_COMPONENT, RunError
@@ -10,12 +10,9 @@ from simscen.spec.choice import Choice
 from simscen.spec.lazy import LazySpec
 from simscen.spec.places import RobotName
 
-if TYPE_CHECKING:
-    from simscen.core.stage import Effect, Stage
-
 
 class AnyAction(Choice):
-    """One thing to do."""
+    """One action, chosen by its key."""
 
     group: ClassVar[str] = "action"
     modifiers: ClassVar[frozenset[str]] = frozenset({"robot"})
@@ -39,49 +36,49 @@ class AnyAction(Choice):
     mark: Annotated[Action | None, LazySpec("simscen.actions.mark", "Mark")] = None
 
     robot: RobotName | None = None
-    """Which of several robots it is about; default: the only one."""
+    """The robot that the action is for, if there are several; default: the only one."""
 
     def may(self, *kinds: str) -> bool:
-        """Whether it does one of these; an action of an installed package may do anything."""
+        """Return whether it is one of these actions, or one of a plugin, which can do anything."""
         return self.kind in kinds or self.narrow is not None
 
-    def perform(self, stage: "Stage") -> "Effect":
-        """Do it now, and say what came of it, and of which robot where it names one."""
+    def perform(self, stage: Stage) -> Effect:
+        """Perform the action and return its effect, which starts with the name of the robot if one is given."""
         if self.robot is None:
-            return self._done(stage)
-        effect = self._done(stage.of(self.robot))
+            return self._perform_chosen(stage)
+        effect = self._perform_chosen(stage.of(self.robot))
         return replace(effect, what=f"{self.robot}: {effect.what}")
 
-    def _done(self, stage: "Stage") -> "Effect":
+    def _perform_chosen(self, stage: Stage) -> Effect:
         action = self.chosen
         assert isinstance(action, Action)
-        if self.narrow is None:
-            return action.perform(stage)
-
-        return perform_checked(action, stage, self.added_by)
+        return action.perform(stage) if self.narrow is None else perform_checked(action, stage, self.added_by)
 
 
-_TELLING = frozenset({*dir(Situation), "room", "chance", "door", "motion", "mass"})
-"""What of a stage only tells how it stands; everything else changes a run."""
+_QUERIES = frozenset({*dir(Situation), "room", "chance", "door", "motion", "mass"})
+"""Members of a stage that only return information; all others change the run."""
 
 
-def perform_checked(action: Action, stage: Stage, whose: str) -> Effect:
-    """Do it, and say what came of it. `whose` ends a message. Raises RunError where that is not so."""
-    watched = _Watched(stage)
-    effect: object = action.perform(cast(Stage, watched))
+def perform_checked(action: Action, stage: Stage, origin: str) -> Effect:
+    """Perform an action of a plugin; raises RunError if its effect is invalid or contradicts what it did.
+
+    `origin` names the plugin at the end of a message.
+    """
+    observed = _ObservedStage(stage)
+    effect: object = action.perform(cast(Stage, observed))
     if not isinstance(effect, Effect) or not isinstance(effect.happened, bool) or not isinstance(effect.what, str):
-        raise RunError(BROKEN_COMPONENT, f"an action says {effect!r}, which is no Effect{whose}")
-    if effect.happened and not watched.done:
-        raise RunError(BROKEN_COMPONENT, f"an action says `{effect.what}`, but did nothing{whose}")
+        raise RunError(BROKEN_COMPONENT, f"an action returned {effect!r}, which is not an Effect{origin}")
+    if effect.happened and not observed.changed:
+        raise RunError(BROKEN_COMPONENT, f"an action returned the effect `{effect.what}`, but did nothing{origin}")
     return effect
 
 
-class _Watched:
-    """The stage, and whether anything was done on it."""
+class _ObservedStage:
+    """A stage that records whether any of its members was used that changes the run."""
 
     def __init__(self, stage: Stage) -> None:
-        self._stage, self.done = stage, False
+        self._stage, self.changed = stage, False
 
     def __getattr__(self, name: str) -> Any:
-        self.done = self.done or name not in _TELLING
+        self.changed = self.changed or name not in _QUERIES
         return getattr(self._stage, name)

@@ -17,63 +17,64 @@ from simscen.spec.quantities import Force, Impulse, PositiveAngle, PositiveDurat
 from simscen.spec.references import MovableName
 
 POSE_TOLERANCE = 1e-3
-"""Meters and radians within which the robot is where a kidnapper wants it."""
+"""Meters and radians within which the robot is already at the requested pose."""
 
 
 class Kidnap(Spec, Action):
-    """Set the robot down somewhere else, at rest; its stack is not told. For objects there is `teleport`.
+    """Move the robot to another pose, at rest, without informing its stack. For objects, use `teleport`.
 
-    Imitates somebody who carries the robot away, and a localizer that has to find out by itself.
+    Use it for a robot that is carried away and for testing relocalization.
 
     Example: `do: {kidnap: {pose: {x: 2, y: 3, yaw: 90 deg}}}`
     """
 
     pose: PlaceOrPose
-    """Where it finds itself, in the world frame: a pose, or a place by name."""
+    """New pose in the world frame, or a place by name."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Set it down, at rest; nothing comes of it when it stands there."""
-        here, there = stage.robot, self.pose.pose
-        if here.distance(there) < POSE_TOLERANCE and abs(wrap(here.yaw - there.yaw)) < POSE_TOLERANCE:
+        """Move the robot; has no effect if it is already there."""
+        current, target = stage.robot, self.pose.pose
+        distance = current.distance(target)
+        if distance < POSE_TOLERANCE and abs(wrap(current.yaw - target.yaw)) < POSE_TOLERANCE:
             return Effect(False, "the robot stood there already")
-        stage.place_robot(there)
-        return Effect(True, f"set the robot down {here.distance(there):.2f} m away, at ({there.x:.2f}, {there.y:.2f})")
+        stage.place_robot(target)
+        return Effect(True, f"set the robot down {distance:.2f} m away, at ({target.x:.2f}, {target.y:.2f})")
 
 
 class Push(Spec, Action):
-    """Push the robot, or an object that has a mass, at its center: an impulse at once, or a force for a while.
+    """Push the robot, or an object with a mass, at its center: with an impulse, or with a force for a while.
 
-    Imitates somebody who bumps into the robot (`impulse`), and somebody who leans on it, a slope or a gust of wind
-    (`force`). A force of F newtons for t seconds gives a mass that nothing holds an impulse of F t.
+    Use an `impulse` for a person who bumps into the robot, and a `force` for a person who leans on it, a slope, or a
+    gust of wind. A force of F newtons for t seconds gives a free mass an impulse of F t.
 
     Example: `do: {push: {force: [0, 20], for: 1.5 s}}`
     """
 
     name: MovableName | None = None
-    """An object that has a mass; default: the robot."""
+    """An object with a mass; default: the robot."""
     impulse: Annotated[list[Impulse], Field(min_length=2, max_length=2)] | None = None
-    """N s along x and y of the world frame, within one tick of the physics."""
+    """N s along x and y of the world frame, within one physics tick."""
     force: Annotated[list[Force], Field(min_length=2, max_length=2)] | None = None
-    """Instead: N along x and y of the world frame, for as long as `for` says."""
+    """Alternatively: N along x and y of the world frame, for the duration `for`."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
-    """How long the force lasts."""
+    """Duration of the force."""
 
     @model_validator(mode="after")
-    def _how(self) -> Push:
+    def _check_kind(self) -> Push:
         if (self.impulse is None) == (self.force is None):
             raise ValueError("expected either impulse or force")
         if (self.force is None) != (self.for_ is None):
-            raise ValueError("a force needs `for`: how long it lasts" if self.force else "an impulse lasts no time")
+            raise ValueError("a force needs a duration `for`" if self.force else "an impulse has no duration `for`")
         return self
 
     @property
-    def of_a_robot(self) -> bool:
-        """It is, unless it is an object that is pushed."""
+    def is_robot_specific(self) -> bool:
+        """Whether it pushes the robot rather than an object."""
         return self.name is None
 
     def perform(self, stage: Stage) -> Effect:
-        """Push; nothing comes of a push of zero, or of one on what is not there or has no mass."""
-        what, lasts = self.name or "the robot", self.for_ or 0.0
+        """Push; has no effect if the push is zero, or the object does not exist or has no mass."""
+        target, duration = self.name or "the robot", self.for_ or 0.0
         x, y = self.impulse or self.force or (0.0, 0.0)
         if not math.hypot(x, y):
             return Effect(False, "a push of zero moves nothing")
@@ -81,46 +82,46 @@ class Push(Spec, Action):
             if stage.object(self.name) is None:
                 return Effect(False, f"there is nothing called {self.name}")
             if not stage.mass(self.name):
-                return Effect(False, f"{self.name} has no mass, or a script moves it: no push does")
-        stage.push((x * lasts, y * lasts) if lasts else (x, y), self.name, lasts)
-        said = f"{math.hypot(x, y):.1f} N for {lasts:g} s" if lasts else f"{math.hypot(x, y):.1f} N s"
-        return Effect(True, f"pushed {what} with {said}")
+                return Effect(False, f"{self.name} has no mass or is moved by a script, so it cannot be pushed")
+        stage.push((x * duration, y * duration) if duration else (x, y), self.name, duration)
+        strength = f"{math.hypot(x, y):.1f} N for {duration:g} s" if duration else f"{math.hypot(x, y):.1f} N s"
+        return Effect(True, f"pushed {target} with {strength}")
 
 
 class NewGoal(Spec, Action):
-    """Send another goal; it preempts the one the robot is driving to, and the goals after it follow.
+    """Send another goal; it preempts the current goal, and the remaining goals follow it.
 
-    Criteria judge it like any other goal of the scenario, and the one it preempts as preempted. Every goal that events
-    send has a name of its own; sent twice, it has to be reached twice.
+    Criteria judge it like any other goal of the scenario; the preempted goal counts as preempted. Each goal that
+    events send needs its own name; a goal that is sent twice must be reached twice.
 
     Example: `do: {new_goal: {name: detour, pose: {x: 1, y: 4}}}`
     """
 
     name: Name
-    """What the goal is called."""
+    """Name of the goal."""
     pose: PlaceOrPose
-    """In the map frame: a pose, or a place by name."""
+    """Pose in the map frame, or a place by name."""
     timeout: PositiveDuration | None = None
-    """Simulated time it may take."""
+    """Maximum simulated time to reach it."""
     xy_tolerance: PositiveLength | None = None
-    """How far off the position may be; default: that of the stack's goal checker."""
+    """Maximum distance from the position; default: that of the stack's goal checker."""
     yaw_tolerance: PositiveAngle | None = None
-    """How far off the heading may be; default: that of the stack's goal checker."""
+    """Maximum heading error; default: that of the stack's goal checker."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Send it."""
+        """Send the goal."""
         stage.send_goal(self.name)
         return Effect(True, f"sent goal {self.name}")
 
 
 class CancelGoal(Spec, Action):
-    """Cancel the goal the robot is driving to, as an action client would; the robot must stop.
+    """Cancel the current goal as an action client would; the robot must stop.
 
     Example: `do: {cancel_goal: {}}`
     """
 
     def perform(self, stage: Stage) -> Effect:
-        """Cancel it; nothing comes of it when the robot drives to no goal."""
+        """Cancel the goal; has no effect if there is none."""
         goal = stage.goal
         if goal is None:
             return Effect(False, "the robot was driving to no goal")

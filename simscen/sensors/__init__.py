@@ -1,1 +1,1 @@
-"""What the robot is told of the world: lidar, odometry, IMU, bumper, camera, each with its own noise."""
+"""Simulated sensors: lidar, wheel odometry, IMU, bumper, and camera, each with its own noise."""

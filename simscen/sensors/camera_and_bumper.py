@@ -1,4 +1,4 @@
-"""Camera and bumper: sensors that report what the simulation provides without noise."""
+"""Camera and bumper: sensors that report what the simulation provides, without noise."""
 
 from simscen.core.messages.sensor_data import Bump, Image
 from simscen.model.robot import Bumper, Camera
@@ -6,25 +6,25 @@ from simscen.sensors.sensor import SensorSetting
 
 
 class CameraSensor:
-    """A pinhole without noise or distortion; costs milliseconds a picture, so robots have none unless asked."""
+    """Pinhole camera with color and depth, without noise or distortion. Rendering takes milliseconds per picture."""
 
     def __init__(self, spec: Camera, setting: SensorSetting) -> None:
         self.name, self.period, self._spec, self._view = setting.name, setting.period, spec, setting.view
         self._mount = spec.mount.pose
 
     def read(self, tick: int) -> Image:
-        """Take a picture."""
+        """Render a picture."""
         spec = self._spec
         rgb, depth = self._view.image(self._mount, spec.width, spec.height, spec.field_of_view, spec.max_range)
         return Image(self.name, tick, rgb, depth, self._mount, spec.field_of_view)
 
 
 class BumperSensor:
-    """Pressed while the hull touches something, and for a tenth of a second after."""
+    """Contact switch around the hull. It stays pressed for 0.1 s after a contact."""
 
     def __init__(self, spec: Bumper, setting: SensorSetting) -> None:
         self.name, self.period, self._view = setting.name, setting.period, setting.view
 
     def read(self, tick: int) -> Bump:
-        """Whether it is pressed now."""
+        """Return whether the bumper is pressed."""
         return Bump(self.name, tick, self._view.touching())

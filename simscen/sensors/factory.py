@@ -17,91 +17,92 @@ from simscen.core.random_streams import Streams
 from simscen.model.robot import RobotSpec, SensorSpec
 from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
 
+T = TypeVar("T")
+_DISTANCE_ARRAYS = frozenset({"ranges", "depth"})
+"""Arrays in which nan (no measurement) and inf (no hit within range) are valid."""
+
 
 def build_sensors(
     spec: RobotSpec, clock: Clock, streams: Streams, view: SensorView, rays: RayCaster
 ) -> tuple[Sensor, ...]:
-    """The robot's sensors in the order of their names, each with its own stream `sensor.<name>`.
+    """Return the sensors of a robot sorted by name, each with its own random stream `sensor.<name>`.
 
-    Those of installed packages come last: the log calls the first of a kind by the plain name. Raises ValueError when a
-    rate does not divide the clock, RunError where what a package installed is no sensor.
+    Sensors from plugins come last, because the log gives the plain topic name to the first sensor of a kind. Raises
+    ValueError if a rate does not divide the clock rate, and RunError if a plugin does not provide a valid sensor.
     """
     return tuple(
-        _build(name, spec, clock, streams, view, rays)
+        _build_sensor(name, spec, clock, streams, view, rays)
         for name in sorted(spec.sensors, key=lambda name: (spec.sensors[name].narrow is not None, name))
     )
 
 
-def _build(name: str, robot: RobotSpec, clock: Clock, streams: Streams, view: SensorView, rays: RayCaster) -> Sensor:
+def _build_sensor(
+    name: str, robot: RobotSpec, clock: Clock, streams: Streams, view: SensorView, rays: RayCaster
+) -> Sensor:
     entry = robot.sensors[name]
     spec = entry.chosen
     assert isinstance(spec, SensorSpec)
-    period, chance = clock.period(spec.rate), streams.generator(f"sensor.{name}")
-    setting = SensorSetting(name, period, clock.seconds(period), chance, view, rays, robot.drive)
+    period, rng = clock.period(spec.rate), streams.generator(f"sensor.{name}")
+    setting = SensorSetting(name, period, clock.seconds(period), rng, view, rays, robot.drive)
     if entry.narrow is not None:
         return PluginSensor(entry.kind, spec, setting)
     sensor: Sensor = spec.implementation()(spec, setting)
     return sensor
 
 
-T = TypeVar("T")
-_MAY_BE_MISSING = frozenset({"ranges", "depth"})
-"""Arrays in which nan (no answer) and inf (nothing there) are answers."""
-
-
 class PluginSensor:
-    """Asks the sensor, and looks at its readings before the stack and the log get them."""
+    """Wrapper of a plugin's sensor that checks each reading before the stack and the log receive it."""
 
     def __init__(self, kind: str, spec: SensorSpec, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
         self._kind, self._spec = kind, spec
-        self._reading: type = getattr(sensor_data, spec.says)
-        self._inner: Any = self._ask(lambda: spec.implementation()(spec, setting))
-        if not callable(getattr(self._inner, "read", None)):
-            self._broke(f"{type(self._inner).__name__} has no `read`, which every sensor has")
+        self._reading_type: type = getattr(sensor_data, spec.says)
+        self._sensor: Any = self._call(lambda: spec.implementation()(spec, setting))
+        if not callable(getattr(self._sensor, "read", None)):
+            self._fail(f"{type(self._sensor).__name__} has no method `read`")
 
     def read(self, tick: int) -> Reading:
-        """Its reading. Raises RunError where that is none."""
-        reading: Reading = self._ask(lambda: self._inner.read(tick))
-        if type(reading) is not self._reading:
-            self._broke(f"says {type(reading).__name__}, but its specification says {self._spec.says}")
+        """Return a reading; raises RunError if it is invalid."""
+        reading: Reading = self._call(lambda: self._sensor.read(tick))
+        if type(reading) is not self._reading_type:
+            self._fail(f"returned {type(reading).__name__}, but its specification declares {self._spec.says}")
         if (reading.sensor, reading.tick) != (self.name, tick):
-            self._broke(f"signs its reading `{reading.sensor}` of tick {reading.tick}, at tick {tick}")
+            self._fail(f"returned a reading of `{reading.sensor}` at tick {reading.tick}, but it is tick {tick}")
         for field in fields(reading):
-            if why := _flaw(field.name, getattr(reading, field.name)):
-                self._broke(f"says {field.name} that {why}")
+            if defect := _defect(field.name, getattr(reading, field.name)):
+                self._fail(f"returned a reading whose `{field.name}` {defect}")
         return reading
 
-    def _ask(self, call: Callable[[], T]) -> T:
+    def _call(self, function: Callable[[], T]) -> T:
         try:
-            return call()
+            return function()
         except (RunError, MemoryError):
             raise
-        except Exception as error:  # the boundary to code of others, which can raise anything
+        except Exception as error:  # a plugin can raise anything
             frame, line = list(traceback.walk_tb(error.__traceback__))[-1]
             place = f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
-            raise RunError("crashed", f"{self._who}: {type(error).__name__}: {error} ({place})") from error
+            raise RunError("crashed", f"{self._label}: {type(error).__name__}: {error} ({place})") from error
 
-    def _broke(self, what: str) -> NoReturn:
-        raise RunError(BROKEN_COMPONENT, f"{self._who} {what}")
+    def _fail(self, problem: str) -> NoReturn:
+        raise RunError(BROKEN_COMPONENT, f"{self._label} {problem}")
 
     @property
-    def _who(self) -> str:
+    def _label(self) -> str:
         return f"sensor `{self.name}` ({self._kind}, {self._spec.component})"
 
 
-def _flaw(name: str, value: object) -> str:
-    """What is wrong with one part of a reading; "" for nothing."""
+def _defect(name: str, value: object) -> str:
+    """Return what is wrong with the field `name` of a reading, or ""."""
     match value:
-        case np.ndarray() if name in _MAY_BE_MISSING:
-            wrong = value.dtype.kind != "f" or np.isneginf(value).any() or (value < 0).any() or not value.size
-            return "are no distances" if wrong else ""
+        case np.ndarray() if name in _DISTANCE_ARRAYS:
+            is_wrong = value.dtype.kind != "f" or np.isneginf(value).any() or (value < 0).any() or not value.size
+            return "is not an array of distances" if is_wrong else ""
         case np.ndarray():
-            return "" if value.dtype == np.uint8 and value.ndim == 3 else "are no colors"
+            return "" if value.dtype == np.uint8 and value.ndim == 3 else "is not an array of colors"
         case tuple() | Twist():
             return "" if np.isfinite(np.array(value, dtype=float)).all() else "is not finite"
         case float() | np.floating():
             return "" if np.isfinite(value) else "is not finite"
         case bool() | int() | str() | np.bool_():
             return ""
-    return f"is {type(value).__name__}"
+    return f"is a {type(value).__name__}"

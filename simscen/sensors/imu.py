@@ -1,28 +1,27 @@
-"""An inertial measurement unit at the base frame's origin."""
+"""Inertial measurement unit at the origin of the base frame."""
 
 import math
 
 from simscen.core.geometry import rotated
 from simscen.core.messages.sensor_data import Imu
 from simscen.model.robot import InertialUnit
-from simscen.sensors.normals import NormalStream
+from simscen.sensors.normal_stream import NormalStream
 from simscen.sensors.sensor import SensorSetting, Vector
 
-GRAVITY = 9.81
-"""m/s²"""
+GRAVITY = 9.81  # m/s²
 MAX_UNEXPLAINED_STEP_M = 0.05
 """A robot that moved this much farther than its velocity explains was placed elsewhere (`kidnap`)."""
 
 
 class ImuSensor:
-    """Measures angular velocity with a constant bias, and the mean specific force since the last reading.
+    """Measures the angular velocity with a constant bias, and the mean specific force since the last reading.
 
-    A robot that is placed elsewhere by an action has not been accelerated: that reading shows gravity only.
+    When an action places the robot elsewhere, this is no acceleration: that reading contains gravity only.
     """
 
     def __init__(self, spec: InertialUnit, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
-        self._gyro, self._force = spec.gyro_noise, spec.accelerometer_noise
+        self._gyro_std, self._force_std = spec.gyro_noise, spec.accelerometer_noise
         self._seconds, self._view = setting.seconds, setting.view
         self._bias: list[float] = setting.chance.normal(0.0, spec.gyro_bias, 3).tolist()
         self._normals = NormalStream(setting.chance)
@@ -40,7 +39,7 @@ class ImuSensor:
         seconds, base_from_world = self._seconds, (-i, -j, -k, w)
         p, q, r = rotated(base_from_world, angular)
         x, y, z = rotated(base_from_world, ((vx - ax) / seconds, (vy - ay) / seconds, (vz - az) / seconds + GRAVITY))
-        gyro, force, (bp, bq, br) = self._gyro, self._force, self._bias
+        gyro, force, (bp, bq, br) = self._gyro_std, self._force_std, self._bias
         np, nq, nr, nx, ny, nz = self._normals.take(6)
         return Imu(
             self.name,

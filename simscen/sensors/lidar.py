@@ -1,4 +1,4 @@
-"""A planar lidar: rays, gaussian noise, ranges in whole steps. No work per beam in Python."""
+"""Planar lidar: ray casting, Gaussian noise, and quantized ranges, vectorized over the beams."""
 
 import math
 
@@ -10,59 +10,61 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.model.robot import Lidar
 from simscen.sensors.sensor import SensorSetting
 
-CERTAIN = 10.0
-"""Standard deviations that noise never exceeds."""
-AT_ONCE = 8
-"""Scans whose noise is drawn at once."""
+MAX_NOISE_STDS = 10.0
+"""Noise never exceeds this many standard deviations."""
+NOISE_BUFFER_SCANS = 8
+"""Number of scans whose noise is drawn in one call."""
 
 
 class LidarSensor:
-    """Measures along `spec.beams` directions at once; a scan is an instant, as in Gazebo.
+    """Lidar that measures all `spec.beams` directions at the same instant, as in Gazebo.
 
-    A full circle has no beam twice; any other field of view has beams on both of its edges.
+    A full circle has no duplicate beam; a smaller field of view has beams on both of its edges.
     """
 
     def __init__(self, spec: Lidar, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
-        self._spec, self._chance, self._view, self._rays = spec, setting.chance, setting.view, setting.rays
-        full = spec.field_of_view >= 2 * math.pi - 1e-9
-        self._increment = spec.field_of_view / max(1, spec.beams if full else spec.beams - 1)
+        self._spec, self._rng, self._view, self._rays = spec, setting.chance, setting.view, setting.rays
+        is_full_circle = spec.field_of_view >= 2 * math.pi - 1e-9
+        self._increment = spec.field_of_view / max(1, spec.beams if is_full_circle else spec.beams - 1)
         self._first = -spec.field_of_view / 2 if spec.beams > 1 else 0.0
         self._mount = Pose2(spec.mount.x, spec.mount.y, spec.mount.yaw)
         self._fan = RayFan(self._first + spec.mount.yaw, self._increment, spec.beams)
-        # What is beyond this is beyond the lidar's range whatever the noise, and when it is rounded to a whole step.
-        self._reach = spec.max_range + CERTAIN * spec.noise + spec.resolution
-        self._lens = spec.mount.x, spec.mount.y, spec.mount.z
-        self._ahead, self._next = np.empty((0, spec.beams)), 0
+        # Beyond this distance, a range exceeds the maximum in spite of noise and rounding.
+        self._cast_range = spec.max_range + MAX_NOISE_STDS * spec.noise + spec.resolution
+        self._origin = spec.mount.x, spec.mount.y, spec.mount.z
+        self._noise_buffer, self._next = np.empty((0, spec.beams)), 0
 
     def read(self, tick: int) -> Scan:
-        """One scan. inf: nothing within range; nan: something nearer than the lidar can measure."""
+        """Return a scan; inf: no hit within range, nan: a hit below the minimum range."""
         pose = self._view.base_pose()
         px, py, pz, i, j, k, w = pose
-        x, y, z = rotated((i, j, k, w), self._lens)
-        ranges = self._measured(self._rays.sweep(self._fan, Pose3(px + x, py + y, pz + z, i, j, k, w), self._reach))
+        x, y, z = rotated((i, j, k, w), self._origin)
+        origin = Pose3(px + x, py + y, pz + z, i, j, k, w)
+        ranges = self._to_ranges(self._rays.sweep(self._fan, origin, self._cast_range))
         spec = self._spec
         return Scan(self.name, tick, ranges, self._first, self._increment, spec.min_range, spec.max_range, self._mount)
 
-    def _measured(self, distances: Array | Singles) -> Array:
-        """What the electronics make of true distances."""
+    def _to_ranges(self, distances: Array | Singles) -> Array:
+        """Return reported ranges for true distances: with noise, rounded, and limited to the sensor's range."""
         spec = self._spec
-        ranges: Array = distances + self._noise() if spec.noise > 0 else distances.astype(np.float64)
+        ranges: Array = distances + self._draw_noise() if spec.noise > 0 else distances.astype(np.float64)
         ranges /= spec.resolution
         np.rint(ranges, ranges)
         ranges *= spec.resolution
-        # Where the nearest and the farthest are is told sooner than which are too near or too far; mostly none is.
-        near, far = ranges.item(ranges.argmin()), ranges.item(ranges.argmax())
-        if far > spec.max_range:
+        # Finding the extremes is cheaper than two masks, and usually no range is out of bounds.
+        nearest, farthest = ranges.item(ranges.argmin()), ranges.item(ranges.argmax())
+        if farthest > spec.max_range:
             ranges[ranges > spec.max_range] = np.inf
-        if near < spec.min_range:
+        if nearest < spec.min_range:
             ranges[ranges < spec.min_range] = np.nan
         return ranges
 
-    def _noise(self) -> Array:
-        """That of a scan, in meters; drawn ahead for several, as single draws would give it."""
-        if self._next == len(self._ahead):
-            self._ahead, self._next = self._chance.normal(0.0, self._spec.noise, (AT_ONCE, self._spec.beams)), 0
+    def _draw_noise(self) -> Array:
+        """Return the noise of one scan in meters from a buffer that has the values of single draws."""
+        if self._next == len(self._noise_buffer):
+            shape = NOISE_BUFFER_SCANS, self._spec.beams
+            self._noise_buffer, self._next = self._rng.normal(0.0, self._spec.noise, shape), 0
         self._next += 1
-        noise: Array = self._ahead[self._next - 1]
+        noise: Array = self._noise_buffer[self._next - 1]
         return noise

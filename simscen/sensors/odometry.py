@@ -8,92 +8,94 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Odometry
 from simscen.model.robot import Drive, Mecanum, Omnidirectional, SkidSteer, WheelOdometry
-from simscen.sensors.normals import NormalStream
+from simscen.sensors.normal_stream import NormalStream
 from simscen.sensors.sensor import SensorSetting
 
-_made = tuple.__new__  # poses and twists without the calls of their classes
+EncoderIncrement = tuple[float, ...]
+"""Difference of two values of `SensorView.encoders`."""
+Kinematics = Callable[[EncoderIncrement], Twist]
+"""Function from encoder increments to the motion of the base in its own frame (m, m, rad)."""
+_new = tuple.__new__  # creates a named tuple without the call overhead of its class
 
 
 class WheelOdometrySensor:
-    """Dead reckoning from where the robot was switched on, which is the origin of its odom frame.
+    """Dead reckoning; the origin of the odom frame is the initial pose of the robot.
 
-    Errors are independent from increment to increment, with variances in proportion to what was driven and turned;
-    so they do not depend on the rate, and after one meter have the standard deviation that the specification says.
+    Errors of increments are independent, with variances proportional to the distance and the turn. They therefore do
+    not depend on the rate, and the standard deviation after one meter is that of the specification.
     """
 
     def __init__(self, spec: WheelOdometry, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
         self._seconds, self._view = setting.seconds, setting.view
-        # Standard deviation along the way, and variances of the heading, after one meter or radian.
-        self._spread, self._twist, self._drift = spec.translation_noise, spec.rotation_noise**2, spec.drift_noise**2
+        self._position_std = spec.translation_noise
+        self._heading_variance_per_rad = spec.rotation_noise**2
+        self._heading_variance_per_m = spec.drift_noise**2
         self._normals = NormalStream(setting.chance)
-        self._motion = kinematics_of(setting.drive)
-        self._rolled = self._view.encoders()
+        self._kinematics = kinematics_of(setting.drive)
+        self._encoders = self._view.encoders()
         self._pose = Pose2(0.0, 0.0, 0.0)
 
     def read(self, tick: int) -> Odometry:
-        """The pose reckoned so far, and the mean velocity since the last reading."""
-        rolled, before, seconds = self._view.encoders(), self._rolled, self._seconds
-        self._rolled = rolled
-        step = self._noisy(self._motion(tuple(map(sub, rolled, before))))
-        self._pose = pose = self._pose.compose(along_arc(step))
+        """Return the integrated pose and the mean velocity since the last reading."""
+        encoders, before, seconds = self._view.encoders(), self._encoders, self._seconds
+        self._encoders = encoders
+        step = self._add_noise(self._kinematics(tuple(map(sub, encoders, before))))
+        self._pose = pose = self._pose.compose(integrate_arc(step))
         vx, vy, wz = step
-        return Odometry(self.name, tick, pose, _made(Twist, (vx / seconds, vy / seconds, wz / seconds)))
+        return Odometry(self.name, tick, pose, _new(Twist, (vx / seconds, vy / seconds, wz / seconds)))
 
-    def _noisy(self, step: Twist) -> Twist:
-        """Thrun, Burgard and Fox, Probabilistic Robotics, table 5.6, for increments."""
+    def _add_noise(self, step: Twist) -> Twist:
+        """Return the increment with noise (Thrun, Burgard and Fox, Probabilistic Robotics, table 5.6)."""
         vx, vy, wz = step
-        driven, turned = math.hypot(vx, vy), abs(wz)
-        if driven == 0 and turned == 0:
+        distance, turn = math.hypot(vx, vy), abs(wz)
+        if distance == 0 and turn == 0:
             return step
-        along, across, turn = self._normals.take(3)
-        spread = self._spread * math.sqrt(driven)
-        heading = math.sqrt(self._twist * turned + self._drift * driven)
-        return _made(Twist, (vx + spread * along, vy + (spread * across if vy else 0.0), wz + heading * turn))
+        forward_draw, lateral_draw, turn_draw = self._normals.take(3)
+        position_std = self._position_std * math.sqrt(distance)
+        heading_std = math.sqrt(self._heading_variance_per_rad * turn + self._heading_variance_per_m * distance)
+        lateral_noise = position_std * lateral_draw if vy else 0.0
+        return _new(Twist, (vx + position_std * forward_draw, vy + lateral_noise, wz + heading_std * turn_draw))
 
 
-def along_arc(step: Twist) -> Pose2:
-    """Where a motion at constant velocity leads (the exponential map of SE(2)): m, m, rad in the base frame."""
+def integrate_arc(step: Twist) -> Pose2:
+    """Return the pose after a motion (m, m, rad) at constant velocity: the exponential map of SE(2)."""
     vx, vy, turn = step
     if abs(turn) < 1e-9:
-        return _made(Pose2, (vx, vy, turn))
+        return _new(Pose2, (vx, vy, turn))
     sine, cosine = math.sin(turn) / turn, (1 - math.cos(turn)) / turn
-    return _made(Pose2, (vx * sine - vy * cosine, vx * cosine + vy * sine, turn))
-
-
-Rolled = tuple[float, ...]
-Kinematics = Callable[[Rolled], Twist]
+    return _new(Pose2, (vx * sine - vy * cosine, vx * cosine + vy * sine, turn))
 
 
 def kinematics_of(drive: Drive) -> Kinematics:
-    """Turns an increment of `SensorView.encoders` into a motion of the base in its own frame (m, m, rad).
+    """Return the forward kinematics of a drive without slip.
 
-    Siegwart, Nourbakhsh and Scaramuzza, Introduction to Autonomous Mobile Robots, section 3.2; mecanum wheels: see
-    MecanumWheels.
+    Source: Siegwart, Nourbakhsh and Scaramuzza, Introduction to Autonomous Mobile Robots, section 3.2; for mecanum
+    wheels, see MecanumWheels.
     """
     if isinstance(drive, Omnidirectional):
-        return _omnidirectional
+        return _omnidirectional_motion
     if isinstance(drive, Mecanum):
-        return _mecanum(drive)
+        return _mecanum_kinematics(drive)
     separation = drive.wheel_separation * (drive.turning_scale if isinstance(drive, SkidSteer) else 1.0)
-    return _sided(drive.wheel_radius, separation)
+    return _two_sided_kinematics(drive.wheel_radius, separation)
 
 
-def _sided(radius: float, separation: float) -> Kinematics:
-    def motion(rolled: Rolled) -> Twist:
-        left, right = rolled[0] * radius, rolled[1] * radius
-        return _made(Twist, ((left + right) / 2, 0.0, (right - left) / separation))
+def _two_sided_kinematics(radius: float, separation: float) -> Kinematics:
+    def motion(increment: EncoderIncrement) -> Twist:
+        left, right = increment[0] * radius, increment[1] * radius
+        return _new(Twist, ((left + right) / 2, 0.0, (right - left) / separation))
 
     return motion
 
 
-def _mecanum(drive: Mecanum) -> Kinematics:
-    def motion(rolled: Rolled) -> Twist:
-        front_left, front_right, rear_left, rear_right = rolled
+def _mecanum_kinematics(drive: Mecanum) -> Kinematics:
+    def motion(increment: EncoderIncrement) -> Twist:
+        front_left, front_right, rear_left, rear_right = increment
         return drive.wheels.motion((front_left, front_right, rear_left, rear_right))
 
     return motion
 
 
-def _omnidirectional(rolled: Rolled) -> Twist:
-    return Twist(*rolled)
+def _omnidirectional_motion(increment: EncoderIncrement) -> Twist:
+    return Twist(*increment)

@@ -1,4 +1,4 @@
-"""What a sensor is, and what it may look at."""
+"""Interface of sensors, and their view of the simulation."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -15,51 +15,51 @@ Vector = tuple[float, float, float]
 
 
 class SensorView(Protocol):
-    """The truth, as far as sensors may see it."""
+    """Part of the true state that sensors may use."""
 
     def base_pose(self) -> Pose3:
-        """The robot's base frame in the world."""
+        """Return the pose of the base frame in the world."""
         ...
 
     def base_velocity(self) -> tuple[Vector, Vector]:
-        """Linear (m/s) and angular (rad/s) velocity of the base frame along the world's axes."""
+        """Return the linear (m/s) and angular (rad/s) velocity of the base frame along the world axes."""
         ...
 
     def encoders(self) -> tuple[float, ...]:
-        """What has been rolled so far.
+        """Return the accumulated rotation of the wheels.
 
-        On wheels: the mean angle in rad of the driven wheels on the left, and of those on the right. Mecanum: the
-        angles in rad of the wheels front left, front right, rear left, rear right. Omnidirectional: meters forward,
-        meters to the left, and radians.
+        Wheels on two sides: mean angle in rad of the driven wheels on the left and on the right. Mecanum: angles in rad
+        of the front left, front right, rear left, and rear right wheel. Omnidirectional: meters forward, meters to the
+        left, and radians.
         """
         ...
 
     def touching(self) -> bool:
-        """Whether the hull touches anything but the ground."""
+        """Return whether the hull touches anything besides the ground."""
         ...
 
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """Colors (h, w, 3) and depths (h, w) in meters along the optical axis, inf beyond `far`.
+        """Return colors (h, w, 3) and depths (h, w) in meters along the optical axis, inf beyond `far`.
 
-        `mount` is where the camera is in the base frame; it looks along its x axis. `field_of_view` is horizontal,
-        in rad.
+        `mount` is the pose of the camera in the base frame; its optical axis is its x axis. `field_of_view` is
+        horizontal, in rad.
         """
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class SensorSetting:
-    """All that a sensor may know besides its specification: `Class(specification, setting)`. SI units.
+    """Arguments of a sensor besides its specification: `Class(specification, setting)`. SI units.
 
-    name:     what the robot's file calls it; its readings carry it
+    name:     name of the sensor in the robot's file, repeated in its readings
     period:   ticks between two readings
     seconds:  the same in seconds
-    chance:   its own random generator, `sensor.<name>` of the run's seed
-    view:     the truth, as far as sensors may see it
-    rays:     distances to what is around
-    drive:    what the robot drives with, for what is measured at its wheels
+    chance:   random generator of this sensor, from the stream `sensor.<name>` of the run's seed
+    view:     part of the true state that sensors may use
+    rays:     ray caster for distances to the surroundings
+    drive:    drive of the robot, for measurements at its wheels
     """
 
     name: str
@@ -81,7 +81,7 @@ class Sensor(Protocol):
 
     @property
     def name(self) -> str:
-        """The instance, as faults call it."""
+        """Name of the sensor, as faults refer to it."""
         ...
 
     @property
@@ -90,5 +90,5 @@ class Sensor(Protocol):
         ...
 
     def read(self, tick: int) -> Reading:
-        """Measure now, at `tick`. Called once every `period` ticks, in order."""
+        """Return the reading at the current `tick`. Called every `period` ticks in order."""
         ...

@@ -63,7 +63,7 @@ GROUPS: dict[str, Group] = {
     ),
     "trigger": Group(
         "simscen.triggers.base:Condition",
-        "simscen.triggers.registry:Test",
+        "simscen.triggers.registry:AnyCondition",
         ("for", "robot", "edge", "delay", "times", "probability", "all", "any", "not"),
     ),
     "action": Group("simscen.actions.base:Action", "simscen.actions.registry:AnyAction", ("robot",)),

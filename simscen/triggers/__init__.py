@@ -1,1 +1,1 @@
-"""When something happens: one file for each condition, its specification and its meaning together."""
+"""Conditions that start events, each with its specification and implementation."""

@@ -1,4 +1,4 @@
-"""What a trigger is."""
+"""Base class of trigger conditions."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ if TYPE_CHECKING:
 
 
 class Condition(ABC):
-    """A condition on the running scenario.
+    """Condition on the state of the run.
 
-    *Given* the same situation *then* the same answer: a condition keeps no state and draws no chance.
+    *Given* the same situation *then* the result is the same: a condition keeps no state and draws no random numbers.
     """
 
-    of_a_robot: ClassVar[bool] = True
-    """Whether it depends on which of several robots it is about."""
+    is_robot_specific: ClassVar[bool] = True
+    """Whether the result depends on which of several robots the condition is for."""
 
     @abstractmethod
     def holds(self, now: Situation) -> bool:
-        """Whether it is true at this beat."""
+        """Return whether the condition is true at this beat."""

@@ -19,36 +19,36 @@ class RobotIn(Spec, Condition):
     """
 
     region: RegionName
-    """A region of the world, by name."""
+    """Name of a region of the world."""
 
     def holds(self, now: Situation) -> bool:
-        """The robot's true center is inside or on the edge."""
+        """Return whether the true position is inside or on the border."""
         return distance_to_polygon(now.robot, now.region(self.region)) <= 0
 
 
 class RobotWithin(Spec, Condition):
-    """True while the robot's center is at most `distance` from a point, an object or a region.
+    """True while the robot's center is at most `distance` away from a point, an object, or a region.
 
     Example: `when: {robot_within: {of: [2, 2], distance: 1.5 m}}`
     """
 
     of: PlaceOrPoint | None = None
-    """A point [x, y] in the world, or a place of it by name."""
+    """A point [x, y] in the world frame, or a place by name."""
     object: MoverName | None = None
-    """An object of the world or of the scenario's events, or another robot, by name; false while it is not there."""
+    """An object of the world or of the scenario's events, or another robot, by name; false while it does not exist."""
     region: RegionName | None = None
-    """A region of the world, by name."""
+    """Name of a region of the world."""
     distance: NonNegativeLength
-    """From the robot's center."""
+    """Maximum distance from the robot's center."""
 
     @model_validator(mode="after")
-    def _one_target(self) -> "RobotWithin":
+    def _check_target(self) -> "RobotWithin":
         if sum(target is not None for target in (self.of, self.object, self.region)) != 1:
             raise ValueError("expected exactly one of: of, object, region")
         return self
 
     def holds(self, now: Situation) -> bool:
-        """The robot's true center is near."""
+        """Return whether the true position is near the target."""
         if self.region is not None:
             return distance_to_polygon(now.robot, now.region(self.region)) <= self.distance
         target = Pose2(self.of[0], self.of[1]) if self.of else now.object(self.object or "")
@@ -56,14 +56,14 @@ class RobotWithin(Spec, Condition):
 
 
 class ClearanceBelow(Value[PositiveLength], Condition):
-    """True while anything is nearer to the robot's hull than this (m).
+    """True while the distance between the robot's hull and the nearest obstacle is less than this (m).
 
-    For what goes wrong where there is no room left: a scan that drops out in the doorway, a push beside the shelf.
-    Walls, objects and other robots count; measured with each sample of the truth (`physics.truth_rate`).
+    Use it for disturbances in narrow places: a scan that drops out in a doorway, a push beside a shelf. Walls, objects,
+    and other robots count. The clearance is measured with each truth sample (`physics.truth_rate`).
 
     Example: `when: {clearance_below: 30 cm}`
     """
 
     def holds(self, now: Situation) -> bool:
-        """The newest sample of the true clearance is below."""
+        """Return whether the newest sample of the true clearance is smaller."""
         return now.clearance is not None and now.clearance < self.root

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from simscen.core.stage import Situation
 
 
-class Test(Choice):
-    """One condition, or several combined."""
+class AnyCondition(Choice):
+    """One condition, chosen by its key, or a combination of conditions."""
 
     group: ClassVar[str] = "trigger"
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot"})
@@ -50,34 +50,34 @@ class Test(Choice):
     collision: Annotated[Condition | None, LazySpec("simscen.triggers.events", "Collided")] = None
     pedestrian: Annotated[Condition | None, LazySpec("simscen.triggers.events", "PedestrianStatus")] = None
     event: Annotated[Condition | None, LazySpec("simscen.triggers.events", "EventStatus")] = None
-    all: Annotated[list["Test"], Field(min_length=1, max_length=50)] | None = None
-    """True while all of these are."""
-    any: Annotated[list["Test"], Field(min_length=1, max_length=50)] | None = None
-    """True while at least one of these is."""
-    not_: "Test | None" = Field(default=None, alias="not")
-    """True while this is not."""
+    all: Annotated[list["AnyCondition"], Field(min_length=1, max_length=50)] | None = None
+    """True while all of these conditions are true."""
+    any: Annotated[list["AnyCondition"], Field(min_length=1, max_length=50)] | None = None
+    """True while at least one of these conditions is true."""
+    not_: "AnyCondition | None" = Field(default=None, alias="not")
+    """True while this condition is false."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
-    """Count it as true only once it has been true for this long without a break; default: at once."""
+    """Count the condition as true only after it has been true without interruption for this long; default: at once."""
     robot: RobotName | None = None
-    """Which of several robots it is about; default: the only one."""
+    """The robot that the condition is for, if there are several; default: the only one."""
 
     @property
-    def inner(self) -> "list[Test]":
-        """The conditions that this one combines; none where it is a single one."""
+    def inner(self) -> "list[AnyCondition]":
+        """The conditions that this one combines; [] for a single condition."""
         return self.all or self.any or ([self.not_] if self.not_ is not None else [])
 
-    def parts(self) -> "Iterator[Test]":
-        """This condition, then all that are in it."""
+    def parts(self) -> "Iterator[AnyCondition]":
+        """Yield this condition and, recursively, all conditions in it."""
         yield self
         for test in self.inner:
             yield from test.parts()
 
     def seen(self, now: "Situation") -> "Situation":
-        """The situation of the robot that it is about."""
+        """Return the situation of the robot that the condition is for."""
         return now if self.robot is None else now.of(self.robot)
 
     def holds(self, now: "Situation") -> bool:
-        """Whether the condition is true at this beat; how long it has been (`for`) is not its to know."""
+        """Return whether the condition is true at this beat, regardless of `for`."""
         now = self.seen(now)
         if self.all is not None:
             return all_hold(self.all, now)
@@ -87,32 +87,33 @@ class Test(Choice):
             return not self.not_.holds(now)
         condition = self.chosen
         assert isinstance(condition, Condition)
-        answer: object = condition.holds(now)
-        if not isinstance(answer, bool | np.bool_):
-            raise RunError(BROKEN_COMPONENT, f"a condition says neither True nor False, but {answer!r}{self.added_by}")
-        return bool(answer)
+        result: object = condition.holds(now)
+        if not isinstance(result, bool | np.bool_):
+            raise RunError(BROKEN_COMPONENT, f"a condition returned {result!r} instead of True or False{self.added_by}")
+        return bool(result)
 
 
-def all_hold(tests: list[Test], now: "Situation") -> bool:
-    """Conjunction."""
+# `all` and `any` are fields of AnyCondition, so that its methods cannot call the built-in functions by these names.
+def all_hold(tests: list[AnyCondition], now: "Situation") -> bool:
+    """Return whether all conditions are true."""
     return all(test.holds(now) for test in tests)
 
 
-def any_holds(tests: list[Test], now: "Situation") -> bool:
-    """Disjunction."""
+def any_holds(tests: list[AnyCondition], now: "Situation") -> bool:
+    """Return whether at least one condition is true."""
     return any(test.holds(now) for test in tests)
 
 
-class Trigger(Test):
-    """A condition, and how it makes an event start."""
+class Trigger(AnyCondition):
+    """A condition and how it starts an event."""
 
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot", "edge", "delay", "times", "probability"})
 
     edge: Literal["rising", "falling"] = "rising"
-    """Start when the condition becomes true (rising) or stops being true (falling)."""
+    """Start when the condition becomes true (rising) or false (falling)."""
     delay: Duration = 0.0
-    """Start this long after the edge."""
+    """Delay between the edge and the start."""
     times: Annotated[int, Field(ge=1, le=10_000)] = 1
-    """Start at most so often."""
+    """Maximum number of starts."""
     probability: Probability = 1.0
-    """The chance that an edge counts, drawn from the scenario's seed."""
+    """Probability that an edge starts the event, drawn from the scenario's seed."""

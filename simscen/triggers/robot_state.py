@@ -17,128 +17,130 @@ from simscen.triggers.base import Condition
 
 
 class SpeedBelow(Value[PositiveSpeed], Condition):
-    """True while the robot truly drives slower than this.
+    """True while the true speed of the robot is less than this.
 
     Example: `when: {speed_below: 0.05 m/s}`
     """
 
     def holds(self, now: Situation) -> bool:
-        """Its true speed over ground is below."""
+        """Return whether the true speed over ground is below the limit."""
         return math.hypot(now.twist.vx, now.twist.vy) < self.root
 
 
 class SpeedAbove(Value[PositiveSpeed], Condition):
-    """True while the robot truly drives faster than this.
+    """True while the true speed of the robot is greater than this.
 
     Example: `when: {speed_above: 0.4 m/s}`
     """
 
     def holds(self, now: Situation) -> bool:
-        """Its true speed over ground is above."""
+        """Return whether the true speed over ground is above the limit."""
         return math.hypot(now.twist.vx, now.twist.vy) > self.root
 
 
-class DistanceRemaining(Value[NonNegativeLength], Condition):
-    """True while the robot is truly at most this far from its goal, as the crow flies.
-
-    Example: `when: {distance_remaining: 2 m}`
-    """
-
-    def holds(self, now: Situation) -> bool:
-        """There is a goal and it is near."""
-        return now.goal is not None and now.robot.distance(now.goal.pose) <= self.root
-
-
-class LocalizationError(Value[NonNegativeLength], Condition):
-    """True while the robot believes itself further than this from where it is.
-
-    Example: `when: {localization_error: 0.5 m}`
-    """
-
-    def holds(self, now: Situation) -> bool:
-        """There is a belief and it is off."""
-        return now.belief is not None and now.robot.distance(now.belief.pose) > self.root
-
-
 class TurningAbove(Value[PositiveAngularSpeed], Condition):
-    """True while the robot truly turns faster than this, to either side (rad/s).
+    """True while the true turn rate of the robot, in either direction, is greater than this (rad/s).
 
-    For what hurts a robot in a turn: a scan smeared by the motion, odometry that slips, somebody in the blind corner.
+    Use it for disturbances in a turn: a scan distorted by the motion, odometry that slips, a person in a blind corner.
 
     Example: `when: {turning_above: 30 deg/s}`
     """
 
     def holds(self, now: Situation) -> bool:
-        """Its true turn rate is above."""
+        """Return whether the true turn rate is above the limit."""
         return abs(now.twist.wz) > self.root
 
 
 class TurningBelow(Value[PositiveAngularSpeed], Condition):
-    """True while the robot truly turns slower than this, to either side (rad/s).
+    """True while the true turn rate of the robot, in either direction, is less than this (rad/s).
 
-    With `for`, for the moment at which a turn is over; a robot that stands turns at 0 rad/s, too.
+    Combine it with `for` to detect the end of a turn. It is also true for a robot that stands still.
 
     Example: `when: {turning_below: 5 deg/s, for: 1 s}`
     """
 
     def holds(self, now: Situation) -> bool:
-        """Its true turn rate is below."""
+        """Return whether the true turn rate is below the limit."""
         return abs(now.twist.wz) < self.root
 
 
 class Travelled(Value[NonNegativeLength], Condition):
-    """True once the robot has truly driven this far since the start; being kidnapped is no drive.
+    """True once the robot has truly driven this far since the start; kidnapping does not count.
 
     Example: `when: {travelled: 2.5 m}`
     """
 
     def holds(self, now: Situation) -> bool:
-        """The driven distance has reached the length."""
+        """Return whether the driven distance has reached the length."""
         return now.travelled >= self.root
 
 
-class BelievedDistanceRemaining(Value[NonNegativeLength], Condition):
-    """True while the robot believes itself at most this far from its goal, as the crow flies (m).
+class DistanceRemaining(Value[NonNegativeLength], Condition):
+    """True while the true straight-line distance from the robot to its goal is at most this.
 
-    For a robot that is wrong about where it is: it slows down, parks or reports where it thinks the goal is.
-    `distance_remaining` measures from where it truly is.
+    Example: `when: {distance_remaining: 2 m}`
+    """
+
+    def holds(self, now: Situation) -> bool:
+        """Return whether there is a goal and it is near."""
+        return now.goal is not None and now.robot.distance(now.goal.pose) <= self.root
+
+
+class BelievedDistanceRemaining(Value[NonNegativeLength], Condition):
+    """True while the straight-line distance from the believed pose to the goal is at most this (m).
+
+    A robot with a wrong belief slows down, parks, or reports success where it believes the goal is.
+    `distance_remaining` measures from the true position.
 
     Example: `when: {believed_distance_remaining: 1 m}`
     """
 
     def holds(self, now: Situation) -> bool:
-        """There is a goal, and a belief that is near it."""
+        """Return whether there are a goal and a belief near it."""
         return now.goal is not None and now.belief is not None and now.belief.pose.distance(now.goal.pose) <= self.root
 
 
-class LocalizationLost(Spec, Condition):
-    """True while the robot is lost: its belief is off by more than a planner can bear, or it says so itself.
+class LocalizationError(Value[NonNegativeLength], Condition):
+    """True while the believed position of the robot is further than this from its true position.
 
-    For what follows a kidnapping or a slip: stairs, a person, a new order while the robot drives by a wrong map in its
-    head. `localization_error` looks at the position alone. Without any belief nothing is known to be lost.
+    Example: `when: {localization_error: 0.5 m}`
+    """
+
+    def holds(self, now: Situation) -> bool:
+        """Return whether there is a belief and its error is larger."""
+        return now.belief is not None and now.robot.distance(now.belief.pose) > self.root
+
+
+class LocalizationLost(Spec, Condition):
+    """True while the believed pose has a large error or, with `std`, a large reported uncertainty.
+
+    Use it for disturbances after kidnapping or slip: stairs, a person, or a new goal while the robot navigates with a
+    wrong pose. `localization_error` considers the position alone. False without a belief.
 
     Example: `when: {localization_lost: {tolerance: 0.5 m, yaw_tolerance: 30 deg}, for: 1 s}`
     """
 
     tolerance: PositiveLength = 0.5
-    """How far the believed position may be off (m)."""
+    """Maximum error of the believed position (m)."""
     yaw_tolerance: PositiveAngle = 0.5236
-    """How far the believed heading may be off (rad); 30° unless said otherwise."""
+    """Maximum error of the believed heading (rad); default: 30°."""
     std: PositiveLength | None = None
-    """Lost, too, while the belief's own standard deviation of the position is larger than this (m), be it right or
-    not; default: whatever it says of itself."""
+    """Maximum standard deviation of the position (m) that the belief reports, correct or not; default: no maximum."""
 
     def holds(self, now: Situation) -> bool:
-        """There is a belief, and it is off or unsure."""
+        """Return whether there is a belief that is wrong or uncertain."""
         belief = now.belief
         if belief is None:
             return False
-        off = now.robot.distance(belief.pose) > self.tolerance
-        turned = abs(wrap(now.robot.yaw - belief.pose.yaw)) > self.yaw_tolerance
-        return off or turned or (self.std is not None and _spread(belief) > self.std)
+        is_displaced = now.robot.distance(belief.pose) > self.tolerance
+        is_rotated = abs(wrap(now.robot.yaw - belief.pose.yaw)) > self.yaw_tolerance
+        return is_displaced or is_rotated or (self.std is not None and _max_position_std(belief) > self.std)
 
 
-def _spread(belief: Belief) -> float:
-    """Standard deviation of the position where it is least sure: the root of the larger eigenvalue of x and y."""
-    xx, xy, yy = (float(belief.covariance[at]) for at in ((0, 0), (0, 1), (1, 1)))
+def _max_position_std(belief: Belief) -> float:
+    """Return the largest standard deviation of the position over all directions.
+
+    It is the square root of the larger eigenvalue of the covariance of x and y.
+    """
+    xx, xy, yy = (float(belief.covariance[index]) for index in ((0, 0), (0, 1), (1, 1)))
     return math.sqrt(max(0.0, (xx + yy) / 2 + math.hypot((xx - yy) / 2, xy)))

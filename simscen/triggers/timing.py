@@ -15,28 +15,29 @@ class Time(Value[Duration], Condition):
     Example: `when: {time: 10 s}`
     """
 
-    of_a_robot: ClassVar[bool] = False
+    is_robot_specific: ClassVar[bool] = False
 
     def holds(self, now: Situation) -> bool:
-        """The clock, which counts whole ticks, has reached the tick nearest to the time."""
+        """Return whether the tick nearest to the time has been reached."""
         return now.tick >= now.clock.ticks(self.root)
 
 
 class ScanAge(Spec, Condition):
     """True while the newest scan that the stack received is older than this.
 
-    For a second trouble that comes while a lidar is silent: somebody steps in front of a blind robot. What counts is
-    simulated time since the stack received it, whenever it was measured; before the first scan, since the start.
+    Use it for a second disturbance while a lidar is silent, such as a person who steps in front of a blind robot. The
+    age is the simulated time since the stack received the scan, however late it arrived; before the first scan, it is
+    the time since the start.
 
     Example: `when: {scan_age: {above: 500 ms, sensor: lidar}}`
     """
 
     above: PositiveDuration
-    """Seconds."""
+    """Age in seconds."""
     sensor: Name | None = None
-    """The lidar, by its name in the robot's `sensors`; default: whichever spoke last."""
+    """Name of the lidar in the robot's `sensors`; default: the lidar whose scan arrived last."""
 
     def holds(self, now: Situation) -> bool:
-        """Longer ago than that."""
+        """Return whether the scan is older."""
         last = now.scanned(self.sensor)
         return now.tick - (0 if last is None else last) > now.clock.ticks(self.above)

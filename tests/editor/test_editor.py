@@ -25,7 +25,7 @@ from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.robot import Sensor
 from simscen.spec.choice import Choice
 from simscen.spec.registry import GROUPS, entries
-from simscen.triggers.registry import Test as Condition
+from simscen.triggers.registry import AnyCondition as Condition
 
 ROOT = Path(__file__).parents[2]
 SCHEMAS = PACKAGE / "data" / "schemas"

@@ -132,10 +132,20 @@ def test_a_metric_that_a_run_does_not_have_says_why(run) -> None:
 @pytest.mark.parametrize(
     ("kind", "text", "error", "told"),
     [
-        ("trigger", "return 1", "broken-component", "neither True nor False, but 1 (trigger `mine` of mines 0.3)"),
+        (
+            "trigger",
+            "return 1",
+            "broken-component",
+            "1 instead of True or False (trigger `mine` of mines 0.3)",
+        ),
         ("trigger", "return now.nothing", "crashed", "trigger `mine` of mines 0.3: AttributeError: "),
-        ("action", "return None", "broken-component", "None, which is no Effect (action `mine` of mines 0.3)"),
-        ("action", "return Effect(True, 'done')", "broken-component", "says `done`, but did nothing (action `mine`"),
+        ("action", "return None", "broken-component", "None, which is not an Effect (action `mine` of mines 0.3)"),
+        (
+            "action",
+            "return Effect(True, 'done')",
+            "broken-component",
+            "the effect `done`, but did nothing (action `mine`",
+        ),
         ("action", "raise ValueError('no')", "crashed", "action `mine` of mines 0.3: ValueError: no (mine.py:"),
         ("fault", "def reading(self, reading): return 3", "broken-component", "makes int of the Scan of a sensor"),
         ("fault", "def reading(self, reading): reading.ranges[:] = 0; return reading", "crashed", "read-only"),
@@ -145,10 +155,20 @@ def test_a_metric_that_a_run_does_not_have_says_why(run) -> None:
             "sensor",
             "return Bump('extra', tick, True)",
             "broken-component",
-            "says Bump, but its specification says Scan",
+            "returned Bump, but its specification declares Scan",
         ),
-        ("sensor", "return Scan('x', tick, np.ones(3), 0., 1., 0., 9.)", "broken-component", "signs its reading `x`"),
-        ("sensor", "return Scan('extra', tick, -np.ones(3), 0., 1., 0., 9.)", "broken-component", "ranges that are no"),
+        (
+            "sensor",
+            "return Scan('x', tick, np.ones(3), 0., 1., 0., 9.)",
+            "broken-component",
+            "a reading of `x`",
+        ),
+        (
+            "sensor",
+            "return Scan('extra', tick, -np.ones(3), 0., 1., 0., 9.)",
+            "broken-component",
+            "is not an array of",
+        ),
         ("sensor", "return Scan('extra', tick, np.ones(3), np.nan, 1., 0., 9.)", "broken-component", "is not finite"),
     ],
 )

@@ -64,7 +64,7 @@ def test_everything_happened_but_what_could_not(run):
     done, _ = run
     happened = {one.ordered.name: one for one in done.result.disturbances}
     assert {name for name, one in happened.items() if not one.happened} == {"gone", "stood"}
-    assert happened["gone"].effect == "crate has no mass, or a script moves it: no push does"
+    assert happened["gone"].effect == "crate has no mass or is moved by a script, so it cannot be pushed"
     assert happened["stood"].effect == "cart was not moving"
     assert happened["hatch opens then 1"].effect == "hatch swings shut"
 

@@ -46,7 +46,7 @@ from simscen.spec.named_places import OrPlace, PlaceAlone
 from simscen.spec.places import PoseSpec
 from simscen.spec.quantities import UNITS, Quantity
 from simscen.spec.speedmask import SpeedMask
-from simscen.triggers.registry import Test, Trigger
+from simscen.triggers.registry import AnyCondition, Trigger
 
 _EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
 OPTIONAL = "–"
@@ -96,8 +96,8 @@ class Topic:
 def topics(installed: bool = False) -> list[Topic]:
     """Every topic, group by group, in the order of the language; with what `installed` packages add, if asked."""
     return [
-        *_choices("trigger", Test),
-        *added_topics(Test, installed),
+        *_choices("trigger", AnyCondition),
+        *added_topics(AnyCondition, installed),
         _topic("trigger", "when", Trigger),
         *_choices("action", AnyAction),
         *added_topics(AnyAction, installed),

@@ -12,7 +12,7 @@ from simscen.loading.known_names import own_goal_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.disturbances import Step
 from simscen.model.stack import StackSpec
-from simscen.triggers.registry import Test, Trigger
+from simscen.triggers.registry import AnyCondition, Trigger
 
 Reason = tuple[Keys, str]
 """Keys of what keeps a trigger from firing, and the reason as words after "can never happen: "."""
@@ -147,7 +147,7 @@ class PossibleRun:
             return (*keys, key), f"{earliest:g} s is not before the time limit of {limit:g} s"
         return self._reason(trigger, keys)
 
-    def _reason(self, test: Test, keys: Keys) -> Reason | None:
+    def _reason(self, test: AnyCondition, keys: Keys) -> Reason | None:
         if not self.loaded.concerns(test.robot):
             return None
         limit = self.loaded.spec.time_limit
@@ -166,7 +166,7 @@ class PossibleRun:
         reason = check(self, test.chosen) if check else None
         return ((*keys, test.kind), reason) if reason else None
 
-    def _reasons(self, tests: Sequence[Test], keys: Keys) -> list[Reason | None]:
+    def _reasons(self, tests: Sequence[AnyCondition], keys: Keys) -> list[Reason | None]:
         return [self._reason(test, (*keys, k)) for k, test in enumerate(tests)]
 
     def does(self, *kinds: str) -> bool:
@@ -292,18 +292,18 @@ _CONDITIONS = {
 }
 
 
-def _latched(test: Test) -> bool:
+def _latched(test: AnyCondition) -> bool:
     """Return whether a condition stays true once it is."""
     parts = test.all or test.any
     return all(map(_latched, parts)) if parts else test.kind in LATCHED
 
 
-def _earliest(test: Test) -> float:
+def _earliest(test: AnyCondition) -> float:
     """Return a lower bound on the time in s at which a condition counts as true."""
     return (test.for_ or 0.0) + _first_true(test)
 
 
-def _first_true(test: Test) -> float:
+def _first_true(test: AnyCondition) -> float:
     if test.all is not None:
         return max(map(_earliest, test.all))
     if test.any is not None:

@@ -8,7 +8,7 @@ from simscen.loading.checks.registry import NAMES, Finding, Keys, NameScope
 from simscen.loading.known_names import NOUNS, event_names, known_names, own_goal_names, world_object_names
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import Reference, references, walk
-from simscen.triggers.registry import Test
+from simscen.triggers.registry import AnyCondition
 
 RENAME_HINT = "rename one of them"
 
@@ -61,7 +61,7 @@ def unknown_lidars(scope: NameScope) -> Iterator[Finding]:
         return
     lidars = [name for name, sensor in loaded.robot.spec.sensors.items() if sensor.says == "Scan"]
     for keys, part in walk(loaded.spec, concerns=loaded.concerns):
-        named = getattr(part.scan_age, "sensor", None) if isinstance(part, Test) else None
+        named = getattr(part.scan_age, "sensor", None) if isinstance(part, AnyCondition) else None
         if named is not None and named not in lidars:
             message = f"robot `{loaded.robot.name}` has no lidar called {quoted(named)}"
             yield Finding((*keys, "scan_age", "sensor"), message, suggestion(named, lidars) or "it has no lidar")

@@ -10,7 +10,7 @@ from simscen.loading.multirobot import ROBOTS
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import walk
 from simscen.triggers.base import Condition
-from simscen.triggers.registry import Test
+from simscen.triggers.registry import AnyCondition
 
 
 @ROBOT_NAMES.check("SC030")
@@ -19,7 +19,7 @@ def unknown_robots(scenario: WrittenScenario) -> Iterator[Finding]:
     spec = scenario.spec
     robots = spec.robots or {}
     for keys, part in walk({"events": spec.events, "faults": spec.faults, ROBOTS: robots}):
-        if not isinstance(part, Test | AnyAction) or part.robot is None or part.robot in robots:
+        if not isinstance(part, AnyCondition | AnyAction) or part.robot is None or part.robot in robots:
             continue
         message, hint = f"no robot is called {quoted(part.robot)}", suggestion(part.robot, robots)
         if not robots:
@@ -40,13 +40,13 @@ def missing_robots(scenario: WrittenScenario) -> Iterator[Finding]:
         unnamed = [] if step.when is None else list(_tests_without_robot(step.when, (*step.keys, "when"), faults))
         for keys, action in step.placed():
             assert isinstance(action.chosen, Action)
-            if action.robot is None and action.chosen.of_a_robot:
+            if action.robot is None and action.chosen.is_robot_specific:
                 unnamed.append((keys, action.kind))
         for keys, kind in unnamed:
             yield Finding((*keys, kind), f"`{kind}` must name one of the robots", hint, at_key=True)
 
 
-def _tests_without_robot(test: Test, keys: Keys, faults: Container[str]) -> Iterator[tuple[Keys, str]]:
+def _tests_without_robot(test: AnyCondition, keys: Keys, faults: Container[str]) -> Iterator[tuple[Keys, str]]:
     """Yield keys and kind of each condition on a robot, or on a fault of a robot, that names no robot."""
     if test.robot is not None:
         return
@@ -58,7 +58,7 @@ def _tests_without_robot(test: Test, keys: Keys, faults: Container[str]) -> Iter
     elif not test.inner:
         condition = test.chosen
         assert isinstance(condition, Condition)
-        if condition.of_a_robot or (test.kind == "event" and getattr(condition, "name", "") in faults):
+        if condition.is_robot_specific or (test.kind == "event" and getattr(condition, "name", "") in faults):
             yield keys, test.kind
 
 

@@ -24,7 +24,7 @@ from simscen.loading.yaml.tree import (
     value_position,
 )
 from simscen.spec.choice import Choice
-from simscen.triggers.registry import Test, Trigger
+from simscen.triggers.registry import AnyCondition, Trigger
 
 Model = TypeVar("Model", bound=BaseModel)
 LANGUAGE_VERSION = 1
@@ -114,7 +114,7 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
     hint = messages.suggestion(key, keys_of(models))
     if mended := textfile.lookalike_hint(key):
         hint = mended
-    elif key in Trigger.modifiers and models == [Test]:
+    elif key in Trigger.modifiers and models == [AnyCondition]:
         hint = f"`{key}` applies to the whole trigger: write it next to `all`, `any` or `not` under `when`"
     elif others := types_with_key(model, loc[:-1], key):
         hint = f"`{key}` is a parameter of type {' and '.join(f'`{name}`' for name in others)}"

@@ -11,7 +11,7 @@ from simscen.model.disturbances import FaultEntry, Step
 from simscen.run.faults.injector import FaultInjector
 from simscen.run.live_world.random_streams import stream_names
 from simscen.run.live_world.stage import LiveStage
-from simscen.triggers.registry import Test, Trigger
+from simscen.triggers.registry import AnyCondition, Trigger
 from simscen.triggers.timing import Time
 
 _AT_ONCE = Trigger(time=Time(0.0))
@@ -121,7 +121,7 @@ class TriggerState:
 class ConditionState:
     """Tracks how long a condition and each of its parts have held, for `for`. Must be evaluated at every beat."""
 
-    def __init__(self, test: Test) -> None:
+    def __init__(self, test: AnyCondition) -> None:
         self._test = test
         lasting = any(part.for_ is not None for inner in test.inner for part in inner.parts())
         self._parts = [ConditionState(inner) for inner in test.inner] if lasting else []

@@ -8,7 +8,7 @@ from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.robot import Ackermann
 from simscen.run.robot_interface import robot_model
-from simscen.sensors.odometry import along_arc, kinematics_of
+from simscen.sensors.odometry import integrate_arc, kinematics_of
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.simulation import FIRMWARE_RATE
 from simscen.sim.single_robot import SingleRobotSimulation
@@ -113,11 +113,11 @@ def _trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: 
     for twist in (twist for leg in legs for twist in _commands(leg, body)):
         simulation.drive(twist)
         simulation.step(PERIOD)
-        told.to(told.last.compose(along_arc(Twist(*(part / FIRMWARE_RATE for part in twist)))))
+        told.to(told.last.compose(integrate_arc(Twist(*(part / FIRMWARE_RATE for part in twist)))))
         now = simulation.encoders()
         step = motion(tuple(b - a for a, b in zip(rolled, now, strict=True)))
         rolled = now
-        reckoned.to(reckoned.last.compose(along_arc(step)))
+        reckoned.to(reckoned.last.compose(integrate_arc(step)))
         pose = simulation.base_pose()
         true.to(start.between(pose.plane))
         most = max(most, _tilt(pose, level))

@@ -19,7 +19,7 @@ from simscen.run.caching.world_cache import bounds_with
 from simscen.run.worldchecks.placement import blocked_poses
 from simscen.run.worldchecks.scene import START, WORLD, Scene
 from simscen.triggers.position import RobotIn, RobotWithin
-from simscen.triggers.registry import Test
+from simscen.triggers.registry import AnyCondition
 from simscen.worlds.geometry.overlaps import placed, polygons_overlap
 from simscen.worlds.routes.simple_paths import SimplePaths, simple_paths_between
 
@@ -102,12 +102,14 @@ class TriggerArea(NamedTuple):
 def trigger_areas(scene: Scene) -> list[TriggerArea]:
     """Return the areas that the robot must enter for events and faults to happen."""
     spec = scene.loaded.spec
-    tests: list[tuple[Keys, str, Test | None]] = [((*step.keys, "when"), step.name, step.when) for step in spec.steps]
+    tests: list[tuple[Keys, str, AnyCondition | None]] = [
+        ((*step.keys, "when"), step.name, step.when) for step in spec.steps
+    ]
     tests += [(("faults", k, "when"), fault.label, fault.when) for k, fault in enumerate(spec.faults)]
     return [area for keys, name, test in tests if test is not None for area in _areas(scene, test, keys, name)]
 
 
-def _areas(scene: Scene, test: Test, keys: Keys, name: str) -> Iterator[TriggerArea]:
+def _areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> Iterator[TriggerArea]:
     """Return the areas of all conditions that must be true for a test to be true."""
     if not scene.loaded.concerns(test.robot) or test.any is not None or test.not_ is not None:
         return

@@ -118,8 +118,8 @@ def test_nothing_comes_of_a_push_on_nothing_or_on_what_cannot_be_pushed():
     ("told", "said"),
     {
         "expected either impulse or force": {},
-        "a force needs `for`": {"force": [0, 1]},
-        "an impulse lasts no time": {"impulse": [0, 1], "for": 1.0},
+        "a force needs a duration `for`": {"force": [0, 1]},
+        "an impulse has no duration `for`": {"impulse": [0, 1], "for": 1.0},
     }.items(),
 )
 def test_what_is_no_push_is_refused(told, said):

@@ -91,7 +91,10 @@ def test_defaults_are_told_and_what_is_required_has_none() -> None:
 def test_modifiers_are_listed_apart_from_the_choices() -> None:
     assert {"edge", "delay", "times", "probability"} <= {field.key for field in fields_of(trigger_registry.Trigger)}
     assert {field.key for field in fields_of(trigger_registry.Trigger)}.isdisjoint(trigger_registry.Trigger.choices())
-    assert {topic.name for topic in TOPICS if topic.group == "trigger"} == {*trigger_registry.Test.choices(), "when"}
+    assert {topic.name for topic in TOPICS if topic.group == "trigger"} == {
+        *trigger_registry.AnyCondition.choices(),
+        "when",
+    }
 
 
 def test_every_key_of_the_language_says_what_it_means() -> None:

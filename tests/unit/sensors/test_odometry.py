@@ -9,7 +9,7 @@ from puppet import Puppet
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.model.robot import Ackermann, Differential, Omnidirectional, SkidSteer, WheelOdometry
-from simscen.sensors.odometry import WheelOdometrySensor, along_arc
+from simscen.sensors.odometry import WheelOdometrySensor, integrate_arc
 from simscen.sensors.sensor import SensorSetting
 
 DRIVE = Differential(type="differential", wheel_radius=0.033, wheel_separation=0.287)
@@ -111,5 +111,5 @@ def test_errors_after_a_radian_are_those_of_the_specification():
 
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-3, 3))
 def test_two_halves_of_an_arc_are_the_arc(vx, vy, wz):
-    half = along_arc(Twist(vx / 2, vy / 2, wz / 2))
-    assert half.compose(half) == pytest.approx(along_arc(Twist(vx, vy, wz)), abs=1e-8)
+    half = integrate_arc(Twist(vx / 2, vy / 2, wz / 2))
+    assert half.compose(half) == pytest.approx(integrate_arc(Twist(vx, vy, wz)), abs=1e-8)

@@ -11,7 +11,7 @@ from simscen.faults.registry import AnyFault
 from simscen.model.world import Wall
 from simscen.spec.base import Spec
 from simscen.spec.lazy import LazySpec, annotation_of
-from simscen.triggers.registry import Test as AnyTest
+from simscen.triggers.registry import AnyCondition as AnyTest
 
 
 class Site(Spec):
