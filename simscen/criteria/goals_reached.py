@@ -17,7 +17,7 @@ from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_o
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.criteria.trace_signals.ground_truth import check_samples, true_pose
 from simscen.spec.base import Spec
-from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
+from simscen.spec.quantities import NonNegativeAngle, NonNegativeLength, PositiveAngle, PositiveDuration, PositiveLength
 from simscen.spec.references import GoalName
 
 if TYPE_CHECKING:
@@ -35,6 +35,9 @@ class GoalsReached(Spec, Criterion):
     Goals that events send count from when they are sent. A goal that such a goal preempted is dropped, as in Nav2: it
     is told as preempted and need not be reached, but those that remain must be. Named in `goals`, it is inconclusive.
 
+    The stack decides with its estimated pose. The true pose may therefore be beyond the goal's tolerance by a margin
+    for localization. To require accuracy, give a `tolerance`, or set the margin to 0.
+
     What is measured: distance and heading error between the goal and the robot's true pose at the tick of the
         robot's report, for each goal.
     When it fails: a goal was not reported reached, or was reported while the true pose was out of tolerance, or later
@@ -50,9 +53,14 @@ class GoalsReached(Spec, Criterion):
     """Only these, by name, in every loop (`shelf#2`: in the second one); default: all of the scenario, and all that
     events have sent."""
     tolerance: PositiveLength | None = None
-    """How far the true position may be off; default: the goal's own tolerance."""
+    """How far the true position may be off; default: the goal's own tolerance plus `localization_margin`."""
     yaw_tolerance: PositiveAngle | None = None
-    """How far the true heading may be off; default: the goal's own tolerance."""
+    """How far the true heading may be off; default: the goal's own tolerance plus `localization_yaw_margin`."""
+    localization_margin: NonNegativeLength = 0.15
+    """Added to the goal's own tolerance, because a robot stops where its estimated position is within the tolerance.
+    With 0 the true position has to be."""
+    localization_yaw_margin: NonNegativeAngle = 0.1
+    """Added to the goal's own tolerance of the heading."""
     within: PositiveDuration | None = None
     """Each goal at most this long after the robot accepted it."""
 
@@ -114,7 +122,7 @@ class GoalsReached(Spec, Criterion):
             at_most(
                 what,
                 pose.distance(goal.pose),
-                self.tolerance or goal.xy_tolerance,
+                self._limit(outcome),
                 "m",
                 at=(trace, tick),
                 context="from the goal when the robot said it was there",
@@ -123,7 +131,7 @@ class GoalsReached(Spec, Criterion):
             at_most(
                 f"{what} heading",
                 abs(wrap(pose.yaw - goal.pose.yaw)),
-                self.yaw_tolerance or goal.yaw_tolerance,
+                self.yaw_tolerance or goal.yaw_tolerance + self.localization_yaw_margin,
                 "rad",
                 at=(trace, tick),
                 context="from the goal's heading when the robot said it was there",
@@ -137,11 +145,15 @@ class GoalsReached(Spec, Criterion):
     def _passed(self, trace: Trace, outcome: GoalOutcome, told: list[GoalOutcome]) -> list[Finding]:
         """Of a pose that is passed on the way the heading is free, and how near the robot came to it at all counts."""
         tick, apart = closest_approach(trace, outcome, told)
-        limit, context = self.tolerance or outcome.goal.xy_tolerance, "from the pose where it came nearest to it"
+        limit, context = self._limit(outcome), "from the pose where it came nearest to it"
         findings = [at_most(f"goal {outcome.goal.name}", apart, limit, "m", at=(trace, tick), context=context)]
         if self.within is not None:
             findings.append(self._time(trace, outcome, self.within))
         return findings
+
+    def _limit(self, outcome: GoalOutcome) -> float:
+        """Return the largest true distance from a goal that passes, in m."""
+        return self.tolerance or outcome.goal.xy_tolerance + self.localization_margin
 
     def _time(self, trace: Trace, outcome: GoalOutcome, within: float) -> Finding:
         what = f"goal {outcome.goal.name} time"

@@ -27,7 +27,7 @@ class SimpleGoalChecker(GoalCheckerSpec):
     type: Literal["simple"] = "simple"
     stateful: bool = True
     """Once the position was reached only the heading counts."""
-    well_inside: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 0.5
+    well_inside: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
     """While it moves, the robot has arrived within this share of the tolerances; at rest, anywhere inside. Nav2: 1."""
 
 

@@ -32,7 +32,7 @@ class VelocitySmoother(Spec):
     """Of each component of its velocity; default: what the controller commands."""
     max_angular_velocity: PositiveAngularSpeed | None = None
     """Of its turn rate; default: what the controller commands."""
-    counter_turn_slip: bool = True
+    counter_turn_slip: bool = False
     """Whether the turn is taken off the command that wheels of which one side slips more add to it, as the gyroscope
     shows; with the localizers `ekf` and `slip_ekf` only. Nav2 does not."""
 
@@ -58,7 +58,7 @@ class CollisionMonitor(Spec):
 class Prediction(Ranged):
     """Motion prediction: what moves is tracked from the lidars' scans and met where it will be."""
 
-    enabled: bool = True
+    enabled: bool = False
     """Whether it is there at all."""
     max_range: PositiveLength = 12.0
     """Nothing further off is tracked."""

@@ -154,14 +154,16 @@ class OdometryOnly(LocalizerSpec):
     type: Literal["odometry"]
 
 
-DEFAULT_TYPE = "scan_matching_amcl"
+DEFAULT_TYPE = "amcl"
 """The type of a localizer that is written without one."""
 _Localizers = Annotated[
-    Annotated[Amcl, Tag("amcl")]
+    Annotated[Amcl, Tag(DEFAULT_TYPE)]
     | Annotated[Ekf, Tag("ekf")]
     | Annotated[GroundTruth, Tag("ground_truth")]
     | Annotated[OdometryOnly, Tag("odometry")]
-    | Annotated[LocalizerSpec, LazySpec("simscen.advanced.localizers.spec", "ScanMatchingAmcl"), Tag(DEFAULT_TYPE)]
+    | Annotated[
+        LocalizerSpec, LazySpec("simscen.advanced.localizers.spec", "ScanMatchingAmcl"), Tag("scan_matching_amcl")
+    ]
     | Annotated[LocalizerSpec, LazySpec("simscen.advanced.localizers.spec", "SlipEkf"), Tag("slip_ekf")],
     Discriminator(type_discriminator(DEFAULT_TYPE)),
 ]

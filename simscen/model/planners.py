@@ -1,11 +1,12 @@
-"""The parameters of planners: OMPL's, and Nav2's grid planners."""
+"""The parameters of planners: OMPL's, Nav2's grid planners, and the planner of the advanced stack."""
 
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 
 from simscen.spec.bytype import ByType
 from simscen.spec.component import Typed
+from simscen.spec.lazy import LazySpec
 from simscen.spec.quantities import (
     Frequency,
     NonNegativeLength,
@@ -15,43 +16,44 @@ Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 class PlannerSpec(Typed):
-    """What finds a way, and when it is asked for another one."""
+    """The planner of the global path, and when it plans anew."""
 
     tolerance: NonNegativeLength = 0.5
     """How far from an unreachable goal the plan may end."""
     replanning: Literal["on_invalid", "rate"] = "on_invalid"
-    """Replan when the plan is blocked or clearly worse than a new one, or at a rate."""
+    """Replan only if the path becomes invalid, or at a rate; Nav2 has a behavior tree for each. The advanced stack also
+    replans `on_invalid` if a clearly better path appears, and if moving obstacles will be in the way."""
     replanning_rate: Frequency | None = None
-    """How often, with `replanning: rate`; default: 1 Hz, through poses 0.333 Hz, as in Nav2's trees."""
-    cautious: bool = True
-    """Whether, once a plan could not be followed, roomier ways are taken where there are some. Nav2 does not."""
+    """Rate of new plans, or of checks of the current one; default: 1 Hz, through poses 0.333 Hz, as in Nav2's trees."""
+    cautious: bool = False
+    """Whether paths with more clearance are preferred once a plan could not be followed; the advanced stack does."""
 
 
-class OmplPlanner(PlannerSpec):
-    """A planner of OMPL on the costmap."""
+StateSpace = Literal["auto", "holonomic", "se2", "dubins", "reeds_shepp"]
 
-    component: ClassVar[str] = "simscen.stack.planners.build:ompl_planner"
-    type: Literal["bit_star", "rrt_connect", "rrt_star", "informed_rrt_star", "aorrtc", "kpiece"] = "bit_star"
+
+class OmplParameters(PlannerSpec):
+    """The parameters of all planners that search with OMPL."""
+
     allow_unknown: bool = True
     """Whether plans may lead over what is not known, as dear as what is barely free."""
     cost_travel_multiplier: Annotated[float, Field(ge=0, le=100)] = 2.0
     """A meter of way costs 1 + this times its cost / 252 (nav2_smac_planner's name and meaning; its default is 1)."""
-    sampler: Literal["auto", "uniform", "medial_axis", "corridor"] = "auto"
-    """Where it searches; auto: medial_axis for bit_star, which alone can, else uniform."""
     max_iterations: Iterations = 50_000
-    """Iterations of a search before it is given up; never seconds."""
-    improving_iterations: Iterations = 500
-    """Iterations of planners that improve their path, when they draw the samples themselves."""
-    simplify: bool = True
-    """Whether the path that OMPL found is moved to where it costs least, and smoothed."""
-    state_space: Literal["auto", "holonomic", "se2", "dubins", "reeds_shepp"] = "auto"
-    """auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, else holonomic."""
+    """Iterations after which a search fails. There is no limit in seconds, so that results repeat."""
+    state_space: StateSpace = "auto"
+    """auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, otherwise holonomic."""
 
-    @model_validator(mode="after")
-    def _sampled(self) -> "OmplPlanner":
-        if self.sampler == "medial_axis" and self.type != "bit_star":
-            raise ValueError(f"`sampler: medial_axis` is for `bit_star`; `{self.type}` draws its samples itself")
-        return self
+
+class OmplPlanner(OmplParameters):
+    """A planner of OMPL on the costmap."""
+
+    component: ClassVar[str] = "simscen.stack.planners.build:ompl_planner"
+    type: Literal["bit_star", "rrt_connect", "rrt_star", "informed_rrt_star", "aorrtc", "kpiece"] = "bit_star"
+    improving_iterations: Iterations = 500
+    """Iterations of planners that improve their path; `bit_star` processes two batches of 200 samples instead."""
+    simplify: bool = True
+    """Whether OMPL shortens the path and moves it to where it costs less."""
 
 
 class Navfn(PlannerSpec):
@@ -80,11 +82,14 @@ class Smac2d(PlannerSpec):
 
 def _planner(value: Any) -> str | None:
     kind = value.get("type", "bit_star") if isinstance(value, dict) else getattr(value, "type", None)
-    return kind if kind in ("navfn", "smac_2d") else "ompl"
+    return kind if kind in ("navfn", "smac_2d", "medial_axis") else "ompl"
 
 
 _Planners = Annotated[
-    Annotated[OmplPlanner, Tag("ompl")] | Annotated[Navfn, Tag("navfn")] | Annotated[Smac2d, Tag("smac_2d")],
+    Annotated[OmplPlanner, Tag("ompl")]
+    | Annotated[Navfn, Tag("navfn")]
+    | Annotated[Smac2d, Tag("smac_2d")]
+    | Annotated[PlannerSpec, LazySpec("simscen.advanced.planners.spec", "MedialAxisPlanner"), Tag("medial_axis")],
     Discriminator(_planner),
 ]
 
@@ -97,4 +102,5 @@ PLANNERS = {
     **dict.fromkeys(get_args(OmplPlanner.model_fields["type"].annotation), _HERE + "OmplPlanner"),
     "navfn": _HERE + "Navfn",
     "smac_2d": _HERE + "Smac2d",
+    "medial_axis": "simscen.advanced.planners.spec:MedialAxisPlanner",
 }

@@ -1,13 +1,14 @@
-"""Default parameters of the stack by profile: `nav2` takes those of nav2_bringup, with Nav2's meanings.
+"""Default parameters of the stack by profile. Parameters that a scenario gives take precedence.
 
-Read from navigation2 of August 2026: nav2_bringup/params/nav2_params.yaml, the default behavior trees, and for plugins
-that the file does not use the defaults of their code. What is said in a scenario wins.
+`reference` has the defaults of the model. `nav2` has those of nav2_bringup, read from navigation2 of August 2026:
+nav2_bringup/params/nav2_params.yaml, the default behavior trees, and for plugins that the file does not use the
+defaults of their code. `advanced` chooses the components that Nav2 does not have.
 """
 
 from collections.abc import Mapping
 from typing import Any, Literal
 
-Profile = Literal["simscen", "advanced", "nav2"]
+Profile = Literal["reference", "advanced", "nav2", "simscen"]
 Values = Mapping[str, Any]
 
 BY_TYPE = ("localizer", "planner", "controller", "goal_checker")
@@ -61,12 +62,33 @@ NAV2: Values = {
         "source_timeout": 1.0, "time_before_collision": 1.2, "stop_margin": 0.0, "min_points": 6, "hold_timeout": 0.0,
     },
 }  # fmt: skip
-PROFILES: Mapping[str, Values] = {"simscen": {}, "advanced": {}, "nav2": NAV2}
+_CAUTIOUS: Values = {"cautious": True}
+ADVANCED: Values = {
+    "localizer": {"scan_matching_amcl": {}},
+    "planner": {
+        "medial_axis": _CAUTIOUS, "bit_star": _CAUTIOUS, "rrt_connect": _CAUTIOUS, "rrt_star": _CAUTIOUS,
+        "informed_rrt_star": _CAUTIOUS, "aorrtc": _CAUTIOUS, "kpiece": _CAUTIOUS, "navfn": _CAUTIOUS,
+        "smac_2d": _CAUTIOUS,
+    },
+    "goal_checker": {"simple": {"well_inside": 0.5}},
+    "recovery": {
+        "retries_since_progress": True,
+        "planner_codes": [
+            "PLANNER_UNKNOWN", "START_OUTSIDE_MAP", "START_OCCUPIED", "GOAL_OCCUPIED", "PLANNER_TIMEOUT",
+            "NO_VALID_PATH",
+        ],
+        "behaviors": ["clear_costmap", "retrace", "spin", "wait"],
+        "clear_entirely": False, "backup_partial": True,
+    },
+    "velocity_smoother": {"counter_turn_slip": True},
+    "prediction": {"enabled": True},
+}  # fmt: skip
+PROFILES: Mapping[str, Values] = {"reference": {}, "advanced": ADVANCED, "nav2": NAV2, "simscen": ADVANCED}
 
 
 def with_profile(said: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The parameters of a stack with those of the profile that it names; what is said wins."""
-    chosen = PROFILES.get(str(said.get("profile", "simscen")), {})
+    """Return the parameters of a stack with those of the profile that it names."""
+    chosen = PROFILES.get(str(said.get("profile", "reference")), {})
     return {**said, **{section: _with(section, values, said.get(section)) for section, values in chosen.items()}}
 
 

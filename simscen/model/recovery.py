@@ -70,8 +70,8 @@ class BackUp(BehaviorSpec):
     """How fast it backs up."""
     simulate_ahead_time: PositiveDuration = 2.0
     """How far ahead it looks for collisions."""
-    backup_partial: bool = True
-    """Whether it backs up as far as there is room, where that is less; often it is enough to turn. Nav2 does not."""
+    backup_partial: bool = False
+    """Whether it backs up as far as there is room, if that is less. Nav2 does not."""
 
 
 class Retrace(BehaviorSpec):
@@ -95,8 +95,8 @@ class ClearCostmap(BehaviorSpec):
 
     component: ClassVar[str] = "simscen.stack.behaviors.motions:ClearCostmap"
     type: Literal["clear_costmap"] = "clear_costmap"
-    clear_entirely: bool = False
-    """Whether all of the global costmap is cleared, as in Nav2, or as much as the local one reaches."""
+    clear_entirely: bool = True
+    """Whether all of the global costmap is cleared, as in Nav2, or as much as the local one covers."""
 
 
 _Behaviors = Annotated[
@@ -123,29 +123,26 @@ class Recovery(Spec):
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
     """How often a goal is tried again before it fails."""
-    retries_since_progress: bool = True
+    retries_since_progress: bool = False
     """Whether that is counted anew, and the first behavior is next, once the robot is a meter nearer to its goal than
     at any recovery before. Nav2 counts for the whole goal."""
     planner_codes: Annotated[list[PlannerCode], Field(max_length=20)] = [
         "PLANNER_UNKNOWN",
-        "START_OUTSIDE_MAP",
-        "START_OCCUPIED",
-        "GOAL_OCCUPIED",
         "PLANNER_TIMEOUT",
         "NO_VALID_PATH",
     ]
-    """After which failures to plan that is done (WouldAPlannerRecoveryHelp); after others the goal fails at once.
-    Nav2 gives up where start or goal are occupied, though what occupies them may go."""
+    """Planner failures after which recovery is tried (WouldAPlannerRecoveryHelp); after others the goal fails at once.
+    The advanced stack adds START_OUTSIDE_MAP, START_OCCUPIED and GOAL_OCCUPIED."""
     behaviors: Annotated[list[Behavior], Field(max_length=20)] = [
         "clear_costmap",
-        "retrace",
         "spin",
         "wait",
+        "backup",
     ]
     """What is done in turn, by name or with parameters of its own."""
-    clear_entirely: bool = False
-    """Whether all of the global costmap is cleared, as in Nav2, or as much as the local one reaches: a dead end that is
-    forgotten is driven into again. When planning fails it is cleared each time, not ever more rarely."""
+    clear_entirely: bool = True
+    """Whether all of the global costmap is cleared each time, as in Nav2. With false only as much as the local costmap
+    covers, and more and more rarely when planning fails: a dead end that is forgotten is driven into again."""
     spin_dist: Angle = 1.57
     """How far it turns."""
     wait_duration: Duration = 5.0
@@ -154,8 +151,8 @@ class Recovery(Spec):
     """How far it backs up."""
     backup_speed: PositiveSpeed = 0.15
     """How fast it backs up."""
-    backup_partial: bool = True
-    """Whether it backs up as far as there is room, where that is less; often it is enough to turn. Nav2 does not."""
+    backup_partial: bool = False
+    """Whether it backs up as far as there is room, if that is less. Nav2 does not."""
     retrace_dist: NonNegativeLength = 1.0
     """How far it drives back the way it came: beyond `backup_dist` only until it has room to turn in place."""
     simulate_ahead_time: PositiveDuration = 2.0

@@ -46,9 +46,10 @@ class StackSpec(InProcessStack):
 
     component: ClassVar[str] = "simscen.stack.build:configured_stack"
     type: Literal["reference"] = "reference"
-    profile: Profile = "simscen"
-    """Default values of the other parameters. `nav2`: those of nav2_bringup, which build the reference stack alone.
-    `advanced`, the same as `simscen`: those that include components that Nav2 does not have."""
+    profile: Profile = "reference"
+    """Default values of the other parameters. `nav2`: those of nav2_bringup. `advanced`: those that choose the
+    components that Nav2 does not have, such as motion prediction and scan matching. `simscen` is the deprecated name
+    of `advanced`."""
     nav2_params: ParameterFile | None = None
     """A parameter file of Nav2, such as nav2_params.yaml: what it says of parameters that are here, too."""
     localizer: Localizer = by_default()
@@ -89,7 +90,6 @@ class StackSpec(InProcessStack):
         """The builder of the stack as `module:class`: that of the advanced stack if any parameter asks for it."""
         is_advanced = (
             self.prediction.enabled
-            or self.planner.replanning == "on_invalid"
             or self.planner.cautious
             or not self.recovery.clear_entirely
             or (self.velocity_smoother.counter_turn_slip and self.localizer.fuses_odometry)

@@ -51,7 +51,7 @@ class _Request:
 class PlanManager:
     """Maintains the plan in the map frame for one goal after another. Times `now` are those of the navigator's clock.
 
-    Replans at a fixed rate, as Nav2's default trees do. Subclasses may add reasons to replan.
+    Replans as Nav2's trees do: at a fixed rate, or only if the plan has become invalid. Subclasses may add reasons.
     """
 
     def __init__(
@@ -150,11 +150,15 @@ class PlanManager:
         return self._scheduled_reason(now, plan)
 
     def _scheduled_reason(self, now: float, plan: FollowedPlan) -> str:
-        """Return "rate" when the next periodic plan is due, as in Nav2's default trees."""
+        """Return why a new plan is due by the clock: "rate", or with `replanning: on_invalid` "blocked" or "window"."""
         rate = self._spec.replanning_rate or (THROUGH_POSES_RATE_HZ if self._via else TO_POSE_RATE_HZ)
         if now - self._scheduled_at < 1.0 / rate:
             return ""
         self._scheduled_at = now
+        if self._spec.replanning == "on_invalid":
+            if self._is_blocked(plan):
+                return "blocked"
+            return "window" if self._is_partial and self._costmap.view.origin != self._origin else ""
         keeps = plan.remaining() < GOAL_NEARBY_M and not self._is_partial
         return "" if keeps and not self._is_blocked(plan) else "rate"
 

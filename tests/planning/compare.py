@@ -8,35 +8,35 @@ import numpy as np
 from grounds import ROBOT, cheapest, forest, maze, pair, rooms, view_of
 from scipy.spatial import cKDTree
 
+from simscen.advanced.planners.medial_axis_planner import medial_axis_planner
+from simscen.advanced.planners.spec import MedialAxisPlanner
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Path
 from simscen.model.planners import Navfn, OmplPlanner, PlannerSpec, Smac2d
 from simscen.stack.planners import build, grid_planner
-from simscen.stack.planners.ends import find_ends
-from simscen.stack.planners.rates import Rates
+from simscen.stack.planners.endpoints import find_endpoints
+from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 from simscen.testing.flatland import setting
 
 PAGE = File(__file__).parents[2] / "docs/reference/planners.md"
 BEGIN, END = "<!-- figures -->\n", "<!-- end of figures -->"
 SEEDS = range(1, 6)
-HEAD = """| planner | found | cost: mean, greatest | length | least room, m | apart, m | ms: median, greatest |
+HEAD = """| Planner | Found | Cost: mean, greatest | Length | Least clearance, m | Spread, m | ms: median, greatest |
 |---|---|---|---|---|---|---|
 """
 PLANNERS: dict[str, PlannerSpec] = {
     "`bit_star`": OmplPlanner(),
-    "`bit_star`, not eased": OmplPlanner(simplify=False),
-    "`bit_star`, `uniform`": OmplPlanner(sampler="uniform"),
-    "`bit_star`, `corridor`": OmplPlanner(sampler="corridor"),
+    "`bit_star`, `simplify: false`": OmplPlanner(simplify=False),
     "`aorrtc`": OmplPlanner(type="aorrtc"),
     "`rrt_connect`": OmplPlanner(type="rrt_connect"),
-    "`rrt_connect`, not eased": OmplPlanner(type="rrt_connect", simplify=False),
-    "`rrt_connect`, `corridor`": OmplPlanner(type="rrt_connect", sampler="corridor"),
+    "`rrt_connect`, `simplify: false`": OmplPlanner(type="rrt_connect", simplify=False),
     "`rrt_star`": OmplPlanner(type="rrt_star"),
     "`informed_rrt_star`": OmplPlanner(type="informed_rrt_star"),
     "`kpiece`": OmplPlanner(type="kpiece"),
     "`navfn`": Navfn(type="navfn"),
     "`smac_2d`": Smac2d(type="smac_2d"),
+    "`medial_axis` (advanced)": MedialAxisPlanner(type="medial_axis"),
 }
 
 
@@ -44,13 +44,13 @@ class Way:
     """A way on a ground, with what the cheapest one costs."""
 
     def __init__(self, view: CostmapView, chance: np.random.Generator) -> None:
-        self.view, self.rates = view, Rates(view, ROBOT, 2.0, True)
+        self.view, self.rates = view, TraversalCosts(view, ROBOT, 2.0, True)
         free = np.argwhere(self.rates.free & (view.distance < 0.6))
         inside = Pose2(*((free[len(free) // 2][::-1] + 0.5) * view.resolution + view.origin).tolist())
-        reachable = find_ends(self.rates, inside, inside, 0.5).reachable
+        reachable = find_endpoints(self.rates, inside, inside, 0.5).reachable
         self.start, self.goal = pair(self.rates, reachable, chance)
         self.cost = cheapest(self.rates, self.start, self.goal)
-        shortest = Rates(view, ROBOT, 0.0, True)
+        shortest = TraversalCosts(view, ROBOT, 0.0, True)
         self.length = cheapest(shortest, self.start, self.goal)
 
     def price(self, points: Array) -> float:
@@ -70,6 +70,8 @@ def built(spec: PlannerSpec) -> Planner:
         return build.ompl_planner(spec, setting(ROBOT))
     if isinstance(spec, Navfn):
         return grid_planner.navfn(spec, setting(ROBOT))
+    if isinstance(spec, MedialAxisPlanner):
+        return medial_axis_planner(spec, setting(ROBOT))
     assert isinstance(spec, Smac2d)
     return grid_planner.smac_2d(spec, setting(ROBOT))
 

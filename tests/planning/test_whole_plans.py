@@ -12,10 +12,10 @@ from simscen.model.planners import Navfn, Smac2d
 from simscen.model.planners import OmplPlanner as Spec
 from simscen.stack.footprint import Footprint
 from simscen.stack.planners.build import ompl_planner
-from simscen.stack.planners.ends import find_ends
-from simscen.stack.planners.finish import spaced
+from simscen.stack.planners.endpoints import find_endpoints
 from simscen.stack.planners.grid_planner import navfn, smac_2d
-from simscen.stack.planners.rates import Rates
+from simscen.stack.planners.path_points import spaced
+from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, RobotModel
 from simscen.testing.flatland import box_robot, setting
 
@@ -30,14 +30,14 @@ def way(kind: str, number: int, robot: RobotModel = ROBOT, room: float = 0.0) ->
     """A ground, and two places with so much room on it."""
     chance = np.random.default_rng((number, len(kind), 5))
     view = view_of(*GROUNDS[kind](chance), robot=robot)
-    rates = Rates(view, robot, 2.0, True)
+    rates = TraversalCosts(view, robot, 2.0, True)
     free = np.argwhere(rates.free & (view.distance > room))
     inside = Pose2(*((free[len(free) // 2][::-1] + 0.5) * view.resolution + view.origin).tolist())
-    reachable = find_ends(rates, inside, inside, 0.5).reachable & (view.distance > room)
+    reachable = find_endpoints(rates, inside, inside, 0.5).reachable & (view.distance > room)
     return view, *pair(rates, reachable, chance)
 
 
-def passed(rates: Rates, points: Array) -> np.ndarray:
+def passed(rates: TraversalCosts, points: Array) -> np.ndarray:
     """What a meter costs on each half millimeter of the way."""
     return rates.at(spaced(points[:, :2], 0.0005))
 
@@ -58,7 +58,7 @@ def test_nowhere_does_a_plan_lead_over_a_cell_where_the_robot_cannot_be(kind: st
     for ground, number in WAYS:
         view, start, goal = way(ground, number)
         points = planners[kind].plan(view, start, goal, number).points
-        assert np.isfinite(passed(Rates(view, ROBOT, 2.0, True), points)).all(), (ground, number)
+        assert np.isfinite(passed(TraversalCosts(view, ROBOT, 2.0, True), points)).all(), (ground, number)
 
 
 @pytest.mark.parametrize("kind", ["bit_star", "rrt_connect"])
@@ -71,7 +71,7 @@ def test_nowhere_does_a_plan_lead_over_a_single_cell_that_is_not_known(kind: str
             costs[int(row), int(column)] = 0
         view = replace(view, costs=costs)
         points = ompl_planner(spec(kind, allow_unknown=False), setting(ROBOT)).plan(view, *ends, number).points
-        assert np.isfinite(passed(Rates(view, ROBOT, 2.0, False), points)).all(), (ground, number)
+        assert np.isfinite(passed(TraversalCosts(view, ROBOT, 2.0, False), points)).all(), (ground, number)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_nowhere_between_two_poses_does_a_cars_hull_touch_anything(
     """Of thirty, those on which it did."""
     for number in numbers:
         view, start, goal = way(ground, number, CAR, 0.45)
-        car = ompl_planner(spec(kind, state_space=space, max_iterations=3000), setting(CAR))
+        car = ompl_planner(spec(kind, state_space=space, max_iterations=20_000), setting(CAR))
         points = car.plan(view, turned(start, number), turned(goal, number + 1), number).points
         points[:, 2] = np.unwrap(points[:, 2])
         part = (np.arange(50) / 50)[:, None]

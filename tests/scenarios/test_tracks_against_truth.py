@@ -19,6 +19,7 @@ HOUSE = """\
 simscen: 1
 world: house.world.yaml
 robot: {pose: {x: 9.4, y: 7.3, yaw: 90 deg}}
+stack: {profile: advanced}
 goals: [{pose: {x: 6.0, y: 4.95, yaw: 0 deg}}, {pose: {x: 3.0, y: 3.0, yaw: 180 deg}}]
 events:
   - name: two walk

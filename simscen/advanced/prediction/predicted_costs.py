@@ -15,7 +15,7 @@ from simscen.advanced.prediction.avoidance import ROOM
 from simscen.advanced.prediction.rollouts import HORIZON
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
-from simscen.stack.planners.rates import MAX_NON_OBSTACLE
+from simscen.stack.planners.traversal_costs import MAX_NON_OBSTACLE
 from simscen.stack.protocols import CostmapView
 
 DECAY_TIME_S = 2.0

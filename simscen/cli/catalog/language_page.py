@@ -23,7 +23,7 @@ _GROUPS = {
         "`*.stack.yaml`, given as `--stack NAME=FILE`; and the user's own configuration, which says what the names of "
         "external stacks run.",
     ),
-    "localizer": ("Localizers", "Under `stack.localizer`, chosen by `type`, by default `scan_matching_amcl`."),
+    "localizer": ("Localizers", "Under `stack.localizer`, chosen by `type`, by default `amcl`."),
     "controller": ("Controllers", "Under `stack.controller`, told apart by `type`."),
     "behavior": (
         "Recovery behaviors",

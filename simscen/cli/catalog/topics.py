@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from simscen.actions.registry import AnyAction
+from simscen.advanced.planners.spec import MedialAxisPlanner
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.registry import AnyFault
 from simscen.model import (
@@ -161,6 +162,7 @@ _STACK: dict[str, type[BaseModel]] = {
     "latency": latency.Latency,
     "navfn": planners.Navfn,
     "smac_2d": planners.Smac2d,
+    "medial_axis": MedialAxisPlanner,
 }
 _BEHAVIORS: dict[str, type[BaseModel]] = {
     "clear_costmap": recovery.ClearCostmap,

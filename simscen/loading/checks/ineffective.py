@@ -69,6 +69,8 @@ def duplicate_entries(loaded: LoadedScenario) -> Iterator[Finding]:
 @MEANING.check("SC055", severity="warning")
 def deprecated_parameters(loaded: LoadedScenario) -> Iterator[Finding]:
     """Find parameters that earlier versions had and that no longer have an effect."""
+    if getattr(loaded.spec.stack, "profile", None) == "simscen":
+        yield Finding(("stack", "profile"), "`simscen` is a deprecated name of this profile", "write `advanced`")
     localizer = getattr(loaded.spec.stack, "localizer", None)
     if isinstance(localizer, Amcl) and localizer.parameters is not None:
         message = "`parameters` is deprecated: `amcl` always has the default values of nav2_amcl"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.planners.ends import ESCAPE
+from simscen.stack.planners.endpoints import ESCAPE
 from simscen.stack.planners.pose_search import SPACING, Space
 
 DIRECTIONS = 16

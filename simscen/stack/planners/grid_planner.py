@@ -6,12 +6,11 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.grid_graph import EIGHT_NEIGHBORS, SIXTEEN_NEIGHBORS, GridGraph
 from simscen.model.planners import Navfn, Smac2d
-from simscen.stack.planners.corners import around_corners
-from simscen.stack.planners.ends import Ends, find_ends
-from simscen.stack.planners.finish import SPACING, spaced, with_headings
-from simscen.stack.planners.nearby import nearby
-from simscen.stack.planners.rates import MAX_NON_OBSTACLE, Rates
-from simscen.stack.planners.tube import smoothed
+from simscen.stack.planners.corner_clearing import around_corners
+from simscen.stack.planners.endpoints import Endpoints, find_endpoints
+from simscen.stack.planners.path_points import SPACING_M, smoothed, spaced, with_headings
+from simscen.stack.planners.planning_window import nearby
+from simscen.stack.planners.traversal_costs import MAX_NON_OBSTACLE, TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
 
@@ -59,21 +58,21 @@ class GridPlanner:
         return nearby(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, _: int) -> Path:
-        rates = Rates(costmap, self._robot, self._multiplier, self._allow_unknown)
-        ends = find_ends(rates, start, goal, self._tolerance)
+        rates = TraversalCosts(costmap, self._robot, self._multiplier, self._allow_unknown)
+        ends = find_endpoints(rates, start, goal, self._tolerance)
         way = self._finished(rates, ends, self._over(rates, ends))
-        return Path(with_headings(spaced(np.vstack(((start.x, start.y), way)), SPACING), goal))
+        return Path(with_headings(spaced(np.vstack(((start.x, start.y), way)), SPACING_M), goal))
 
-    def _finished(self, rates: Rates, ends: Ends, cells: Array) -> Array:
+    def _finished(self, rates: TraversalCosts, ends: Endpoints, cells: Array) -> Array:
         """From start to goal over the cells, smoothed, if that leads through nothing."""
         way = np.vstack((ends.start, cells[1:-1], ends.goal))
         for points in (smoothed(rates, way), way) if self._smooth else (way,):
-            led = around_corners(rates, spaced(points, SPACING))
+            led = around_corners(rates, spaced(points, SPACING_M))
             if led is not None:
                 return led
         return np.vstack((ends.start, cells, ends.goal))  # no move between middles of cells cuts a corner
 
-    def _over(self, rates: Rates, ends: Ends) -> Array:
+    def _over(self, rates: TraversalCosts, ends: Endpoints) -> Array:
         """The middles (n, 2) of the cells of the cheapest way."""
         lattice = GridGraph(np.pad(ends.reachable, BORDER), self._moves, np.pad(rates.rates, BORDER))
         first, last = (

@@ -1,107 +1,131 @@
-"""Plans poses rather than points: Dubins and Reeds-Shepp paths for cars, SE(2) for long hulls."""
+"""Planner over poses: Dubins and Reeds-Shepp paths for cars, SE(2) for long hulls."""
 
 import math
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
-from simscen.model.planners import OmplPlanner as PlannerSpec
+from simscen.model.planners import OmplParameters
 from simscen.stack.cusps import cusps
 from simscen.stack.footprint import Footprint
-from simscen.stack.planners.ends import find_ends, near
+from simscen.stack.planners.distance_lookup import Field
+from simscen.stack.planners.endpoints import Endpoints, find_endpoints, near
 from simscen.stack.planners.escapes import escapes
-from simscen.stack.planners.field import Field
-from simscen.stack.planners.informed_set import InformedSet
+from simscen.stack.planners.ompl_planner import reachable_bounds
 from simscen.stack.planners.pose_search import SPACING, Space, Valid, search_poses
-from simscen.stack.planners.rates import NO_INFORMATION, Rates
+from simscen.stack.planners.traversal_costs import NO_INFORMATION, TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
-PLANE_ONLY = ("bit_star", "aorrtc")
-"""RRT-Connect stands in for them: over poses OMPL's AORRTC (2.0.1) calls a path of the goal alone an exact solution."""
-TIGHTEST = 0.2
-"""Meters: the arcs of a long robot that could turn in place, but should not have to."""
-ROOM_TO_STEER = 1.15
-"""A car's arcs are this much wider than its tightest: at full lock a controller has nothing left to correct with."""
-ROOM, LESS_ROOM = 0.10, 0.05
-"""Meters beyond the hull that are kept where that is possible: belief and map are off by as much at times."""
-ATTEMPTS = (
-    (0.15, ROOM, 0.1, SPACING),
-    (0.3, ROOM, 0.1, SPACING),
-    (0.15, LESS_ROOM, 0.1, SPACING),
-    (0.3, LESS_ROOM, 0.1, SPACING),
-    (0.3, 0.0, 0.2, SPACING),
-    (2.0, 0.0, 0.4, SPACING),
-    (2.0, 0.0, 0.4, SPACING / 10),
-)
-"""Slack of the informed set, room, share of the iterations, meters between looks. Cars need wider sets than discs: they
-swing out."""
-TRIES = 6
-"""Searches in all once there is a path: trees over poses make detours, and each takes only milliseconds."""
-LOOKS = 50
-"""Poses from one of an answer to the next at which the hull is looked at in the end."""
-DEEPER = 0.01
-"""Meters that a hull may sink further into what it touches while it gets away: the costmap tells no less."""
-CUSP = 1.0
-"""Meters that a change of direction counts as: about what a car could drive while it stops and steers round."""
+PLANE_ONLY = ("bit_star", "aorrtc", "medial_axis")
+"""Replaced by RRT-Connect over poses: there, OMPL's AORRTC (2.0.1) returns the goal alone as an exact solution."""
+MIN_RADIUS_M = 0.2
+"""Radius of the arcs of a long robot that could turn in place, but should not have to."""
+RADIUS_RATIO = 1.15
+"""Ratio of the arcs of a car to its tightest ones, so that the controller can still correct to both sides."""
+CLEARANCE_M, LESS_CLEARANCE_M = 0.10, 0.05
+"""Clearance beyond the hull that is kept where possible, because pose estimate and map are off by as much at times."""
+SEARCHES = 6
+"""Searches once there is a path, of which the best one is taken: trees over poses make detours."""
+FINAL_CHECKS = 50
+"""Poses per step of the path at which the hull is checked in the end."""
+DEEPER_M = 0.01
+"""Distance that a hull may sink further into an obstacle that it touches while it gets away."""
+CUSP_M = 1.0
+"""Length that a change of direction counts as: what a car could drive while it stops and steers."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One attempt to find a path, in a region, with a clearance beyond the hull in m.
+
+    It has this share of the iterations, and checks the hull every `spacing` m. The `bounds` of the region are
+    (min x, min y, max x, max y).
+    """
+
+    bounds: tuple[float, float, float, float]
+    contains: Callable[[float, float], bool]
+    clearance: float
+    share: float
+    spacing: float
 
 
 class PosePlanner:
-    """Checks the whole hull at each pose, as a row of discs."""
+    """Plans with the whole hull, which is checked at each pose as a row of discs."""
 
-    def __init__(self, spec: PlannerSpec, robot: RobotModel, footprint: Footprint, space: Space) -> None:
+    def __init__(self, spec: OmplParameters, robot: RobotModel, footprint: Footprint, space: Space) -> None:
         self._spec, self._robot, self._footprint, self._space = spec, robot, footprint, space
         self._inscribed = robot.inscribed_radius
         self._type = "rrt_connect" if spec.type in PLANE_ONLY else spec.type
-        self._turning_radius = max(ROOM_TO_STEER * robot.turning_radius, TIGHTEST)
+        self._turning_radius = max(RADIUS_RATIO * robot.turning_radius, MIN_RADIUS_M)
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """A path of poses in the map frame, 5 cm apart; the easiest of a few searches."""
-        rates = Rates(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
+        """Return a path of poses in the map frame, 5 cm apart: the cheapest of a few searches."""
+        costs = TraversalCosts(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
         field = Field(costmap if self._spec.allow_unknown else self._shut(costmap))
-        ends = find_ends(rates, start, goal, self._spec.tolerance)
-        goal = self._fitting(costmap, goal, near(rates, ends.reachable, goal, self._spec.tolerance))
-        away = self._led_away(rates, start)
+        ends = find_endpoints(costs, start, goal, self._spec.tolerance)
+        goal = self._fitting(costmap, goal, near(costs, ends.reachable, goal, self._spec.tolerance))
+        away = self._led_away(costs, start)
         begin = Pose2(*away[-1].tolist())
-        informed = InformedSet(rates, (begin.x, begin.y), (goal.x, goal.y))
-        for slack, room, share, looks in ATTEMPTS:
-            informed.narrow(slack)
-            valid = self._valid(field, informed, room, (begin, goal))
-            iterations = max(1, round(share * self._spec.max_iterations))
+        for attempt in self._attempts(costs, ends, begin, goal):
+            valid = self._valid(field, attempt, (begin, goal))
+            iterations = max(1, round(attempt.share * self._spec.max_iterations))
             found: list[Array] = []
-            for _ in range(TRIES):
+            for _ in range(SEARCHES):
                 seed += 1
                 poses = search_poses(
-                    self._type, self._space, self._turning_radius, informed.bounds(), begin, goal, valid, seed,
-                    iterations, looks,
+                    self._type, self._space, self._turning_radius, attempt.bounds, begin, goal, valid, seed,
+                    iterations, attempt.spacing,
                 )  # fmt: skip
                 if poses is None:
                     break
                 found.append(np.array(poses))
-            for easiest in sorted(found, key=lambda poses: _effort(rates, poses)):
-                if self._clear(rates, easiest):
-                    return Path(np.concatenate((away[:-1], easiest)))
+            for cheapest in sorted(found, key=lambda poses: _effort(costs, poses)):
+                if self._clear(costs, cheapest):
+                    return Path(np.concatenate((away[:-1], cheapest)))
         message = f"{self._type}: no path in {self._spec.max_iterations} iterations"
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
 
-    def _clear(self, rates: Rates, poses: Array) -> bool:
-        """Whether the whole hull has room on all of the way: a search looks at it every 5 cm."""
-        part = np.arange(LOOKS) / LOOKS
+    def _attempts(self, costs: TraversalCosts, ends: Endpoints, begin: Pose2, goal: Pose2) -> Iterator[Attempt]:
+        """Yield the attempts in turn: with less and less clearance, at last with finer checks."""
+        bounds, reachable, size, (x0, y0) = (
+            reachable_bounds(costs, ends),
+            ends.reachable,
+            costs.resolution,
+            costs.origin,
+        )
+        rows, columns = reachable.shape
+
+        def contains(x: float, y: float) -> bool:
+            row, column = int((y - y0) / size), int((x - x0) / size)
+            return 0 <= row < rows and 0 <= column < columns and bool(reachable[row, column])
+
+        for clearance, share, spacing in (
+            (CLEARANCE_M, 0.2, SPACING),
+            (LESS_CLEARANCE_M, 0.2, SPACING),
+            (0.0, 0.3, SPACING),
+            (0.0, 0.3, SPACING / 10),
+        ):
+            yield Attempt(bounds, contains, clearance, share, spacing)
+
+    def _clear(self, costs: TraversalCosts, poses: Array) -> bool:
+        """Return whether the whole hull fits on all of the path, between the checks of the search as well."""
+        part = np.arange(FINAL_CHECKS) / FINAL_CHECKS
         yaw = np.unwrap(poses[:, 2])
         unwrapped = np.column_stack((poses[:, :2], yaw))
         between = unwrapped[:-1, None] + part[:, None] * np.diff(unwrapped, axis=0)[:, None]
         whole = np.vstack((between.reshape(-1, 3), unwrapped[-1:]))
-        return bool(self._footprint.free(rates.costmap, whole).all() and np.isfinite(rates.at(whole[:, :2])).all())
+        return bool(self._footprint.free(costs.costmap, whole).all() and np.isfinite(costs.at(whole[:, :2])).all())
 
     def _shut(self, costmap: CostmapView) -> CostmapView:
-        """The costmap with no room for the robot where nothing is known."""
+        """Return the costmap with no room for the robot in unknown cells."""
         least = np.minimum(costmap.distance, np.float32(self._inscribed))
         return replace(costmap, distance=np.where(costmap.costs == NO_INFORMATION, least, costmap.distance))
 
     def _fitting(self, costmap: CostmapView, goal: Pose2, places: Iterable[tuple[float, float]]) -> Pose2:
-        """The goal at the first of the places where the whole hull fits, with its heading kept."""
+        """Return the goal moved to the first of the places where the whole hull fits, with its heading."""
         poses = np.array([(*place, goal.yaw) for place in places])
         free = self._footprint.free(costmap, poses)
         if not free.any():
@@ -109,35 +133,35 @@ class PosePlanner:
             raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, f"the robot does not fit {within}")
         return Pose2(*poses[free.argmax()].tolist())
 
-    def _led_away(self, rates: Rates, start: Pose2) -> Array:
-        """Poses (n, 3) from the start to the nearest one where the whole hull fits: the start alone if it fits there.
+    def _led_away(self, costs: TraversalCosts, start: Pose2) -> Array:
+        """Return poses (n, 3) from the start to the nearest one where the whole hull fits.
 
         A start where it touches something is left on the shortest arc that leads no deeper.
         """
-        costmap, best = rates.costmap, None
+        costmap, best = costs.costmap, None
         for arc in escapes(self._space, self._turning_radius, start):
-            free = self._footprint.free(costmap, arc) & np.isfinite(rates.at(arc[:, :2]))
+            free = self._footprint.free(costmap, arc) & np.isfinite(costs.at(arc[:, :2]))
             clear = int(free.argmax())
             if not free[clear] or (best is not None and clear + 1 >= len(best)):
                 continue
             rooms = self._footprint.clearance(costmap, arc[: clear + 1])
-            if (rooms >= rooms[0] - DEEPER).all():
+            if (rooms >= rooms[0] - DEEPER_M).all():
                 best = arc[: clear + 1]
         if best is None:
             message = f"the robot does not fit at the start ({start.x:.2f}, {start.y:.2f}) nor can it get away"
             raise NavigationFailure(ErrorCode.START_OCCUPIED, message)
         return best
 
-    def _valid(self, field: Field, informed: InformedSet, room: float, ends: tuple[Pose2, Pose2]) -> Valid:
-        """Whether a pose is in the informed set and clear of obstacles; near the ends without the extra room."""
+    def _valid(self, field: Field, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> Valid:
+        """Return whether a pose is in the region and clear of obstacles; near the ends without the extra clearance."""
         offsets = self._footprint.discs.offsets.tolist()
-        roomy = self._footprint.discs.radius + room
+        roomy = self._footprint.discs.radius + attempt.clearance
         sure = self._footprint.discs.radius + math.sqrt(2.0) * field.resolution  # from middle to middle of two cells
         inner = self._inscribed
-        at, has, free, costmap = field.at, informed.has, self._footprint.free, field.costmap
+        at, contains, free, costmap = field.at, attempt.contains, self._footprint.free, field.costmap
 
         def valid(x: float, y: float, yaw: float) -> bool:
-            if not has(x, y) or at(x, y) <= inner:
+            if not contains(x, y) or at(x, y) <= inner:
                 return False
             cosine, sine = math.cos(yaw), math.sin(yaw)
             least = min(at(x + offset * cosine, y + offset * sine) for offset in offsets)
@@ -148,8 +172,8 @@ class PosePlanner:
         return valid
 
 
-def _effort(rates: Rates, poses: Array) -> float:
-    """What the way costs, and what stopping to change direction does."""
+def _effort(costs: TraversalCosts, poses: Array) -> float:
+    """Return the cost of a path, with that of changes of direction."""
     steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
     middles = 0.5 * (poses[1:, :2] + poses[:-1, :2])
-    return float((steps * rates.at(middles)).sum()) + CUSP * int(cusps(poses).size)
+    return float((steps * costs.at(middles)).sum()) + CUSP_M * int(cusps(poses).size)

@@ -10,7 +10,7 @@ from ompl import geometric as og
 from ompl import util as ou
 
 from simscen.core.geometry import Pose2
-from simscen.stack.planners.search import PLANNERS, after
+from simscen.stack.planners.ompl_search import PLANNERS, stop_after
 
 Space = Literal["se2", "dubins", "reeds_shepp"]
 Valid = Callable[[float, float, float], bool]
@@ -60,7 +60,7 @@ def search_poses(
     planner = PLANNERS[kind](information)
     planner.setProblemDefinition(problem)
     planner.setup()
-    planner.solve(ob.PlannerTerminationCondition(after(iterations)))
+    planner.solve(ob.PlannerTerminationCondition(stop_after(iterations)))
     if not problem.hasExactSolution():
         return None
     path = problem.getSolutionPath()

@@ -56,7 +56,9 @@ class Bench:
         self.costmap = Costmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE))
         self.journal: list[Event] = []
         self.now = 0.0
-        self.keeper = AdvancedPlanManager(PlannerSpec(**options), self.script, self.costmap, lambda k: 100 + k, 0.22)
+        self.keeper = AdvancedPlanManager(
+            PlannerSpec(**{"cautious": True, **options}), self.script, self.costmap, lambda k: 100 + k, 0.22
+        )
 
     def steps(self, count: int, goal: Goal = GOAL) -> list[object]:
         """Reasons of the plans made in so many steps of the navigator."""

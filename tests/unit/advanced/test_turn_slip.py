@@ -13,7 +13,6 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Goal
 from simscen.core.messages.sensor_data import Imu, Odometry, Readings
 from simscen.core.records.trace import Decision
-from simscen.model.guards import VelocitySmoother
 from simscen.model.stack import StackSpec
 from simscen.testing.flatland import Drive, Flatland, drive
 
@@ -44,7 +43,7 @@ class Slipping:
 def slipping(**smoothed: bool) -> Drive:
     """Straight through a room, for 11 m."""
     spec = StackSpec(
-        localizer=SlipEkf(type="slip_ekf", rotation_noise=0.5), velocity_smoother=VelocitySmoother(**smoothed)
+        profile="advanced", localizer=SlipEkf(type="slip_ekf", rotation_noise=0.5), velocity_smoother=smoothed
     )
     d = drive(ROOM, Pose2(1.0, 1.3), Goal("g", Pose2(12.0, 1.3)), spec=spec, odometry=("odom",))
     d.stack = Slipping(d)
@@ -73,7 +72,7 @@ def beside(d: Drive) -> float:
 @pytest.mark.parametrize("matched, off", [(False, 0.7), (True, 0.1)])
 def test_scans_tell_an_ekf_how_far_a_robot_came_whose_wheels_turn_in_vain(matched: bool, off: float) -> None:
     """Wheels that count a tenth too much, for 8 m."""
-    spec = StackSpec(localizer=SlipEkf(type="slip_ekf", rotation_noise=0.5, match_scans=matched))
+    spec = StackSpec(profile="advanced", localizer=SlipEkf(type="slip_ekf", rotation_noise=0.5, match_scans=matched))
     world = Flatland().room(14, 6)
     world.discs += [(2.0 + 2.0 * k, 1.5 if k % 2 else 4.5, 0.2) for k in range(6)]
     d = drive(world, Pose2(1.0, 3.0), Goal("g", Pose2(12.9, 3.0)), spec=spec, odometry=("odom",))

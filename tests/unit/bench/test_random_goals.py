@@ -109,7 +109,7 @@ def test_a_variant_of_drives_without_a_map_keeps_the_localizer_that_needs_none(t
     made = replace(corridors.ramps(tmp_path / "r", (1,)), mapless=True)
     other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
     spec = load_scenario(other.drives[0].file, other.root, other.world_path).spec
-    assert (spec.stack.controller.desired_linear_vel, spec.stack.localizer.type) == (0.3, "scan_matching_amcl")
+    assert (spec.stack.controller.desired_linear_vel, spec.stack.localizer.type) == (0.3, "amcl")
 
 
 def test_the_reference_tells_of_every_fault() -> None:

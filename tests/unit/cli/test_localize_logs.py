@@ -221,7 +221,8 @@ def test_a_scan_is_read_however_its_beams_are_laid_out(
 ) -> None:
     write_map(tmp_path)
     write_mcap(tmp_path / "drive.mcap", rescanned(layout, change))
-    found = localized(simscen, "drive.mcap")
+    (tmp_path / "at_once.yaml").write_text(AT_ONCE)
+    found = localized(simscen, "drive.mcap", "--scenario", "at_once.yaml")
     assert found["error"]["max"] < 0.2
     assert found["error"]["median"] < 0.06  # odometry alone: 0.21 m
     assert "note:" not in found["err"]

@@ -68,14 +68,27 @@ def test_a_specification_that_is_made_already_stays_as_it_is() -> None:
 
 def test_without_a_profile_nothing_changes() -> None:
     assert with_profile({"controller": {"type": "dwb"}}) == {"controller": {"type": "dwb"}}
-    assert StackSpec(profile="simscen") == StackSpec()
+    assert StackSpec(profile="reference") == StackSpec()
 
 
 def test_nav2_values_build_the_reference_stack_and_any_advanced_parameter_the_advanced_one() -> None:
     assert StackSpec(profile="nav2").builder == REFERENCE_BUILDER
     assert StackSpec(profile="nav2", prediction={"enabled": True}).builder == ADVANCED_BUILDER
     assert StackSpec(profile="nav2", recovery={"clear_entirely": False}).builder == ADVANCED_BUILDER
-    assert StackSpec(profile="advanced").builder == StackSpec().builder == ADVANCED_BUILDER
+    assert StackSpec().builder == REFERENCE_BUILDER
+    assert StackSpec(profile="advanced").builder == ADVANCED_BUILDER
+
+
+def test_advanced_chooses_the_advanced_components() -> None:
+    spec = StackSpec(profile="advanced")
+    assert (spec.localizer.type, spec.planner.type, spec.planner.cautious) == (
+        "scan_matching_amcl",
+        "medial_axis",
+        True,
+    )
+    assert "retrace" in spec.recovery.behaviors and spec.prediction.enabled
+    own = StackSpec(profile="advanced", planner={"type": "navfn"}, localizer={"type": "amcl"})
+    assert (own.planner.type, own.planner.cautious, own.localizer.type) == ("navfn", True, "amcl")
 
 
 def test_mappings_are_merged_to_their_ends() -> None:

@@ -40,6 +40,7 @@ PLAIN = {
     "ScanMatchingAmcl.likelihood_exponent": "an exponent",
     "OmplPlanner.cost_travel_multiplier": "a factor of costs, as in every file of Nav2",
     "Smac2d.cost_travel_multiplier": "likewise",
+    "MedialAxisPlanner.cost_travel_multiplier": "likewise",
     "Costmap.cost_scaling_factor": "an exponent for each meter, 3.0 in every file of Nav2",
     "LocalCostmap.cost_scaling_factor": "likewise",
     "Amcl.lambda_short": "an exponent for each meter, 0.1 in every file of Nav2",

@@ -20,6 +20,7 @@ from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.model.recovery import Recovery
 from simscen.model.recovery import Wait as WaitSpec
+from simscen.model.stack import StackSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import Wait
 from simscen.stack.collision_monitor import CollisionMonitor
@@ -42,7 +43,7 @@ DRIVING = Twist(0.3)
 
 
 def checker_that(*, stateful: bool) -> SimpleGoalChecker:
-    return SimpleGoalChecker(CheckerSpec(stateful=stateful), setting(round_robot()))
+    return SimpleGoalChecker(CheckerSpec(stateful=stateful, well_inside=0.5), setting(round_robot()))
 
 
 def view_of(world: Flatland, robot: RobotModel) -> CostmapView:
@@ -332,7 +333,7 @@ def test_the_retries_count_anew_for_who_has_come_a_meter_nearer(anew: bool, ther
 
 
 @pytest.mark.parametrize(
-    ("code", "ours", "nav2s"),
+    ("code", "advanced", "nav2"),
     [
         (ErrorCode.NO_VALID_PATH, True, True),
         (ErrorCode.START_OCCUPIED, True, False),
@@ -342,12 +343,11 @@ def test_the_retries_count_anew_for_who_has_come_a_meter_nearer(anew: bool, ther
     ],
 )
 def test_recoveries_help_after_the_codes_that_are_named_and_after_codes_that_nobody_knows(
-    code: int, ours: bool, nav2s: bool
+    code: int, advanced: bool, nav2: bool
 ) -> None:
     failure = NavigationFailure(code, "")
-    assert RoundRobin([], Recovery()).helps(failure) == ours
-    only = Recovery(planner_codes=["PLANNER_UNKNOWN", "PLANNER_TIMEOUT", "NO_VALID_PATH"])
-    assert RoundRobin([], only).helps(failure) == nav2s
+    assert RoundRobin([], Recovery()).helps(failure) == nav2
+    assert RoundRobin([], StackSpec(profile="advanced").recovery).helps(failure) == advanced
 
 
 def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> None:

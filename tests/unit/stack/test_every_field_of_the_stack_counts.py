@@ -18,6 +18,7 @@ from pydantic import BaseModel, ValidationError
 from scenes import Scene
 
 from simscen.advanced.localizers.spec import ScanMatchingAmcl, SlipEkf
+from simscen.advanced.planners.spec import MedialAxisPlanner
 from simscen.model import checkers, costmaps, guards, localizers, planners
 from simscen.model import recovery as behaviors
 from simscen.model.controllerspec import ControllerSpec
@@ -83,6 +84,7 @@ RANDOM: Said = {
 SMALL: Said = {**TRUTH, "costmap": {"rolling_size": 8.0}}
 SEEN = ((TRUTH, scenes.through), (SMALL, scenes.no_map), (TRUTH, scenes.seen_by_a_camera))
 SEEN_BY_A_CAMERA = ("min_obstacle_height", "max_obstacle_height", "max_ground_slope")
+STRICT: Said = {**TRUTH, "goal_checker": {"well_inside": 0.5}}
 DENOISE = {"enabled": True, "minimal_group_size": 6}
 PARTS = [
     Part(("localizer",), localizers.Amcl, ((plain_amcl(), scenes.moved),), {
@@ -135,14 +137,17 @@ PARTS = [
         "denoise_layer": [{"enabled": True, "minimal_group_size": 20}], "obstacle_min_range": [1.0],
         "raytrace_min_range": [2.0],
     }),
-    Part(("goal_checker",), checkers.SimpleGoalChecker, ((TRUTH, scenes.arriving), (TRUTH, scenes.drifting_past))),
+    Part(("goal_checker",), checkers.SimpleGoalChecker, (
+        (STRICT, scenes.arriving), (STRICT, scenes.drifting_past))),
     Part(("progress_checker",), checkers.ProgressChecker, (
         ({**TRUTH, "progress_checker": {"movement_time_allowance": 0.5}}, scenes.stuck),
         ({**TRUTH, "progress_checker": {"movement_time_allowance": 1.0}}, scenes.stuck),
     )),
     Part(("recovery",), behaviors.Recovery, ((recovery("backup", "spin", "wait"), scenes.shut),), {
         "number_of_retries": ((recovery("clear_costmap"), scenes.shut),),
-        "planner_codes": ((TRUTH, scenes.walled_in), (TRUTH, scenes.shut)),
+        "planner_codes": (
+            ({**TRUTH, "recovery": StackSpec(profile="advanced").recovery.model_dump()}, scenes.walled_in),
+            (TRUTH, scenes.shut)),
         "wait_duration": ((recovery("wait"), scenes.shut),),
         **dict.fromkeys(("spin_dist", "max_rotational_vel"), ((recovery("spin"), scenes.shut),)),
         "simulate_ahead_time": ((recovery("backup", backup_partial=False), scenes.shut),),
@@ -162,18 +167,26 @@ PARTS = [
     Part(("velocity_smoother",), guards.VelocitySmoother, ((TRUTH, scenes.through), (TRUTH, scenes.arriving))),
     Part(("collision_monitor",), guards.CollisionMonitor, (
         (TRUTH, scenes.silent), (BLIND, scenes.seen_by_one), (BLIND, scenes.through))),
-    Part(("prediction",), guards.Prediction, ((TRUTH, scenes.crossed),), values={
+    Part(("prediction",), guards.Prediction, (({**TRUTH, "prediction": {"enabled": True}}, scenes.crossed),), {
+        "enabled": ((TRUTH, scenes.crossed),)}, {
         "max_range": [1.0], "max_radius": [0.1], "min_speed": [1.0]}),
     Part(("latency",), Latency, ((TRUTH, scenes.seen_by_one), (amcl(), scenes.moved))),
     Part((), StackSpec, ((TRUTH, scenes.through),), {"failure_tolerance": (
         ({**BLIND, "local_costmap": {"obstacle_max_range": 2.5}}, scenes.seen_by_one),)}, {"profile": ["nav2"]}),
     Part(("planner",), planners.OmplPlanner, (
-        (planner(), scenes.planned), (planner(sampler="uniform"), scenes.planned)), {
+        (planner(), scenes.planned),), {
         **of_planner("bit_star"),
         "max_iterations": ((planner(type="rrt_connect"), scenes.planned),),
         "improving_iterations": ((planner(type="rrt_star", improving_iterations=60), scenes.planned),),
         "state_space": ((planner(), scenes.planned), (planner(state_space="se2"), scenes.planned)),
     }, {"max_iterations": [1, 3], "improving_iterations": [5, 30]}),
+    Part(("planner",), MedialAxisPlanner, ((planner(type="medial_axis"), scenes.planned),), {
+        **of_planner("medial_axis"),
+        "state_space": (
+            (planner(type="medial_axis"), scenes.planned),
+            (planner(type="medial_axis", state_space="se2"), scenes.planned),
+        ),
+    }, {"max_iterations": [1, 3]}),
     Part(("planner",), planners.Navfn, ((planner(type="navfn"), scenes.planned),), of_planner("navfn")),
     Part(("planner",), planners.Smac2d, ((planner(type="smac_2d"), scenes.planned),), of_planner("smac_2d")),
 ]  # fmt: skip

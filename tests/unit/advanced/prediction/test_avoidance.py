@@ -38,6 +38,7 @@ def start(
     *goals: Goal, controller: ControllerSpec | None = None, enabled: bool = True, world: Flatland | None = None
 ) -> Drive:
     spec = StackSpec(
+        profile="advanced",
         localizer=GroundTruth(type="ground_truth"),
         costmap=Costmap(obstacle_max_range=8.0, raytrace_max_range=10.0, update_frequency=10.0),
         controller=controller or CONTROLLERS[0],

@@ -22,7 +22,7 @@ def least(heed: str, controller: str = "regulated_pure_pursuit") -> float:
     """The least clearance of a robot whose avoidance is off, where only the controller or the monitor is told."""
     world, grid = Flatland().room(7, 8), Flatland().room(7, 8).grid((-0.5, -0.5, 7.5, 8.5))
     own = {"type": controller, **CONTROLLERS[controller]}
-    spec = StackSpec.model_validate({"localizer": {"type": "ground_truth"}, "controller": own})
+    spec = StackSpec.model_validate({"profile": "advanced", "localizer": {"type": "ground_truth"}, "controller": own})
     goal = Goal("beyond", Pose2(6.0, 4.0))
     driven = drive(world, Pose2(1.0, 4.0), goal, robot=round_robot(), grid=grid, spec=spec)
     stack = driven.stack.inner

@@ -71,7 +71,7 @@ def test_clear_costmap_clears_once_around_the_robot_or_everywhere_and_is_done(en
 
 def test_backup_fails_where_there_is_something_behind() -> None:
     with pytest.raises(NavigationFailure) as failed:
-        run(BackUp(model.BackUp(), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.26, 1.0)))
+        run(BackUp(model.BackUp(backup_partial=True), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.26, 1.0)))
     assert failed.value.code == ErrorCode.BACKUP_COLLISION_AHEAD
 
 
@@ -91,13 +91,13 @@ def test_a_robot_without_a_reverse_gear_cannot_be_told_to_back_up() -> None:
 
 
 def test_backup_uses_what_room_there_is() -> None:
-    pose, _, _ = run(BackUp(model.BackUp(), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
+    pose, _, _ = run(BackUp(model.BackUp(backup_partial=True), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
     assert -0.2 < pose.x < -0.05
 
 
 def test_nav2s_backup_wants_all_the_room_it_may_need() -> None:
     with pytest.raises(NavigationFailure) as failed:
-        run(BackUp(model.BackUp(backup_partial=False), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
+        run(BackUp(model.BackUp(), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
     assert failed.value.code == ErrorCode.BACKUP_COLLISION_AHEAD
 
 

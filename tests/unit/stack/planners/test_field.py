@@ -3,7 +3,7 @@ import numpy as np
 from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import distances
-from simscen.stack.planners.field import Field
+from simscen.stack.planners.distance_lookup import Field
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot
 

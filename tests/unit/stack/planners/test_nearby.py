@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner
+from simscen.advanced.planners.spec import MedialAxisPlanner as PlannerSpec
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
-from simscen.model.planners import OmplPlanner as PlannerSpec
-from simscen.stack.planners.nearby import LARGE, nearby
-from simscen.stack.planners.ompl_planner import OmplPlanner
+from simscen.stack.planners.planning_window import LARGE, nearby
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.testing.flatland import round_robot
 
@@ -83,7 +83,7 @@ def test_an_end_off_the_map_is_told_by_the_planner():
 @pytest.mark.parametrize("wall", [60, 300])
 def test_the_way_around_a_wall_is_found_wherever_its_end_is(wall):
     """3 m to either side, within the window; 15 m, beyond it."""
-    planner = OmplPlanner(PlannerSpec(type="bit_star"), round_robot())
+    planner = MedialAxisPlanner(PlannerSpec(type="medial_axis"), round_robot())
     path = planner.plan(hall(wall), START, GOAL, seed=1)
     around = 2 * np.hypot(wall * 0.05, 3.0)
     assert around - 0.1 < path.length() < around + 1.0

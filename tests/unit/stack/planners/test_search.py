@@ -1,13 +1,19 @@
 import math
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from simscen.stack.planners.search import PLANNERS, Problem, search
+from simscen.advanced.planners.sampled_search import SampledSearch
+from simscen.stack.planners.ompl_search import PLANNERS, OmplSearch, Point, Problem
 
 BOUNDS = (0.0, 0.0, 4.0, 4.0)
+
+
+def search(
+    kind: str, problem: Problem, seed: int, iterations: int, improving: int, simplify: bool = False
+) -> list[Point] | None:
+    return OmplSearch(kind, problem, seed, iterations, improving).solve(simplify=simplify)
 
 
 def left_half(ax: float, ay: float, bx: float, by: float) -> float:
@@ -53,7 +59,7 @@ def test_planners_that_take_their_first_path_do_not_care_what_it_costs() -> None
 
 def test_bit_star_goes_by_the_samples_it_is_given_and_no_others() -> None:
     samples = np.array([(0.7, 3.0), (2.0, 3.1), (3.3, 3.0), (2.0, 0.5)])
-    points = search("bit_star", replace(PROBLEM, samples=samples), 1, 3000, 400)
+    points = SampledSearch(PROBLEM, samples, 2.3, 1, 3000).solve(simplify=False)
     assert points is not None
     assert {*points[1:-1]} <= {*map(tuple, samples.tolist())}
     assert len(points) > 2

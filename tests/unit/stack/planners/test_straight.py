@@ -3,11 +3,11 @@ import math
 import numpy as np
 import pytest
 
+from simscen.advanced.planners.straight_line import BEYOND, dear_until, straight_on
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.ompl_planner import OmplPlanner
-from simscen.stack.planners.straight import BEYOND, dear_until, straight_on
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.testing.flatland import round_robot
 

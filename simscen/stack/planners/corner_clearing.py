@@ -4,14 +4,14 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
-from simscen.stack.planners.finish import spaced
-from simscen.stack.planners.rates import Rates
+from simscen.stack.planners.path_points import spaced
+from simscen.stack.planners.traversal_costs import TraversalCosts
 
 BESIDE = 0.02
 """Cells by which a path passes a corner that it would cut."""
 
 
-def around_corners(rates: Rates, points: Array) -> Array | None:
+def around_corners(rates: TraversalCosts, points: Array) -> Array | None:
     """The path (n, 2) led around each corner that it cut; None where more than a corner is in its way.
 
     The points of a path that cut any are then no further apart than the cells are wide.
@@ -43,7 +43,7 @@ def _mixed(one: Array, other: Array) -> tuple[Array, Array]:
     return np.column_stack((one[:, 0], other[:, 1])), np.column_stack((other[:, 0], one[:, 1]))
 
 
-def _free(rates: Rates, cells: Array) -> npt.NDArray[np.bool_]:
+def _free(rates: TraversalCosts, cells: Array) -> npt.NDArray[np.bool_]:
     """Whether the robot can be in cells (n, 2), columns first."""
     columns, rows = cells.astype(np.int64).T
     return np.asarray(np.isfinite(rates.rates[rows, columns]))

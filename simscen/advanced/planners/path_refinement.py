@@ -13,18 +13,17 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.grid_graph import resample_polyline
-from simscen.stack.planners.rates import STEP, Rates
+from simscen.stack.planners.path_points import smoothed
+from simscen.stack.planners.traversal_costs import STEP, TraversalCosts
 
 ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
 """Meters between stations, meters to either side, points across."""
 LEAST_LEGS = 2
 """So that there is a station to move."""
-SMOOTHINGS, MOST_RISE = 8, 1.003
-"""Passes that take out what the points' own spacing leaves, and how much dearer (ratio) the path may get by them."""
 Costs = npt.NDArray[np.float32]
 
 
-def eased(rates: Rates, points: Array) -> Array:
+def refined(rates: TraversalCosts, points: Array) -> Array:
     """The path (n, 2) moved to where it costs least, with its ends kept, and smoothed."""
     points = _cut_short(rates, points)
     cost = rates.along(points)
@@ -40,7 +39,7 @@ def eased(rates: Rates, points: Array) -> Array:
     return smoothed(rates, points)
 
 
-def _cut_short(rates: Rates, points: Array) -> Array:
+def _cut_short(rates: TraversalCosts, points: Array) -> Array:
     """From each kept point straight on to the farthest that it costs no more to go straight to, found by doubling."""
     places = resample_polyline(points, ROUNDS[0][0], LEAST_LEGS)
     rows = places.tolist()
@@ -62,7 +61,7 @@ def _cut_short(rates: Rates, points: Array) -> Array:
     return places[kept]
 
 
-def _through(rates: Rates, stations: Array, offsets: Array, stride: float) -> Array:
+def _through(rates: TraversalCosts, stations: Array, offsets: Array, stride: float) -> Array:
     """The cheapest way through points at `offsets` to the left of each station but the first and last.
 
     Costs are looked at every `stride` meters.
@@ -87,7 +86,7 @@ def _through(rates: Rates, stations: Array, offsets: Array, stride: float) -> Ar
     return stations + offsets[chosen[::-1], None] * left
 
 
-def _step_costs(rates: Rates, points: Array, stride: float) -> Costs:
+def _step_costs(rates: TraversalCosts, points: Array, stride: float) -> Costs:
     """What it costs (n - 1, k, k) to go from each point of one station to each of the next, given points (n, k, 2)."""
     before = ((points[:-1] - rates.origin) / rates.resolution).astype(np.float32)[:, :, None]
     step = ((points[1:] - rates.origin) / rates.resolution).astype(np.float32)[:, None] - before
@@ -100,19 +99,3 @@ def _step_costs(rates: Rates, points: Array, stride: float) -> Costs:
     lengths = np.sqrt(step[..., 0] ** 2 + step[..., 1] ** 2) * np.float32(rates.resolution / looks)
     costs: Costs = total * lengths
     return costs
-
-
-def smoothed(rates: Rates, points: Array) -> Array:
-    """The path (n, 2) with its corners rounded, as long as that costs next to nothing.
-
-    One that is too tight by a hair costs more than can be said, and is only exchanged for one that is not.
-    """
-    cost = rates.along(points)
-    for _ in range(SMOOTHINGS):
-        other = points.copy()
-        other[1:-1] += 0.5 * (0.5 * (points[:-2] + points[2:]) - points[1:-1])
-        costs = rates.along(other)
-        if math.isinf(costs) or costs > MOST_RISE * cost:
-            break
-        points, cost = other, costs if math.isinf(cost) else cost
-    return points

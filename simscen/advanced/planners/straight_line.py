@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.planners.nearby import window
+from simscen.stack.planners.planning_window import window
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 MOST_DEAR = 0.5

@@ -21,7 +21,7 @@ STRIDE = 0.4
 radius, and between two looks no line comes deeper into one than 2 % of it."""
 
 
-class Rates:
+class TraversalCosts:
     """Costs of a meter on a costmap: 1 where it is free, 1 + `multiplier` beside obstacles, inf where none can be.
 
     That is nav2_smac_planner's count, 1 + cost_travel_multiplier · cost / 252, taken along the way instead of from cell
@@ -51,7 +51,7 @@ class Rates:
         self._asked: tuple[float, float, float, float] | None = None
         self._answer = 0.0
 
-    def after(self, before: "Rates | None") -> "Rates":
+    def after(self, before: "TraversalCosts | None") -> "TraversalCosts":
         """These, with what was worked out of those of the last plan where they are the same."""
         if before is not None and np.array_equal(before.rates, self.rates):
             self.kept = before.kept

@@ -10,8 +10,8 @@ from scipy.ndimage import label
 
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import ErrorCode
-from simscen.stack.planners.finish import spaced
-from simscen.stack.planners.rates import Rates
+from simscen.stack.planners.path_points import spaced
+from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import NavigationFailure
 
 ESCAPE = 0.5
@@ -19,7 +19,7 @@ ESCAPE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Ends:
+class Endpoints:
     """Where the search begins and ends; they differ from what was asked where the robot could not stand there.
 
     `reachable` (height, width) are the cells that a way joins with the start.
@@ -30,7 +30,7 @@ class Ends:
     reachable: npt.NDArray[np.bool_]
 
 
-def find_ends(rates: Rates, start: Pose2, goal: Pose2, tolerance: float) -> Ends:
+def find_endpoints(rates: TraversalCosts, start: Pose2, goal: Pose2, tolerance: float) -> Endpoints:
     """The ends of a search.
 
     A start where the robot is too near an obstacle is moved to the nearest free place that nothing is in front of (it
@@ -50,10 +50,10 @@ def find_ends(rates: Rates, start: Pose2, goal: Pose2, tolerance: float) -> Ends
     end = next(near(rates, reachable, goal, tolerance), None)
     if end is None:
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, "start and goal are not connected")
-    return Ends(begin, end, reachable)
+    return Endpoints(begin, end, reachable)
 
 
-def _possible(rates: Rates, pose: Pose2, outside: ErrorCode, occupied: ErrorCode, what: str) -> None:
+def _possible(rates: TraversalCosts, pose: Pose2, outside: ErrorCode, occupied: ErrorCode, what: str) -> None:
     row, column = _cell(rates, (pose.x, pose.y))
     if not (0 <= row < rates.height and 0 <= column < rates.width):
         raise NavigationFailure(outside, f"{what} ({pose.x:.2f}, {pose.y:.2f}) is outside the map")
@@ -61,14 +61,16 @@ def _possible(rates: Rates, pose: Pose2, outside: ErrorCode, occupied: ErrorCode
         raise NavigationFailure(occupied, f"{what} ({pose.x:.2f}, {pose.y:.2f}) is in an obstacle")
 
 
-def _cell(rates: Rates, point: tuple[float, float]) -> tuple[int, int]:
+def _cell(rates: TraversalCosts, point: tuple[float, float]) -> tuple[int, int]:
     return (
         math.floor((point[1] - rates.origin[1]) / rates.resolution),
         math.floor((point[0] - rates.origin[0]) / rates.resolution),
     )
 
 
-def near(rates: Rates, free: npt.NDArray[np.bool_], pose: Pose2, within: float) -> Iterator[tuple[float, float]]:
+def near(
+    rates: TraversalCosts, free: npt.NDArray[np.bool_], pose: Pose2, within: float
+) -> Iterator[tuple[float, float]]:
     """The point itself if its cell is free, then the centers of free cells at most `within` away, nearest first."""
     row, column = _cell(rates, (pose.x, pose.y))
     if free[row, column]:
@@ -85,7 +87,7 @@ def near(rates: Rates, free: npt.NDArray[np.bool_], pose: Pose2, within: float) 
         yield float(x[best]), float(y[best])
 
 
-def _open(rates: Rates, start: Pose2, place: tuple[float, float]) -> bool:
+def _open(rates: TraversalCosts, start: Pose2, place: tuple[float, float]) -> bool:
     """Whether no obstacle is between the start and this place."""
     way = spaced(np.array([(start.x, start.y), place]), 0.5 * rates.resolution)
     columns, rows = np.floor((way - rates.origin) / rates.resolution).astype(np.int64).T

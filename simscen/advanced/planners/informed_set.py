@@ -15,10 +15,10 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from simscen.advanced.planners.blocks import pooled, roomiest
 from simscen.core.geometry import Array
-from simscen.stack.planners.blocks import pooled, roomiest
-from simscen.stack.planners.rates import Rates
-from simscen.stack.planners.search import Point
+from simscen.stack.planners.ompl_search import Point
+from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView
 
 BLOCK, PRICED_BLOCK = 0.2, 0.15
@@ -39,7 +39,7 @@ class InformedSet:
     Distances are those of king's and knight's moves, at most 2.8 % too long (8.2 % without the knight).
     """
 
-    def __init__(self, rates: Rates, start: Point, goal: Point, priced: bool = False) -> None:
+    def __init__(self, rates: TraversalCosts, start: Point, goal: Point, priced: bool = False) -> None:
         """`priced`: by what ways cost, in meters of free ground, rather than by their lengths."""
         size, most = (PRICED_BLOCK, MOST_PRICED) if priced else (BLOCK, MOST_BLOCKS)
         widest = max(1, int(2.0 * rates.inscribed / rates.resolution))
@@ -182,7 +182,7 @@ def _at(mask: Mask, rows: int, columns: int) -> Mask:
     return moved
 
 
-def _graph(rates: Rates, factor: int, priced: bool) -> csr_matrix:
+def _graph(rates: TraversalCosts, factor: int, priced: bool) -> csr_matrix:
     """Edges between blocks a move apart, as long as the move in blocks, or times what both cost."""
     blocks = _cut(rates.free, factor)
     height, width = blocks.shape[:2]
@@ -202,7 +202,7 @@ def _graph(rates: Rates, factor: int, priced: bool) -> csr_matrix:
     return csr_matrix((length, to, begin), shape=(height * width, height * width))
 
 
-def _prices(rates: Rates, factor: int) -> Array:
+def _prices(rates: TraversalCosts, factor: int) -> Array:
     """What a meter costs in each block, flat: between its best cell and the mean of those where the robot can be.
 
     The best alone makes nothing of what is dear for a cell or two, the mean makes a gap dearer than its middle.

@@ -9,8 +9,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from simscen.advanced.planners.blocks import pooled, roomiest
 from simscen.core.geometry import Array
-from simscen.stack.planners.blocks import pooled, roomiest
 from simscen.stack.protocols import CostmapView
 
 BLOCK = 0.1

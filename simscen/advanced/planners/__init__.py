@@ -1,0 +1,1 @@
+"""Planners that Nav2 does not have."""

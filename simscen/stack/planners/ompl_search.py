@@ -1,0 +1,244 @@
+"""Search with OMPL's planners in the plane, over the costs of a costmap. Seeded, and limited by iterations.
+
+The random generator of OMPL is global to the process. It is seeded anew for each plan, before any other object of OMPL
+is made. OMPL logs a warning about the repeated seed, although the seed takes effect; this is why its log is silenced.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ompl import base as ob
+from ompl import geometric as og
+from ompl import util as ou
+
+Point = tuple[float, float]
+Motion = Callable[[float, float, float, float], float]
+"""Cost of a straight motion from (x, y) to (x, y), at least its length in m; inf if it is not possible."""
+Termination = Callable[[], bool]
+"""Condition that OMPL evaluates once per iteration. The search stops when it returns True."""
+
+PLANNERS: dict[str, Callable[[Any], Any]] = {
+    "rrt_connect": og.RRTConnect,
+    "rrt_star": og.RRTstar,
+    "informed_rrt_star": og.InformedRRTstar,
+    "bit_star": og.BITstar,
+    "aorrtc": og.AORRTC,
+    "kpiece": og.KPIECE1,
+}
+FEASIBLE_ONLY = frozenset(("rrt_connect", "kpiece"))
+"""Planners that stop at their first path. The others continue to improve it."""
+RANGE_M = 1.0
+"""Longest motion added to a tree. The default of OMPL, a fifth of the map, mostly ends in the walls of a building."""
+BATCH_SAMPLES, BATCHES = 200, 2
+"""Samples per batch of BIT*, and batches after which its path is good enough."""
+REWIRE_FACTOR = 1.5
+"""Factor of BIT* for the distance up to which samples are connected. With OMPL's 1.1, detours are more frequent."""
+GOOD_ENOUGH_RATIO = 1.01
+"""A path that costs at most this times the distance to the goal ends the search: no path costs less than that."""
+SIMPLIFY_STEPS = 100
+"""Attempts of each pass of the simplification. Counted, because OMPL's own simplify() stops by wall-clock time."""
+PERTURBATIONS_M = (0.5, 0.15)
+"""Distances by which states are moved to where the path costs less, one pass each."""
+ou.setLogLevel(ou.LOG_NONE)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A search from `start` to `goal` within `bounds` (min x, min y, max x, max y), all in m."""
+
+    start: Point
+    goal: Point
+    bounds: tuple[float, float, float, float]
+    motion: Motion
+
+
+class _MotionValidator(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
+    """Validity of a motion by its cost: one call instead of one for each state on the way."""
+
+    def __init__(self, information: Any, motion: Motion) -> None:
+        super().__init__(information)
+        self.motion = motion
+
+    def checkMotion(self, a: Any, b: Any) -> bool:
+        """Return whether the straight motion is possible."""
+        return self.motion(a[0], a[1], b[0], b[1]) < math.inf
+
+
+class _CostBeyondLength(ob.OptimizationObjective):  # type: ignore[misc] # ompl has no types
+    """Cost of a motion beyond its length."""
+
+    def __init__(self, information: Any, motion: Motion) -> None:
+        super().__init__(information)
+        self.motion = motion
+
+    def motionCost(self, a: Any, b: Any) -> Any:
+        """Return the cost of the straight motion, less its length."""
+        ax, ay, bx, by = a[0], a[1], b[0], b[1]
+        return ob.Cost(self.motion(ax, ay, bx, by) - math.hypot(bx - ax, by - ay))
+
+    def stateCost(self, _: Any) -> Any:
+        """Return 0: only motions cost something."""
+        return ob.Cost(0.0)
+
+
+class _MotionCost(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # ompl has no types
+    """Cost of a motion, as an objective of length: only for these OMPL samples the ellipse of the informed set."""
+
+    def __init__(self, information: Any, motion: Motion) -> None:
+        super().__init__(information)
+        self.motion = motion
+
+    def motionCost(self, a: Any, b: Any) -> Any:
+        """Return the cost of the straight motion."""
+        return ob.Cost(self.motion(a[0], a[1], b[0], b[1]))
+
+    def motionCostHeuristic(self, a: Any, b: Any) -> Any:
+        """Return the length of the motion, since no meter costs less than 1."""
+        return ob.Cost(math.hypot(b[0] - a[0], b[1] - a[1]))
+
+
+class StateValidity:
+    """Validity of a state: whether the robot can be there."""
+
+    def __init__(self, motion: Motion) -> None:
+        self.motion = motion
+
+    def __call__(self, state: Any) -> bool:
+        """Return whether a state of OMPL is valid."""
+        x, y = state[0], state[1]
+        return self.motion(x, y, x, y) < math.inf
+
+
+def _impossible(_ax: float, _ay: float, _bx: float, _by: float) -> float:
+    return math.inf
+
+
+class OmplSearch:
+    """One search by one of OMPL's planners. Subclasses may change where it samples and when it stops."""
+
+    good_enough_ratio = GOOD_ENOUGH_RATIO
+
+    def __init__(self, kind: str, problem: Problem, seed: int, max_iterations: int, improving_iterations: int) -> None:
+        """Search with the planner of this `kind`, a key of PLANNERS.
+
+        A planner that improves its path does so until it has used `improving_iterations`; BIT*, until it has processed
+        BATCHES batches of samples.
+        """
+        self.kind, self.problem, self.seed = kind, problem, seed
+        self.max_iterations, self.improving_iterations = max_iterations, improving_iterations
+        self._callbacks: list[Any] = []
+
+    def solve(self, *, simplify: bool) -> list[Point] | None:
+        """Return the points of a path from start to goal; None if the iterations did not suffice.
+
+        `simplify` runs OMPL's path simplification on it. An approximate solution counts as none.
+        """
+        try:
+            return self._solve(simplify)
+        finally:
+            for callback in self._callbacks:  # OMPL's bindings leak their callbacks: release the costmap
+                callback.motion = _impossible
+
+    def _solve(self, simplify: bool) -> list[Point] | None:
+        ou.RNG.setSeed(self.seed)
+        problem, information = self.problem, self._make_information()
+        ends = _state(information, problem.start), _state(information, problem.goal)
+        if not all(information.satisfiesBounds(end) and information.isValid(end) for end in ends):
+            return None  # a planner would wait for a better goal, 5 ms per iteration
+        definition = ob.ProblemDefinition(information)
+        definition.setStartAndGoalStates(*ends)
+        objective = self._make_objective(information)
+        definition.setOptimizationObjective(objective)
+        planner = PLANNERS[self.kind](information)
+        if hasattr(planner, "setRange"):
+            planner.setRange(RANGE_M)
+        self._configure(planner)
+        planner.setProblemDefinition(definition)
+        planner.setup()
+        planner.solve(ob.PlannerTerminationCondition(self._make_termination(planner)))
+        if not definition.hasExactSolution():
+            return None
+        path = definition.getSolutionPath()
+        if simplify:
+            _simplify(og.PathSimplifier(information, definition.getGoal(), objective), path)
+        return [(state[0], state[1]) for state in path.getStates()]
+
+    def _configure(self, planner: Any) -> None:
+        """Set the parameters of a planner."""
+        if self.kind == "bit_star":
+            planner.setUseKNearest(False)
+            planner.setSamplesPerBatch(BATCH_SAMPLES)
+            planner.setRewireFactor(REWIRE_FACTOR)
+
+    def _make_termination(self, planner: Any) -> Termination:
+        """Return when this planner is to stop."""
+        if self.kind in FEASIBLE_ONLY:
+            return stop_after(self.max_iterations)
+
+        def is_solved() -> bool:
+            return math.isfinite(planner.bestCost().value())
+
+        if self.kind == "bit_star":
+            batches = planner.numBatches
+            return stop_after(self.max_iterations, lambda: batches() > BATCHES and is_solved())
+        return stop_after(self.max_iterations, is_solved, self.improving_iterations)
+
+    def _make_validity(self) -> StateValidity:
+        return StateValidity(self.problem.motion)
+
+    def _make_information(self) -> Any:
+        space, limits, bounds = ob.RealVectorStateSpace(2), ob.RealVectorBounds(2), self.problem.bounds
+        for axis in (0, 1):
+            limits.setLow(axis, bounds[axis])
+            limits.setHigh(axis, bounds[axis + 2])
+        space.setBounds(limits)
+        information = ob.SpaceInformation(space)
+        validity, motions = self._make_validity(), _MotionValidator(information, self.problem.motion)
+        self._callbacks += [validity, motions]
+        information.setStateValidityChecker(validity)
+        information.setMotionValidator(motions)
+        information.setup()
+        return information
+
+    def _make_objective(self, information: Any) -> Any:
+        """Return the cost of a path as OMPL's own length, whose heuristic needs no Python, and the cost beyond it."""
+        motion = self.problem.motion
+        if self.kind == "informed_rrt_star":
+            whole = _MotionCost(information, motion)
+            self._callbacks.append(whole)
+            return whole
+        beyond = _CostBeyondLength(information, motion)
+        self._callbacks.append(beyond)
+        both = ob.MultiOptimizationObjective(information)
+        both.addObjective(ob.PathLengthOptimizationObjective(information), 1.0)
+        both.addObjective(beyond, 1.0)
+        both.setCostThreshold(ob.Cost(self.good_enough_ratio * math.dist(self.problem.start, self.problem.goal)))
+        return both
+
+
+def _simplify(simplifier: Any, path: Any) -> None:
+    """Shorten a path where that costs less, and move its states to where it costs less."""
+    simplifier.partialShortcutPath(path, SIMPLIFY_STEPS, SIMPLIFY_STEPS // 2)
+    for distance in PERTURBATIONS_M:
+        simplifier.perturbPath(path, distance, SIMPLIFY_STEPS, SIMPLIFY_STEPS // 2)
+    simplifier.partialShortcutPath(path, SIMPLIFY_STEPS, SIMPLIFY_STEPS // 2)
+
+
+def _state(information: Any, point: Point) -> Any:
+    state = information.allocState()
+    state[0], state[1] = point
+    return state
+
+
+def stop_after(iterations: int, is_done: Termination = lambda: False, least: int = 0) -> Termination:
+    """Return a termination condition: stop after so many iterations, or after at least `least` when it `is_done`."""
+    left = iterations
+
+    def should_stop() -> bool:
+        nonlocal left
+        left -= 1
+        return left < 0 or (iterations - left > least and is_done())
+
+    return should_stop
