@@ -157,7 +157,10 @@ PLACES = {
         "collision_monitor", "prediction", "latency",
     )},
     "stack.denoise_layer": Place("scenario", STACK + "costmap:\n    denoise_layer:\n      "),
-    **{f"stack.{each}": Place("scenario", f"{STACK}planner:\n    type: {each}\n    ") for each in ("navfn", "smac_2d", "medial_axis")},
+    **{
+        f"stack.{each}": Place("scenario", f"{STACK}planner:\n    type: {each}\n    ")
+        for each in ("navfn", "smac_2d", "medial_axis")
+    },
     "stack file.stack file": Place("stack", ""),
     "stack file.configuration": Place("config", ""),
     "stack file.stacks": Place("config", "stacks:\n  mine:\n    "),
