@@ -35,17 +35,26 @@ if TYPE_CHECKING:
     from simscen.criteria.trace_signals.ground_truth import clearance, drive, pose_error, speed, truth, turn_rate
     from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance, Sight, Wheels
     from simscen.model.checkers import GoalCheckerSpec
-    from simscen.model.controllerspec import ControllerSpec
     from simscen.model.localizers import LocalizerSpec
     from simscen.model.planners import PlannerSpec
     from simscen.model.recovery import BehaviorSpec
     from simscen.model.robot import Mount, SensorSpec
     from simscen.model.stack import InProcessStack
+    from simscen.model.stack_base import ControllerSpec
     from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
     from simscen.spec.base import Ranged, Spec, Value, by_default
     from simscen.spec.choice import Choice
-    from simscen.spec.named_places import PlaceOrPoint, PlaceOrPose
-    from simscen.spec.places import Point, PoseSpec
+    from simscen.spec.places import (
+        GoalName,
+        MaskFile,
+        MovableName,
+        ObjectName,
+        PlaceOrPoint,
+        PlaceOrPose,
+        Point,
+        PoseSpec,
+        RegionName,
+    )
     from simscen.spec.quantities import (
         Angle,
         AngularSpeed,
@@ -64,7 +73,6 @@ if TYPE_CHECKING:
         Ratio,
         Speed,
     )
-    from simscen.spec.references import GoalName, MaskFile, MovableName, ObjectName, RegionName
     from simscen.stack.footprint import Footprint, distances
     from simscen.stack.moving_obstacles import MovingObstacles
     from simscen.stack.protocols import (
@@ -233,19 +241,15 @@ _WHERE = {
         "Ratio",
         "Speed",
     ),
-    "simscen.spec.named_places": (
-        "PlaceOrPoint",
-        "PlaceOrPose",
-    ),
     "simscen.spec.places": (
-        "Point",
-        "PoseSpec",
-    ),
-    "simscen.spec.references": (
         "GoalName",
         "MaskFile",
         "MovableName",
         "ObjectName",
+        "PlaceOrPoint",
+        "PlaceOrPose",
+        "Point",
+        "PoseSpec",
         "RegionName",
     ),
     # What a specification is: one base for each kind.
@@ -254,7 +258,7 @@ _WHERE = {
     "simscen.model.checkers": ("GoalCheckerSpec",),
     "simscen.model.localizers": ("LocalizerSpec",),
     "simscen.model.planners": ("PlannerSpec",),
-    "simscen.model.controllerspec": ("ControllerSpec",),
+    "simscen.model.stack_base": ("ControllerSpec",),
     "simscen.model.robot": (
         "Mount",
         "SensorSpec",

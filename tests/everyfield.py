@@ -9,9 +9,9 @@ from pydantic.fields import FieldInfo
 
 from simscen.cli.catalog.json_schema import MODELS
 from simscen.model.criteria_file import CriteriaSpec
-from simscen.model.rosmap import RosMapSpec
-from simscen.spec.bytype import ByType
-from simscen.spec.lazy import LazySpec
+from simscen.model.ros_map import RosMapSpec
+from simscen.spec.extensible_union import ExtensibleUnion
+from simscen.spec.lazy_spec import LazySpec
 
 
 class Written(NamedTuple):
@@ -46,7 +46,7 @@ def _values(model: type[BaseModel]) -> Iterator[Written]:
 
 
 def _inside(kind: Any, marks: tuple[Any, ...]) -> Iterator[tuple[Any, tuple[Any, ...]]]:
-    found = next((mark for mark in marks if isinstance(mark, LazySpec | ByType)), None)
+    found = next((mark for mark in marks if isinstance(mark, LazySpec | ExtensibleUnion)), None)
     if found is not None:
         rest = tuple(mark for mark in marks if mark is not found)
         yield from _inside(found.load() if isinstance(found, LazySpec) else found.own, rest)

@@ -11,8 +11,8 @@ from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.shapes import MotionPath
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
+from simscen.spec.places import DoorName
 from simscen.spec.quantities import PositiveDuration, Ratio
-from simscen.spec.references import DoorName
 
 SWING_SEGMENTS = 16
 """Straight segments of a swing. The edge of the panel then deviates from its arc by less than 0.2 %."""

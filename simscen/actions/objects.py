@@ -14,12 +14,9 @@ from simscen.core.geometry.shapes import Body
 from simscen.core.messages.navigation import Path
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
-from simscen.spec.motions import Motion
-from simscen.spec.named_places import PlaceOrPose
-from simscen.spec.objects import Shaped
-from simscen.spec.places import Name
+from simscen.spec.moving_objects import Motion, Shaped
+from simscen.spec.places import MovableName, Name, PlaceOrPose
 from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength, PositiveDuration
-from simscen.spec.references import MovableName
 
 POSE_TOLERANCE = 1e-3
 """Meters and radians within which an object is already at the requested pose."""

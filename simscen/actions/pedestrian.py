@@ -13,10 +13,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
-from simscen.spec.named_places import PlaceOrPoint, PlaceOrPose
-from simscen.spec.places import Name
+from simscen.spec.places import Name, PlaceOrPoint, PlaceOrPose, RegionName
 from simscen.spec.quantities import PositiveDuration, PositiveLength, PositiveSpeed
-from simscen.spec.references import RegionName
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,10 +11,8 @@ from simscen.core.environment.costmap_filters import ZoneSwitch
 from simscen.core.environment.world_model import Patch, disc_outline
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
-from simscen.spec.named_places import PlaceOrPoint
-from simscen.spec.places import PlaceName
+from simscen.spec.places import PlaceName, PlaceOrPoint, RegionName
 from simscen.spec.quantities import Friction, PositiveDuration, PositiveLength, PositiveSpeed
-from simscen.spec.references import RegionName
 
 
 class FrictionPatch(Spec, WorldAction):

@@ -7,7 +7,7 @@ from simscen.actions.base import Action
 from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.core.stage import Effect, Situation, Stage
 from simscen.spec.choice import Choice
-from simscen.spec.lazy import LazySpec
+from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.places import RobotName
 
 

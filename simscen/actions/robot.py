@@ -11,10 +11,8 @@ from simscen.actions.base import Action
 from simscen.core.geometry import wrap
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
-from simscen.spec.named_places import PlaceOrPose
-from simscen.spec.places import Name
+from simscen.spec.places import MovableName, Name, PlaceOrPose
 from simscen.spec.quantities import Force, Impulse, PositiveAngle, PositiveDuration, PositiveLength
-from simscen.spec.references import MovableName
 
 POSE_TOLERANCE = 1e-3
 """Meters and radians within which the robot is already at the requested pose."""

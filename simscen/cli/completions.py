@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from simscen.core.version import PACKAGE
+
 
 def scenarios(incomplete: str) -> list[str]:
     """Complete scenario files and folders."""
@@ -31,7 +33,6 @@ def topics(incomplete: str) -> list[str]:
 
 def shipped(incomplete: str) -> list[str]:
     """Complete ids of shipped scenarios and scenario files."""
-    from simscen.cli.shipped_scenarios import shipped_scenarios
 
     return [*(name for name in shipped_scenarios() if name.startswith(incomplete)), *scenarios(incomplete)]
 
@@ -65,3 +66,16 @@ def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
                 yield f"{parent}{slash}{path.name}/"
             elif path.name.endswith(suffixes):
                 yield f"{parent}{slash}{path.name}"
+
+
+# MERGED: Location of the shipped scenarios: beside the package in a checkout, inside the package when installed.
+SUFFIX = ".scenario.yaml"
+_PLACES = (PACKAGE / "data" / "library", PACKAGE.parent)
+
+
+def shipped_scenarios() -> dict[str, Path]:
+    """Return the files by id, such as "navigation/goal"; empty if the installation does not contain them."""
+    home = next((place / "scenarios" for place in _PLACES if (place / "scenarios").is_dir()), None)
+    if home is None:
+        return {}
+    return {path.relative_to(home).as_posix().removesuffix(SUFFIX): path for path in sorted(home.rglob(f"*{SUFFIX}"))}

@@ -15,8 +15,8 @@ from simscen.criteria.findings import InvalidTrace, MissingEvidence, at_most, co
 from simscen.criteria.trace_signals.distances import pedestrian_radii
 from simscen.criteria.trace_signals.ground_truth import speed, turn_rate
 from simscen.spec.base import Spec
+from simscen.spec.places import ObjectName
 from simscen.spec.quantities import Impulse
-from simscen.spec.references import ObjectName
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case

@@ -17,8 +17,8 @@ from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes
 from simscen.criteria.timeline import has_ended
 from simscen.criteria.trace_signals.ground_truth import Drive, drive
 from simscen.spec.base import Spec
+from simscen.spec.places import GoalName
 from simscen.spec.quantities import PositiveDuration, PositiveLength, Ratio
-from simscen.spec.references import GoalName
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case

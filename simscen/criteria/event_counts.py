@@ -14,7 +14,7 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.findings import counted, undecided
 from simscen.criteria.timeline import has_ended
 from simscen.spec.base import Spec
-from simscen.spec.bytype import BehaviorName
+from simscen.spec.extensible_union import BehaviorName
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case

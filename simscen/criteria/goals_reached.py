@@ -17,8 +17,8 @@ from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_o
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.criteria.trace_signals.ground_truth import check_samples, true_pose
 from simscen.spec.base import Spec
+from simscen.spec.places import GoalName
 from simscen.spec.quantities import NonNegativeAngle, NonNegativeLength, PositiveAngle, PositiveDuration, PositiveLength
-from simscen.spec.references import GoalName
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case

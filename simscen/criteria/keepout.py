@@ -17,8 +17,8 @@ from simscen.criteria.findings import InvalidTrace, at_least, undecided
 from simscen.criteria.timeline import NEVER_SWITCHED, clip_samples, enabled_spans
 from simscen.criteria.trace_signals.ground_truth import Flags, truth
 from simscen.spec.base import Spec
+from simscen.spec.places import MaskFile, RegionName
 from simscen.spec.quantities import Duration, NonNegativeLength
-from simscen.spec.references import MaskFile, RegionName
 
 if TYPE_CHECKING:
     from collections.abc import Callable

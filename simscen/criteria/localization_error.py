@@ -14,8 +14,8 @@ from simscen.criteria.findings import at_most, undecided
 from simscen.criteria.timeline import Span, end_reason, has_ended, never_started, spans
 from simscen.criteria.trace_signals.ground_truth import first_sustained, pose_error
 from simscen.spec.base import Spec
+from simscen.spec.places import HappeningName
 from simscen.spec.quantities import Duration, PositiveAngle, PositiveDuration, PositiveLength
-from simscen.spec.references import HappeningName
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case

@@ -7,7 +7,7 @@ from pydantic import BaseModel, model_validator
 
 from simscen.criteria.base import Criterion
 from simscen.spec.choice import Choice
-from simscen.spec.lazy import LazySpec
+from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.places import Name
 
 

@@ -14,8 +14,8 @@ from simscen.criteria.goal_outcomes import Code, GoalOutcome, closest_approach, 
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.criteria.trace_signals.ground_truth import true_pose
 from simscen.spec.base import Spec
+from simscen.spec.places import GoalName
 from simscen.spec.quantities import PositiveLength
-from simscen.spec.references import GoalName
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case

@@ -14,8 +14,8 @@ from simscen.criteria.goal_outcomes import goal_outcomes
 from simscen.criteria.timeline import Span, end_reason, never_started, spans
 from simscen.criteria.trace_signals.ground_truth import Flags, drive, first_sustained, speed, truth, turn_rate
 from simscen.spec.base import Spec
+from simscen.spec.places import HappeningName
 from simscen.spec.quantities import PositiveAngularSpeed, PositiveDuration, PositiveLength, PositiveSpeed
-from simscen.spec.references import HappeningName
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case

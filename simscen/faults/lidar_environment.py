@@ -14,8 +14,8 @@ from simscen.core.messages.sensor_data import Reading, Scan
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.faults.common import clip_to_sensor_range, ranges_with_scan_errors
 from simscen.spec.base import Spec
+from simscen.spec.places import ObjectName
 from simscen.spec.quantities import PositiveLength, Probability, Quantity
-from simscen.spec.references import ObjectName
 
 MM_PER_HOUR = 0.001 / 3600
 """1 mm/h in m/s."""

@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar
 
 from simscen.faults.base import Fault
 from simscen.spec.choice import Choice
-from simscen.spec.lazy import LazySpec
+from simscen.spec.lazy_spec import LazySpec
 
 
 class AnyFault(Choice):

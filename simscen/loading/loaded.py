@@ -12,7 +12,7 @@ from simscen.core.records.verdict import ExpectedFailure
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.yaml.tree import Key, MappingNode, Position, key_position, value_position
 from simscen.model.robot import RobotSpec
-from simscen.model.rosmap import RosMapSpec
+from simscen.model.ros_map import RosMapSpec
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import WorldSpec
 

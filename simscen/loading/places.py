@@ -10,8 +10,7 @@ from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import Reference, references
 from simscen.loading.yaml.tree import Key, Node, value_position
-from simscen.spec.named_places import OrPlace
-from simscen.spec.places import PoseSpec
+from simscen.spec.places import PlaceAllowed, PoseSpec
 
 Spec = TypeVar("Spec", bound=BaseModel)
 Places = Mapping[str, PoseSpec]
@@ -47,7 +46,7 @@ def resolve_criteria_places(plain: dict[str, Any], spec: BaseModel, places: Plac
 
 def place_references(spec: BaseModel) -> Iterator[Reference]:
     """Yield the references to places."""
-    return (reference for reference in references(spec) if isinstance(reference.mark, OrPlace))
+    return (reference for reference in references(spec) if isinstance(reference.mark, PlaceAllowed))
 
 
 def unknown_places(spec: BaseModel, tree: Node, known: Iterable[str], nothing: str = NO_PLACES) -> Iterator[Problem]:
@@ -62,7 +61,7 @@ def unknown_places(spec: BaseModel, tree: Node, known: Iterable[str], nothing: s
 
 def _named(spec: BaseModel, places: Places) -> Iterator[tuple[Reference, Any]]:
     for reference in place_references(spec):
-        assert isinstance(reference.mark, OrPlace)
+        assert isinstance(reference.mark, PlaceAllowed)
         yield reference, reference.mark.of(places.get(reference.name, NOWHERE).at(reference.name))
 
 

@@ -7,16 +7,15 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin
 from pydantic import BaseModel, RootModel
 
 from simscen.loading.yaml.tree import Key
-from simscen.spec.named_places import OrPlace
+from simscen.spec.places import PlaceAllowed, ReferenceTo
 from simscen.spec.quantities import Quantity
-from simscen.spec.references import Refers
 
 
 class Reference(NamedTuple):
     """Name at `keys` of a scenario that refers to something; `mark` says to what kind of thing."""
 
     keys: tuple[Key, ...]
-    mark: Refers
+    mark: ReferenceTo
     name: str
 
     @property
@@ -40,16 +39,18 @@ def references(spec: BaseModel, keys: tuple[Key, ...] = (), concerns: Concerns |
 
 
 @cache
-def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, Refers | None]]:
+def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | None]]:
     """Return name and key of each field, and what text in it refers to."""
     found = []
     for name, field in model.model_fields.items():
-        marks = [mark for mark in field.metadata if isinstance(mark, Refers)]
+        marks = [mark for mark in field.metadata if isinstance(mark, ReferenceTo)]
         found.append((name, field.alias or name, marks[0] if marks else _mark(field.annotation)))
     return found
 
 
-def _in_value(value: Any, mark: Refers | None, keys: tuple[Key, ...], concerns: Concerns | None) -> Iterator[Reference]:
+def _in_value(
+    value: Any, mark: ReferenceTo | None, keys: tuple[Key, ...], concerns: Concerns | None
+) -> Iterator[Reference]:
     if isinstance(value, BaseModel):
         yield from references(value, keys, concerns)
     elif isinstance(value, list):
@@ -58,14 +59,14 @@ def _in_value(value: Any, mark: Refers | None, keys: tuple[Key, ...], concerns: 
     elif isinstance(value, dict):
         for key, item in value.items():
             yield from _in_value(item, mark, (*keys, key), concerns)
-    elif isinstance(value, str) and mark is not None and not (isinstance(mark, OrPlace) and value in mark.besides):
+    elif isinstance(value, str) and mark is not None and not (isinstance(mark, PlaceAllowed) and value in mark.besides):
         yield Reference(keys, mark, value)
 
 
-def _mark(kind: Any) -> Refers | None:
+def _mark(kind: Any) -> ReferenceTo | None:
     """Return what text of this type refers to; unions and lists are searched."""
     if get_origin(kind) is Annotated:
-        marks = [mark for mark in get_args(kind)[1:] if isinstance(mark, Refers)]
+        marks = [mark for mark in get_args(kind)[1:] if isinstance(mark, ReferenceTo)]
         if marks:
             return marks[0]
         return _mark(get_args(kind)[0])

@@ -4,10 +4,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from simscen.model.stackbase import GoalTolerances
-from simscen.spec.base import Spec
-from simscen.spec.bytype import ByType
-from simscen.spec.component import Typed
+from simscen.model.stack_base import GoalTolerances
+from simscen.spec.base import Spec, Typed
+from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.quantities import (
     PositiveAngle,
     PositiveDuration,
@@ -31,7 +30,7 @@ class SimpleGoalChecker(GoalCheckerSpec):
     """While it moves, the robot has arrived within this share of the tolerances; at rest, anywhere inside. Nav2: 1."""
 
 
-GoalChecker = Annotated[GoalCheckerSpec, ByType("goal_checker", SimpleGoalChecker)]
+GoalChecker = Annotated[GoalCheckerSpec, ExtensibleUnion("goal_checker", SimpleGoalChecker)]
 
 
 class ProgressChecker(Spec):

@@ -4,10 +4,10 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from simscen.model.controllerspec import ControllerSpec, Weight
 from simscen.model.mppi import Mppi
+from simscen.model.stack_base import ControllerSpec, Weight
 from simscen.spec.base import Ranged, type_discriminator
-from simscen.spec.bytype import ByType
+from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.quantities import (
     Angle,
     Length,
@@ -186,7 +186,7 @@ _Controllers = Annotated[
     | Annotated[Mppi, Tag("mppi")],
     Discriminator(type_discriminator("regulated_pure_pursuit")),
 ]
-Controller = Annotated[ControllerSpec, ByType("controller", _Controllers)]
+Controller = Annotated[ControllerSpec, ExtensibleUnion("controller", _Controllers)]
 CONTROLLERS = {
     "regulated_pure_pursuit": "simscen.model.controllers:RegulatedPurePursuit",
     "dwb": "simscen.model.controllers:DynamicWindow",

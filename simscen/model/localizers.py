@@ -5,10 +5,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from simscen.spec.base import Ranged, type_discriminator
-from simscen.spec.bytype import ByType
-from simscen.spec.component import Typed
-from simscen.spec.lazy import LazySpec
+from simscen.spec.base import Ranged, Typed, type_discriminator
+from simscen.spec.extensible_union import ExtensibleUnion
+from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.quantities import (
     Length,
     NonNegativeAngle,
@@ -169,7 +168,7 @@ _Localizers = Annotated[
 ]
 
 
-Localizer = Annotated[LocalizerSpec, ByType("localizer", _Localizers)]
+Localizer = Annotated[LocalizerSpec, ExtensibleUnion("localizer", _Localizers)]
 
 
 _HERE = "simscen.model.localizers:"

@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from simscen.model.controllerspec import ControllerSpec, Weight
+from simscen.model.stack_base import ControllerSpec, Weight
 from simscen.spec.base import Spec, by_default
 from simscen.spec.quantities import (
     Duration,

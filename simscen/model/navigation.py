@@ -6,7 +6,7 @@ from pydantic import Discriminator, Field, Tag
 
 from simscen.core.messages.goal_names import FAILED, Mode
 from simscen.spec.base import Spec
-from simscen.spec.lazy import LazySpec
+from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.quantities import Duration, PositiveLength
 
 

@@ -4,9 +4,9 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag
 
-from simscen.spec.bytype import ByType
-from simscen.spec.component import Typed
-from simscen.spec.lazy import LazySpec
+from simscen.spec.base import Typed
+from simscen.spec.extensible_union import ExtensibleUnion
+from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.quantities import (
     Frequency,
     NonNegativeLength,
@@ -94,7 +94,7 @@ _Planners = Annotated[
 ]
 
 
-Planner = Annotated[PlannerSpec, ByType("planner", _Planners)]
+Planner = Annotated[PlannerSpec, ExtensibleUnion("planner", _Planners)]
 
 
 _HERE = "simscen.model.planners:"

@@ -5,9 +5,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Discriminator, Field, Tag
 
 from simscen.core.messages.navigation import RecoveryBehavior
-from simscen.spec.base import Spec
-from simscen.spec.bytype import ByType
-from simscen.spec.component import Typed
+from simscen.spec.base import Spec, Typed
+from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.quantities import (
     Angle,
     Duration,
@@ -115,7 +114,7 @@ _NamedOrWhole = Annotated[
 ]
 
 
-Behavior = Annotated[str | BehaviorSpec, ByType("behavior", _NamedOrWhole, named=True)]
+Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", _NamedOrWhole, named=True)]
 
 
 class Recovery(Spec):

@@ -9,10 +9,9 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.kinematics import MecanumWheels
 from simscen.core.records.events import READING_KINDS
 from simscen.model.latency import RobotLatency
-from simscen.spec.base import LanguageVersion, Ranged, Spec, by_default
+from simscen.spec.base import Component, LanguageVersion, Ranged, Spec, by_default
 from simscen.spec.choice import Choice
-from simscen.spec.component import Component
-from simscen.spec.objects import Shaped
+from simscen.spec.moving_objects import Shaped
 from simscen.spec.places import Name, PoseSpec, Ring
 from simscen.spec.quantities import (
     Angle,

@@ -9,13 +9,21 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import LARGEST_SEED
 from simscen.criteria.registry import AnyCriterion
-from simscen.model.anystack import AnyStack
 from simscen.model.navigation import Expectation, Navigation, OnReached
+from simscen.model.stack_files import AnyStack
 from simscen.model.world import WorldSpec
 from simscen.spec.base import LanguageVersion, Spec, by_default
-from simscen.spec.lazy import LazySpec
-from simscen.spec.named_places import OrPlace, PlaceAlone, PlaceOrPose
-from simscen.spec.places import Name, PlaceName, PoseSpec, RobotName
+from simscen.spec.lazy_spec import LazySpec
+from simscen.spec.places import (
+    Name,
+    PlaceAllowed,
+    PlaceName,
+    PlaceOrPose,
+    PlaceShorthand,
+    PoseSpec,
+    ReferenceTo,
+    RobotName,
+)
 from simscen.spec.quantities import (
     Duration,
     Length,
@@ -28,7 +36,6 @@ from simscen.spec.quantities import (
     Quantity,
     WholeQuantity,
 )
-from simscen.spec.references import Refers
 
 if TYPE_CHECKING:
     from simscen.criteria.plugin_metric import AnyMeasure
@@ -65,7 +72,7 @@ class InitialEstimate(PoseSpec):
     """Standard deviations of x, y (m) and yaw (rad); Nav2's default covariance."""
 
 
-class EstimateOrPlace(OrPlace):
+class EstimateOrPlace(PlaceAllowed):
     """Marks an estimate in place of which the name of a place may be written."""
 
     def of(self, pose: PoseSpec) -> InitialEstimate:
@@ -143,7 +150,7 @@ class OneOfSeveral(RobotEntry):
     """The map this robot gets; `none` = no map, odometry only."""
     stack: AnyStack | None = None
     """What its stack has otherwise than that of all."""
-    goals: Annotated[list[Annotated[GoalEntry, PlaceAlone("pose")]], Field(max_length=MAX_GOALS)] = []
+    goals: Annotated[list[Annotated[GoalEntry, PlaceShorthand("pose")]], Field(max_length=MAX_GOALS)] = []
     """In this order; a robot without goals stands where it is."""
     navigation: Navigation | None = None
     """Which action takes its goals, and how often."""
@@ -175,7 +182,7 @@ class ExpectedFailure(Spec):
 
     fail: Reason
     """Why, for people: a ticket, and what is wrong."""
-    criteria: Annotated[list[Annotated[Name, Refers("verdict")]], Field(max_length=200)] = []
+    criteria: Annotated[list[Annotated[Name, ReferenceTo("verdict")]], Field(max_length=200)] = []
     """Ids of the criteria, or names of the events and faults that do not happen, that must fail, and alone may;
     default: one or more criteria, whichever."""
 
@@ -233,7 +240,7 @@ class ScenarioSpec(Spec):
     """Several robots by name, instead of `robot`: each with its own goals, faults and criteria."""
     stack: AnyStack = by_default()
     """The stack under test: simscen's own, or `{external: NAME}`, a process."""
-    goals: Annotated[list[Annotated[GoalEntry, PlaceAlone("pose")]], Field(max_length=MAX_GOALS)] = []
+    goals: Annotated[list[Annotated[GoalEntry, PlaceShorthand("pose")]], Field(max_length=MAX_GOALS)] = []
     """In this order; places of the world alone will do: `[kitchen, office]`."""
     navigation: Navigation = by_default()
     """Which action takes the goals, and how often."""

@@ -14,9 +14,8 @@ from simscen.model.localizers import GroundTruth, Localizer
 from simscen.model.planners import Planner
 from simscen.model.profiles import PROFILES, Profile, with_profile
 from simscen.model.recovery import Recovery
-from simscen.model.stackbase import StackBase
-from simscen.spec.base import by_default
-from simscen.spec.component import Typed
+from simscen.model.stack_base import StackBase
+from simscen.spec.base import Typed, by_default
 from simscen.spec.quantities import (
     Quantity,
 )

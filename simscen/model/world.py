@@ -5,10 +5,8 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from simscen.spec.base import LanguageVersion, Spec
-from simscen.spec.motions import Motion
-from simscen.spec.named_places import PlaceOrPoint, PlaceOrPose
-from simscen.spec.objects import Shaped
-from simscen.spec.places import Name, PlaceName, PoseSpec, Ring
+from simscen.spec.moving_objects import Motion, Shaped
+from simscen.spec.places import Name, PlaceName, PlaceOrPoint, PlaceOrPose, PoseSpec, Ring
 from simscen.spec.quantities import Duration, Friction, Mass, PositiveLength
 
 

@@ -16,7 +16,7 @@ do the same; simscen sets that variable. docs/reference/stack-protocol.md define
 """
 
 from .client import Message, Peer, Step
-from .connection import Connection, Gone, Refused
 from .goals import Goal, Goals
+from .wire import Connection, Gone, Refused
 
 __all__ = ["Connection", "Goal", "Goals", "Gone", "Message", "Peer", "Refused", "Step"]

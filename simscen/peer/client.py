@@ -6,8 +6,8 @@ import json
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import messages, wire
-from .connection import Connection, Gone, Refused
 from .goals import Goal, Goals
+from .wire import Connection, Gone, Refused
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

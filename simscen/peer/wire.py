@@ -6,6 +6,8 @@ docs/reference/stack-protocol.md defines the protocol. Both sides use this modul
 from __future__ import annotations
 
 import json
+import os
+import socket
 import struct
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -128,3 +130,69 @@ def _taken(layout: struct.Struct, body: bytes, offset: int) -> tuple[Any, ...]:
     if offset + layout.size > len(body):
         raise Malformed("it ends before its header does")
     return layout.unpack_from(body, offset)
+
+
+# MERGED: Socket between simscen and a stack, which transfers whole frames.
+class Gone(ConnectionError):
+    """The other side has closed the connection."""
+
+
+class Refused(RuntimeError):
+    """simscen ends the run because of something that this stack sent; the message gives the reason."""
+
+
+class Connection:
+    """A stream socket for frames of the protocol. It blocks, because the simulation waits for this side anyway."""
+
+    def __init__(self, stream: socket.socket) -> None:
+        self._stream = stream
+
+    @classmethod
+    def inherited(cls) -> Connection:
+        """Return the connection that this process inherited from simscen.
+
+        Raises RuntimeError if simscen did not start this process.
+        """
+        number = os.environ.get(DESCRIPTOR, "")
+        if not (number.isascii() and number.isdecimal()):
+            raise RuntimeError(f"{DESCRIPTOR} is not set: this program is started by simscen (run --stack)")
+        return cls(socket.socket(fileno=int(number)))
+
+    def send(self, frame: bytes) -> None:
+        """Send a frame. Raises Gone."""
+        try:
+            self._stream.sendall(frame)
+        except OSError as error:
+            raise Gone(str(error)) from error
+
+    def send_json(self, kind: int, content: dict[str, Any]) -> None:
+        """Send a frame with a JSON object."""
+        self.send(json_frame(kind, content))
+
+    def receive(self) -> tuple[int, bytes]:
+        """Return kind and body of the next frame. Raises Gone, and Refused for an ERROR."""
+        (size,) = SIZE.unpack(self._exactly(SIZE.size))
+        if not 1 <= size <= LONGEST:
+            raise Malformed(f"a frame of {size} bytes")
+        content = self._exactly(size)
+        kind, body = content[0], content[1:]
+        if kind == ERROR:
+            raise Refused(str(from_json(body).get("message", "")))
+        return kind, body
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._stream.close()
+
+    def _exactly(self, size: int) -> bytes:
+        parts, left = [], size
+        while left:
+            try:
+                part = self._stream.recv(min(left, 1 << 20))
+            except OSError as error:
+                raise Gone(str(error)) from error
+            if not part:
+                raise Gone("simscen has hung up")
+            parts.append(part)
+            left -= len(part)
+        return b"".join(parts)

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simscen.pytesting.names import OUT
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from simscen.pytesting.fixture import Simscen
+    from simscen.pytesting.runner import Simscen
 
+OUT_OPTION = "simscen_out"
+"""Name of the setting for the output folder: in the configuration, and in the input of xdist workers."""
 SUFFIXES = (".scenario.yaml", ".scenario.yml")
 
 
@@ -55,7 +55,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addini("simscen_seed", "as --simscen-seed", default="")
     parser.addini("simscen_stack", "as --simscen-stack, one in a line", "linelist", [])
     parser.addini("simscen_world_path", "folders with worlds and models, as --world-path", "paths", [])
-    parser.addini(OUT, "as --simscen-out", default="")
+    parser.addini(OUT_OPTION, "as --simscen-out", default="")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -67,7 +67,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     """A scenario's file, where somebody asks for it."""
     if not file_path.name.endswith(SUFFIXES) or not _asked(file_path, parent):
         return None
-    from simscen.pytesting.collecting import ScenarioFile
+    from simscen.pytesting.scenario_items import ScenarioFile
 
     collected: pytest.Collector = ScenarioFile.from_parent(parent, path=file_path)
     return collected
@@ -85,12 +85,12 @@ def pytest_configure_node(node: Any) -> None:
     """With xdist: all workers leave their logs in one folder."""
     from simscen.pytesting.runner import runner_of
 
-    node.workerinput[OUT] = str(runner_of(node.config).folder)
+    node.workerinput[OUT_OPTION] = str(runner_of(node.config).folder)
 
 
 @pytest.fixture
 def simscen(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Simscen]:
     """`simscen("goal.scenario.yaml", seed=7)` runs a scenario here and now: a Run with result, metrics and trace."""
-    from simscen.pytesting.fixture import Simscen
+    from simscen.pytesting.runner import Simscen
 
     yield Simscen(request.path.parent, tmp_path)

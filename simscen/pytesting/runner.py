@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
+import simscen
+from simscen.core.records.case import Run
 from simscen.core.records.session_events import RunFinished
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
-from simscen.pytesting.names import OUT
+from simscen.pytesting.plugin import OUT_OPTION
 from simscen.run.process.isolation import plugin_path_arguments
 from simscen.run.process.jobs import Job, ReplayMode
 from simscen.run.process.supervisor import OnDemandRunner
@@ -19,7 +21,7 @@ from simscen.run.sessions.output_folder import DEFAULT_FOLDER, run_folder
 from simscen.run.sessions.results import finished_run
 
 WARM_PROCESS = ("-m", "simscen.cli.session.warm_process")
-WALL_LIMIT = 300.0
+WALL_LIMIT_S = 300.0
 """Seconds that one run may take, as with `simscen run`."""
 
 
@@ -35,7 +37,7 @@ class Runner:
     def run(self, scenario: LoadedScenario, seed: int) -> RunFinished:
         """The answer to a run."""
         key = scenario.key(seed)
-        job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT, ReplayMode.FAILED)
+        job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT_S, ReplayMode.FAILED)
         told = plugin_path_arguments(plugins_of(scenario))
         if told not in self._standbys:
             self._standbys[told] = self._closing.enter_context(OnDemandRunner((*WARM_PROCESS, *told)))
@@ -58,8 +60,32 @@ def runner_of(config: pytest.Config) -> Runner:
 
 
 def _folder(config: pytest.Config) -> Path:
-    told = getattr(config, "workerinput", {}).get(OUT)
+    told = getattr(config, "workerinput", {}).get(OUT_OPTION)
     if told is not None:
         return Path(told)
-    home = Path(config.getoption("--simscen-out") or config.getini(OUT) or DEFAULT_FOLDER)
+    home = Path(config.getoption("--simscen-out") or config.getini(OUT_OPTION) or DEFAULT_FOLDER)
     return home / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}-pytest"
+
+
+# MERGED: What the fixture `simscen` gives to a test.
+class Simscen:
+    """Runs scenarios in the test's own process, with `simscen.simulate()`. Files are relative to the test's folder.
+
+    Each run leaves its log among the test's temporary files: `run.log`.
+    """
+
+    def __init__(self, folder: Path, out: Path) -> None:
+        self._folder, self._out = folder, out
+        self._runs = 0
+
+    def __call__(
+        self, scenario: str | Path, seed: int | None = None, *, stack: str | None = None, variation: str = ""
+    ) -> Run:
+        """Run it; the arguments are those of `simscen.simulate`."""
+        self._runs += 1
+        log = self._out / f"run-{self._runs}.mcap"
+        return simscen.simulate(self._folder / scenario, seed, log=log, stack=stack, variation=variation)
+
+    def variations(self, scenario: str | Path) -> list[str]:
+        """The names of a scenario's variations; `[""]` where it has none."""
+        return simscen.variations(self._folder / scenario)

@@ -9,8 +9,8 @@ import tempfile
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from simscen.peer import messages, wire
-from simscen.peer.connection import Connection, Gone
 from simscen.peer.goals import Goal, Goals
+from simscen.peer.wire import Connection, Gone
 from simscen.ros2.domain import Domain, claim, ros_environment
 from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.options import AdapterError, Options

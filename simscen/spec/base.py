@@ -2,10 +2,12 @@
 
 import ast
 import inspect
+import re
 import sys
 from collections.abc import Callable
 from functools import cache
-from typing import Annotated, Any, Generic, Literal, TypeVar
+from importlib import import_module
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -121,3 +123,33 @@ def _of_class(node: ast.ClassDef) -> dict[str, str]:
                 case ast.Expr(value=ast.Constant(value=str(text))):
                     docs[statement.target.id] = inspect.cleandoc(text)
     return docs
+
+
+# MERGED: Specifications of what is built when a run is assembled: parts of a stack, whole stacks, sensors.
+class Component(Spec):
+    """What a file says of a component; its class is imported when a run is assembled, and no sooner.
+
+    So a file is validated without the engine or the library that the component needs.
+    """
+
+    component: ClassVar[str]
+    """`package.module:Class`, called as `Class(specification, setting)`."""
+
+    @classmethod
+    def broken_promise(cls) -> str:
+        """Why it is no specification of a component; "" for one that is."""
+        named = isinstance(getattr(cls, "component", None), str) and re.fullmatch(r"[\w.]+:\w+", cls.component)
+        return "" if named else "it does not say what its `component` is, as package.module:Class"
+
+    @classmethod
+    def implementation(cls) -> Any:
+        """The class that `component` names. Raises ImportError or AttributeError where there is none."""
+        module, _, name = cls.component.partition(":")
+        return getattr(import_module(module), name)
+
+
+class Typed(Component):
+    """A component that a file chooses by its `type`: the name of its entry point."""
+
+    type: str = ""
+    """Which one it is."""

@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails
 
 from simscen.spec.base import Spec
-from simscen.spec.lazy import LazySpec
+from simscen.spec.lazy_spec import LazySpec
 
 
 class Choice(Spec):
@@ -52,7 +52,7 @@ class Choice(Spec):
     @classmethod
     def _or_installed(cls, value: Any, handler: ModelWrapValidatorHandler["Choice"]) -> "Choice":
         if cls.group and cls.narrow is None and isinstance(value, dict) and not cls.known_keys().issuperset(value):
-            wider = widened(cls)
+            wider = with_installed_choices(cls)
             if not wider.known_keys().isdisjoint(value.keys() - cls.known_keys()):
                 return wider.model_validate(value, by_alias=True, by_name=False)
         if isinstance(value, dict) and (named := cls._python_names().intersection(value)):
@@ -108,11 +108,11 @@ class Choice(Spec):
 
 
 @cache
-def widened(choice: type[Choice]) -> type[Choice]:
+def with_installed_choices(choice: type[Choice]) -> type[Choice]:
     """The choice with a field for each name that installed packages add to its group; itself where there is none."""
     from pydantic import create_model
 
-    from simscen.spec.bytype import PluginSpec
+    from simscen.spec.extensible_union import PluginSpec
     from simscen.spec.registry import installed
 
     if choice.narrow is not None or not choice.group:
@@ -134,7 +134,7 @@ def widened(choice: type[Choice]) -> type[Choice]:
     return wider
 
 
-def added(choice: type[Choice]) -> dict[str, type[BaseModel]]:
+def installed_choices(choice: type[Choice]) -> dict[str, type[BaseModel]]:
     """The specifications that installed packages add to a choice, by key, without those that cannot be used."""
     from simscen.spec.registry import BrokenPlugin, installed
 
@@ -148,7 +148,7 @@ def added(choice: type[Choice]) -> dict[str, type[BaseModel]]:
 
 def blank(narrow: type[Choice]) -> Choice:
     """What a widened choice is unpickled into: its class is made anew by each process."""
-    wider = widened(narrow)
+    wider = with_installed_choices(narrow)
     return wider.__new__(wider)
 
 

@@ -12,17 +12,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from simscen.testing.promise import Contract, Promise, PromiseBroken
-    from simscen.testing.subjects import contracts_of, promises_of
+    from simscen.testing.contracts.base import Contract, Promise, PromiseBroken
+    from simscen.testing.targets import contracts_of, promises_of
 
 __all__ = ["Contract", "Promise", "PromiseBroken", "contracts_of", "promises_of"]
 
 _WHERE = {
-    "Contract": "promise",
-    "Promise": "promise",
-    "PromiseBroken": "promise",
-    "contracts_of": "subjects",
-    "promises_of": "subjects",
+    "Contract": "contracts.base",
+    "Promise": "contracts.base",
+    "PromiseBroken": "contracts.base",
+    "contracts_of": "targets",
+    "promises_of": "targets",
 }
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from simscen.testing.promise import Promise
+    from simscen.testing.contracts.base import Promise
 
 pytest_plugins = ("simscen.pytesting.plugin",)
 """What collects scenarios stands above the command line, and this below it: it is named, not imported."""
@@ -47,11 +47,11 @@ def pytest_configure(config: pytest.Config) -> None:
     targets: list[str] = config.getoption("--simscen-contract")
     if not targets:
         return
-    from simscen.testing.subjects import NoSubject, named
+    from simscen.testing.targets import InvalidTarget, promises_of_target
 
     try:
-        config.stash[_PROMISES] = [promise for target in targets for promise in named(target)]
-    except NoSubject as wrong:
+        config.stash[_PROMISES] = [promise for target in targets for promise in promises_of_target(target)]
+    except InvalidTarget as wrong:
         raise pytest.UsageError(f"--simscen-contract {wrong}") from wrong
     if config.args_source is not pytest.Config.ArgsSource.ARGS:
         config.args[:] = []
@@ -66,13 +66,13 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
 def _items(session: pytest.Session, promises: list[Promise], limit: float) -> Iterator[pytest.Item]:
     for subject in dict.fromkeys((promise.role, promise.subject) for promise in promises):
         title = f"{subject[0]} {subject[1]}"
-        node = Subject.from_parent(session, name=title, nodeid=title)
+        node = SubjectCollector.from_parent(session, name=title, nodeid=title)
         for promise in promises:
             if (promise.role, promise.subject) == subject:
-                yield Tried.from_parent(node, name=promise.name, promise=promise, limit=limit)
+                yield PromiseItem.from_parent(node, name=promise.name, promise=promise, limit=limit)
 
 
-class Subject(pytest.Collector):
+class SubjectCollector(pytest.Collector):
     """What is tried."""
 
     def collect(self) -> list[pytest.Item]:
@@ -80,7 +80,7 @@ class Subject(pytest.Collector):
         return []
 
 
-class Tried(pytest.Item):
+class PromiseItem(pytest.Item):
     """One promise."""
 
     def __init__(self, *, promise: Promise, limit: float, **kwargs: Any) -> None:
@@ -93,7 +93,7 @@ class Tried(pytest.Item):
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """What was seen, what was promised, and where the component raised if it did."""
-        from simscen.testing.promise import PromiseBroken
+        from simscen.testing.contracts.base import PromiseBroken
 
         if not isinstance(excinfo.value, PromiseBroken):
             return super().repr_failure(excinfo)

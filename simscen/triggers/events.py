@@ -8,8 +8,8 @@ from simscen.core.messages.goal_names import matches_goal_name
 from simscen.core.records.events import EventKind
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
-from simscen.spec.bytype import BehaviorName
-from simscen.spec.references import GoalName, HappeningName, MovableName, ObjectName
+from simscen.spec.extensible_union import BehaviorName
+from simscen.spec.places import GoalName, HappeningName, MovableName, ObjectName
 from simscen.triggers.base import Condition
 
 Count = Annotated[int, Field(ge=1, le=10_000)]

@@ -6,9 +6,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import distance_to_polygon
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec, Value
-from simscen.spec.named_places import PlaceOrPoint
+from simscen.spec.places import MoverName, PlaceOrPoint, RegionName
 from simscen.spec.quantities import NonNegativeLength, PositiveLength
-from simscen.spec.references import MoverName, RegionName
 from simscen.triggers.base import Condition
 
 

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.spec.choice import Choice
-from simscen.spec.lazy import LazySpec
+from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.places import RobotName
 from simscen.spec.quantities import Duration, PositiveDuration, Probability
 from simscen.triggers.base import Condition

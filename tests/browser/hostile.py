@@ -8,7 +8,7 @@ from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.evaluation import outcome_of_verdicts
 from simscen.record.log_header import LogHeader
 from simscen.record.log_reader.read import Log
-from simscen.testing.sketch import sketch
+from simscen.testing.synthetic_trace import synthetic_trace
 
 EVIL = "</script><img src=x onerror=pwned()>\u202eevil\u2066 \x1b[31m{{data}}"
 TEXT = f'simscen: 1\nname: "{EVIL}"\n# --> ]]> <!-- <script>pwned()</script>\n'
@@ -16,7 +16,7 @@ TEXT = f'simscen: 1\nname: "{EVIL}"\n# --> ]]> <!-- <script>pwned()</script>\n'
 
 def hostile_log() -> tuple[Log, RunResult]:
     """The log, and a result that fails."""
-    trace = sketch(
+    trace = synthetic_trace(
         {
             "seconds": 4,
             "truth": [[0, 0, 0], [4, 2, 0]],

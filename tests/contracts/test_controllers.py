@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.model.controllers import DynamicWindow, Mppi, RegulatedPurePursuit
-from simscen.model.controllerspec import ControllerSpec
+from simscen.model.stack_base import ControllerSpec
 from simscen.testing import Promise, promises_of
 
 SPECS: dict[str, ControllerSpec] = {

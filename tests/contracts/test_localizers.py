@@ -11,7 +11,7 @@ from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import Amcl, Ekf, GroundTruth, LocalizerSpec, OdometryOnly
 from simscen.testing import Promise, promises_of
 from simscen.testing.contracts.localizer import here, short
-from simscen.testing.room import Drive, localizer, run
+from simscen.testing.synthetic_room import Drive, localizer, run
 
 SPECS: dict[str, LocalizerSpec] = {
     "amcl": Amcl(),

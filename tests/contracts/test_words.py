@@ -11,9 +11,9 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.faults.registry import AnyFault
 from simscen.model.robot import Bumper, Camera, InertialUnit, Lidar, WheelOdometry
 from simscen.spec.choice import Choice
-from simscen.spec.lazy import annotation_of
+from simscen.spec.lazy_spec import annotation_of
 from simscen.testing import Promise, promises_of
-from simscen.testing.subjects import named
+from simscen.testing.targets import promises_of_target
 from simscen.triggers.registry import Trigger
 
 
@@ -54,5 +54,5 @@ NAMES = ['dwell={"region": "dock", "max": 5.0}', "crosstalk", 'turn_robot={"by":
 
 @pytest.mark.parametrize("name", NAMES)
 def test_what_a_package_adds_keeps_its_promises(yardwork, name: str) -> None:
-    for promise in named(name):
+    for promise in promises_of_target(name):
         promise.check()

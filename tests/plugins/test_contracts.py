@@ -4,7 +4,7 @@ import pytest
 
 from simscen.spec.registry import find
 from simscen.testing import promises_of
-from simscen.testing.subjects import NoSubject, named
+from simscen.testing.targets import InvalidTarget, promises_of_target
 
 VALUES = {
     ("criterion", "dwell"): {"region": "yard", "max": 2.0},
@@ -32,8 +32,8 @@ def test_what_the_package_adds_keeps_its_promises(yardwork, kind: str, name: str
 )
 def test_a_bare_value_is_given_as_it_is_written(yardwork, target: str, told: int | str) -> None:
     if isinstance(told, int):
-        assert len(named(target)) == told
+        assert len(promises_of_target(target)) == told
         return
-    with pytest.raises(NoSubject) as wrong:
-        named(target)
+    with pytest.raises(InvalidTarget) as wrong:
+        promises_of_target(target)
     assert told in str(wrong.value)

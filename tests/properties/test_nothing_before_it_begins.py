@@ -22,7 +22,7 @@ from simscen.loading.scenario import load_scenario
 from simscen.run.preparation.scenario import prepare
 from simscen.run.simulate import simulate
 from simscen.spec.choice import Choice
-from simscen.spec.lazy import annotation_of
+from simscen.spec.lazy_spec import annotation_of
 
 ROBOT = """\
 simscen: 1

@@ -12,7 +12,7 @@ from simscen.core.records.trace import Samples, Trace
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 SECONDS = 8
 SQUARE = [[-0.3, -0.2], [0.3, -0.2], [0.3, 0.2], [-0.3, 0.2]]
@@ -114,7 +114,7 @@ def criteria(draw):
 
 
 def verdict(kind, words, trace, case=CASE):
-    (found,) = judge([AnyCriterion.model_validate({kind: words})], trace, sketch_case(case))
+    (found,) = judge([AnyCriterion.model_validate({kind: words})], trace, synthetic_case(case))
     return found
 
 
@@ -125,7 +125,7 @@ def test_every_criterion_is_drawn():
 @given(runs(), criteria())
 @settings(deadline=None)
 def test_the_sign_of_a_margin_is_the_verdict(run, criterion):
-    found = verdict(*criterion, sketch(run))
+    found = verdict(*criterion, synthetic_trace(run))
     for finding in found.findings:
         if finding.margin is not None:
             assert finding.status is (Status.PASS if finding.margin >= 0 else Status.FAIL), finding
@@ -136,7 +136,7 @@ def test_the_sign_of_a_margin_is_the_verdict(run, criterion):
 @given(runs(), criteria(), st.data())
 @settings(deadline=None)
 def test_loosening_a_bound_never_turns_a_pass_into_anything_else(run, criterion, data):
-    (kind, words), trace = criterion, sketch(run)
+    (kind, words), trace = criterion, synthetic_trace(run)
     raised, lowered = LIMITS.get(kind, ()), LOWERED.get(kind, ())
     assume(raised or lowered)
     key = data.draw(st.sampled_from([*raised, *lowered]))
@@ -173,7 +173,7 @@ def shifted(trace: Trace, ticks: int) -> Trace:
 @given(runs(), criteria(), st.integers(1, 10_000))
 @settings(deadline=None)
 def test_a_run_that_is_moved_in_time_has_the_same_verdict_at_moved_ticks(run, criterion, ticks):
-    (kind, words), trace = criterion, sketch(run)
+    (kind, words), trace = criterion, synthetic_trace(run)
     assume(kind != "relocalized_within" or "after" in words)
     now, then = verdict(kind, words, trace), verdict(kind, words, shifted(trace, ticks))
     assert [(f.status, f.what, f.value, f.margin) for f in now.findings] == [
@@ -185,7 +185,7 @@ def test_a_run_that_is_moved_in_time_has_the_same_verdict_at_moved_ticks(run, cr
 @given(runs(), criteria(), st.integers(1, 400))
 @settings(deadline=None)
 def test_what_was_not_decided_or_failed_when_a_log_was_cut_off_is_never_a_pass_there(run, criterion, cut):
-    trace = sketch(run)
+    trace = synthetic_trace(run)
     end = trace.end - cut
     events = tuple(e for e in trace.events if e.tick <= end and e.kind is not EventKind.RUN_ENDED)
     assert verdict(*criterion, replace(trace, events=events)).status is not Status.PASS
@@ -195,7 +195,7 @@ def test_what_was_not_decided_or_failed_when_a_log_was_cut_off_is_never_a_pass_t
 @given(criteria(), st.integers(0, 300), st.sampled_from([np.nan, np.inf, -np.inf]))
 @settings(deadline=None)
 def test_a_pose_that_is_no_number_never_lets_what_looks_at_it_pass(column, criterion, k, value):
-    trace = sketch({"seconds": SECONDS, "truth": [[0, 0, 0], [SECONDS, 4, 0]], "events": LOOKED_AT})
+    trace = synthetic_trace({"seconds": SECONDS, "truth": [[0, 0, 0], [SECONDS, 4, 0]], "events": LOOKED_AT})
     trace.truth.values[k, column] = value
     kind, words = criterion
     if kind in ("keepout", "path_length", "stuck", "localization_error", "relocalized_within"):
@@ -207,5 +207,7 @@ LOOKED_AT = [[0.5, "goal.accepted", "a"], [1, "event.started", "kidnapped"], [6,
 
 def test_events_of_the_same_tick_keep_their_order():
     both = (Event(5, EventKind.GOAL_ACCEPTED, "a"), Event(5, EventKind.GOAL_REACHED, "a"))
-    trace = replace(sketch({"seconds": 1, "truth": [[0, 2, 0, 0]]}), events=(*both, Event(240, EventKind.RUN_ENDED)))
+    trace = replace(
+        synthetic_trace({"seconds": 1, "truth": [[0, 2, 0, 0]]}), events=(*both, Event(240, EventKind.RUN_ENDED))
+    )
     assert verdict("goals_reached", {"goals": ["a"]}, trace).status is Status.PASS

@@ -8,9 +8,8 @@ from multiprocessing import get_context
 import numpy as np
 
 from simscen.advanced.localizers.spec import ScanMatchingAmcl
-from simscen.bench.localization.consistency import anees, bounds, bounds_over, within_bounds
 from simscen.bench.localization.generated_logs import CIRCUMSTANCES, log
-from simscen.bench.localization.trial import MOMENTS, Trial, trial
+from simscen.bench.localization.trial import MOMENTS, Trial, anees, bounds, bounds_over, trial, within_bounds
 from simscen.core.random_streams import Streams
 from simscen.core.statistics import bootstrap_mean_interval
 from simscen.model.localizers import Amcl, AmclParameters

@@ -7,8 +7,20 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.bench.localization.buildings import Building, building, lived_in, mesh_of
-from simscen.bench.localization.lidar import Sight, angles_of, hidden_by, measured, people_in
-from simscen.bench.localization.trajectory import CLEAN, STEP, ShutIn, Wheels, drive, reckoned, tour
+from simscen.bench.localization.generated_drive import (
+    CLEAN,
+    STEP,
+    ShutIn,
+    Sight,
+    Wheels,
+    angles_of,
+    drive,
+    hidden_by,
+    measured,
+    people_in,
+    reckoned,
+    tour,
+)
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist

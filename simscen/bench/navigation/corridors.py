@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.bench.navigation.experiment import Drive, Experiment, write_scenario
+from simscen.bench.navigation.experiments import Drive, Experiment, write_scenario
 from simscen.core.random_streams import Streams
 
 WIDTH = (1.4, 2.4)

@@ -4,16 +4,48 @@ Scenarios that are generated are written as files, so that everything goes throu
 can be repeated by hand.
 """
 
-from collections.abc import Iterable, Sequence
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from simscen.bench.navigation import barn, localization_drives, nav2_sandbox
+from simscen.bench.navigation import barn, scenario_texts
 from simscen.bench.navigation import dynamic_fields as movers
-from simscen.bench.navigation.experiment import Drive, Experiment, write_scenario
 from simscen.bench.navigation.obstacle_fields import CELL, HEIGHT, ObstacleField, obstacle_field
 from simscen.core.random_streams import Streams
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A scenario file, the seeds to run it with, and BARN's reference length in meters where it has one.
+
+    `world` tells worlds apart, over which success rates are compared: drives in one world are no independent evidence.
+    """
+
+    file: Path
+    seeds: Sequence[int]
+    reference_length: float | None = None
+    world: str = ""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One line of the table. `root` and `world_path` are what `simscen run` needs to find everything.
+
+    `mapless`: the robot has no map, so that only some localizers can be tried.
+    """
+
+    name: str
+    drives: tuple[Drive, ...]
+    root: Path
+    world_path: tuple[Path, ...] = ()
+    localization: bool = False
+    mapless: bool = False
+
 
 NARROW = (0.30, 0.20, 0.10)
 """Meters that the widest way through a narrow field is wider than the robot."""
@@ -94,7 +126,7 @@ def sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
             name,
             (
                 Drive(
-                    write_scenario(folder / f"nav2/{stem}.scenario.yaml", nav2_sandbox.sandbox_scenario(name, box)),
+                    write_scenario(folder / f"nav2/{stem}.scenario.yaml", scenario_texts.sandbox_scenario(name, box)),
                     seeds,
                 ),
             ),
@@ -132,15 +164,15 @@ def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequen
         return Drive(write_scenario(folder / f"localization/{stem}.scenario.yaml", text), seeds)
 
     directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in lost}
-    misled = [one(f"misled_{n}", localization_drives.misled(directions[n], n % 2 == 0), [n]) for n in lost]
-    tour = experiment(LOCALIZATIONS[0], one("tour", localization_drives.tour(), seeds), known=True)
+    misled = [one(f"misled_{n}", scenario_texts.misled(directions[n], n % 2 == 0), [n]) for n in lost]
+    tour = experiment(LOCALIZATIONS[0], one("tour", scenario_texts.tour(), seeds), known=True)
     if not lost:
         return [tour]
     return [
         tour,
         experiment(LOCALIZATIONS[1], *misled, known=True),
-        experiment(LOCALIZATIONS[2], one("start_unknown", localization_drives.start_unknown(), lost)),
-        experiment(LOCALIZATIONS[3], one("kidnapped", localization_drives.kidnapped(), lost)),
+        experiment(LOCALIZATIONS[2], one("start_unknown", scenario_texts.start_unknown(), lost)),
+        experiment(LOCALIZATIONS[3], one("kidnapped", scenario_texts.kidnapped(), lost)),
     ]
 
 
@@ -166,3 +198,33 @@ def _moving_world_text(field: movers.DynamicField) -> str:
             f"      repeat: back_and_forth\n      ease: spline\n      phase: {mover.phase:.3f} s\n"
         )
     return f"simscen: 1\nname: dynamic field {field.number}\nobjects:\n{''.join(lines)}"
+
+
+# MERGED: An experiment of `simscen bench nav`: scenarios, each with its seeds.
+def write_scenario(file: Path, text: str) -> Path:
+    """The file, with this text in it."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
+    """The same drives with these parameters on top of their own, as files in `folder` that extend theirs.
+
+    The folder's name is part of theirs, as drives of two experiments may be called the same.
+    Where there is no map the robot keeps the localizer that the drive has chosen for that.
+    """
+    drives = []
+    stack = {key: value for key, value in stack.items() if not (experiment.mapless and key == "localizer")}
+    for number, drive in enumerate(experiment.drives, start=1):
+        stem = drive.file.name.split(".")[0]
+        file = folder / f"{number}_{stem}.scenario.yaml"
+        text = f"simscen: 1\nextends: {json.dumps(os.path.relpath(drive.file, folder))}\nstack: {json.dumps(stack)}\n"
+        drives.append(replace(drive, file=write_scenario(file, text), world=drive.world or str(drive.file)))
+    return replace(
+        experiment,
+        name=name,
+        drives=tuple(drives),
+        root=folder.parent,
+        world_path=(experiment.root, *experiment.world_path),
+    )

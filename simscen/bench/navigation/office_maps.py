@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from simscen.bench.navigation.experiment import write_scenario
+from simscen.bench.navigation.experiments import write_scenario
 from simscen.core.random_streams import Streams
 
 FINE = 0.05

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.bench.navigation.experiment import Drive, Experiment, write_scenario
+from simscen.bench.navigation.experiments import Drive, Experiment, write_scenario
 from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Pose2
 from simscen.core.random_streams import Streams

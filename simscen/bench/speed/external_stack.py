@@ -4,8 +4,8 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from simscen.bench.speed.measurement import Stopwatch
 from simscen.bench.speed.run_speed import PATROL, SEED
-from simscen.bench.speed.stopwatch import Stopwatch
 from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
 from simscen.record.recorder import MomentSink
@@ -16,7 +16,7 @@ from simscen.run.simulate import simulate
 
 
 @dataclass(frozen=True)
-class External:
+class ExternalStackCost:
     """Of the same drive: its beats, and µs of wall time in which the engine waits for the stack at each.
 
     `here_us` with the stack in the engine, `there_us` with all it hears and says going over the socket, in full.
@@ -32,12 +32,14 @@ class External:
         return self.there_us / self.here_us
 
 
-def measure_external(rounds: int) -> External:
+def measure_external(rounds: int) -> ExternalStackCost:
     """The medians of several drives of the patrol, without a log."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     here = [_each_beat(prepared) for _ in range(rounds)]
     there = [_each_beat(with_external_reference(prepared)) for _ in range(rounds)]
-    return External(here[0][0], statistics.median(us for _, us in here), statistics.median(us for _, us in there))
+    return ExternalStackCost(
+        here[0][0], statistics.median(us for _, us in here), statistics.median(us for _, us in there)
+    )
 
 
 def _each_beat(prepared: PreparedScenario) -> tuple[int, float]:

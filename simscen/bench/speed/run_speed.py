@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from simscen.bench.speed.stopwatch import Stopwatch
+from simscen.bench.speed.measurement import Stopwatch
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.loading.scenario import load_scenario
@@ -28,7 +28,7 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 
 PATROL = Path(__file__).parents[2] / "data" / "bench" / "patrol.scenario.yaml"
 SEED = 1
-Tell = Callable[[str], None]
+ProgressCallback = Callable[[str], None]
 """Is told what is being measured."""
 BEAMS = 720
 
@@ -78,11 +78,11 @@ class Field:
     bare_step_us: float
 
 
-def nobody(_: str) -> None:
+def no_progress(_: str) -> None:
     """Is told for nothing."""
 
 
-def measure_patrol(rounds: int, tell: Tell = nobody) -> Patrol:
+def measure_patrol(rounds: int, tell: ProgressCallback = no_progress) -> Patrol:
     """The median of several runs of the patrol, recorded as always; then half as many more, taken apart."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     simulated, *_ = timed_run(prepared)  # the first run pays for imports and caches

@@ -7,7 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from simscen.bench.speed.measurement import Measurement, Measurements
-from simscen.bench.speed.run_speed import PATROL, Tell, nobody, timed_run
+from simscen.bench.speed.run_speed import PATROL, ProgressCallback, no_progress, timed_run
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation.goals import scenario_goals
 from simscen.run.preparation.scenario import prepare
@@ -29,7 +29,7 @@ ROW = 25
 UNIT = "ms a simulated second"
 
 
-def measure_growth(rounds: int, tell: Tell = nobody) -> Measurements:
+def measure_growth(rounds: int, tell: ProgressCallback = no_progress) -> Measurements:
     """The medians of several runs each."""
     figures: Measurements = {}
     with TemporaryDirectory() as folder:

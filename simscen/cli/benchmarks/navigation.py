@@ -14,7 +14,7 @@ from simscen.core.errors import Exit, NothingSelected
 from simscen.report.styled_line import detect_style
 
 if TYPE_CHECKING:
-    from simscen.bench.navigation.experiment import Experiment
+    from simscen.bench.navigation.experiments import Experiment
 
 
 class Format(str, Enum):
@@ -72,7 +72,7 @@ def command(
     well, with the command that repeats it. Interrupted, it prints what there is by then; with the same options and
     --resume it goes on. Exit code 0, or 3 when a run could not be completed.
     """
-    from simscen.bench.navigation.comparison import compare_drives
+    from simscen.bench.navigation.summary import compare_drives
     from simscen.cli.benchmarks.navigation_experiments import Sizes, available_experiments
     from simscen.cli.benchmarks.navigation_runs import drive, driven, measured
     from simscen.cli.benchmarks.navigation_table import as_json, as_text
@@ -113,7 +113,7 @@ def command(
 
 def with_stack(file: Path, experiments: list["Experiment"], made: Path, project: Path) -> list["Experiment"]:
     """The same experiments with the parameters of a stack file. Raises InvalidInput."""
-    from simscen.bench.navigation.experiment import with_stack_parameters
+    from simscen.bench.navigation.experiments import with_stack_parameters
     from simscen.loading.stacks.stackfile import load_stack_file
 
     choice = load_stack_file(file.name.split(".")[0], str(file), file, project)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from simscen.bench.navigation import barn, corridors, dynamic_fields, experiments, random_goals
-from simscen.bench.navigation.experiment import Experiment
+from simscen.bench.navigation.experiments import Experiment
 from simscen.bench.navigation.office_maps import write_building
 
 if TYPE_CHECKING:

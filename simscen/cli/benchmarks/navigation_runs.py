@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from simscen.bench.localization.consistency import anees, bounds, nees_at
-from simscen.bench.navigation.experiment import Drive, Experiment
+from simscen.bench.localization.trial import anees, bounds, nees_at
+from simscen.bench.navigation.experiments import Drive, Experiment
 from simscen.bench.navigation.summary import Row, Trial, mean, summarize
 from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text

@@ -5,8 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 from simscen.bench.navigation.barn import DWA
-from simscen.bench.navigation.comparison import Difference, DriveComparison
-from simscen.bench.navigation.summary import Row
+from simscen.bench.navigation.summary import Difference, DriveComparison, Row
 from simscen.cli.benchmarks.navigation_runs import Localized, Measured
 from simscen.report.styled_line import StyledText, plain_text, wrap_line
 

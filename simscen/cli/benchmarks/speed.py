@@ -17,7 +17,7 @@ from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit
 
 if TYPE_CHECKING:
-    from simscen.bench.speed.suite import Suite
+    from simscen.bench.speed.session_speed import Suite
 if TYPE_CHECKING:
     from simscen.bench.speed.large_worlds import Cost
 
@@ -109,10 +109,10 @@ def suite_command(
     before = load_baseline(compare)
     workers = jobs or len(os.sched_getaffinity(0))
     with engine_output_on_stderr(), TemporaryDirectory() as folder:
-        from simscen.bench.speed.suite import measure_suite, spread_over
+        from simscen.bench.speed.session_speed import evenly_spaced, measure_suite
 
         scenarios, _ = load_all(paths or [Path("scenarios")], None, (), False, Selection())
-        suite = measure_suite(spread_over(scenarios, most), workers, Path(folder), WARM_PROCESS, print_progress)
+        suite = measure_suite(evenly_spaced(scenarios, most), workers, Path(folder), WARM_PROCESS, print_progress)
     print_result(Result.here(suite.figures), suite_text(suite), {"suite": asdict(suite)}, format_, before)
     if suite.unfinished:
         print(f"{len(suite.unfinished)} runs broke off: {', '.join(suite.unfinished)}", file=sys.stderr)

@@ -11,12 +11,11 @@ from simscen.loading.stacks.choice import SCENARIO_KEYS
 from simscen.loading.yaml.library import APPEND_SUFFIX
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec
-from simscen.model.stackfile import StackFileSpec
-from simscen.model.userconfig import UserConfigSpec
+from simscen.model.stack_files import StackFileSpec, UserConfigSpec
 from simscen.model.world import WorldSpec
-from simscen.spec import bytype
-from simscen.spec.bytype import GROUP, NAMES, WHOLE
-from simscen.spec.choice import Choice, added, widened
+from simscen.spec import extensible_union
+from simscen.spec.choice import Choice, installed_choices, with_installed_choices
+from simscen.spec.extensible_union import GROUP_KEY, MAPPINGS_ALLOWED_KEY, NAMES_ALLOWED_KEY
 
 Schema = dict[str, Any]
 
@@ -124,17 +123,17 @@ class _WithInstalled(_Generator):
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         made, model = super().model_schema(schema), schema["cls"]
-        if not issubclass(model, Choice) or widened(model) is model:
+        if not issubclass(model, Choice) or with_installed_choices(model) is model:
             return made
-        for key, found in added(model).items():
+        for key, found in installed_choices(model).items():
             made["properties"][key] = self.generate_inner(core_schema.nullable_schema(found.__pydantic_core_schema__))
-        return {**made, **_exactly_one(model, [*model.choices(), *added(model)])}
+        return {**made, **_exactly_one(model, [*model.choices(), *installed_choices(model)])}
 
     def function_wrap_schema(self, schema: core_schema.WrapValidatorFunctionSchema) -> JsonSchemaValue:
         made, told = super().function_wrap_schema(schema), schema.get("metadata", {})
-        models = dict(bytype.added(told[GROUP])) if GROUP in told else {}
-        more: list[Schema] = [self._named(name, model) for name, model in models.items() if told[WHOLE]]
-        if models and told[NAMES]:
+        models = dict(extensible_union.installed_specs(told[GROUP_KEY])) if GROUP_KEY in told else {}
+        more: list[Schema] = [self._named(name, model) for name, model in models.items() if told[MAPPINGS_ALLOWED_KEY]]
+        if models and told[NAMES_ALLOWED_KEY]:
             more.append({"enum": list(models)})
         return {"anyOf": [made, *more]} if more else made
 

@@ -1,17 +1,23 @@
 """Numbers and names by which results are told: Nav2's error codes, types of JUnit errors, exit codes."""
 
+from collections.abc import Iterator, Sequence
+
+from pydantic import BaseModel
+
 from simscen.cli.catalog.commands_page import EXITS
-from simscen.cli.catalog.key_topics import keys_of_topics
-from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, topics
+from simscen.cli.catalog.json_schema import MODELS
+from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, fields_of, topics
 from simscen.core.errors import BROKEN_COMPONENT
 from simscen.core.messages.navigation import ErrorCode
 from simscen.criteria.plugin_metric import AnyMeasure
 from simscen.criteria.trace_signals.catalog import SIGNALS, Signal
 from simscen.judge.metrics.catalog import METRICS, Metric
 from simscen.loading.codes import CODES
+from simscen.loading.schema.lookup import models_at
 from simscen.run.external.protocol import CRASHED, FAILED, PROTOCOL, TIMEOUT
+from simscen.spec.choice import Choice
 
-NAV2 = {
+NAV2_ERROR_CODES = {
     ErrorCode.NONE: "Nothing went wrong.",
     ErrorCode.FOLLOW_PATH_UNKNOWN: "The controller failed for a reason that it does not tell.",
     ErrorCode.TF_ERROR: "The controller does not know where the robot is in the frame of its path.",
@@ -41,7 +47,7 @@ NAV2 = {
     ErrorCode.NAVIGATE_TIMEOUT: "The goal took longer than its `timeout`.",
 }
 """Error code → what has happened."""
-OF_OTHERS = frozenset({
+EXTERNAL_ONLY_CODES = frozenset({
     ErrorCode.FOLLOW_PATH_UNKNOWN, ErrorCode.TF_ERROR, ErrorCode.INVALID_PATH, ErrorCode.CONTROLLER_TIMED_OUT,
     ErrorCode.PLANNER_UNKNOWN, ErrorCode.PLANNER_TIMEOUT, ErrorCode.NO_VIAPOINTS_GIVEN,
     ErrorCode.FOLLOW_WAYPOINTS_UNKNOWN, ErrorCode.TASK_EXECUTOR_FAILED, ErrorCode.NO_VALID_WAYPOINTS,
@@ -49,9 +55,9 @@ OF_OTHERS = frozenset({
 })  # fmt: skip
 """Codes with which nothing in the reference stack ends: its planners and controllers have no clock, its planners hand
 on no empty path, every robot can drive backward, and goals are checked before a run."""
-BY_OTHERS = "The reference stack never ends with it; Nav2, other external stacks and installed components may."
+EXTERNAL_ONLY_NOTE = "The reference stack never ends with it; Nav2, other external stacks and installed components may."
 
-JUNIT = {
+JUNIT_ERROR_TYPES = {
     "crashed": "The process of the run ended before it was done.",
     "timeout": "The run took longer than --wall-limit allows.",
     "out-of-memory": "The process of the run was killed for want of memory, or could not get what it asked for.",
@@ -74,20 +80,20 @@ JUNIT = {
 def code_topics() -> list[Topic]:
     """Nav2's error codes, JUnit's error types and exit codes."""
     nav2 = [
-        Topic("error code", code.name, None, f"Nav2's error code {int(code)}.\n\n{_told(code)}",
+        Topic("error code", code.name, None, f"Nav2's error code {int(code)}.\n\n{_error_code_text(code)}",
               f"error_code: {{code: {code.name}}}", alias=str(int(code)))
-        for code in NAV2
+        for code in NAV2_ERROR_CODES
     ]  # fmt: skip
     told = "The run could not be completed: a JUnit `<error>`, and exit code 3."
-    junit = [Topic("error type", kind, None, f"{text}\n\n{told}") for kind, text in JUNIT.items()]
+    junit = [Topic("error type", kind, None, f"{text}\n\n{told}") for kind, text in JUNIT_ERROR_TYPES.items()]
     exits = [
         Topic("exit code", f"exit {code.value}", None, text, alias=f"{code.value}") for code, text in EXITS.items()
     ]
     return [*nav2, *junit, *exits]
 
 
-def _told(code: ErrorCode) -> str:
-    return f"{NAV2[code]} {BY_OTHERS}" if code in OF_OTHERS else NAV2[code]
+def _error_code_text(code: ErrorCode) -> str:
+    return f"{NAV2_ERROR_CODES[code]} {EXTERNAL_ONLY_NOTE}" if code in EXTERNAL_ONLY_CODES else NAV2_ERROR_CODES[code]
 
 
 CLOCK = """\
@@ -227,3 +233,63 @@ def known_names(keys: bool = False) -> list[str]:
     """What there is to explain, in order; with `keys` the paths of keys instead."""
     found = everything()
     return keys_of_topics(found) if keys else [*dict.fromkeys(topic.name for topic in found), *CODES]
+
+
+# MERGED: What a single key means, by its path: `goals.pose`, `amcl.update_min_a`, `stack.localizer.alpha1`.
+def key_topics(path: str, known: Sequence[Topic]) -> list[Topic]:
+    """Every key that a path may mean: below a topic, or from the top of a file; a bare key means it wherever it is."""
+    parts = path.split(".")
+    if len(parts) == 1:
+        found = [
+            _key(f"{topic.name}.{path}", field, ()) for topic in known for field in topic.fields if field.key == path
+        ]
+    else:
+        found = [topic for model, keys in _starts(parts, known) for topic in _below(model, keys, path)]
+        name, _, key = path.rpartition(".")
+        listed = [row for topic in known if topic.name == name for row in topic.rows if row.key == key]
+        found += [_key(path, row, ()) for row in listed]
+    return list({(topic.name, topic.text): topic for topic in found}.values())
+
+
+def keys_of_topics(known: Sequence[Topic]) -> list[str]:
+    """The paths of all keys of all topics."""
+    return [f"{topic.name}.{field.key}" for topic in known for field in topic.fields]
+
+
+def _starts(parts: list[str], known: Sequence[Topic]) -> Iterator[tuple[type[BaseModel], list[str]]]:
+    for length in (1, 2):
+        prefix, keys = ".".join(parts[:length]), parts[length:]
+        for topic in known:
+            if keys and topic.model is not None and prefix in (topic.name, f"{topic.group}.{topic.name}"):
+                yield topic.model, keys
+    for model in MODELS.values():
+        yield model, parts
+
+
+def _below(model: type[BaseModel], keys: list[str], path: str) -> Iterator[Topic]:
+    """The last of `keys` below a model, with the keys of what stands there where that is one mapping."""
+    *above, key = keys
+    for holder in models_at(model, _with_items(model, above)):
+        for field in fields_of(holder):
+            if field.key == key:
+                within = models_at(holder, _with_items(holder, [key]))
+                rows = fields_of(within[0]) if len(within) == 1 and not issubclass(within[0], Choice) else []
+                yield _key(path, field, tuple(rows))
+
+
+def _with_items(model: type[BaseModel], keys: list[str]) -> list[str | int]:
+    """The keys with a number behind each that holds a list."""
+    way: list[str | int] = []
+    for key in keys:
+        way.append(key)
+        if not models_at(model, way) or models_at(model, [*way, 0]) != models_at(model, way):
+            way.append(0)
+    return way
+
+
+def _key(path: str, field: Field, rows: tuple[Field, ...]) -> Topic:
+    needed = (
+        "required" if not field.default else "optional" if field.default == OPTIONAL else f"default {field.default}"
+    )
+    text = f"{field.text}\n\n{field.kind} ({needed})" if field.text else f"{field.kind} ({needed})"
+    return Topic("key", path, None, text, rows=rows)

@@ -16,7 +16,6 @@ from simscen.advanced.planners.spec import MedialAxisPlanner
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.registry import AnyFault
 from simscen.model import (
-    anystack,
     checkers,
     controllers,
     costmaps,
@@ -30,23 +29,21 @@ from simscen.model import (
     robot,
     scenario,
     stack,
-    stackfile,
-    userconfig,
+    stack_files,
     variations,
     world,
 )
 from simscen.model.disturbances import EventEntry, FaultEntry, StepEntry
-from simscen.model.rosmap import RosMapSpec
-from simscen.model.stackbase import SpeedZone
-from simscen.spec import bytype, registry
+from simscen.model.ros_map import RosMapSpec
+from simscen.model.stack_base import SpeedZone
+from simscen.spec import extensible_union, registry
 from simscen.spec.base import field_docs
-from simscen.spec.bytype import ByType
-from simscen.spec.choice import Choice, added
-from simscen.spec.lazy import LazySpec, annotation_of
-from simscen.spec.named_places import OrPlace, PlaceAlone
-from simscen.spec.places import PoseSpec
+from simscen.spec.choice import Choice, installed_choices
+from simscen.spec.extensible_union import ExtensibleUnion
+from simscen.spec.lazy_spec import LazySpec, annotation_of
+from simscen.spec.places import PlaceAllowed, PlaceShorthand, PoseSpec
 from simscen.spec.quantities import UNITS, Quantity
-from simscen.spec.speedmask import SpeedMask
+from simscen.spec.speed_mask import SpeedMask
 from simscen.triggers.registry import AnyCondition, Trigger
 
 _EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
@@ -146,7 +143,7 @@ _SCENARIO: dict[str, type[BaseModel]] = {
 }
 _STACK: dict[str, type[BaseModel]] = {
     "stack": stack.StackSpec,
-    "external": anystack.ExternalStackSpec,
+    "external": stack_files.ExternalStackSpec,
     "speed_zones": SpeedZone,
     "speed_mask": SpeedMask,
     "costmap": costmaps.Costmap,
@@ -172,9 +169,9 @@ _BEHAVIORS: dict[str, type[BaseModel]] = {
     "retrace": recovery.Retrace,
 }
 _STACK_FILES: dict[str, type[BaseModel]] = {
-    "stack file": stackfile.StackFileSpec,
-    "configuration": userconfig.UserConfigSpec,
-    "stacks": userconfig.StackCommandSpec,
+    "stack file": stack_files.StackFileSpec,
+    "configuration": stack_files.UserConfigSpec,
+    "stacks": stack_files.StackCommandSpec,
 }
 _WORLD: dict[str, type[BaseModel]] = {
     "world": world.WorldSpec,
@@ -210,11 +207,11 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
     """A type in words, with unit and range: "length in m, ≥ 0"."""
     if isinstance(kind, FieldInfo):
         return kind_of(kind.annotation, tuple(kind.metadata))
-    if mark := next((mark for mark in metadata if isinstance(mark, ByType)), None):
+    if mark := next((mark for mark in metadata if isinstance(mark, ExtensibleUnion)), None):
         return kind_of(mark.own)
     if get_origin(kind) is Annotated:
         return kind_of(get_args(kind)[0], (*get_args(kind)[1:], *metadata))
-    if place := next((mark for mark in metadata if isinstance(mark, OrPlace | PlaceAlone)), None):
+    if place := next((mark for mark in metadata if isinstance(mark, PlaceAllowed | PlaceShorthand)), None):
         words = [f"`{word}`" for word in getattr(place, "besides", ())]
         return " or ".join([*words, "place", kind_of(kind, tuple(mark for mark in metadata if mark is not place))])
     if get_origin(kind) in (Union, UnionType):
@@ -232,7 +229,7 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
 
 def by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
     """The shipped members of a union told apart by `type`."""
-    mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ByType)), None)
+    mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ExtensibleUnion)), None)
     members = get_args(get_args(union if mark is None else mark.own)[0])
     for member in members:
         lazy = next((mark for mark in get_args(member)[1:] if isinstance(mark, LazySpec)), None)
@@ -291,7 +288,7 @@ def added_topics(choice: type[Choice], wanted: bool = True) -> Iterator[Topic]:
     if not wanted:
         return
     origins = {entry.name: entry.origin for entry in registry.installed(choice.group)}
-    for key, model in added(choice).items():
+    for key, model in installed_choices(choice).items():
         yield replace(_topic(choice.group, key, model), origin=origins[key])
 
 
@@ -299,7 +296,7 @@ def _more(group: str, wanted: bool) -> Iterator[Topic]:
     """What installed packages add to a group that is told apart by `type`."""
     if wanted:
         origins = {entry.name: entry.origin for entry in registry.installed(group)}
-        for name, model in bytype.added(group):
+        for name, model in extensible_union.installed_specs(group):
             yield replace(_topic(group, name, model), origin=origins[name])
 
 

@@ -11,9 +11,9 @@ from simscen.cli.benchmarks import localization, navigation, results, speed
 from simscen.cli.benchmarks.results import COMPARE_HELP, Format, Result, load_baseline, print_progress, print_result
 
 if TYPE_CHECKING:
-    from simscen.bench.speed.external_stack import External
-    from simscen.bench.speed.overhead import Overhead
+    from simscen.bench.speed.external_stack import ExternalStackCost
     from simscen.bench.speed.run_speed import Field, Patrol
+    from simscen.bench.speed.session_speed import Overhead
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False)
 app.command("suite")(speed.suite_command)
@@ -51,7 +51,7 @@ def command(
     with engine_output_on_stderr():
         from simscen.bench.speed import run_speed
         from simscen.bench.speed.external_stack import measure_external
-        from simscen.bench.speed.overhead import measure_overhead
+        from simscen.bench.speed.session_speed import measure_overhead
 
         patrol = run_speed.measure_patrol(rounds, print_progress)
         overhead = measure_overhead(rounds, WARM_PROCESS, print_progress)
@@ -65,7 +65,9 @@ def command(
     print_result(Result.here(figures), text, _sections(patrol, overhead, fields, external), format_, before)
 
 
-def _sections(patrol: "Patrol", overhead: "Overhead", fields: "list[Field]", external: "External") -> dict[str, Any]:
+def _sections(
+    patrol: "Patrol", overhead: "Overhead", fields: "list[Field]", external: "ExternalStackCost"
+) -> dict[str, Any]:
     return {
         "patrol": {**asdict(patrol), "real_time_factor": patrol.factor, "ratio_to_bare": patrol.ratio},
         "overhead": asdict(overhead),
@@ -84,7 +86,7 @@ def _patrol_figures(patrol: "Patrol") -> Measurements:
     }
 
 
-def _other_figures(fields: "list[Field]", external: "External") -> Measurements:
+def _other_figures(fields: "list[Field]", external: "ExternalStackCost") -> Measurements:
     figures = dict[str, Measurement]()
     for field in fields:
         figures[f"scan among {field.obstacles} obstacles"] = Measurement(field.scan_ms, "ms")
@@ -127,7 +129,7 @@ def _field_lines(fields: "list[Field]") -> list[str]:
     ]
 
 
-def _external_lines(external: "External") -> list[str]:
+def _external_lines(external: "ExternalStackCost") -> list[str]:
     return [
         f"the stack of the patrol as a process of its own, all it hears and says in full, {external.beats} beats",
         f"    {external.there_us:.0f} µs a beat; in the engine {external.here_us:.0f} µs ({external.ratio:.1f} times)",

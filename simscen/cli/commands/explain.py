@@ -7,8 +7,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.catalog.key_topics import key_topics
-from simscen.cli.catalog.reference_topics import everything, known_names
+from simscen.cli.catalog.reference_topics import everything, key_topics, known_names
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import UsageError
@@ -31,7 +30,7 @@ def command(
     several meanings, all are explained; `simscen explain trigger.localization_error` selects one.
     """
     if page:
-        from simscen.cli.catalog.language_page import language_page
+        from simscen.cli.catalog.generate import language_page
 
         print_text(language_page(installed=True).rstrip())
         return

@@ -11,7 +11,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.judging import Judging, runs_without_log
+from simscen.cli.session.judging import LogJudge, runs_without_log
 from simscen.cli.session.logs import logs_of
 from simscen.cli.session.output_files import verdict
 from simscen.core.errors import UsageError
@@ -23,7 +23,7 @@ from simscen.report.results_json import as_document, in_order
 from simscen.report.styled_line import plain_text
 
 
-class Time(str, Enum):
+class TimeStamps(str, Enum):
     """Time stamp of a message that counts."""
 
     HEADER = "header"
@@ -48,8 +48,8 @@ def command(
         typer.Option(help="NAME=TOPIC: other name of a standard topic, e.g. odom=/my/odom; repeatable."),
     ] = None,
     time: Annotated[
-        Time, typer.Option(help="Time stamps to use in a foreign log: of the message headers, or of logging.")
-    ] = Time.HEADER,
+        TimeStamps, typer.Option(help="Time stamps to use in a foreign log: of the message headers, or of logging.")
+    ] = TimeStamps.HEADER,
     tick_rate: Annotated[int, typer.Option(min=1, max=10_000, help="Ticks per second for foreign logs.")] = 1000,
     same_frame: Annotated[
         bool,
@@ -74,7 +74,7 @@ def command(
     """
     wanted = wanted_of(truth, topic or [], time, tick_rate, same_frame)
     files = logs_of(logs)
-    judging = Judging(wanted, scenario, root, world_path or [])
+    judging = LogJudge(wanted, scenario, root, world_path or [])
     lost = runs_without_log(logs)
     runs = [*((str(file), judging.judged(file, alone=len(files) + len(lost) == 1)) for file in files), *lost]
     if wanted != ForeignLogOptions() and not judging.foreign:
@@ -89,9 +89,11 @@ def command(
     sys.exit(verdict([run for _, run in runs]))
 
 
-def wanted_of(truth: str | None, topic: list[str], time: Time, tick_rate: int, same_frame: bool) -> ForeignLogOptions:
+def wanted_of(
+    truth: str | None, topic: list[str], time: TimeStamps, tick_rate: int, same_frame: bool
+) -> ForeignLogOptions:
     """Return how to read a foreign log according to the command-line options. Raises UsageError."""
-    clock: Clock = "log" if time is Time.LOG else "header"
+    clock: Clock = "log" if time is TimeStamps.LOG else "header"
     wanted = ForeignLogOptions(truth, _topics(topic), tick_rate, clock, same_frame)
     _check_truth(wanted)
     return wanted

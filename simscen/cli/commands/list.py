@@ -12,7 +12,7 @@ from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_variations
-from simscen.model.anystack import ExternalStackSpec
+from simscen.model.stack_files import ExternalStackSpec
 
 
 def command(

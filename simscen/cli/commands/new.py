@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
+from simscen.cli.completions import shipped_scenarios
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.shipped_scenarios import shipped_scenarios
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.version import PACKAGE
 from simscen.loading.files.discovery import BASE, SCENARIO, default_root

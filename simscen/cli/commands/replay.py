@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.commands.judge import Time, wanted_of
+from simscen.cli.commands.judge import TimeStamps, wanted_of
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.judging import Judging
+from simscen.cli.session.judging import LogJudge
 from simscen.cli.session.logs import LOGS, logs_of
 from simscen.cli.session.output_files import save
 from simscen.core.errors import UsageError
@@ -36,7 +36,9 @@ def command(
     topic: Annotated[
         list[str] | None, typer.Option(help="NAME=TOPIC in a foreign log, as in `simscen judge`; repeatable.")
     ] = None,
-    time: Annotated[Time, typer.Option(help="Time stamps in a foreign log, as in `simscen judge`.")] = Time.HEADER,
+    time: Annotated[
+        TimeStamps, typer.Option(help="Time stamps in a foreign log, as in `simscen judge`.")
+    ] = TimeStamps.HEADER,
     tick_rate: Annotated[int, typer.Option(min=1, max=10_000, help="Ticks per second for foreign logs.")] = 1000,
     same_frame: Annotated[
         bool,
@@ -61,7 +63,7 @@ def command(
     if len(files) > 1 and (against is not None or out is not None):
         option = "--against" if against is not None else "--out"
         raise UsageError(f"{option} takes one run, but {len(files)} were found")
-    judging = Judging(wanted_of(truth, topic or [], time, tick_rate, same_frame), scenario, root, world_path or [])
+    judging = LogJudge(wanted_of(truth, topic or [], time, tick_rate, same_frame), scenario, root, world_path or [])
     others = [] if against is None else logs_of([against])
     if len(others) > 1:
         raise UsageError(f"--against takes one run, but {escaped(str(against))} contains {len(others)}")
@@ -75,7 +77,7 @@ def command(
         print_text(f"note: {escaped(note)}", sys.stderr)
 
 
-def _write(judging: Judging, files: list[Path], page: Path) -> None:
+def _write(judging: LogJudge, files: list[Path], page: Path) -> None:
     from simscen.report.replay import write_replay
 
     shown = [judging.shown(file) for file in files]

@@ -8,11 +8,11 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.session.output_files import JunitFamily
-from simscen.cli.session.run_session import Asked, cores, session
+from simscen.cli.session.run_session import SessionRequest, cores, execute_session
 from simscen.cli.session.selection import Selection, shard_of
 from simscen.cli.session.stacks import STACK_HELP
 from simscen.cli.session.terminal import Format
-from simscen.cli.session.watch import watched
+from simscen.cli.session.watch import watch_session
 from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.run.process.jobs import ReplayMode
 from simscen.run.sessions.run_session import SessionOptions
@@ -114,7 +114,7 @@ def command(
     """
     if check_determinism and (earlier := [path for path in paths if (path / JOURNAL_FILE).is_file()]):
         paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]
-    asked = Asked(
+    asked = SessionRequest(
         paths,
         Selection(keyword, tag or [], shard_of(shard), variation or []),
         SessionOptions(
@@ -133,4 +133,4 @@ def command(
         last_failed,
         open_,
     )
-    sys.exit(watched(asked) if watch else session(asked))
+    sys.exit(watch_session(asked) if watch else execute_session(asked))

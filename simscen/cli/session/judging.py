@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.cli.diagnostics import from_here
-from simscen.cli.session.logs import BROKEN_OFF, WHOLE, recorded_result
+from simscen.cli.session.logs import COMPLETE_LOG, PARTIAL_LOG, recorded_result
 from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose2
@@ -29,7 +29,7 @@ from simscen.report.journal_reader import JOURNAL_FILE, read_journal
 from simscen.run.sessions.output_folder import run_folder
 
 
-class Judging:
+class LogJudge:
     """Judges logs by `scenario`, or each by its own; `notes` are what is odd about them.
 
     `foreign` is how many of them simscen did not write.
@@ -103,7 +103,7 @@ class Judging:
             expected = expectation_of(spec)
             result = judge_run(key, str(log), spec.pass_, read.trace, case, (), read.coverage, spec.metrics, expected)
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
-        with _told_from_here(self._criteria):
+        with _scenario_errors(self._criteria):
             criteria = self._criteria.of(robot)
         # What had to happen stands in the scenario of the log, at lines that the file of criteria does not have.
         case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
@@ -122,7 +122,7 @@ class Judging:
     def _judged_foreign(self, log: Path, looks: bool = False) -> tuple[ForeignLog, RunResult]:
         """A log of others, and what the file of criteria says of it."""
         assert self._criteria is not None
-        with _told_from_here(self._criteria):
+        with _scenario_errors(self._criteria):
             criteria = self._criteria.of("")
         case = self._foreign_case()
         goals = tuple(goal.name for goal in case.goals if not goal.via)
@@ -139,7 +139,7 @@ class Judging:
             return self._named
         from simscen.run.preparation.foreign_logs import masks_from_criteria
 
-        with _told_from_here(criteria):
+        with _scenario_errors(criteria):
             named = masks_from_criteria(criteria) if criteria.masks else {}
         self._named = named if criteria is self._criteria else self._named
         return named
@@ -150,7 +150,7 @@ class Judging:
         if self._case is None:
             from simscen.run.preparation.foreign_logs import case_from_criteria
 
-            with _told_from_here(self._criteria):
+            with _scenario_errors(self._criteria):
                 self._case = case_from_criteria(self._criteria, self._world_path)
         return self._case
 
@@ -173,7 +173,7 @@ class UnusableScenario(InvalidInput):
 
 
 @contextmanager
-def _told_from_here(criteria: LoadedCriteria) -> Iterator[None]:
+def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
     """What is wrong with the file of criteria, as UnusableScenario."""
     try:
         yield
@@ -188,7 +188,7 @@ def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
         for folder in folders
         if (folder / JOURNAL_FILE).is_file()
         for answer in read_journal(folder).answers
-        if not any((run_folder(folder, answer.key) / log).exists() for log in (WHOLE, BROKEN_OFF))
+        if not any((run_folder(folder, answer.key) / log).exists() for log in (COMPLETE_LOG, PARTIAL_LOG))
     ]
 
 

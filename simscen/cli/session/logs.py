@@ -14,7 +14,7 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 from simscen.record.log_reader.read import Log
 
-WHOLE, BROKEN_OFF = "run.mcap", "run.partial.mcap"
+COMPLETE_LOG, PARTIAL_LOG = "run.mcap", "run.partial.mcap"
 BAG = "metadata.yaml"
 SUFFIXES = (".mcap", ".db3", ".bag")
 
@@ -45,7 +45,7 @@ def _logs(path: Path) -> Iterator[Path]:
             continue
         below[:] = sorted(name for name in below if not name.startswith("."))
         logs = sorted(name for name in names if name.endswith(SUFFIXES))
-        yield from (here / name for name in logs if not (name == BROKEN_OFF and WHOLE in logs))
+        yield from (here / name for name in logs if not (name == PARTIAL_LOG and COMPLETE_LOG in logs))
 
 
 def is_bag(names: Sequence[str]) -> bool:

@@ -5,6 +5,8 @@ import json
 import os
 import platform
 import sys
+import time
+import webbrowser
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime, timezone
 from enum import Enum
@@ -14,8 +16,15 @@ from pathlib import Path
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
 from simscen.core.files import require_not_input, require_regular_file
-from simscen.core.records.run_result import Outcome
-from simscen.core.records.session_events import Comparison, RunFinished, SessionFinished
+from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.session_events import (
+    Comparison,
+    RunFinished,
+    RunStarted,
+    SessionEvent,
+    SessionFinished,
+    SessionStarted,
+)
 from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.report.junit import Family, to_xml
 from simscen.report.results_json import to_json
@@ -188,3 +197,49 @@ def save(path: Path, write: Callable[[Path], None], inputs: Iterable[Path] = ())
         write(path)
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror}") from error
+
+
+# MERGED: `simscen run --open`: the session's page in a browser while it runs, written anew as runs end; no server.
+MIN_UPDATE_INTERVAL_S = 1.0
+"""Seconds from one writing of the page to the next; the page itself looks every two seconds."""
+UPDATE_INTERVAL_FACTOR = 10
+"""Of the time that passes, writing takes no more than a tenth."""
+
+
+class LivePage:
+    """Listens to a session; its page is there, and open, before anything runs. The last one is that of the reports."""
+
+    def __init__(self, reports: Reports) -> None:
+        self._reports = reports
+        self._total, self._due = 0, 0.0
+        self._answers: list[RunFinished] = []
+        self._under_way: dict[RunKey, None] = {}
+
+    def __call__(self, event: SessionEvent) -> None:
+        """Write the page anew where something ended, and it is time."""
+        match event:
+            case SessionStarted():
+                self._total = event.total
+                self._write()
+                open_page(self._reports.folder / PAGE)
+            case RunStarted():
+                self._under_way[event.key] = None
+            case RunFinished():
+                self._under_way.pop(event.key, None)
+                self._answers.append(event)
+                if time.monotonic() >= self._due:
+                    self._write()
+            case _:
+                pass
+
+    def _write(self) -> None:
+        begun = time.monotonic()
+        self._reports.write_live(self._answers, RunningSession(self._total, tuple(self._under_way)))
+        now = time.monotonic()
+        self._due = now + max(MIN_UPDATE_INTERVAL_S, UPDATE_INTERVAL_FACTOR * (now - begun))
+
+
+def open_page(page: Path) -> None:
+    """Show a page in the reader's browser ($BROWSER, or the system's); say where it is when there is none."""
+    if not webbrowser.open(page.absolute().as_uri()):
+        print_text(f"simscen: no browser was found; open {page} in one", sys.stderr)

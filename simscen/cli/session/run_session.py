@@ -10,8 +10,7 @@ from typing import Protocol
 
 from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.interrupts import signals_interrupt
-from simscen.cli.session.live_page import LivePage
-from simscen.cli.session.output_files import JunitFamily, Reports, require_writable, verdict
+from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, require_writable, verdict
 from simscen.cli.session.pending_runs import PendingRuns, begin, failed_runs
 from simscen.cli.session.selection import Selection, load_all
 from simscen.cli.session.stacks import commands_of
@@ -44,7 +43,7 @@ class Observer(Protocol):
 
 
 @dataclass(frozen=True)
-class Asked:
+class SessionRequest:
     """What the command line asks for; each field means what the option of its name does."""
 
     paths: Sequence[Path]
@@ -64,7 +63,7 @@ class Asked:
     open_: bool = False
 
 
-def session(asked: Asked, observer: Observer | None = None) -> Exit:
+def execute_session(asked: SessionRequest, observer: Observer | None = None) -> Exit:
     """Do it, and leave its reports. Raises InvalidInput, UsageError and NothingSelected before anything runs."""
     options = asked.options
     scenarios, warnings = load_all(asked.paths, asked.root, asked.world_path, asked.lenient, asked.wanted, asked.stacks)
@@ -91,7 +90,7 @@ def session(asked: Asked, observer: Observer | None = None) -> Exit:
     return shown.exit(code)
 
 
-def _last_failed(scenarios: Sequence[LoadedScenario], asked: Asked) -> frozenset[RunKey] | None:
+def _last_failed(scenarios: Sequence[LoadedScenario], asked: SessionRequest) -> frozenset[RunKey] | None:
     if asked.resume is not None:
         raise UsageError("--last-failed and --resume exclude each other")
     only, told = failed_runs(scenarios, asked.options, asked.out)

@@ -23,7 +23,7 @@ from simscen.loading.scenario import load_scenario
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.stacks.choice import REFERENCE, StackChoice
 from simscen.loading.stacks.userconfig import conflicting_stacks, undefined_stack
-from simscen.model.anystack import ExternalStackSpec
+from simscen.model.stack_files import ExternalStackSpec
 from simscen.spec.registry import entries, find
 
 YAML = (".yaml", ".yml")

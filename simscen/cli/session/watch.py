@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from simscen.cli.diagnostics import print_text
-from simscen.cli.session.run_session import Asked, session
+from simscen.cli.session.run_session import SessionRequest, execute_session
 from simscen.cli.session.selection import Selection
 from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.records.session_events import RunFinished, SessionEvent
@@ -22,10 +22,10 @@ from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.reproducibility.digest import scenario_files
 
-Stamps = dict[Path, tuple[int, int, int] | None]
+FileStamps = dict[Path, tuple[int, int, int] | None]
 
 
-def stamps_of(files: Iterable[Path]) -> Stamps:
+def file_stamps(files: Iterable[Path]) -> FileStamps:
     """What changes when a file is saved, of each; None = it is not there."""
     return {file: _stamp(file) for file in files}
 
@@ -38,7 +38,7 @@ def _stamp(file: Path) -> tuple[int, int, int] | None:
     return found.st_mtime_ns, found.st_size, found.st_ino
 
 
-class Report:
+class WatchReporter:
     """Listens to a session and writes down for the one that watches what it is made of and how it comes out."""
 
     def __init__(self, out: TextIO) -> None:
@@ -68,7 +68,7 @@ class Report:
         self._out.flush()
 
 
-class Watching:
+class WatchState:
     """The scenarios that `found` finds below `paths`, the files of each, and those that did not pass.
 
     A session that a mistake in some file kept from running is not done: any change of a file lets it try again.
@@ -141,12 +141,12 @@ class Watching:
             return ()
 
 
-PAUSE = 0.25
+POLL_INTERVAL_S = 0.25
 """Seconds between two looks at the files; two looks that are equal end a burst of saving."""
 STOPPED = (Exit.HUNG_UP, Exit.INTERRUPTED, Exit.TERMINATED)
 
 
-def watched(asked: Asked) -> int:
+def watch_session(asked: SessionRequest) -> int:
     """Run it, wait, run again what was touched, until q or Ctrl-C; the exit code is that of the last session.
 
     Each session has a process of its own, a copy of this one: what it loads, plug-ins too, is loaded anew each time.
@@ -159,15 +159,15 @@ def watched(asked: Asked) -> int:
     if asked.wanted.shard != (1, 1):
         raise UsageError("--watch and --shard exclude each other")
     home = asked.root or default_root(asked.paths)
-    watching = Watching(lambda: discover(asked.paths, home), asked.paths)
-    code, seen = _cycle(replace(asked, root=home), watching)
+    watching = WatchState(lambda: discover(asked.paths, home), asked.paths)
+    code, seen = _run_in_child(replace(asked, root=home), watching)
     while code not in STOPPED:
-        _tell(watching)
+        _print_status(watching)
         files = _next(watching, seen)
         if files is None:
             break
         again = replace(asked, paths=files, root=home, last_failed=False, wanted=_unsharded(asked.wanted))
-        code, seen = _cycle(again, watching)
+        code, seen = _run_in_child(again, watching)
     return code
 
 
@@ -175,9 +175,9 @@ def _unsharded(wanted: Selection) -> Selection:
     return replace(wanted, shard=(1, 1))
 
 
-def _cycle(asked: Asked, watching: Watching) -> tuple[int, Stamps]:
+def _run_in_child(asked: SessionRequest, watching: WatchState) -> tuple[int, FileStamps]:
     """One session in a process of its own: its exit code, and the files as they were before it began."""
-    before = stamps_of(watching.files)
+    before = file_stamps(watching.files)
     reading, writing = os.pipe()
     sys.stdout.flush()
     sys.stderr.flush()
@@ -185,9 +185,9 @@ def _cycle(asked: Asked, watching: Watching) -> tuple[int, Stamps]:
     if pid == 0:
         os.close(reading)
         with os.fdopen(writing, "w", encoding="utf-8") as told:
-            report = Report(told)
+            report = WatchReporter(told)
             try:
-                sys.exit(session(asked, report))
+                sys.exit(execute_session(asked, report))
             except InvalidInput as error:
                 report.mistakes(error.problems)
                 raise
@@ -198,7 +198,7 @@ def _cycle(asked: Asked, watching: Watching) -> tuple[int, Stamps]:
             watching.learn(line)
         code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     watching.end(code)
-    now = stamps_of(watching.files)
+    now = file_stamps(watching.files)
     return code, {**now, **{file: stamp for file, stamp in before.items() if file in now}}
 
 
@@ -212,14 +212,14 @@ def _ignoring_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _tell(watching: Watching) -> None:
+def _print_status(watching: WatchState) -> None:
     failed = len(watching.failed)
     keys = f"a = all, f = what did not pass ({failed}), q = quit"
     print_text(f"watching {len(watching.files)} files of {len(watching.scenarios)} scenarios: {keys}")
     sys.stdout.flush()
 
 
-def _next(watching: Watching, seen: Stamps) -> Sequence[Path] | None:
+def _next(watching: WatchState, seen: FileStamps) -> Sequence[Path] | None:
     """The scenarios to run next, as soon as a key or a saved file says so; None = to quit."""
     with _keys() as keys:
         while True:
@@ -230,10 +230,10 @@ def _next(watching: Watching, seen: Stamps) -> Sequence[Path] | None:
                 return watching.scenarios
             if key == "f" and watching.failed:
                 return watching.failed
-            now = stamps_of(watching.files)
+            now = file_stamps(watching.files)
             if now == seen:
                 continue
-            while (later := _settled(watching)) != now:
+            while (later := _stamps_after_pause(watching)) != now:
                 now = later
             changed = {file for file in {*now, *seen} if now.get(file) != seen.get(file)}
             seen = now
@@ -241,10 +241,10 @@ def _next(watching: Watching, seen: Stamps) -> Sequence[Path] | None:
                 return touched
 
 
-def _settled(watching: Watching) -> Stamps:
+def _stamps_after_pause(watching: WatchState) -> FileStamps:
     """The files after another pause."""
-    select.select([], [], [], PAUSE)
-    return stamps_of(watching.files)
+    select.select([], [], [], POLL_INTERVAL_S)
+    return file_stamps(watching.files)
 
 
 @contextmanager
@@ -267,7 +267,7 @@ class _Keys:
     _ended = False
 
     def __call__(self) -> str:
-        readable, _, _ = select.select([] if self._ended else [0], [], [], PAUSE)
+        readable, _, _ = select.select([] if self._ended else [0], [], [], POLL_INTERVAL_S)
         if not readable:
             return ""
         key = os.read(0, 1).decode("latin-1")

@@ -9,10 +9,9 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from simscen.criteria.trace_signals.catalog import SIGNALS, Signal, SignalName
 from simscen.spec.base import Spec
-from simscen.spec.bytype import BehaviorName
-from simscen.spec.named_places import PlaceOrPoint
+from simscen.spec.extensible_union import BehaviorName
+from simscen.spec.places import EventName, GoalName, HappeningName, MoverName, ObjectName, PlaceOrPoint, RegionName
 from simscen.spec.quantities import UNITS, AnyQuantity, Duration, PositiveDuration, Quantity
-from simscen.spec.references import EventName, GoalName, HappeningName, MoverName, ObjectName, RegionName
 
 Op = Literal[">=", ">", "<=", "<"]
 OPERATORS = ("signal", "all", "any", "not_", "always", "eventually", "until", "whenever")

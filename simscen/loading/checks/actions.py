@@ -6,7 +6,7 @@ from typing import Any
 from simscen.loading.checks.registry import MEANING, Finding, Keys
 from simscen.loading.known_names import pedestrian_names
 from simscen.loading.loaded import LoadedScenario
-from simscen.model.anystack import ExternalStackSpec
+from simscen.model.stack_files import ExternalStackSpec
 
 
 @MEANING.check("SC050")

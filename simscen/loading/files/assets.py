@@ -20,7 +20,7 @@ from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.textfile import read_text
 from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, key_position, node_at, value_position
 from simscen.model.robot import RobotSpec
-from simscen.model.rosmap import RosMapSpec
+from simscen.model.ros_map import RosMapSpec
 from simscen.model.world import WorldSpec
 
 Model = TypeVar("Model", bound=BaseModel)

@@ -12,9 +12,9 @@ from pydantic import BaseModel, RootModel, Tag
 from pydantic.fields import FieldInfo
 
 from simscen.loading.yaml.tree import Key
-from simscen.spec.bytype import ByType, added
 from simscen.spec.choice import Choice
-from simscen.spec.lazy import LazySpec, annotation_of
+from simscen.spec.extensible_union import ExtensibleUnion, installed_specs
+from simscen.spec.lazy_spec import LazySpec, annotation_of
 
 
 def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel]]:
@@ -65,7 +65,7 @@ def field_type(model: type[BaseModel], key: str) -> Any:
 def _type_of(field: FieldInfo) -> Any:
     from simscen.spec.registry import BrokenPlugin
 
-    if mark := next((mark for mark in field.metadata if isinstance(mark, ByType)), None):
+    if mark := next((mark for mark in field.metadata if isinstance(mark, ExtensibleUnion)), None):
         return Annotated[field.annotation, mark]
     try:
         return annotation_of(field)
@@ -76,7 +76,7 @@ def _type_of(field: FieldInfo) -> Any:
 def _options(kind: Any) -> list[Any]:
     """Return the members of a union; for any other type, the type itself."""
     if mark := _by_type(kind):
-        return [*_options(mark.own), *(Annotated[model, Tag(name)] for name, model in added(mark.group))]
+        return [*_options(mark.own), *(Annotated[model, Tag(name)] for name, model in installed_specs(mark.group))]
     bare = _bare(kind)
     if get_origin(bare) in (Union, UnionType):
         return [option for member in get_args(bare) if member is not NoneType for option in _options(member)]
@@ -121,8 +121,8 @@ def _metadata(kind: Any) -> tuple[Any, ...]:
     return tuple(get_args(kind)[1:]) if get_origin(kind) is Annotated else ()
 
 
-def _by_type(kind: Any) -> ByType | None:
-    return next((mark for mark in _metadata(kind) if isinstance(mark, ByType)), None)
+def _by_type(kind: Any) -> ExtensibleUnion | None:
+    return next((mark for mark in _metadata(kind) if isinstance(mark, ExtensibleUnion)), None)
 
 
 def _bare(kind: Any) -> Any:
@@ -132,9 +132,11 @@ def _bare(kind: Any) -> Any:
 
 
 def _widened(choice: type[Choice]) -> type[Choice]:
-    from simscen.spec.choice import widened  # searches installed packages, so only used to explain problems
+    from simscen.spec.choice import (
+        with_installed_choices,  # searches installed packages, so only used to explain problems
+    )
 
-    return widened(choice)
+    return with_installed_choices(choice)
 
 
 def _is_model(kind: Any) -> bool:

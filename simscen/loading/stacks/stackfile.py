@@ -13,7 +13,7 @@ from simscen.loading.stacks.choice import SCENARIO_KEYS, StackChoice
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.textfile import read_text
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, child, key_position
-from simscen.model.stackfile import StackFileSpec
+from simscen.model.stack_files import StackFileSpec
 
 
 def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: Sequence[Path] = ()) -> StackChoice:

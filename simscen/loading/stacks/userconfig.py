@@ -16,8 +16,7 @@ from simscen.loading.stacks.choice import EXTERNAL
 from simscen.loading.stacks.program import parse_command
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.tree import MappingNode, value_position
-from simscen.model.anystack import ExternalStackSpec
-from simscen.model.userconfig import UserConfigSpec
+from simscen.model.stack_files import ExternalStackSpec, UserConfigSpec
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput
 from simscen.core.external_command import ExternalCommand
 from simscen.loading.stacks.userconfig import undefined_stack
-from simscen.model.anystack import ExternalStackSpec
 from simscen.model.stack import StackSpec
-from simscen.model.stackbase import GoalTolerances, StackBase
+from simscen.model.stack_base import GoalTolerances, StackBase
+from simscen.model.stack_files import ExternalStackSpec
 from simscen.run.external.handshake import RunParameters
 from simscen.run.external.stack import ExternalStack
 from simscen.run.preparation.scenario import PreparedScenario

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from simscen.core.environment.costmap_filters import Filter, FilterMasks, Zones, ZoneSwitch
 from simscen.core.environment.world_model import Polygon
-from simscen.model.stackbase import StackBase
+from simscen.model.stack_base import StackBase
 
 
 @dataclass

@@ -9,7 +9,7 @@ from simscen.core.messages.goal_names import loop_goal_name
 from simscen.core.messages.navigation import Goal
 from simscen.model.navigation import failure_of
 from simscen.model.scenario import GoalEntry, ScenarioSpec
-from simscen.model.stackbase import StackBase
+from simscen.model.stack_base import StackBase
 
 
 def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:

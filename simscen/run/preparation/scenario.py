@@ -17,11 +17,11 @@ from simscen.criteria.base import Criterion
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
 from simscen.loading.resolved import disturbances_of
-from simscen.model.anystack import AnyStack
 from simscen.model.localizers import OdometryOnly
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, estimate_of
 from simscen.model.stack import StackSpec
+from simscen.model.stack_files import AnyStack
 from simscen.run.preparation.filter_masks import load_criterion_masks, load_masks
 from simscen.run.preparation.goals import event_goals, expected_failures, scenario_goals
 from simscen.run.preparation.loaders import load_map, load_robot, load_world

@@ -11,7 +11,7 @@ from simscen.model.recovery import Recovery
 from simscen.model.stack import StackSpec
 from simscen.run.preparation.scenario import PreparedScenario
 from simscen.sim.scene import walls
-from simscen.spec.component import Component
+from simscen.spec.base import Component
 from simscen.worlds.raycasting import ray_scene
 
 

@@ -18,7 +18,7 @@ from simscen.loading.checks.registry import Finding, Keys
 from simscen.loading.yaml.tree import MappingNode
 from simscen.run.worldchecks.scene import SILL_M, START, TOUCH_M, WORLD, Scene, expects_start_failure
 from simscen.sim.body.outline import radius_and_height
-from simscen.spec.motions import Motion
+from simscen.spec.moving_objects import Motion
 from simscen.triggers.registry import Trigger
 from simscen.triggers.timing import Time
 from simscen.worlds.geometry.overlaps import first_blocking, placed, polygons_overlap

@@ -11,7 +11,7 @@ from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import ErrorCode, Path
-from simscen.spec.component import Component
+from simscen.spec.base import Component
 from simscen.stack.protocols import NavigationFailure
 from simscen.stack.setting import Setting
 

@@ -10,10 +10,17 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure
-from simscen.testing.contracts.component import ComponentContract, copied, heard, same, view_of
+from simscen.testing.contracts.base import (
+    ComponentContract,
+    call_component,
+    copy_costmap,
+    equal_costmaps,
+    promise,
+    require,
+    view_of,
+)
 from simscen.testing.contracts.controller import PERIOD, SLACK, moved
 from simscen.testing.flatland import Flatland
-from simscen.testing.promise import demand, promise
 
 LONGEST = 120.0
 """Simulated seconds after which a behavior must have ended."""
@@ -36,28 +43,28 @@ class BehaviorContract(ComponentContract):
         """The track of a base that does what it says until it is done or fails."""
         track, seconds = [MIDDLE], 0.0
         try:
-            heard("starts", lambda: behavior.start(MIDDLE))
+            call_component("starts", lambda: behavior.start(MIDDLE))
             while (command := self.command(behavior, track[-1], view, seconds)) is not None:
                 track.append(moved(track[-1], command))
                 seconds += PERIOD
-                demand(seconds <= LONGEST, f"has not ended after {LONGEST:g} s")
+                require(seconds <= LONGEST, f"has not ended after {LONGEST:g} s")
         except NavigationFailure:
             pass
         return track
 
     def command(self, behavior: Behavior, pose: Pose2, view: CostmapView, seconds: float) -> Twist | None:
         """Its command, looked at for type, finiteness and limits; None when it is done."""
-        command = heard("is asked for a command", lambda: behavior.step(pose, view, seconds))
+        command = call_component("is asked for a command", lambda: behavior.step(pose, view, seconds))
         if command is None:
             return None
-        demand(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
-        demand(all(map(math.isfinite, command)), f"commands {tuple(command)}")
+        require(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
+        require(all(map(math.isfinite, command)), f"commands {tuple(command)}")
         robot = self.robot
         within = -robot.max_reverse - SLACK <= command.vx <= robot.max_linear + SLACK
         within = (
             within and abs(command.vy) <= robot.max_lateral + SLACK and abs(command.wz) <= robot.max_angular + SLACK
         )
-        demand(within, f"commands {tuple(command)}, more than the base can do")
+        require(within, f"commands {tuple(command)}, more than the base can do")
         return command
 
     @promise
@@ -70,8 +77,8 @@ class BehaviorContract(ComponentContract):
     @promise
     def it_has_a_name(self) -> None:
         """Given a behavior then its name says what it is in events and criteria."""
-        name = heard("is asked for its name", lambda: self.built().name)
-        demand(isinstance(name, str) and name, f"is called {name!r}")
+        name = call_component("is asked for its name", lambda: self.built().name)
+        require(isinstance(name, str) and name, f"is called {name!r}")
 
     @promise
     def it_never_drives_into_anything(self) -> None:
@@ -81,7 +88,7 @@ class BehaviorContract(ComponentContract):
             view = self.view(self.robot.circumscribed_radius + room)
             for pose in self.done(self.built(), view):
                 free = bool(footprint.free(view, np.array([pose]))[0])
-                demand(
+                require(
                     free, f"drives into a wall with {room:g} m of room: ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f})"
                 )
 
@@ -89,12 +96,12 @@ class BehaviorContract(ComponentContract):
     def the_same_calls_give_the_same_commands_bit_for_bit(self) -> None:
         """Given the same calls with the same generator then bit-identical commands: no clock, no global chance."""
         one, other = (self.done(self.built(), self.view(0.6)) for _ in range(2))
-        demand(one == other, "two tries with the same generator differ")
+        require(one == other, "two tries with the same generator differ")
 
     @promise
     def a_costmap_is_not_changed(self) -> None:
         """Given a costmap then it is not changed."""
         view = self.view(0.6)
-        untouched = copied(view)
+        untouched = copy_costmap(view)
         self.done(self.built(), view)
-        demand(same(view, untouched), "the costmap is not what it was")
+        require(equal_costmaps(view, untouched), "the costmap is not what it was")

@@ -12,9 +12,17 @@ from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.stack.arcs import poses_along
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Controller, CostmapView, NavigationFailure
-from simscen.testing.contracts.component import ComponentContract, copied, heard, same, scribble, view_of
+from simscen.testing.contracts.base import (
+    ComponentContract,
+    call_component,
+    copy_costmap,
+    equal_costmaps,
+    overwrite_costmap,
+    promise,
+    require,
+    view_of,
+)
 from simscen.testing.flatland import Flatland
-from simscen.testing.promise import demand, promise
 
 PERIOD = 0.05
 GOAL = Goal("g", Pose2(7.0, 3.0, 1.0))
@@ -36,20 +44,20 @@ class ControllerContract(ComponentContract):
     def following(self) -> Controller:
         """A new one that has been given the path."""
         controller: Controller = self.built()
-        heard("is given a path", lambda: controller.set_path(Path(STRAIGHT.copy())))
+        call_component("is given a path", lambda: controller.set_path(Path(STRAIGHT.copy())))
         return controller
 
     def command(self, controller: Controller, pose: Pose2, twist: Twist, view: CostmapView) -> Twist:
         """Its command, looked at for type, finiteness and limits."""
-        command = heard("is asked for a command", lambda: controller.command(pose, twist, view, GOAL))
-        demand(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
-        demand(all(map(math.isfinite, command)), f"commands {tuple(command)}")
+        command = call_component("is asked for a command", lambda: controller.command(pose, twist, view, GOAL))
+        require(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
+        require(all(map(math.isfinite, command)), f"commands {tuple(command)}")
         robot = self.robot
         within = -robot.max_reverse - SLACK <= command.vx <= robot.max_linear + SLACK
         within = (
             within and abs(command.vy) <= robot.max_lateral + SLACK and abs(command.wz) <= robot.max_angular + SLACK
         )
-        demand(within, f"commands {tuple(command)}, more than the base can do: {robot.max_linear:g} m/s ahead, "
+        require(within, f"commands {tuple(command)}, more than the base can do: {robot.max_linear:g} m/s ahead, "
                f"{robot.max_reverse:g} back, {robot.max_lateral:g} sideways, {robot.max_angular:g} rad/s")  # fmt: skip
         return command
 
@@ -69,10 +77,10 @@ class ControllerContract(ComponentContract):
         """Given a free path then the robot gets to its end beside it by no more than 0.3 m, and to the heading."""
         track = self.drive(self.following(), self.view(), Pose2(1.0, 3.1, 0.0), 40)
         off, turn = track[-1].distance(GOAL.pose), abs(track[-1].yaw - GOAL.pose.yaw)
-        demand(off < NEAR, f"ends {off:.2f} m from the end of the path after 40 s")
-        demand(turn < NEAR, f"ends {turn:.2f} rad from the goal's heading after 40 s")
+        require(off < NEAR, f"ends {off:.2f} m from the end of the path after 40 s")
+        require(turn < NEAR, f"ends {turn:.2f} rad from the goal's heading after 40 s")
         beside = max(abs(pose.y - 3.0) for pose in track)
-        demand(beside < 0.3, f"is {beside:.2f} m beside the path")
+        require(beside < 0.3, f"is {beside:.2f} m beside the path")
 
     @promise
     def no_command_exceeds_the_limits_of_the_base(self) -> None:
@@ -87,16 +95,16 @@ class ControllerContract(ComponentContract):
     def a_speed_limit_is_kept_and_lifted(self) -> None:
         """Given a limit of 0.15 m/s then no command is faster; given None then it drives at its full speed again."""
         controller, view = self.following(), self.view()
-        demand(
+        require(
             math.isfinite(controller.full_speed) and controller.full_speed > 0, f"full speed {controller.full_speed!r}"
         )
         controller.set_speed_limit(0.15)
         slow = max(self.command(controller, Pose2(2.0, 3.0), Twist(0.15), view).vx for _ in range(20))
-        demand(slow <= 0.15 + SLACK, f"drives at {slow:.3f} m/s under a limit of 0.15 m/s")
-        demand(slow > 0.05, f"drives at no more than {slow:.3f} m/s under a limit of 0.15 m/s")
+        require(slow <= 0.15 + SLACK, f"drives at {slow:.3f} m/s under a limit of 0.15 m/s")
+        require(slow > 0.05, f"drives at no more than {slow:.3f} m/s under a limit of 0.15 m/s")
         controller.set_speed_limit(None)
         fast = max(self.command(controller, Pose2(2.0, 3.0), Twist(0.4), view).vx for _ in range(20))
-        demand(fast > min(0.2, 0.9 * controller.full_speed), f"drives at no more than {fast:.3f} m/s without a limit")
+        require(fast > min(0.2, 0.9 * controller.full_speed), f"drives at no more than {fast:.3f} m/s without a limit")
 
     @promise
     def what_it_is_about_to_drive_is_free_or_it_fails_with_no_valid_control(self) -> None:
@@ -112,7 +120,7 @@ class ControllerContract(ComponentContract):
                 no_valid_control(failure)
             else:
                 free = footprint.free(view, poses_along(pose, command, np.linspace(0, 0.5, 11))).all()
-                demand(free, f"commands {tuple(command)} with an obstacle {gap:g} m ahead")
+                require(free, f"commands {tuple(command)} with an obstacle {gap:g} m ahead")
 
     @promise
     def it_never_drives_into_a_wall_across_its_path(self) -> None:
@@ -127,25 +135,25 @@ class ControllerContract(ComponentContract):
                 no_valid_control(failure)
                 twist = Twist()
             pose = moved(pose, twist)
-            demand(footprint.free(view, np.array([pose]))[0], f"drives into the wall at ({pose.x:.2f}, {pose.y:.2f})")
+            require(footprint.free(view, np.array([pose]))[0], f"drives into the wall at ({pose.x:.2f}, {pose.y:.2f})")
 
     @promise
     def the_same_calls_give_the_same_commands_bit_for_bit(self) -> None:
         """Given the same calls with the same generator then bit-identical commands: no clock, no global chance."""
         view = self.view((4.0, 3.4, 0.15))
         one, other = (self.drive(self.following(), view, Pose2(1, 3.15, 0.3), 2.0) for _ in range(2))
-        demand(one == other, "two drives with the same generator differ")
+        require(one == other, "two drives with the same generator differ")
 
     @promise
     def an_empty_path_is_an_invalid_path(self) -> None:
         """Given a path without points then fails with INVALID_PATH."""
         controller = self.built()
         try:
-            heard("is given an empty path", lambda: controller.set_path(Path()))
+            call_component("is given an empty path", lambda: controller.set_path(Path()))
         except NavigationFailure as failure:
-            demand(failure.code == ErrorCode.INVALID_PATH, f"fails with {failure.code.name}, not with INVALID_PATH")
+            require(failure.code == ErrorCode.INVALID_PATH, f"fails with {failure.code.name}, not with INVALID_PATH")
         else:
-            demand(False, "takes a path without points")
+            require(False, "takes a path without points")
 
     @promise
     def path_and_costmap_are_neither_changed_nor_kept(self) -> None:
@@ -153,25 +161,25 @@ class ControllerContract(ComponentContract):
         view, controller, path = self.view(), self.built(), Path(STRAIGHT.copy())
         other, pose = self.following(), Pose2(1, 3)
         controller.set_path(path)
-        old, untouched = copied(view), copied(view)
+        old, untouched = copy_costmap(view), copy_costmap(view)
         self.command(controller, pose, Twist(), old)
-        demand(np.array_equal(path.points, STRAIGHT), "the path is not what it was")
-        demand(same(old, untouched), "the costmap is not what it was")
-        scribble(old)
+        require(np.array_equal(path.points, STRAIGHT), "the path is not what it was")
+        require(equal_costmaps(old, untouched), "the costmap is not what it was")
+        overwrite_costmap(old)
         self.command(other, pose, Twist(), view)
         commands = [self.command(each, pose, Twist(), view) for each in (controller, other)]
-        demand(commands[0] == commands[1], "an old costmap shows in a new command")
+        require(commands[0] == commands[1], "an old costmap shows in a new command")
 
     @promise
     def its_local_plan_is_a_path_or_none(self) -> None:
         """Given a command then what it expects to drive is a path of finite poses, or None."""
         controller = self.following()
         self.command(controller, Pose2(1, 3), Twist(), self.view())
-        plan = heard("is asked for its local plan", lambda: controller.local_plan)
+        plan = call_component("is asked for its local plan", lambda: controller.local_plan)
         fine = plan is None or (
             isinstance(plan, Path) and plan.points.shape[1:] == (3,) and np.isfinite(plan.points).all()
         )
-        demand(fine, "the local plan is no path of finite poses (n, 3)")
+        require(fine, "the local plan is no path of finite poses (n, 3)")
 
 
 def at_goal(pose: Pose2) -> bool:
@@ -186,4 +194,4 @@ def moved(pose: Pose2, twist: Twist) -> Pose2:
 
 def no_valid_control(failure: NavigationFailure) -> None:
     """The one failure that a blocked controller has."""
-    demand(failure.code == ErrorCode.NO_VALID_CONTROL, f"fails with {failure.code.name}, not with NO_VALID_CONTROL")
+    require(failure.code == ErrorCode.NO_VALID_CONTROL, f"fails with {failure.code.name}, not with NO_VALID_CONTROL")

@@ -13,9 +13,8 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.stack.protocols import Localizer
-from simscen.testing.contracts.component import heard
-from simscen.testing.promise import Contract, demand, promise
-from simscen.testing.room import BEAMS, Drive, Noise, drive, errors, localizer, record, run, scan
+from simscen.testing.contracts.base import Contract, call_component, promise, require
+from simscen.testing.synthetic_room import BEAMS, Drive, Noise, drive, errors, localizer, record, run, scan
 
 SILENT = Noise(lidar=0, translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)
 
@@ -41,30 +40,32 @@ class LocalizerContract(Contract):
 
     def told(self, estimate: Estimate) -> Localizer:
         """A new one that starts from this estimate."""
-        subject = heard("is built", lambda: localizer(self.spec, estimate, 1))
-        heard("is reset", lambda: subject.reset(estimate))
+        subject = call_component("is built", lambda: localizer(self.spec, estimate, 1))
+        call_component("is reset", lambda: subject.reset(estimate))
         return subject
 
     @promise
     def the_same_calls_give_the_same_beliefs_bit_for_bit(self) -> None:
         """Given the same readings with the same generator then bit-identical beliefs: no clock, no global chance."""
         for pose in (here().pose, None):
-            first, again = (heard("localizes", run, self.told(Estimate(pose)), short(), 4, imu=True) for _ in range(2))
+            first, again = (
+                call_component("localizes", run, self.told(Estimate(pose)), short(), 4, imu=True) for _ in range(2)
+            )
             for one, other in zip(first, again, strict=True):
-                demand(one.pose == other.pose and one.map_from_odom == other.map_from_odom, "two runs differ in pose")
-                demand(np.array_equal(one.covariance, other.covariance), "two runs differ in covariance")
-                demand(np.array_equal(one.particles, other.particles), "two runs differ in particles")
+                require(one.pose == other.pose and one.map_from_odom == other.map_from_odom, "two runs differ in pose")
+                require(np.array_equal(one.covariance, other.covariance), "two runs differ in covariance")
+                require(np.array_equal(one.particles, other.particles), "two runs differ in particles")
 
     @promise
     def without_motion_and_with_perfect_readings_the_belief_does_not_wander_off(self) -> None:
         """Given no motion and perfect readings then the belief stays within 5 cm and 0.03 rad."""
         still = record(np.tile(short().truth[:1], (400, 1)))
         start = Estimate(here().pose, (0.02, 0.02, 0.01))
-        beliefs = heard("localizes", lambda: run(self.told(start), still, 1, SILENT, imu=True))
+        beliefs = call_component("localizes", lambda: run(self.told(start), still, 1, SILENT, imu=True))
         error = errors(beliefs, still.truth)
         off, turn = float(np.abs(error[:, :2]).max()), float(np.abs(error[:, 2]).max())
-        demand(off < 0.05, f"wanders off by {off:.3f} m while the robot stands")
-        demand(turn < 0.03, f"turns away by {turn:.3f} rad while the robot stands")
+        require(off < 0.05, f"wanders off by {off:.3f} m while the robot stands")
+        require(turn < 0.03, f"turns away by {turn:.3f} rad while the robot stands")
 
     @promise
     def a_belief_does_not_change_after_it_was_given(self) -> None:
@@ -75,22 +76,22 @@ class LocalizerContract(Contract):
         covariance, particles = belief.covariance.copy(), belief.particles.copy()
         for k in range(1, 20):
             step(subject, k, Pose2(0.3 * k, 0, 0.1 * k))
-            heard("takes a scan", subject.on_scan, scan(short().ranges[k], 24 * k))
-        demand(np.array_equal(belief.covariance, covariance), "a covariance changes after it was given")
-        demand(np.array_equal(belief.particles, particles), "particles change after they were given")
+            call_component("takes a scan", subject.on_scan, scan(short().ranges[k], 24 * k))
+        require(np.array_equal(belief.covariance, covariance), "a covariance changes after it was given")
+        require(np.array_equal(belief.particles, particles), "particles change after they were given")
 
     @promise
     def a_scan_is_neither_changed_nor_kept_to_be_changed_later(self) -> None:
         """Given a scan then its ranges are not changed, and what becomes of them later changes no belief."""
         subject, ranges = self.told(here()), short().ranges[0].copy()
-        heard("takes a scan", lambda: subject.on_scan(scan(ranges, 24)))
-        demand(np.array_equal(ranges, short().ranges[0]), "the ranges of a scan are not what they were")
+        call_component("takes a scan", lambda: subject.on_scan(scan(ranges, 24)))
+        require(np.array_equal(ranges, short().ranges[0]), "the ranges of a scan are not what they were")
         ranges[:] = np.nan
         step(subject, 1, Pose2(0, 0, 0))
         other = self.told(here())
-        heard("takes a scan", lambda: other.on_scan(scan(short().ranges[0], 24)))
+        call_component("takes a scan", lambda: other.on_scan(scan(short().ranges[0], 24)))
         step(other, 1, Pose2(0, 0, 0))
-        demand(subject.belief.pose == other.belief.pose, "a scan that was changed later shows in the belief")
+        require(subject.belief.pose == other.belief.pose, "a scan that was changed later shows in the belief")
 
     @promise
     def a_lidar_that_is_blind_or_lies_never_makes_the_belief_insane(self) -> None:
@@ -99,7 +100,7 @@ class LocalizerContract(Contract):
             subject = self.told(start)
             for k in range(30):
                 step(subject, k, Pose2(0.3 * k, 0.01 * k, 0.3 * k))
-                heard("takes a scan", subject.on_scan, scan(_lies(k % 14), 24 * k))
+                call_component("takes a scan", subject.on_scan, scan(_lies(k % 14), 24 * k))
                 sane(subject)
 
     @promise
@@ -110,9 +111,9 @@ class LocalizerContract(Contract):
             x, y, yaw = chance.choice([0.0, np.nan, np.inf, -np.inf, 1e300, -9e5, 4.0, 1e-300], 3).tolist()
             rate = float(chance.choice([np.nan, np.inf, 99.0, -1e9]))
             imu = Imu("imu", 24 * k, (0.0, 0.0, rate), (0.0, 0.0, 9.8))
-            heard("takes a turn rate", subject.on_imu, imu)
+            call_component("takes a turn rate", subject.on_imu, imu)
             step(subject, k, Pose2(x, y, yaw))
-            heard("takes a scan", subject.on_scan, scan(short().ranges[k % 20], 24 * k))
+            call_component("takes a scan", subject.on_scan, scan(short().ranges[k % 20], 24 * k))
             sane(subject)
 
     @promise
@@ -123,7 +124,7 @@ class LocalizerContract(Contract):
             step(subject, k, Pose2(0.3 * k, 0, 0))
             limits = {"range_max": [12.0, 0.0, np.nan, 1e6][k % 4], "mount": Pose2(0.3, -2.0, 5.0)}
             taken = scan(np.full(size, 2.0), 24 * k, **limits)
-            heard("takes a scan", subject.on_scan, taken)
+            call_component("takes a scan", subject.on_scan, taken)
             sane(subject)
 
     @promise
@@ -132,8 +133,8 @@ class LocalizerContract(Contract):
         used = self.told(Estimate(Pose2(3, 3, 3)))
         drive_ = short()
         begun = Drive(drive_.truth[:80], drive_.steps[:80], drive_.ranges[:20])
-        heard("localizes", lambda: run(used, begun, 1, imu=True))
-        heard("is reset", lambda: used.reset(here()))
+        call_component("localizes", lambda: run(used, begun, 1, imu=True))
+        call_component("is reset", lambda: used.reset(here()))
         near(sane(used), "after a reset")
         step(used, 0, Pose2(-8, 4, 2))
         near(sane(used), "after a reset and the first odometry")
@@ -145,32 +146,34 @@ def near(belief: Belief, when: str) -> None:
     assert start.pose is not None
     x, y, yaw = np.abs(tuple(start.pose.between(belief.pose))).tolist()
     close = max(x, y) <= 3 * start.std[0] and yaw <= 3 * start.std[2]
-    demand(close, f"believes to be at {belief.pose} {when}, and was told {start.pose}")
+    require(close, f"believes to be at {belief.pose} {when}, and was told {start.pose}")
 
 
 def step(subject: Localizer, number: int, pose: Pose2) -> None:
     """Odometry at 10 Hz."""
-    heard("takes odometry", lambda: subject.on_odometry(Odometry("odom", 24 * number, pose, Twist())))
+    call_component("takes odometry", lambda: subject.on_odometry(Odometry("odom", 24 * number, pose, Twist())))
 
 
 def sane(subject: Localizer) -> Belief:
     """Its belief: finite, symmetric, positive semidefinite, with weights that add up to one."""
-    belief: Belief = heard("is asked for its belief", lambda: subject.belief)
-    demand(isinstance(belief, Belief), f"believes {type(belief).__name__}, not a Belief")
+    belief: Belief = call_component("is asked for its belief", lambda: subject.belief)
+    require(isinstance(belief, Belief), f"believes {type(belief).__name__}, not a Belief")
     covariance, particles = belief.covariance, belief.particles
-    demand(np.isfinite([*belief.pose, *belief.map_from_odom]).all(), f"believes to be at {belief.pose}")
-    demand(
+    require(np.isfinite([*belief.pose, *belief.map_from_odom]).all(), f"believes to be at {belief.pose}")
+    require(
         covariance.shape == (3, 3) and np.isfinite(covariance).all(), "believes with a covariance that is not finite"
     )
-    demand(np.allclose(covariance, covariance.T), "believes with a covariance that is not symmetric")
+    require(np.allclose(covariance, covariance.T), "believes with a covariance that is not symmetric")
     least = float(np.linalg.eigvalsh(covariance).min())
-    demand(least >= -1e-9 * float(np.trace(covariance)), "believes with a covariance that is not positive semidefinite")
-    demand(
+    require(
+        least >= -1e-9 * float(np.trace(covariance)), "believes with a covariance that is not positive semidefinite"
+    )
+    require(
         particles.shape[1:] == (4,) and np.isfinite(particles).all(),
         "believes with particles that are not finite (n, 4)",
     )
     weight = float(particles[:, 3].sum())
-    demand(not len(particles) or abs(weight - 1) < 1e-9, f"believes with weights that add up to {weight:g}")
+    require(not len(particles) or abs(weight - 1) < 1e-9, f"believes with weights that add up to {weight:g}")
     return belief
 
 

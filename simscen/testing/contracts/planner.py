@@ -10,9 +10,17 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
-from simscen.testing.contracts.component import ComponentContract, copied, heard, same, scribble, view_of
+from simscen.testing.contracts.base import (
+    ComponentContract,
+    call_component,
+    copy_costmap,
+    equal_costmaps,
+    overwrite_costmap,
+    promise,
+    require,
+    view_of,
+)
 from simscen.testing.flatland import Flatland
-from simscen.testing.promise import demand, promise
 
 START, GOAL = Pose2(1.5, 1.5, 0.3), Pose2(10.0, 5.5, 0.5)
 APART = 0.1
@@ -47,18 +55,18 @@ class PlannerContract(ComponentContract):
 
     def view(self) -> CostmapView:
         """The costmap of the house, in arrays of its own."""
-        return copied(_house_for(self.robot))
+        return copy_costmap(_house_for(self.robot))
 
     def planned(
         self, planner: Planner, view: CostmapView, seed: int, ends: tuple[Pose2, Pose2] = (START, GOAL)
     ) -> Array:
         """The points of a plan, looked at for shape and finiteness."""
-        path = heard("plans", lambda: planner.plan(view, *ends, seed))
-        demand(isinstance(path, Path), f"returns {type(path).__name__}, not a Path")
+        path = call_component("plans", lambda: planner.plan(view, *ends, seed))
+        require(isinstance(path, Path), f"returns {type(path).__name__}, not a Path")
         points = path.points
-        demand(isinstance(points, np.ndarray) and points.ndim == 2 and points.shape[1] == 3, "points are not (n, 3)")
-        demand(len(points) > 0, "returns a path without points instead of failing with NO_VALID_PATH")
-        demand(points.dtype == np.float64 and np.isfinite(points).all(), "points are no finite float64 numbers")
+        require(isinstance(points, np.ndarray) and points.ndim == 2 and points.shape[1] == 3, "points are not (n, 3)")
+        require(len(points) > 0, "returns a path without points instead of failing with NO_VALID_PATH")
+        require(points.dtype == np.float64 and np.isfinite(points).all(), "points are no finite float64 numbers")
         return points
 
     @promise
@@ -67,9 +75,9 @@ class PlannerContract(ComponentContract):
         for seed in (1, 2, 3):
             points = self.planned(self.built(), self.view(), seed)
             off = float(np.hypot(*(points[0, :2] - START[:2])))
-            demand(off < 1e-9, f"the path begins {off:.3f} m from the start")
+            require(off < 1e-9, f"the path begins {off:.3f} m from the start")
             off = float(np.hypot(*(points[-1, :2] - GOAL[:2])))
-            demand(
+            require(
                 off <= self.spec.tolerance,
                 f"the path ends {off:.3f} m from the goal, tolerance {self.spec.tolerance:g}",
             )
@@ -78,7 +86,7 @@ class PlannerContract(ComponentContract):
     def points_are_at_most_a_tenth_of_a_meter_apart(self) -> None:
         """Given success then no two points that follow each other are further apart than 0.1 m."""
         widest = float(np.hypot(*np.diff(self.planned(self.built(), self.view(), 1)[:, :2], axis=0).T).max())
-        demand(widest <= APART + 1e-9, f"two points are {widest:.3f} m apart")
+        require(widest <= APART + 1e-9, f"two points are {widest:.3f} m apart")
 
     @promise
     def the_footprint_is_never_on_a_lethal_cell(self) -> None:
@@ -89,7 +97,7 @@ class PlannerContract(ComponentContract):
             points = self.planned(self.built(), view, seed)
             bad = ~footprint.free(view, points)
             bad[0] = False
-            demand(not bad.any(), f"the robot does not fit at {points[bad.argmax()].round(3).tolist()} (x, y, yaw)")
+            require(not bad.any(), f"the robot does not fit at {points[bad.argmax()].round(3).tolist()} (x, y, yaw)")
 
     @promise
     def what_cannot_be_fails_with_its_code(self) -> None:
@@ -98,9 +106,9 @@ class PlannerContract(ComponentContract):
             try:
                 self.planned(self.built(), self.view(), 1, (start, goal))
             except NavigationFailure as failure:
-                demand(failure.code == code, f"fails with {failure.code.name}, not with {code.name}")
+                require(failure.code == code, f"fails with {failure.code.name}, not with {code.name}")
             else:
-                demand(False, f"finds a path where {code.name} is the only answer")
+                require(False, f"finds a path where {code.name} is the only answer")
 
     @promise
     def the_same_seed_gives_the_same_path_bit_for_bit_whatever_was_planned_before(self) -> None:
@@ -108,15 +116,15 @@ class PlannerContract(ComponentContract):
         one = self.planned(self.built(), self.view(), 7)
         again = self.built()
         self.planned(again, self.view(), 3, (GOAL, START))
-        demand(np.array_equal(self.planned(again, self.view(), 7), one), "two paths from the same seed differ")
+        require(np.array_equal(self.planned(again, self.view(), 7), one), "two paths from the same seed differ")
 
     @promise
     def a_costmap_is_neither_changed_nor_kept(self) -> None:
         """Given a costmap then it is not changed, and what becomes of it later changes no later plan."""
         planner, view, untouched = self.built(), self.view(), self.view()
         first = self.planned(planner, view, 1)
-        demand(same(view, untouched), "the costmap is not what it was before planning")
+        require(equal_costmaps(view, untouched), "the costmap is not what it was before planning")
         kept = first.copy()
-        scribble(view)
-        demand(np.array_equal(self.planned(planner, untouched, 1), kept), "an old costmap shows in a new plan")
-        demand(np.array_equal(first, kept), "a path changes after it was returned")
+        overwrite_costmap(view)
+        require(np.array_equal(self.planned(planner, untouched, 1), kept), "an old costmap shows in a new plan")
+        require(np.array_equal(first, kept), "a path changes after it was returned")

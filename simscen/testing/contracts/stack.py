@@ -17,9 +17,8 @@ from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Decision
 from simscen.stack.protocols import RobotModel, Stack, Surroundings
 from simscen.stack.setting import Setting
-from simscen.testing.contracts.component import heard
+from simscen.testing.contracts.base import Contract, call_component, promise, require
 from simscen.testing.flatland import CONTROL, RATE, Drive, Flatland, round_robot
-from simscen.testing.promise import Contract, demand, promise
 
 START, NEAR, FAR = Pose2(1, 2), Goal("near", Pose2(1.8, 2.0, 0.0)), Goal("far", Pose2(5, 2, 0.0))
 ASIDE = Goal("aside", Pose2(1.5, 3.2, 1.5))
@@ -35,15 +34,15 @@ class Heard:
     def decide(self, tick: int, readings: Readings) -> Decision:
         """The stack's decision."""
         ranges = [reading.ranges.copy() for reading in readings if isinstance(reading, Scan)]
-        decision = heard("decides", lambda: self.stack.decide(tick, readings))
-        demand(isinstance(decision, Decision), f"decides {type(decision).__name__}, not a Decision")
-        demand(all(map(math.isfinite, decision.command)), f"commands {tuple(decision.command)}")
+        decision = call_component("decides", lambda: self.stack.decide(tick, readings))
+        require(isinstance(decision, Decision), f"decides {type(decision).__name__}, not a Decision")
+        require(all(map(math.isfinite, decision.command)), f"commands {tuple(decision.command)}")
         scans = [reading for reading in readings if isinstance(reading, Scan)]
         unchanged = all(np.array_equal(a, b.ranges, equal_nan=True) for a, b in zip(ranges, scans, strict=True))
-        demand(unchanged, "the ranges of a scan are not what they were")
+        require(unchanged, "the ranges of a scan are not what they were")
         for event in decision.events:
-            demand(isinstance(event, Event) and isinstance(event.kind, EventKind), f"tells of {event!r}")
-            demand(event.tick == tick, f"tells at tick {tick} of {event.kind} at tick {event.tick}")
+            require(isinstance(event, Event) and isinstance(event.kind, EventKind), f"tells of {event!r}")
+            require(event.tick == tick, f"tells at tick {tick} of {event.kind} at tick {event.tick}")
         return decision
 
     def __getattr__(self, name: str) -> Any:
@@ -66,8 +65,8 @@ class StackContract(Contract):
         world.discs += discs
         around = Surroundings(robot, grid, RATE, lidars=("lidar",))
         setting = Setting(around, "stack", Streams(seed), CONTROL / RATE, estimate=Estimate(START, (0.05, 0.05, 0.02)))
-        stack = heard("is built", lambda: self.spec.implementation()(self.spec, setting))
-        heard("starts", lambda: stack.start(setting.estimate, goals))
+        stack = call_component("is built", lambda: self.spec.implementation()(self.spec, setting))
+        call_component("starts", lambda: stack.start(setting.estimate, goals))
         truth = ("odom", "ground_truth") if self.told_the_truth else ("odom",)
         return Drive(world, robot, Heard(stack), START, odometry=truth)
 
@@ -80,50 +79,50 @@ class StackContract(Contract):
     def it_reaches_a_goal_around_an_unmapped_obstacle_without_contact(self) -> None:
         """Given a goal and an obstacle in the way that is on no map then the robot gets there and touches nothing."""
         d = self.driving(FAR, discs=((3.2, 1.9, 0.25),)).run(90)
-        demand(d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / RATE:.0f} s")
+        require(d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / RATE:.0f} s")
         off = d.pose.distance(FAR.pose)
-        demand(off <= FAR.xy_tolerance, f"says that it has reached a goal that is {off:.2f} m away")
-        demand(d.least > 0, f"the hull touches something: {d.least:.3f} m")
+        require(off <= FAR.xy_tolerance, f"says that it has reached a goal that is {off:.2f} m away")
+        require(d.least > 0, f"the hull touches something: {d.least:.3f} m")
 
     @promise
     def without_a_goal_it_commands_zero(self) -> None:
         """Given no goal then it commands zero, and follows no plan."""
         d = self.driving().run(0.5)
-        demand(set(d.commands) == {STOP}, "commands a velocity without a goal")
-        demand(d.stack.goal is None and d.stack.plan is None, "has a goal or a plan without being given one")
+        require(set(d.commands) == {STOP}, "commands a velocity without a goal")
+        require(d.stack.goal is None and d.stack.plan is None, "has a goal or a plan without being given one")
 
     @promise
     def once_a_task_has_ended_it_commands_zero(self) -> None:
         """Given a task that has ended then it commands zero from that beat on."""
         d = self.driving(NEAR).run(30)
-        demand(d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / RATE:.0f} s")
+        require(d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / RATE:.0f} s")
         ended = len(d.commands) - 1
         d.run(0.5, until="")
-        demand(set(d.commands[ended:]) == {STOP}, "commands a velocity after the end of its task")
-        demand(d.stack.goal is None, "has a goal after the end of its task")
+        require(set(d.commands[ended:]) == {STOP}, "commands a velocity after the end of its task")
+        require(d.stack.goal is None, "has a goal after the end of its task")
 
     @promise
     def a_canceled_task_ends_at_once(self) -> None:
         """Given a cancel then the goal and the task end as canceled, and it commands zero from the next beat on."""
         d = self.driving(FAR, NEAR).run(2)
-        heard("is canceled", lambda: d.stack.cancel(d.tick))
+        call_component("is canceled", lambda: d.stack.cancel(d.tick))
         begun = len(d.commands)
         d.run(0.5, until="")
-        demand(set(d.commands[begun:]) == {STOP}, "commands a velocity after it was canceled")
-        demand([e.name for e in d.kinds("goal.canceled")] == ["far"], "does not tell that its goal is canceled")
-        demand([e.name for e in d.kinds("navigation.ended")] == ["CANCELED"], "does not end its task as CANCELED")
+        require(set(d.commands[begun:]) == {STOP}, "commands a velocity after it was canceled")
+        require([e.name for e in d.kinds("goal.canceled")] == ["far"], "does not tell that its goal is canceled")
+        require([e.name for e in d.kinds("navigation.ended")] == ["CANCELED"], "does not end its task as CANCELED")
 
     @promise
     def a_goal_that_preempts_is_driven_to_first(self) -> None:
         """Given another goal on the way then the current one is canceled and the other one is driven to."""
         d = self.driving(FAR).run(1)
-        heard("is preempted", lambda: d.stack.preempt(d.tick, ASIDE))
+        call_component("is preempted", lambda: d.stack.preempt(d.tick, ASIDE))
         d.run(0.5, until="")
-        demand(d.stack.goal == ASIDE, f"drives to {d.stack.goal} after it was sent to {ASIDE}")
+        require(d.stack.goal == ASIDE, f"drives to {d.stack.goal} after it was sent to {ASIDE}")
         d.run(60)
         canceled = [e.name for e in d.kinds("goal.canceled")]
-        demand(canceled == ["far"], f"tells that {canceled or 'nothing'} is canceled, not far")
-        demand([e.name for e in d.kinds("goal.reached")] == ["aside"], "does not reach the goal that it was sent to")
+        require(canceled == ["far"], f"tells that {canceled or 'nothing'} is canceled, not far")
+        require([e.name for e in d.kinds("goal.reached")] == ["aside"], "does not reach the goal that it was sent to")
 
     @promise
     def every_goal_is_accepted_once_and_ends_once(self) -> None:
@@ -131,17 +130,17 @@ class StackContract(Contract):
         d = self.driving(NEAR, Goal("never", Pose2(40.0, 0.0), timeout=3.0)).run(60)
         accepted = [e.name for e in d.kinds("goal.accepted")]
         ended = [e.name for e in d.log if e.kind in ENDINGS]
-        demand(accepted == ["near", "never"], f"accepts {accepted}, not near, then never")
-        demand(ended == ["near", "never"], f"ends {ended}, not near, then never")
-        demand([e.name for e in d.kinds("goal.failed")] == ["never"], "does not fail a goal outside the map")
-        demand([e.name for e in d.kinds("navigation.ended")] == ["FAILED"], "does not end its task once, as FAILED")
+        require(accepted == ["near", "never"], f"accepts {accepted}, not near, then never")
+        require(ended == ["near", "never"], f"ends {ended}, not near, then never")
+        require([e.name for e in d.kinds("goal.failed")] == ["never"], "does not fail a goal outside the map")
+        require([e.name for e in d.kinds("navigation.ended")] == ["FAILED"], "does not end its task once, as FAILED")
 
     @promise
     def the_same_seed_gives_the_same_drive_bit_for_bit(self) -> None:
         """Given the same readings and seed then bit-identical commands and events: no clock, no global chance."""
         one, other = (self.driving(FAR, discs=((3.2, 1.9, 0.25),)).run(6) for _ in range(2))
-        demand(one.commands == other.commands, "two drives from the same seed differ in their commands")
-        demand(one.log == other.log, "two drives from the same seed differ in their events")
+        require(one.commands == other.commands, "two drives from the same seed differ in their commands")
+        require(one.log == other.log, "two drives from the same seed differ in their events")
 
     @promise
     def a_blind_lidar_breaks_nothing(self) -> None:

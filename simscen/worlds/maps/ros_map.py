@@ -10,7 +10,7 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, Occ
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.files import require_regular_file
 from simscen.core.geometry import Pose2
-from simscen.model.rosmap import RosMapSpec
+from simscen.model.ros_map import RosMapSpec
 from simscen.worlds.maps.map_image import CODE, read_image
 
 UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 205, 254, 0

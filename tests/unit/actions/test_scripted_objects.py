@@ -10,12 +10,12 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import MotionPath
 from simscen.core.records.events import Event, EventKind
-from simscen.testing.puppetstage import PuppetStage
+from simscen.testing.fakes import FakeStage
 
 WIDE_OPEN = Pose2(0.0, 0.0, math.pi / 2)
 
 
-class Swinging(PuppetStage):
+class Swinging(FakeStage):
     def door(self, name):
         return Pose2(0.0, 0.0, 0.0), WIDE_OPEN
 
@@ -44,13 +44,13 @@ def test_a_door_that_is_reversed_on_its_way_takes_its_share_at_the_same_speed():
 
 
 def test_a_door_that_slides_moves_straight():
-    stage = PuppetStage(objects={"gate": Pose2(0.25, 0.0, 0.0)})
+    stage = FakeStage(objects={"gate": Pose2(0.25, 0.0, 0.0)})
     assert perform(stage, open={"name": "gate", "duration": 2.0}).what == "gate slides open"
     assert moved(stage) == MotionPath((0.0, 1.5), (Pose2(0.25, 0.0, 0.0), Pose2(1.0, 0.0, 0.0)))
 
 
 def test_a_sliding_door_slides_however_its_heading_is_rounded():
-    stage = PuppetStage(objects={"gate": Pose2(0.25, 0.0, 1e-15)})
+    stage = FakeStage(objects={"gate": Pose2(0.25, 0.0, 1e-15)})
     assert perform(stage, open={"name": "gate"}).what == "gate slides open"
 
 
@@ -72,7 +72,7 @@ def test_nothing_comes_of_opening_what_is_open_or_on_its_way():
 
 def test_what_stops_for_a_while_goes_on_where_it_was():
     path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)), "back_and_forth", phase=1.0)
-    stage = PuppetStage(motions={"cart": (path, 1.5)})
+    stage = FakeStage(motions={"cart": (path, 1.5)})
     assert perform(stage, stop={"name": "cart", "for": "3 s"}).what == "stopped cart for 3 s"
     again = moved(stage)
     assert [pose_at(again, t).x for t in (0.0, 3.0, 4.0, 6.0)] == pytest.approx([2.5, 2.5, 3.5, 2.5])
@@ -80,22 +80,22 @@ def test_what_stops_for_a_while_goes_on_where_it_was():
 
 def test_what_waits_for_its_start_waits_the_longer():
     path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)), start=2.0)
-    stage = PuppetStage(motions={"cart": (path, 1.5)})
+    stage = FakeStage(motions={"cart": (path, 1.5)})
     perform(stage, stop={"name": "cart", "for": 3.0})
     assert pose_at(moved(stage), 4.5) == Pose2(1.0, 0.0, 0.0)
 
 
 def test_what_stops_for_good_is_set_down_where_it_is():
     path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)))
-    stage = PuppetStage(motions={"cart": (path, 1.5)}, objects={"cart": Pose2(1.5, 0.0, 0.0)})
+    stage = FakeStage(motions={"cart": (path, 1.5)}, objects={"cart": Pose2(1.5, 0.0, 0.0)})
     assert perform(stage, stop={"name": "cart"}).happened
     assert stage.done == [("place", "cart", Pose2(1.5, 0.0, 0.0))]
-    assert not perform(PuppetStage(), stop={"name": "cart"}).happened
-    assert not perform(PuppetStage(objects={"cart": None}), stop={"name": "cart"}).happened
+    assert not perform(FakeStage(), stop={"name": "cart"}).happened
+    assert not perform(FakeStage(objects={"cart": None}), stop={"name": "cart"}).happened
 
 
 def test_a_force_is_the_impulse_that_it_adds_up_to_over_its_time():
-    stage = PuppetStage()
+    stage = FakeStage()
     assert (
         perform(stage, push={"force": ["0.01 kN", 0], "for": "1.5 s"}).what == "pushed the robot with 10.0 N for 1.5 s"
     )
@@ -103,15 +103,15 @@ def test_a_force_is_the_impulse_that_it_adds_up_to_over_its_time():
     assert stage.done == [("push", (15.0, 0.0), None, 1.5), ("push", (0.0, 5.0), "bin", 0.0)]
 
 
-class Heavy(PuppetStage):
+class Heavy(FakeStage):
     def mass(self, name):
         return 0.0
 
 
 def test_nothing_comes_of_a_push_on_nothing_or_on_what_cannot_be_pushed():
-    assert not perform(PuppetStage(objects={"bin": None}), push={"impulse": [0, 5], "name": "bin"}).happened
+    assert not perform(FakeStage(objects={"bin": None}), push={"impulse": [0, 5], "name": "bin"}).happened
     assert not perform(Heavy(), push={"impulse": [0, 5], "name": "bin"}).happened
-    assert not perform(PuppetStage(), push={"impulse": [0, 0]}).happened
+    assert not perform(FakeStage(), push={"impulse": [0, 0]}).happened
 
 
 @pytest.mark.parametrize(
@@ -128,15 +128,15 @@ def test_what_is_no_push_is_refused(told, said):
 
 
 def test_teleport_sets_an_object_down_and_says_how_far():
-    stage = PuppetStage(objects={"bin": Pose2(1.0, 1.0, 0.0)})
+    stage = FakeStage(objects={"bin": Pose2(1.0, 1.0, 0.0)})
     effect = perform(stage, teleport={"name": "bin", "pose": {"x": 4, "y": 5}})
     assert effect.what == "set bin down 5.00 m away, at (4.00, 5.00)"
     assert stage.done == [("place", "bin", Pose2(4.0, 5.0, 0.0))]
     assert not perform(stage, teleport={"name": "bin", "pose": {"x": 1, "y": 1}}).happened
-    assert not perform(PuppetStage(objects={"bin": None}), teleport={"name": "bin", "pose": {"x": 1, "y": 1}}).happened
+    assert not perform(FakeStage(objects={"bin": None}), teleport={"name": "bin", "pose": {"x": 1, "y": 1}}).happened
 
 
 def test_a_mark_is_written_down():
-    stage = PuppetStage()
+    stage = FakeStage()
     perform(stage, mark={"name": "in the aisle", "note": "sees the rack"})
     assert stage.done == [("tell", Event(0, EventKind.MARK, "in the aisle", {"note": "sees the rack"}))]

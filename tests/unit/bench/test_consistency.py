@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from filterpy.stats import NEES
 
-from simscen.bench.localization.consistency import anees, bounds, bounds_over, nees, within_bounds
+from simscen.bench.localization.trial import anees, bounds, bounds_over, nees, within_bounds
 from simscen.core.geometry import Array
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from simscen.bench.navigation import corridors
-from simscen.bench.navigation.experiment import with_stack_parameters
+from simscen.bench.navigation.experiments import with_stack_parameters
 from simscen.bench.navigation.office_maps import FREE, building, write_building
 from simscen.bench.navigation.random_goals import FAULTS, MOVABLE, ROOM, degraded, random_drives, random_goals
 from simscen.core.environment.world_model import BuiltWorld, World

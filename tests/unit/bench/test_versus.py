@@ -1,8 +1,7 @@
 import pytest
 from finishedruns import ARRIVED, HIT, run
 
-from simscen.bench.navigation.comparison import compare_drives
-from simscen.bench.navigation.summary import Trial, over_worlds, summarize
+from simscen.bench.navigation.summary import Trial, compare_drives, over_worlds, summarize
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.core.statistics import wilson_interval

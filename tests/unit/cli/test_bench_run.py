@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from simscen.bench.navigation import corridors
-from simscen.bench.navigation.experiment import Experiment
+from simscen.bench.navigation.experiments import Experiment
 from simscen.cli.benchmarks.navigation import with_stack
 from simscen.cli.benchmarks.navigation_runs import _planned
 

@@ -3,8 +3,7 @@ from dataclasses import replace
 
 from simscen.bench.localization.campaign import SURE, Share, Sureness
 from simscen.bench.localization.campaign import Row as Numbers
-from simscen.bench.navigation.comparison import Difference, DriveComparison
-from simscen.bench.navigation.summary import Row
+from simscen.bench.navigation.summary import Difference, DriveComparison, Row
 from simscen.cli.benchmarks.localization import SHARES
 from simscen.cli.benchmarks.localization import as_text as localization
 from simscen.cli.benchmarks.navigation_runs import Localized, Measured

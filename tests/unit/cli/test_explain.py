@@ -5,7 +5,7 @@ from pydantic import ValidationError
 
 import simscen as package
 from simscen.cli.catalog import reference_topics
-from simscen.cli.catalog.reference_topics import NAV2, OF_OTHERS, known_names
+from simscen.cli.catalog.reference_topics import EXTERNAL_ONLY_CODES, NAV2_ERROR_CODES, known_names
 from simscen.cli.commands import explain
 from simscen.cli.commands.explain import explained
 from simscen.core.errors import Exit
@@ -47,11 +47,11 @@ def test_a_code_with_which_nothing_in_the_reference_stack_ends_is_told_as_one_of
     stack = Path(package.__file__).parent / "stack"
     sources = [path.read_text(encoding="utf-8") for path in stack.rglob("*.py")]
     named = {code for code in ErrorCode if any(f"ErrorCode.{code.name}" in text for text in sources)}
-    assert set(ErrorCode) - named - {ErrorCode.NONE} <= OF_OTHERS
+    assert set(ErrorCode) - named - {ErrorCode.NONE} <= EXTERNAL_ONLY_CODES
 
 
 def test_no_robot_is_without_reverse_so_that_none_is_told_to_do_what_it_cannot() -> None:
-    assert ErrorCode.BACKUP_INVALID_INPUT in OF_OTHERS
+    assert ErrorCode.BACKUP_INVALID_INPUT in EXTERNAL_ONLY_CODES
     base = {"linear": 1.0, "angular": 1.0, "linear_acceleration": 1.0, "angular_acceleration": 1.0}
     assert Limits.model_validate({**base, "reverse": 0.1}).reverse == 0.1
     with pytest.raises(ValidationError, match="reverse"):
@@ -122,5 +122,5 @@ def test_every_topic_every_key_and_every_code_is_explained(monkeypatch) -> None:
 
 
 def test_every_code_of_nav2_and_of_the_command_line_has_a_text() -> None:
-    assert set(NAV2) == set(ErrorCode)
+    assert set(NAV2_ERROR_CODES) == set(ErrorCode)
     assert {f"exit {code.value}" for code in Exit} <= set(known_names())

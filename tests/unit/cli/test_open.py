@@ -6,7 +6,7 @@ from urllib.parse import unquote, urlparse
 
 import pytest
 
-from simscen.cli.session import live_page
+from simscen.cli.session import output_files
 from simscen.core.records.session_events import SessionEvent
 
 SCENARIO = """\
@@ -39,13 +39,13 @@ def test_the_page_opens_at_once_follows_the_runs_and_becomes_the_report(
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     seen: list[str] = []
 
-    class Watched(live_page.LivePage):
+    class Watched(output_files.LivePage):
         def __call__(self, event: SessionEvent) -> None:
             super().__call__(event)
             seen.append((tmp_path / "out/report.html").read_text(encoding="utf-8"))
 
-    monkeypatch.setattr(live_page, "LEAST_PAUSE", 0.0)
-    monkeypatch.setattr(live_page, "SHARE", 0)
+    monkeypatch.setattr(output_files, "LEAST_PAUSE", 0.0)
+    monkeypatch.setattr(output_files, "SHARE", 0)
     monkeypatch.setattr("simscen.cli.session.run_session.LivePage", Watched)
     ended = simscen("run", "a.scenario.yaml", "--repeat", "2", "--out", "out", "--open", "-j", "1")
     assert (ended.code, ended.err) == (0, "")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.session.watch import Report, Watching, stamps_of
+from simscen.cli.session.watch import WatchReporter, WatchState, file_stamps
 from simscen.core.errors import Exit, Problem
 
 
@@ -19,8 +19,8 @@ def files(tmp_path: Path):
 
 
 @pytest.fixture
-def watching(files: Path) -> Watching:
-    found = Watching(lambda: sorted(files.glob("*.scenario.yaml")), [files])
+def watching(files: Path) -> WatchState:
+    found = WatchState(lambda: sorted(files.glob("*.scenario.yaml")), [files])
     found.begin([files])
     for name, others in (("a", ["room", "robot"]), ("b", ["robot"])):
         scenario = str(files / f"{name}.scenario.yaml")
@@ -38,11 +38,11 @@ def names(paths) -> str:
 @pytest.mark.parametrize(
     ("saved", "told"), [("room.yaml", "a"), ("robot.yaml", "a b"), ("b.scenario.yaml", "b"), ("notes.txt", "")]
 )
-def test_what_a_file_is_part_of_runs_again(watching: Watching, files: Path, saved: str, told: str) -> None:
+def test_what_a_file_is_part_of_runs_again(watching: WatchState, files: Path, saved: str, told: str) -> None:
     assert names(watching.touched({files / saved})) == told
 
 
-def test_a_new_scenario_runs_and_a_removed_one_is_forgotten(watching: Watching, files: Path) -> None:
+def test_a_new_scenario_runs_and_a_removed_one_is_forgotten(watching: WatchState, files: Path) -> None:
     (files / "new.scenario.yaml").write_text("")
     (files / "b.scenario.yaml").unlink()
     assert names(watching.touched({files})) == "new"
@@ -50,18 +50,18 @@ def test_a_new_scenario_runs_and_a_removed_one_is_forgotten(watching: Watching, 
     assert watching.failed == []
 
 
-def test_what_did_not_pass_is_known_until_it_runs_again(watching: Watching, files: Path) -> None:
+def test_what_did_not_pass_is_known_until_it_runs_again(watching: WatchState, files: Path) -> None:
     assert names(watching.failed) == "b"
     watching.begin([files / "b.scenario.yaml"])
     assert watching.failed == []
 
 
 def test_a_session_that_a_mistake_kept_from_running_is_tried_again_with_what_was_touched(
-    watching: Watching, files: Path
+    watching: WatchState, files: Path
 ) -> None:
     watching.begin([files / "b.scenario.yaml"])
     report = io.StringIO()
-    Report(report).mistakes([Problem(str(files / "world.yaml"), 1, 1, "SC012", "unknown key")])
+    WatchReporter(report).mistakes([Problem(str(files / "world.yaml"), 1, 1, "SC012", "unknown key")])
     watching.learn(report.getvalue())
     watching.end(Exit.USAGE)
     assert files / "world.yaml" in watching.files
@@ -71,10 +71,10 @@ def test_a_session_that_a_mistake_kept_from_running_is_tried_again_with_what_was
 
 def test_a_file_that_is_saved_has_another_stamp_also_when_it_comes_or_goes(files: Path) -> None:
     file = files / "a.scenario.yaml"
-    stamps = [stamps_of([file])]
+    stamps = [file_stamps([file])]
     (files / "part").write_text("another")
     (files / "part").rename(file)
-    stamps.append(stamps_of([file]))
+    stamps.append(file_stamps([file]))
     file.unlink()
-    stamps.append(stamps_of([file]))
+    stamps.append(file_stamps([file]))
     assert stamps[0] != stamps[1] != stamps[2] == {file: None}

@@ -9,14 +9,14 @@ from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 HIT = [[4.5, "collision.started", "cart", {"x": 1.0, "impulse": 2.0}]]
 NOTHING = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
 
 
 def verdict(words, trace):
-    (found,) = judge([AnyCriterion.model_validate({"collisions": words})], trace, sketch_case({}))
+    (found,) = judge([AnyCriterion.model_validate({"collisions": words})], trace, synthetic_case({}))
     return found
 
 
@@ -28,24 +28,24 @@ def sparse(trace, seconds):
 
 @pytest.mark.parametrize(("stops", "status"), [(5.0, Status.FAIL), (3.0, Status.PASS)])
 def test_where_samples_are_rare_the_newest_one_before_a_contact_says_whose_fault_it_was(stops, status):
-    trace = sketch({"seconds": 8, "truth": [[0, 0, 0], [stops, 2, 0], [8, 2, 0]], "events": HIT})
+    trace = synthetic_trace({"seconds": 8, "truth": [[0, 0, 0], [stops, 2, 0], [8, 2, 0]], "events": HIT})
     assert verdict({"caused_by_robot": True}, sparse(trace, 1)).status is status
 
 
 def test_a_contact_before_the_first_sample_is_judged_by_that():
-    trace = sketch({"seconds": 8, "truth": [[0, 0, 0], [8, 4, 0]], "events": [[0.01, *HIT[0][1:]]]})
+    trace = synthetic_trace({"seconds": 8, "truth": [[0, 0, 0], [8, 4, 0]], "events": [[0.01, *HIT[0][1:]]]})
     late = replace(trace, velocity=Samples(trace.velocity.ticks[40:], trace.velocity.values[40:]))
     assert verdict({"caused_by_robot": True}, late).status is Status.FAIL
 
 
 def test_without_a_velocity_nobody_knows_whose_fault_it_was():
-    trace = replace(sketch({"seconds": 8, "truth": [[0, 0, 0]], "events": HIT}), velocity=NOTHING)
+    trace = replace(synthetic_trace({"seconds": 8, "truth": [[0, 0, 0]], "events": HIT}), velocity=NOTHING)
     assert verdict({"caused_by_robot": True}, trace).status is Status.INCONCLUSIVE
     assert verdict({}, trace).status is Status.FAIL
 
 
 def test_contacts_are_counted_without_a_truth_but_none_is_no_proof():
-    trace = replace(sketch({"seconds": 8, "truth": [[0, 0, 0]], "events": HIT}), truth=NOTHING)
+    trace = replace(synthetic_trace({"seconds": 8, "truth": [[0, 0, 0]], "events": HIT}), truth=NOTHING)
     assert verdict({}, trace).status is Status.FAIL
     assert verdict({}, trace).findings[0].detail == ("t = 4.50 s: touched cart, 2.0 N s",)
     assert verdict({"max": 1}, trace).status is Status.PASS
@@ -53,19 +53,21 @@ def test_contacts_are_counted_without_a_truth_but_none_is_no_proof():
 
 
 def test_something_seen_at_half_a_place_is_not_placed():
-    trace = sketch({"seconds": 8, "truth": [[0, 0, 0]], "events": [[1, "collision.started", "cart", {"y": 1.0}]]})
+    trace = synthetic_trace(
+        {"seconds": 8, "truth": [[0, 0, 0]], "events": [[1, "collision.started", "cart", {"y": 1.0}]]}
+    )
     assert verdict({}, trace).findings[0].detail == ("t = 1.00 s: touched cart",)
 
 
 @pytest.mark.parametrize(("speed", "status"), [(0.1, Status.PASS), (0.10001, Status.FAIL)])
 def test_up_to_a_tenth_of_a_meter_a_second_is_standing(speed, status):
-    trace = sketch({"seconds": 8, "truth": [[0, 0, 0]], "events": HIT})
+    trace = synthetic_trace({"seconds": 8, "truth": [[0, 0, 0]], "events": HIT})
     trace.velocity.values[:, 0] = speed
     assert verdict({"caused_by_robot": True}, trace).status is status
 
 
 def test_what_it_did_later_says_nothing_of_a_contact_before_the_first_sample():
-    trace = sketch({"seconds": 8, "truth": [[0, 0, 0]], "events": [[0.01, *HIT[0][1:]]]})
+    trace = synthetic_trace({"seconds": 8, "truth": [[0, 0, 0]], "events": [[0.01, *HIT[0][1:]]]})
     trace.velocity.values[41:, 0] = 1.0
     late = replace(trace, velocity=Samples(trace.velocity.ticks[40:], trace.velocity.values[40:]))
     assert verdict({"caused_by_robot": True}, late).status is Status.PASS

@@ -15,8 +15,8 @@ from simscen.core.records.verdict import Status
 from simscen.criteria.findings import InvalidTrace, at_least, at_most, counted
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.spec.lazy import annotation_of
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.spec.lazy_spec import annotation_of
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 CHOICES = AnyCriterion.choices()
 HEADINGS = ["What is measured:", "When it fails:", "Why this:", "Source:", "Example:"]
@@ -59,7 +59,7 @@ def test_its_docstring_answers_the_four_questions_and_gives_an_example_that_load
 
 @pytest.mark.parametrize("kind", CHOICES)
 def test_the_same_trace_gives_the_same_findings_and_at_least_one(kind):
-    criterion, trace, case = example(kind).chosen, sketch(DRIVE), sketch_case(CASE)
+    criterion, trace, case = example(kind).chosen, synthetic_trace(DRIVE), synthetic_case(CASE)
     first, second = criterion.judge(trace, case), criterion.judge(trace, case)
     assert first
     assert first == second
@@ -68,7 +68,7 @@ def test_the_same_trace_gives_the_same_findings_and_at_least_one(kind):
 def test_a_margin_has_the_sign_of_the_status():
     measured = set()
     for kind in CHOICES:
-        for finding in example(kind).chosen.judge(sketch(DRIVE), sketch_case(CASE)):
+        for finding in example(kind).chosen.judge(synthetic_trace(DRIVE), synthetic_case(CASE)):
             if finding.margin is not None:
                 measured.add(kind)
                 assert (finding.status is Status.PASS) == (finding.margin >= 0)
@@ -77,13 +77,13 @@ def test_a_margin_has_the_sign_of_the_status():
 
 @pytest.mark.parametrize("kind", CHOICES)
 def test_on_a_log_that_was_cut_off_nothing_passes(kind):
-    (verdict,) = judge([example(kind)], sketch({**DRIVE, "ended": None}), sketch_case(CASE))
+    (verdict,) = judge([example(kind)], synthetic_trace({**DRIVE, "ended": None}), synthetic_case(CASE))
     assert verdict.status is not Status.PASS
 
 
 def nothing_in(seconds):
     """A whole log, to its proper end, in which nothing was recorded."""
-    trace = sketch({"seconds": seconds, "truth": [[0, 0, 0]], "belief": None, "scans": []})
+    trace = synthetic_trace({"seconds": seconds, "truth": [[0, 0, 0]], "belief": None, "scans": []})
     none = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     far = Samples(none.ticks, np.empty((0, 1)))
     return replace(trace, truth=none, velocity=none, clearance=far, odometry=none, command=none)
@@ -93,14 +93,14 @@ def nothing_in(seconds):
 @pytest.mark.parametrize("seconds", [0, 8])
 @pytest.mark.parametrize("case", [CASE, {}], ids=["with goals", "without goals"])
 def test_a_whole_log_with_nothing_in_it_is_never_a_pass_nor_a_crash(kind, seconds, case):
-    (verdict,) = judge([example(kind)], nothing_in(seconds), sketch_case(case))
+    (verdict,) = judge([example(kind)], nothing_in(seconds), synthetic_case(case))
     assert verdict.status in (Status.FAIL, Status.INCONCLUSIVE), verdict
 
 
 @pytest.mark.parametrize("kind", ["path_length", "speed", "stopped_within", "localization_error", "goals_reached"])
 def test_a_nan_in_the_truth_is_an_error_that_names_the_time(kind):
     truth = [[0, 0, 0], [4, 2, math.nan], [4.1, 2, 0.5], [8, 2.5, 0.5]]
-    (verdict,) = judge([example(kind)], sketch({**DRIVE, "truth": truth}), sketch_case(CASE))
+    (verdict,) = judge([example(kind)], synthetic_trace({**DRIVE, "truth": truth}), synthetic_case(CASE))
     assert verdict.status is Status.ERROR
     assert re.search(r"not finite at t = [\d.]+ s", verdict.findings[0].measured)
 

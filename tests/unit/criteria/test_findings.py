@@ -5,7 +5,7 @@ import math
 import pytest
 
 from simscen.criteria.findings import at_least, at_most, counted, missed, quantity
-from simscen.testing.sketch import sketch
+from simscen.testing.synthetic_trace import synthetic_trace
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_counts_are_words():
 
 
 def test_a_place_is_that_of_the_moment():
-    trace = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 4, 2]]})
+    trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 4, 2]]})
     finding = missed("x", "a", "b", (trace, 480), ["why"])
     assert (finding.tick, finding.place, finding.detail) == (480, (2.0, 1.0), ("why",))
 

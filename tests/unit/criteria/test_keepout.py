@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 SQUARE = [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]]
 NOTCHED = [[0, 0], [3, 0], [3, 3], [1.6, 3], [1.6, 1], [1.4, 1], [1.4, 3], [0, 3]]
@@ -18,8 +18,8 @@ NOTCHED = [[0, 0], [3, 0], [3, 3], [1.6, 3], [1.6, 1], [1.4, 1], [1.4, 3], [0, 3
 
 def judged(region, truth, footprint=SQUARE, seconds=10, distance=0.0, events=(), radius=0.2):
     entry = AnyCriterion.model_validate({"keepout": {"region": "wet", "distance": distance}})
-    trace = sketch({"seconds": seconds, "truth": truth, "events": events})
-    case = sketch_case({"regions": {"wet": region}, "footprint": footprint, "inscribed_radius": radius})
+    trace = synthetic_trace({"seconds": seconds, "truth": truth, "events": events})
+    case = synthetic_case({"regions": {"wet": region}, "footprint": footprint, "inscribed_radius": radius})
     (verdict,) = judge([entry], trace, case)
     (finding,) = verdict.findings
     return finding

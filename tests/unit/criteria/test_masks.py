@@ -15,7 +15,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 SEEDS = st.integers(0, 2**32 - 1)
 LONG = [[-0.4, -0.1], [0.3, -0.2], [0.5, 0.0], [0.3, 0.2], [-0.4, 0.1]]
@@ -30,12 +30,12 @@ def mask_of(chance, values, share):
 
 def judged(criterion, grid, truth, footprint=(), seconds=10.0):
     mask = mask_blocks(grid)
-    case = sketch_case({
+    case = synthetic_case({
         "footprint": footprint,
         "inscribed_radius": 0.2,
         "masks": {"a.yaml": {"resolution": mask.resolution, "origin": list(mask.origin), "blocks": mask.blocks}},
     })  # fmt: skip
-    trace = sketch({"seconds": seconds, "truth": truth})
+    trace = synthetic_trace({"seconds": seconds, "truth": truth})
     (verdict,) = judge([AnyCriterion.model_validate(criterion)], trace, case)
     return verdict.findings, trace
 
@@ -123,12 +123,12 @@ def test_the_speed_is_judged_by_the_cell_that_the_robot_truly_is_in(seed, grace)
 
 
 def test_a_mask_that_the_log_does_not_have_is_no_pass():
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     for criterion in (
         {"keepout": {"mask": "b.yaml"}},
         {"speed": {"mask": {"file": "b.yaml", "type": "absolute"}}},
     ):
-        (verdict,) = judge([AnyCriterion.model_validate(criterion)], trace, sketch_case({}))
+        (verdict,) = judge([AnyCriterion.model_validate(criterion)], trace, synthetic_case({}))
         assert [(f.status, f.measured) for f in verdict.findings] == [
             (Status.INCONCLUSIVE, "the log has no mask `b.yaml`")
         ]

@@ -9,7 +9,7 @@ from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 CASE = {"goals": [{"name": "a", "pose": [4, 0]}], "shortest": {"a": 4.0}}
 REACHED = [[0, "goal.accepted", "a"], [4, "goal.reached", "a"]]
@@ -19,8 +19,8 @@ def found(words, events=REACHED, case=CASE, step=0.5, steps=8):
     """What path_length says of a straight drive in a few exact steps, one each half second."""
     ticks = np.arange(steps + 1, dtype=np.int64) * 120
     way = np.column_stack((step * np.arange(steps + 1), np.zeros((steps + 1, 2))))
-    trace = replace(sketch({"seconds": 4, "truth": [[0, 0, 0]], "events": events}), truth=Samples(ticks, way))
-    (verdict,) = judge([AnyCriterion.model_validate({"path_length": words})], trace, sketch_case(case))
+    trace = replace(synthetic_trace({"seconds": 4, "truth": [[0, 0, 0]], "events": events}), truth=Samples(ticks, way))
+    (verdict,) = judge([AnyCriterion.model_validate({"path_length": words})], trace, synthetic_case(case))
     (finding,) = verdict.findings
     return finding
 

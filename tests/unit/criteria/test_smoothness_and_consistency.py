@@ -11,13 +11,13 @@ from simscen.core.statistics import nees_mean_bounds
 from simscen.criteria.localization_consistency import LocalizationConsistency
 from simscen.criteria.smoothness import Smoothness
 from simscen.criteria.trace_signals.sparc_ldlj import sparc
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
-CASE = sketch_case({})
+CASE = synthetic_case({})
 
 
 def with_speeds(speeds):
-    trace = sketch({"seconds": (len(speeds) - 1) * 0.025, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": (len(speeds) - 1) * 0.025, "truth": [[0, 0, 0]]})
     zero = np.zeros(len(speeds))
     return replace(trace, velocity=Samples(trace.truth.ticks, np.column_stack((speeds, zero, zero))))
 
@@ -44,7 +44,7 @@ def test_two_samples_have_a_spectrum():
 
 
 def test_without_velocities_nothing_is_smooth():
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     every = Smoothness(max_acceleration=1.0, max_jerk=1.0, max_mean_jerk=1.0, min_sparc=-1.0, min_ldlj=-1.0)
     findings = every.judge(replace(trace, velocity=nothing), CASE)
@@ -57,7 +57,7 @@ def test_smoothness_needs_a_bound():
 
 
 def believing(seconds, covariances, offset=0.1):
-    trace = sketch({"seconds": seconds, "truth": [[0, 0, 0]], "belief": {"offset": [offset, 0, 0]}})
+    trace = synthetic_trace({"seconds": seconds, "truth": [[0, 0, 0]], "belief": {"offset": [offset, 0, 0]}})
     values = trace.belief.values.copy()
     values[:, 3:9] = covariances
     return replace(trace, belief=Samples(trace.belief.ticks, values))

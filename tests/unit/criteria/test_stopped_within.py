@@ -9,7 +9,7 @@ from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 MOVING, STILL = 0.5, 0.0
 
@@ -22,11 +22,11 @@ def found(speeds, *faults, turning=0.0, scans=(), **words):
         events += [] if end is None else [[end, "fault.ended", "lidar.off"]]
     ticks = np.arange(len(speeds), dtype=np.int64) * 24
     velocity = np.column_stack((speeds, np.zeros(len(speeds)), np.full(len(speeds), turning)))
-    trace = sketch({"seconds": (len(speeds) - 1) / 10, "truth": [[0, 0, 0]], "events": events})
+    trace = synthetic_trace({"seconds": (len(speeds) - 1) / 10, "truth": [[0, 0, 0]], "events": events})
     seen = np.array([round(t * 240) for t in scans], dtype=np.int64)
     trace = replace(trace, velocity=Samples(ticks, velocity), scans=seen)
     entry = AnyCriterion.model_validate({"stopped_within": {"time": 0.5, "after": "lidar.off", **words}})
-    (verdict,) = judge([entry], trace, sketch_case({}))
+    (verdict,) = judge([entry], trace, synthetic_case({}))
     return verdict.findings
 
 

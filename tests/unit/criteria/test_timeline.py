@@ -1,7 +1,7 @@
 import pytest
 
 from simscen.criteria.timeline import Span, spans
-from simscen.testing.sketch import sketch
+from simscen.testing.synthetic_trace import synthetic_trace
 
 SECOND = 240
 
@@ -9,7 +9,7 @@ SECOND = 240
 def happened(*events):
     kinds = {"+": "fault.started", "-": "fault.ended"}
     listed = [[at, kinds[sign], "lidar.off", {"entry": entry}] for at, sign, entry in events]
-    return spans(sketch({"seconds": 20, "truth": [[0, 0, 0]], "events": listed}), "lidar.off")
+    return spans(synthetic_trace({"seconds": 20, "truth": [[0, 0, 0]], "events": listed}), "lidar.off")
 
 
 def lasted(start, end):

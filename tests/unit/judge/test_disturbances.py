@@ -9,7 +9,7 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.judge.disturbances import disturbance_outcomes
 from simscen.judge.result_json import from_json, to_json
 from simscen.judge.run_result import judge_run
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 WORDS = {"seconds": 10, "truth": [[0, 0, 0], [10, 5, 0]]}
 EVENT = {"name": "pallet falls", "kind": "event", "when": "time: 3 s", "line": 7}
@@ -31,7 +31,7 @@ def fault(begins, touches=None, ends=None, touched=0, entry=0):
 
 
 def judged(events, *ordered, **changes):
-    trace, case = sketch({**WORDS, "events": events, **changes}), sketch_case({"disturbances": ordered})
+    trace, case = synthetic_trace({**WORDS, "events": events, **changes}), synthetic_case({"disturbances": ordered})
     criteria = [AnyCriterion.model_validate({"collisions": {}})]
     return judge_run(RunKey("a", 1), "a.scenario.yaml", criteria, trace, case, lines=(20,))
 
@@ -110,8 +110,8 @@ def test_every_action_of_an_event_has_to_take_effect_but_not_each_time():
 
 
 def test_entries_of_one_name_are_told_apart():
-    trace = sketch({**WORDS, "events": fault(3, 3, 4, 10, entry=1)})
-    case = sketch_case({"disturbances": [FAULT, EVENT, {**FAULT, "line": 10}]})
+    trace = synthetic_trace({**WORDS, "events": fault(3, 3, 4, 10, entry=1)})
+    case = synthetic_case({"disturbances": [FAULT, EVENT, {**FAULT, "line": 10}]})
     assert [(one.ordered.line, one.happened) for one in disturbance_outcomes(trace, case)] == [
         (9, False),
         (7, False),
@@ -128,7 +128,7 @@ def test_disturbances_survive_their_file():
 
 
 def test_in_a_file_that_does_not_hold_the_criteria_it_has_no_line_either():
-    trace, case = sketch(WORDS), sketch_case({"disturbances": [EVENT]})
+    trace, case = synthetic_trace(WORDS), synthetic_case({"disturbances": [EVENT]})
     result = judge_run(RunKey("a", 1), "run.mcap", [AnyCriterion.model_validate({"collisions": {}})], trace, case)
     assert len(result.verdicts) == 2
     assert result.lines == ()

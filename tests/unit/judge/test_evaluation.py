@@ -12,10 +12,10 @@ from simscen.criteria.clearance import Clearance
 from simscen.criteria.findings import at_least, at_most
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import findings_defect, judge, outcome_of_verdicts
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
-TRACE = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})
-CASE = sketch_case({})
+TRACE = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})
+CASE = synthetic_case({})
 
 
 def criterion(**words):

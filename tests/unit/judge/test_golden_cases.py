@@ -8,7 +8,7 @@ import yaml
 from simscen.core.records.verdict import Finding, Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 FILES = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
 CASES = [(file.stem, case) for file in FILES for case in yaml.load(file.read_text(encoding="utf-8"), yaml.CSafeLoader)]
@@ -19,7 +19,7 @@ def test_a_criterion_answers_as_its_golden_case_says(kind, golden):
     entry = AnyCriterion.model_validate(golden["criterion"])
     assert entry.kind == kind
     assert golden["origin"]
-    (verdict,) = judge([entry], sketch(golden["trace"]), sketch_case(golden.get("case", {})))
+    (verdict,) = judge([entry], synthetic_trace(golden["trace"]), synthetic_case(golden.get("case", {})))
     assert verdict.status is Status(golden["expect"]["status"]), verdict
     expected = golden["expect"]["findings"]
     assert len(verdict.findings) == len(expected), verdict.findings

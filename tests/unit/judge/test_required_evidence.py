@@ -7,7 +7,7 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import partial_evidence_reason, required_evidence
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.compute import compute_metrics
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 TRUTH, ALIGNMENT, GOALS, BELIEF = Evidence.TRUTH, Evidence.ALIGNMENT, Evidence.NAVIGATION, Evidence.BELIEF
 
@@ -72,10 +72,10 @@ NEAR_PEOPLE = {"min_person_distance", "intrusion_intimate", "intrusion_personal"
     ],
 )
 def test_what_a_log_lacks_leaves_these_metrics_out_and_no_others(lacking, left_out):
-    trace = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})
-    whole = compute_metrics(trace, sketch_case({}))
+    trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})
+    whole = compute_metrics(trace, synthetic_case({}))
     for coverage in (LogCoverage({lacking: ""}), LogCoverage(partial={lacking: "not after t = 1 s"})):
-        found = compute_metrics(trace, sketch_case({}), coverage)
+        found = compute_metrics(trace, synthetic_case({}), coverage)
         reasons = {f"the log does not say {lacking.value}", "not after t = 1 s"}
         assert {name for name, reason in found.undefined.items() if reason in reasons} == left_out
         assert all(found.values[name] is None for name in left_out)

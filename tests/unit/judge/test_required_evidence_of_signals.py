@@ -8,7 +8,7 @@ from simscen.criteria.trace_signals.catalog import SIGNALS, signal_evidence
 from simscen.judge.evaluation import judge, required_evidence
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.compute import compute_metrics
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 DRIVE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]}
 
@@ -31,14 +31,14 @@ def test_a_criterion_needs_what_its_signals_need(criterion, wanted):
     entry = AnyCriterion.model_validate(criterion)
     assert wanted in required_evidence(entry)
     assert required_evidence(entry) != frozenset(Evidence)
-    (verdict,) = judge([entry], sketch(DRIVE), sketch_case({}), LogCoverage({wanted: "no such topic"}))
+    (verdict,) = judge([entry], synthetic_trace(DRIVE), synthetic_case({}), LogCoverage({wanted: "no such topic"}))
     assert verdict.status is Status.INCONCLUSIVE
     assert wanted.value in verdict.findings[0].measured
 
 
 @pytest.mark.parametrize("lacking", Evidence)
 def test_a_metric_that_the_log_cannot_tell_is_none_and_says_so(lacking):
-    measures = compute_metrics(sketch(DRIVE), sketch_case({}), LogCoverage({lacking: "no such topic"}))
+    measures = compute_metrics(synthetic_trace(DRIVE), synthetic_case({}), LogCoverage({lacking: "no such topic"}))
     assert list(measures.values) == list(METRICS)
     assert {name for name, value in measures.values.items() if value is None} == set(measures.undefined)
     if lacking is Evidence.CONTACTS:

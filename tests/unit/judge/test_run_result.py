@@ -8,13 +8,13 @@ from simscen.criteria.clearance import Clearance
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.result_json import from_json, read_result, to_json
 from simscen.judge.run_result import judge_run
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 TRACE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5, "events": [[1, "plan.made", "", {}]]}
 
 
 def conclude(trace, *criteria):
-    built, case = sketch(trace), sketch_case({})
+    built, case = synthetic_trace(trace), synthetic_case({})
     asked = [AnyCriterion.model_validate(words) for words in criteria]
     lines = tuple(range(10, 10 + len(criteria)))
     return judge_run(RunKey("a/b", 7), "scenarios/a/b.scenario.yaml", asked, built, case, lines)
@@ -67,10 +67,10 @@ def test_a_broken_clearance_makes_the_run_an_error_though_nothing_bounds_it(brok
 @pytest.mark.parametrize("signal", ["truth", "velocity", "belief", "command"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_one_sample_that_is_no_number_breaks_the_run_whatever_judges_it(signal, value):
-    trace = sketch(TRACE)
+    trace = synthetic_trace(TRACE)
     getattr(trace, signal).values[2, 1] = value
     criteria = [AnyCriterion.model_validate({"collisions": {}})]
-    assert judge_run(RunKey("a", 7), "a", criteria, trace, sketch_case({})).outcome is Outcome.ERROR
+    assert judge_run(RunKey("a", 7), "a", criteria, trace, synthetic_case({})).outcome is Outcome.ERROR
 
 
 def test_a_thing_without_a_place_breaks_the_run():

@@ -14,7 +14,7 @@ from simscen.criteria.trace_signals.sampling import check_recorded_signals, time
 from simscen.criteria.trace_signals.sparc_ldlj import sparc
 from simscen.judge.evaluation import judge
 from simscen.judge.run_result import judge_run
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 FOREIGN = LogCoverage(recorded_by_simscen=False)
 RATE = 240
@@ -24,7 +24,7 @@ def drive(times, speeds, clearance=0.5):
     """A run along x, sampled at these times (s) with these speeds."""
     ticks = np.round(np.array(times) * RATE).astype(np.int64)
     speeds = np.array(speeds, dtype=np.float64)
-    trace = sketch({"seconds": float(times[-1]), "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": float(times[-1]), "truth": [[0, 0, 0]]})
     still = np.zeros(len(ticks))
     x = np.concatenate(([0.0], np.cumsum(speeds[:-1] * np.diff(ticks) / RATE)))
     return replace(
@@ -38,7 +38,7 @@ def drive(times, speeds, clearance=0.5):
 
 def result(trace, *criteria, coverage=FOREIGN):
     entries = [AnyCriterion.model_validate(words) for words in criteria]
-    return judge_run(RunKey("a", 7), "a", entries, trace, sketch_case({}), coverage=coverage)
+    return judge_run(RunKey("a", 7), "a", entries, trace, synthetic_case({}), coverage=coverage)
 
 
 def wobble(times):
@@ -111,7 +111,7 @@ def test_a_window_is_one_of_time_not_of_samples():
     trace = drive(times, [0.1, 0.1, 0.1, 0.9, 0.1])
     for within, status in ((0.5, Status.PASS), (1.0, Status.FAIL)):
         entry = AnyCriterion.model_validate({"always": {"signal": "speed", "op": "<=", "value": 0.5, "within": within}})
-        (verdict,) = judge([entry], trace, sketch_case({}))
+        (verdict,) = judge([entry], trace, synthetic_case({}))
         assert verdict.status is status
 
 

@@ -17,8 +17,7 @@ from simscen.model.controllers import DynamicWindow
 from simscen.model.localizers import Amcl
 from simscen.model.robot import InertialUnit, SkidSteer
 from simscen.model.scenario import Physics, ScenarioSpec
-from simscen.spec.named_places import OrPlace
-from simscen.spec.places import PoseSpec
+from simscen.spec.places import PlaceAllowed, PoseSpec
 from simscen.spec.quantities import AnyQuantity, Quantity
 
 PLAIN = {
@@ -141,6 +140,6 @@ def test_a_whole_number_with_a_unit_stays_whole() -> None:
 
 def test_a_place_may_stand_wherever_a_pose_or_a_point_of_the_world_is_meant() -> None:
     found = list(_poses_and_points())
-    without = {str(value) for value in found if not any(isinstance(mark, OrPlace) for mark in value.marks)}
+    without = {str(value) for value in found if not any(isinstance(mark, PlaceAllowed) for mark in value.marks)}
     assert without == set(NO_PLACES)
     assert len(found) > len(without)

@@ -23,7 +23,7 @@ from simscen.report.picture.map_picture import (
 )
 from simscen.report.picture.path_layer import round_time_step
 from simscen.report.picture.scene import Scene, object_outlines, outlines_of_event
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 WIDE, TALL, RESOLUTION = 200, 120, 0.05
 
@@ -48,10 +48,10 @@ def scene(**changes):
         ],
         **changes,
     }
-    case = sketch_case(
+    case = synthetic_case(
         {"goals": [{"name": "end", "pose": [8, 4.5, 0]}], "footprint": [[-0.2, -0.2], [0.2, 0], [-0.2, 0.2]]}
     )
-    trace = sketch(words)
+    trace = synthetic_trace(words)
     criteria = [AnyCriterion.model_validate({"clearance": {"min": 2.0}})]
     result = judge_run(RunKey("room/cross", 3), "room/cross.scenario.yaml", criteria, trace, case)
     return Scene(trace, case, room(), result, Scenery(places={"corner": Pose2(9, 1)}))
@@ -150,7 +150,7 @@ def test_thin_walls_of_a_huge_map_stay_whole():
 
 def test_all_parts_of_a_thing_are_its_outline_and_the_unknown_is_a_disc():
     legs = (((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), ((2.0, 0.0), (3.0, 0.0), (2.0, 1.0)))
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]], "objects": {"ghost": [[0, 1, 1, 0]]}})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "objects": {"ghost": [[0, 1, 1, 0]]}})
     found = object_outlines(trace, [MovableObject("table", Pose2(0, 0), legs)])
     assert [outline[:, 0].max() for outline in found["table"]] == [1.0, 3.0]
     assert np.hypot(*found["ghost"][0].T) == pytest.approx(np.full(32, 0.2))
@@ -158,7 +158,9 @@ def test_all_parts_of_a_thing_are_its_outline_and_the_unknown_is_a_disc():
 
 @pytest.mark.parametrize("data", [{}, {"shape": "mesh", "size": []}, {"shape": "box", "size": "big"}])
 def test_an_event_that_does_not_describe_a_shape_still_gives_one(data):
-    event = sketch({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "object.spawned", "x", data]]}).events[0]
+    event = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "object.spawned", "x", data]]}).events[
+        0
+    ]
     assert len(outlines_of_event(event)[0]) == 32
 
 

@@ -23,7 +23,7 @@ from simscen.report.picture.scene import Scene, scene_with_robots
 from simscen.run.log_header import world_scenery as scenery_in
 from simscen.run.preparation.scenario import prepare
 from simscen.run.simulate import simulate
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 GOLDEN = Path(__file__).parent / "everything.parts.txt"
 PANEL = ((0.0, -0.05), (1.0, -0.05), (1.0, 0.05), (0.0, 0.05))
@@ -64,13 +64,13 @@ def everything(**changes):
         ],
         **changes,
     }  # fmt: skip
-    case = sketch_case({
+    case = synthetic_case({
         "goals": [{"name": "shelf", "pose": [2, 5, 0]}, {"name": "never", "pose": [9, 5, 0]}],
         "sent": [{"name": "late", "pose": [9, 1, 0]}, {"name": "unsent", "pose": [8, 3, 0]}],
         "footprint": [[-0.2, -0.2], [0.2, 0], [-0.2, 0.2]],
         "regions": {"ward": [[6, 2], [8, 2], [8, 3], [6, 3]]},
     })  # fmt: skip
-    trace = sketch(words)
+    trace = synthetic_trace(words)
     criteria = [AnyCriterion.model_validate(one) for one in ({"goals_reached": {}}, {"clearance": {"min": 2.0}})]
     result = judge_run(RunKey("room/all", 3), "room/all.scenario.yaml", criteria, trace, case)
     scenery = Scenery(

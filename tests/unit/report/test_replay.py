@@ -29,7 +29,7 @@ from simscen.report.replay import replay_page
 from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, keep_extremes, spaced_in_time
 from simscen.report.replay.page import FOLDER, script
 from simscen.report.replay.robot_data import costmaps_of, map_from_odom
-from simscen.testing.sketch import sketch
+from simscen.testing.synthetic_trace import synthetic_trace
 
 TEXT = """\
 simscen: 1
@@ -50,7 +50,7 @@ pass:
 
 def log_of(words: dict[str, Any], case: Case | None = None, text: str = "") -> Log:
     about = LogHeader("hall/drive", 7, case or Case(Pose2(0, 0), ()), text)
-    return Log(about, sketch(words), "", True)
+    return Log(about, synthetic_trace(words), "", True)
 
 
 def result_of(*verdicts: Verdict) -> RunResult:

@@ -2,9 +2,8 @@
 
 import pytest
 
-from simscen.bench.speed.overhead import SHORT, short_patrol
 from simscen.bench.speed.scaling import AXES, write_more
-from simscen.bench.speed.suite import Suite, spread_over
+from simscen.bench.speed.session_speed import SHORT, Suite, evenly_spaced, short_patrol
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation.loaders import load_robot, load_world
@@ -37,9 +36,9 @@ def test_the_short_patrol_is_over_at_once(tmp_path):
 
 
 def test_of_a_large_suite_every_so_manieth_is_run():
-    assert spread_over(list(range(89)), 60)[:4] == [0, 1, 2, 4]
-    assert len(set(spread_over(list(range(89)), 60))) == 60
-    assert spread_over([1, 2], 60) == [1, 2]
+    assert evenly_spaced(list(range(89)), 60)[:4] == [0, 1, 2, 4]
+    assert len(set(evenly_spaced(list(range(89)), 60))) == 60
+    assert evenly_spaced([1, 2], 60) == [1, 2]
 
 
 def test_a_suite_is_held_against_pybullet_alone_for_as_long():

@@ -11,7 +11,7 @@ from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
 from simscen.run.lockstep import EndCondition
-from simscen.testing.sketch import sketch_case
+from simscen.testing.synthetic_trace import synthetic_case
 
 RATES = [
     (240, 40, 20),
@@ -59,7 +59,7 @@ def test_a_run_ends_exactly_at_its_time_limit_with_a_sample_of_the_truth(play, t
 def test_an_end_between_two_samples_breaks_nothing_that_is_derived_from_them(play):
     trace = play(time_limit="2.01", physics="{truth_rate: 20 Hz}", stack="{localizer: {type: ground_truth}}")
     criterion = AnyCriterion.model_validate({"always": {"signal": "jerk", "op": "<=", "value": 1e6}})
-    (verdict,) = judge([criterion], trace, sketch_case({}))
+    (verdict,) = judge([criterion], trace, synthetic_case({}))
     assert verdict.status is Status.PASS, verdict
 
 

@@ -8,7 +8,7 @@ from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.run.live_world.director import ConditionState, TriggerState
-from simscen.testing.puppetstage import PuppetStage
+from simscen.testing.fakes import FakeStage
 from simscen.triggers.registry import Trigger
 
 
@@ -112,7 +112,7 @@ def test_a_condition_may_last_anywhere_inside_of_others(where):
     square = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
     said = [
         watch.holds(
-            PuppetStage(
+            FakeStage(
                 tick=24 * k,
                 twist=Twist(1.0 if fast[k] else 0.0),
                 robot=Pose2(0.5 if hall[k] else 9.0, 0.5),

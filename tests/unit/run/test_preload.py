@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from simscen.run.preparation import warm_up
-from simscen.spec.component import Component
+from simscen.spec.base import Component
 
 SCENARIO = """\
 simscen: 1

@@ -5,7 +5,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.records.events import EventKind
 from simscen.run.live_world.director import RelativeSituation
-from simscen.testing.puppetstage import PuppetStage
+from simscen.testing.fakes import FakeStage
 from simscen.triggers.registry import Trigger
 
 PUSH = "do: {push: {impulse: [0, 0.001]}}"
@@ -67,7 +67,7 @@ def test_a_story_that_waits_changes_nothing_until_it_goes_on(play):
 
 
 def test_in_a_step_everything_that_counts_counts_from_its_beginning():
-    now = PuppetStage(tick=1000, travelled=5.0, scans={"lidar": 990, "rear": 700})
+    now = FakeStage(tick=1000, travelled=5.0, scans={"lidar": 990, "rear": 700})
     step = RelativeSituation(now)
 
     def holds(words):

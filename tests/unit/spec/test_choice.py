@@ -8,21 +8,21 @@ from pydantic import ValidationError
 
 from simscen.criteria.registry import AnyCriterion
 from simscen.model.stack import StackSpec
-from simscen.spec.choice import added, widened
+from simscen.spec.choice import installed_choices, with_installed_choices
 
 
 def test_a_name_that_a_package_adds_is_one_of_the_choices(calm) -> None:
     entry = AnyCriterion.model_validate({"calm": {"max": "0.5 m/s"}, "severity": "warn"}, by_alias=True, by_name=False)
     assert isinstance(entry, AnyCriterion)
     assert (entry.kind, entry.severity, entry.chosen.max) == ("calm", "warn", 0.5)
-    assert set(added(AnyCriterion)) == {"calm"}
+    assert set(installed_choices(AnyCriterion)) == {"calm"}
 
 
 def test_without_the_package_it_is_an_unknown_key() -> None:
     with pytest.raises(ValidationError) as told:
         AnyCriterion.model_validate({"calm": {}})
     assert "extra_forbidden" in {error["type"] for error in told.value.errors()}
-    assert widened(AnyCriterion) is AnyCriterion
+    assert with_installed_choices(AnyCriterion) is AnyCriterion
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_a_package_that_is_broken_is_a_problem_of_the_key_that_needs_it(packages
     (error,) = told.value.errors()
     assert error["loc"] == ("calm",)
     assert error["msg"].startswith("criterion `calm` of calm 1.0 cannot be used: `calm:Calm` cannot be loaded: ")
-    assert added(AnyCriterion) == {}
+    assert installed_choices(AnyCriterion) == {}
 
 
 def test_it_survives_being_copied_and_sent_to_another_process(calm) -> None:

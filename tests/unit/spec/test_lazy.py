@@ -10,7 +10,7 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.faults.registry import AnyFault
 from simscen.model.world import Wall
 from simscen.spec.base import Spec
-from simscen.spec.lazy import LazySpec, annotation_of
+from simscen.spec.lazy_spec import LazySpec, annotation_of
 from simscen.triggers.registry import AnyCondition as AnyTest
 
 

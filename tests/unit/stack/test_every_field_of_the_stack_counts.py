@@ -21,11 +21,10 @@ from simscen.advanced.localizers.spec import ScanMatchingAmcl, SlipEkf
 from simscen.advanced.planners.spec import MedialAxisPlanner
 from simscen.model import checkers, costmaps, guards, localizers, planners
 from simscen.model import recovery as behaviors
-from simscen.model.controllerspec import ControllerSpec
 from simscen.model.latency import Latency
 from simscen.model.stack import StackSpec
-from simscen.model.stackbase import SpeedZone
-from simscen.spec.speedmask import SpeedMask
+from simscen.model.stack_base import ControllerSpec, SpeedZone
+from simscen.spec.speed_mask import SpeedMask
 
 Said = dict[str, Any]
 TRUTH: Said = {"localizer": {"type": "ground_truth"}, "planner": {"type": "navfn"}}

@@ -129,5 +129,5 @@ def test_a_pytest_that_asks_for_no_contract_imports_nothing_of_simscen_but_the_p
     code, told = run("-q", "-p", "no:xdist", probe=probe)
     assert code == 0, told
     loaded = told.splitlines()[-1].split()[1:]
-    light = ["core", "core.version", "pytesting", "pytesting.names", "pytesting.plugin", "testing", "testing.plugin"]
+    light = ["core", "core.version", "pytesting", "pytesting.plugin", "testing", "testing.plugin"]
     assert loaded == ["simscen", *(f"simscen.{name}" for name in light)]

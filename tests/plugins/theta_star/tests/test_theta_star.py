@@ -7,7 +7,7 @@ from theta_star.spec import ThetaStar
 
 from simscen.plugin import Pose2
 from simscen.testing import promises_of
-from simscen.testing.contracts.component import view_of
+from simscen.testing.contracts.base import view_of
 from simscen.testing.flatland import Flatland, round_robot, setting
 
 

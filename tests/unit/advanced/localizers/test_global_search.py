@@ -6,7 +6,7 @@ import pytest
 from simscen.advanced.localizers.global_search import ANSWERS, SHARES, GlobalSearch, View, distinct
 from simscen.advanced.localizers.scan_memory import REMEMBERED, ScanMemory, ends_of
 from simscen.core.geometry import Pose2
-from simscen.testing.room import BEAMS, cast, grid, scan
+from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
 
 PLACES = (Pose2(-2.5, -1.8, 0.6), Pose2(3.0, 1.8, -2.8), Pose2(-4.0, 2.9, 1.9))
 

@@ -9,7 +9,7 @@ from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.stack.localizers.motion_models import Differential
-from simscen.testing.room import grid
+from simscen.testing.synthetic_room import grid
 
 
 def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:

@@ -13,7 +13,7 @@ from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.stack.localizers.likelihood_field import obstacle_field
-from simscen.testing.room import BEAMS, cast, grid, scan
+from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
 
 START = Pose2(-2.5, -1.8, 0.6)
 OFF = Pose2(0.4, -0.3, 0.15)

@@ -6,7 +6,7 @@ import pytest
 from simscen.advanced.localizers.scan_matcher import ScanMatcher, Step, moved
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
-from simscen.testing.room import BEAMS, cast, scan
+from simscen.testing.synthetic_room import BEAMS, cast, scan
 
 ANGLES = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
 START, STEP = Pose2(-2.5, -1.8, 0.6), Pose2(0.3, 0.02, 0.15)

@@ -18,7 +18,7 @@ from simscen.core.random_streams import Streams
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting
-from simscen.testing.room import BEAMS, cast, drive, grid, localizer, run, scan, surroundings
+from simscen.testing.synthetic_room import BEAMS, cast, drive, grid, localizer, run, scan, surroundings
 
 START = Pose2(-2.5, -1.8, 0.6)
 GUESS = Estimate(Pose2(-2.3, -1.9, 0.5), (0.3, 0.3, 0.2))

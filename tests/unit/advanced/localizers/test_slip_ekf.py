@@ -10,7 +10,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.stack.protocols import Localizer
-from simscen.testing.room import Noise, drive, errors, localizer, nees, run
+from simscen.testing.synthetic_room import Noise, drive, errors, localizer, nees, run
 
 STD = np.array([0.1, 0.1, 0.05])
 """Standard deviations of the initial pose: m, m, rad."""

@@ -10,7 +10,7 @@ from test_slip_ekf_slip import RATE, replayed
 from simscen.advanced.localizers.slip_detector import SlipDetector
 from simscen.advanced.localizers.spec import SlipEkf
 from simscen.core.geometry import Array
-from simscen.testing.room import nees
+from simscen.testing.synthetic_room import nees
 
 SPEC = SlipEkf(type="slip_ekf")
 TRACK = 0.4

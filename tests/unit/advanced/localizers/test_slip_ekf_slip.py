@@ -11,7 +11,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
-from simscen.testing.room import localizer, nees
+from simscen.testing.synthetic_room import localizer, nees
 
 RATE, EVERY = 40, 6
 

@@ -14,7 +14,7 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, Occ
 from simscen.core.geometry import Pose2
 from simscen.stack.localizers.beams import select_beams
 from simscen.stack.localizers.likelihood_field import LikelihoodFieldProb, obstacle_field
-from simscen.testing.room import BEAMS, cast, grid, scan
+from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
 
 Z_HIT, Z_RAND, SIGMA = 0.5, 0.5, 0.2
 

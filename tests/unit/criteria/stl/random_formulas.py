@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from simscen.core.records.trace import Samples
 from simscen.criteria.stl.condition import Condition
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
-CASE = sketch_case({"clearance_range": math.inf})
+CASE = synthetic_case({"clearance_range": math.inf})
 SIGNALS = {"clearance": "p", "yaw_rate": "q"}
 NUMBERS = st.integers(-3, 3).map(float)
 VALUES = st.lists(NUMBERS, min_size=1, max_size=12)
@@ -18,7 +18,7 @@ VALUES = st.lists(NUMBERS, min_size=1, max_size=12)
 
 def run(p, q, ended=True):
     """A run with these clearances and yaw rates, one sample a second."""
-    trace = sketch({"seconds": 0, "truth": [[0, 0, 0]], "ended": "navigation ended" if ended else None})
+    trace = synthetic_trace({"seconds": 0, "truth": [[0, 0, 0]], "ended": "navigation ended" if ended else None})
     ticks = np.arange(len(p), dtype=np.int64) * 240
     still = np.zeros((len(p), 3))
     turning = np.column_stack((still[:, :2], q))

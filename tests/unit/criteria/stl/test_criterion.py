@@ -8,7 +8,7 @@ from simscen.core.records.verdict import Evidence, Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.stl.criterion import TemporalCriterion
 from simscen.judge.evaluation import judge
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 
 def criterion(words):
@@ -18,7 +18,7 @@ def criterion(words):
 
 
 def found(words, trace, case=None):
-    (verdict,) = judge([AnyCriterion.model_validate(words)], sketch(trace), sketch_case(case or {}))
+    (verdict,) = judge([AnyCriterion.model_validate(words)], synthetic_trace(trace), synthetic_case(case or {}))
     (finding,) = verdict.findings
     return finding
 

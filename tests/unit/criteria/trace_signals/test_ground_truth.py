@@ -20,31 +20,31 @@ from simscen.criteria.trace_signals.ground_truth import (
     true_pose,
     turn_rate,
 )
-from simscen.testing.sketch import sketch
+from simscen.testing.synthetic_trace import synthetic_trace
 
 
 def test_a_circle_is_as_long_as_its_circumference():
     angles = np.linspace(0, 2 * math.pi, 400)
     circle = [[10 * k / 399, 2 * math.cos(a), 2 * math.sin(a), a + math.pi / 2] for k, a in enumerate(angles)]
-    assert drive(sketch({"seconds": 10, "truth": circle})).length == pytest.approx(4 * math.pi, rel=1e-3)
+    assert drive(synthetic_trace({"seconds": 10, "truth": circle})).length == pytest.approx(4 * math.pi, rel=1e-3)
 
 
 def test_the_way_until_a_moment_grows_with_it():
-    way = drive(sketch({"seconds": 10, "truth": [[0, 0, 0], [10, 8, 0]]}))
+    way = drive(synthetic_trace({"seconds": 10, "truth": [[0, 0, 0], [10, 8, 0]]}))
     assert way.until(0) == 0.0
     assert way.until(1200) == pytest.approx(4.0, abs=0.021)
     assert way.until(10**9) == way.length == pytest.approx(8.0)
 
 
 def test_pose_error_is_the_distance_at_the_moment_of_the_belief():
-    trace = sketch({"seconds": 10, "truth": [[0, 0, 0], [10, 5, 0]], "belief": {"offset": [0.03, 0.04, 0.1]}})
+    trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0], [10, 5, 0]], "belief": {"offset": [0.03, 0.04, 0.1]}})
     error = pose_error(trace)
     assert error.values[:, 0] == pytest.approx(np.full(len(error), 0.05))
     assert error.values[:, 1] == pytest.approx(np.full(len(error), 0.1))
 
 
 def test_a_belief_that_falls_silent_grows_wrong_after_a_second():
-    trace = sketch({"seconds": 10, "truth": [[0, 0, 0], [10, 5, 0]]})
+    trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0], [10, 5, 0]]})
     early = trace.belief.ticks <= 2 * 240
     silent = type(trace)(
         **{**vars(trace), "belief": type(trace.belief)(trace.belief.ticks[early], trace.belief.values[early])}
@@ -76,7 +76,7 @@ def at_half_seconds(xy, placed=()):
     ticks = np.arange(len(xy), dtype=np.int64) * 120
     truth = Samples(ticks, np.column_stack((np.array(xy, dtype=np.float64), np.zeros(len(xy)))))
     events = [[t, "robot.placed"] for t in placed]
-    return replace(sketch({"seconds": len(xy) / 2, "truth": [[0, 0, 0]], "events": events}), truth=truth)
+    return replace(synthetic_trace({"seconds": len(xy) / 2, "truth": [[0, 0, 0]], "events": events}), truth=truth)
 
 
 def test_trembling_is_no_drive_and_small_moves_add_up_to_one():
@@ -115,7 +115,7 @@ def test_nothing_recorded_is_no_way():
 
 
 def test_speed_is_over_ground_and_turning_has_no_sign():
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     trace.velocity.values[3] = (-3.0, 4.0, -2.0)
     assert (speed(trace).values[3, 0], turn_rate(trace).values[3, 0]) == (5.0, 2.0)
     assert speed(trace).values.shape == turn_rate(trace).values.shape == (41, 1)
@@ -123,7 +123,7 @@ def test_speed_is_over_ground_and_turning_has_no_sign():
 
 @pytest.mark.parametrize(("column", "value"), [(0, np.nan), (1, np.inf), (2, -np.inf)])
 def test_a_signal_that_is_not_finite_is_named_with_its_first_moment(column, value):
-    trace = sketch({"seconds": 4, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0]]})
     trace.truth.values[[80, 120], column] = value
     with pytest.raises(InvalidTrace, match=r"the true pose is not finite at t = 2\.00 s"):
         drive(trace)
@@ -131,7 +131,7 @@ def test_a_signal_that_is_not_finite_is_named_with_its_first_moment(column, valu
 
 @pytest.mark.parametrize("value", [np.nan, -np.inf])
 def test_a_clearance_that_is_no_number_is_named_with_its_first_moment(value):
-    trace = sketch({"seconds": 4, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0]]})
     trace.clearance.values[[80, 120]] = value
     with pytest.raises(InvalidTrace, match=r"the clearance is not a number at t = 2\.00 s"):
         clearance(trace)
@@ -140,7 +140,7 @@ def test_a_clearance_that_is_no_number_is_named_with_its_first_moment(value):
 
 
 def test_of_several_things_whose_pose_is_not_finite_the_first_by_name_is_named():
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     lost = Samples(trace.truth.ticks, np.full((41, 3), np.nan))
     with pytest.raises(InvalidTrace, match=r"the pose of cart is not finite at t = 0\.00 s"):
         check_finite(replace(trace, objects={"door": lost, "cart": lost}))
@@ -153,12 +153,12 @@ def test_the_true_pose_at_a_tick_is_the_newest_sample():
 
 def test_an_error_of_heading_goes_the_short_way_round_between_samples_too():
     words = {"seconds": 2, "truth": [[0, 0, 0, 3.1], [2, 0, 0, 3.2]], "belief": [[0, 0, 0, -3.1], [2, 0, 0, -3.0]]}
-    assert pose_error(sketch(words)).values[:, 1] == pytest.approx(np.full(21, 2 * math.pi - 6.2))
+    assert pose_error(synthetic_trace(words)).values[:, 1] == pytest.approx(np.full(21, 2 * math.pi - 6.2))
 
 
 def test_an_error_is_against_the_truth_at_that_very_moment():
     ticks = np.array([0, 240], dtype=np.int64)
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]], "belief": [[0, 1, 1, 3.2]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "belief": [[0, 1, 1, 3.2]]})
     rare = replace(trace, truth=Samples(ticks, np.array([[0.0, 0.0, 3.0], [4.0, 8.0, 3.4 - 2 * math.pi]])))
     error = pose_error(rare)
     assert error.ticks[5] == 120
@@ -166,7 +166,7 @@ def test_an_error_is_against_the_truth_at_that_very_moment():
 
 
 def test_each_belief_is_relied_on_for_a_second_also_the_first():
-    trace = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 4, 0]]})
+    trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 4, 0]]})
     few = np.array([240, 720])
     error = pose_error(replace(trace, belief=Samples(few, trace.belief.at(few))))
     assert error.ticks.tolist() == [240, *range(486, 720, 6), 720]

@@ -9,7 +9,7 @@ import pytest
 from simscen.core.records.trace import Samples
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.trace_signals.ground_truth import DIMENSIONS, nees, nees_samples
-from simscen.testing.sketch import sketch
+from simscen.testing.synthetic_trace import synthetic_trace
 
 APART = [0.25, 0.0, 0.0, 0.04, 0.0, 0.01]
 """Variances of x, y and yaw: deviations of 0.5 m, 0.2 m and 0.1 rad."""
@@ -60,7 +60,7 @@ def test_a_filter_of_three_dimensions_that_tells_the_truth_has_three():
 
 def believing(truth, belief, covariance=APART):
     """Truth and beliefs as (tick, x, y, yaw)."""
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     ticks, poses = np.array([row[0] for row in belief]), np.array([row[1:] for row in belief], dtype=np.float64)
     way = Samples(np.array([row[0] for row in truth]), np.array([row[1:] for row in truth], dtype=np.float64))
     return replace(

@@ -16,13 +16,13 @@ from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_signal
 from simscen.criteria.trace_signals.readers import points_in_polygon
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 STEP = 6 / 240
 
 
 def signal(name, words, case=None, **of):
-    return read_signal(name, sketch(words), sketch_case(case or {}), of)
+    return read_signal(name, synthetic_trace(words), synthetic_case(case or {}), of)
 
 
 def at(values, seconds):
@@ -31,7 +31,7 @@ def at(values, seconds):
 
 def driving(velocity):
     """A trace whose recorded velocity is exactly this."""
-    trace = sketch({"seconds": (len(velocity) - 1) * STEP, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": (len(velocity) - 1) * STEP, "truth": [[0, 0, 0]]})
     return replace(trace, velocity=Samples(trace.truth.ticks, np.array(velocity, dtype=np.float64)))
 
 
@@ -56,7 +56,7 @@ def test_a_signal_has_one_finite_value_for_each_truth_sample_within_its_range(na
     case = {"goals": [{"name": "shelf", "pose": [2, 1, 0]}], "regions": {"dock": [[0, 0], [1, 0], [1, 1]]}}
     of = {"object": "cart", "region": "dock", "fault": "off", "event": "off"}
     wanted = {key: of[key] for key in SIGNALS[name].required_arguments[:1]}
-    values = read_signal(name, sketch(words), sketch_case(case), wanted)
+    values = read_signal(name, synthetic_trace(words), synthetic_case(case), wanted)
     assert values.shape == (161,)
     assert np.isfinite(values).all()
     assert values.min() >= SIGNALS[name].minimum
@@ -65,16 +65,16 @@ def test_a_signal_has_one_finite_value_for_each_truth_sample_within_its_range(na
 
 def test_speed_is_over_ground_and_its_parts_have_signs():
     trace = driving([[-3.0, 4.0, -0.5]] * 5)
-    assert read_signal("speed", trace, sketch_case({}), {}).tolist() == [5.0] * 5
-    assert read_signal("forward_speed", trace, sketch_case({}), {}).tolist() == [-3.0] * 5
-    assert read_signal("turn_rate", trace, sketch_case({}), {}).tolist() == [0.5] * 5
-    assert read_signal("yaw_rate", trace, sketch_case({}), {}).tolist() == [-0.5] * 5
+    assert read_signal("speed", trace, synthetic_case({}), {}).tolist() == [5.0] * 5
+    assert read_signal("forward_speed", trace, synthetic_case({}), {}).tolist() == [-3.0] * 5
+    assert read_signal("turn_rate", trace, synthetic_case({}), {}).tolist() == [0.5] * 5
+    assert read_signal("yaw_rate", trace, synthetic_case({}), {}).tolist() == [-0.5] * 5
 
 
 def test_acceleration_is_divided_by_the_time_between_samples():
     """Arena's get_metrics.py divides neither acceleration nor jerk by dt."""
     trace = driving([[0.05 * k * k, 0, 0.1 * k] for k in range(9)])
-    case = sketch_case({})
+    case = synthetic_case({})
     expected = [0.05 / STEP, *(0.05 * (2 * k + 1) / STEP for k in range(8))]
     assert read_signal("acceleration", trace, case, {}) == pytest.approx(expected)
     assert read_signal("angular_acceleration", trace, case, {}) == pytest.approx([0.1 / STEP] * 9)
@@ -82,7 +82,7 @@ def test_acceleration_is_divided_by_the_time_between_samples():
 
 def test_jerk_is_the_second_difference_of_speed_not_the_first():
     """HuNavSim's jerk is the first difference, divided by dt twice."""
-    case = sketch_case({})
+    case = synthetic_case({})
     ramp = driving([[0.1 * k, 0, 0] for k in range(9)])
     assert read_signal("jerk", ramp, case, {}) == pytest.approx([0.0] * 9, abs=1e-9)
     parabola = driving([[-0.05 * k * k, 0, 0] for k in range(9)])
@@ -90,7 +90,7 @@ def test_jerk_is_the_second_difference_of_speed_not_the_first():
 
 
 def test_jerk_needs_three_samples_and_acceleration_two():
-    case = sketch_case({})
+    case = synthetic_case({})
     assert len(read_signal("acceleration", driving([[0, 0, 0], [1, 0, 0]]), case, {})) == 2
     assert len(read_signal("jerk", driving([[0, 0, 0], [1, 0, 0], [1, 0, 0]]), case, {})) == 3
     with pytest.raises(SignalUnavailable, match="too short: 2 samples"):
@@ -101,9 +101,9 @@ def test_jerk_needs_three_samples_and_acceleration_two():
 
 def test_being_set_down_elsewhere_is_neither_braking_nor_jerk():
     trace = driving([[1, 0, 0]] * 4 + [[0, 0, 0]] * 4)
-    carried = sketch({"seconds": 7 * STEP, "truth": [[0, 0, 0]], "events": [[3 * STEP, "robot.placed"]]})
+    carried = synthetic_trace({"seconds": 7 * STEP, "truth": [[0, 0, 0]], "events": [[3 * STEP, "robot.placed"]]})
     trace, stays = replace(trace, events=carried.events), replace(trace, events=())
-    case = sketch_case({})
+    case = synthetic_case({})
     assert read_signal("acceleration", trace, case, {}).tolist() == [0.0] * 8
     assert read_signal("jerk", trace, case, {}).tolist() == [0.0] * 8
     assert np.count_nonzero(read_signal("acceleration", stays, case, {})) == 1
@@ -116,8 +116,8 @@ def test_being_set_down_elsewhere_is_neither_braking_nor_jerk():
 def test_only_the_changes_over_being_set_down_are_left_out(after, still, smooth):
     """Speeds of a parabola; set down elsewhere after a sample, so that the change to the next one is none."""
     trace = driving([[0.05 * k * k, 0, 0] for k in range(9)])
-    events = sketch({"seconds": 1, "truth": [[0, 0, 0]], "events": [[after * STEP, "robot.placed"]]}).events
-    trace, case = replace(trace, events=events), sketch_case({})
+    events = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "events": [[after * STEP, "robot.placed"]]}).events
+    trace, case = replace(trace, events=events), synthetic_case({})
     changes = np.array([0.05 / STEP, *(0.05 * (2 * k + 1) / STEP for k in range(8))])
     changes[still] = 0.0
     jerks = np.full(9, 0.1 / STEP**2)
@@ -128,18 +128,18 @@ def test_only_the_changes_over_being_set_down_are_left_out(after, still, smooth)
 
 def test_being_set_down_before_the_first_sample_changes_nothing_after_it():
     trace = driving([[0, 0, 0]] * 4 + [[1, 0, 0]])
-    placed = sketch({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "robot.placed"]]}).events
+    placed = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "robot.placed"]]}).events
     later = Samples(trace.truth.ticks + 240, trace.truth.values)
     trace = replace(trace, truth=later, velocity=Samples(later.ticks, trace.velocity.values), events=placed)
-    assert read_signal("acceleration", trace, sketch_case({}), {}).tolist() == [0.0] * 4 + [1.0 / STEP]
+    assert read_signal("acceleration", trace, synthetic_case({}), {}).tolist() == [0.0] * 4 + [1.0 / STEP]
 
 
 def test_a_belief_without_a_covariance_does_not_say_how_sure_it_is():
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     bare = replace(trace, belief=Samples(trace.belief.ticks, trace.belief.values[:, :3]))
     for name in ("position_std", "yaw_std"):
         with pytest.raises(SignalUnavailable, match="no covariance of the belief was recorded"):
-            read_signal(name, bare, sketch_case({}), {})
+            read_signal(name, bare, synthetic_case({}), {})
 
 
 def test_a_kidnapped_robot_has_not_travelled():
@@ -160,23 +160,23 @@ def uneven(ticks, speeds):
 def test_differences_of_uneven_samples_are_those_of_the_interpolated_signal():
     ticks = [0, 11, 25, 36, 60, 71, 84]
     steady = uneven(ticks, [tick / 240 for tick in ticks])
-    assert read_signal("acceleration", steady, sketch_case({}), {}) == pytest.approx(np.ones(7), abs=1e-9)
-    assert read_signal("jerk", steady, sketch_case({}), {}) == pytest.approx(np.zeros(7), abs=1e-9)
+    assert read_signal("acceleration", steady, synthetic_case({}), {}) == pytest.approx(np.ones(7), abs=1e-9)
+    assert read_signal("jerk", steady, synthetic_case({}), {}) == pytest.approx(np.zeros(7), abs=1e-9)
 
 
 def test_differences_are_not_known_across_a_long_gap():
     steady = uneven([0, 12, 24, 36, 97, 108], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert read_signal("speed", steady, sketch_case({}), {}).tolist() == [0.0] * 6
+    assert read_signal("speed", steady, synthetic_case({}), {}).tolist() == [0.0] * 6
     with pytest.raises(SignalUnavailable, match=r"no sample from t = 0.15 s to 0.40 s; .* need one every 0.25 s"):
-        read_signal("acceleration", steady, sketch_case({}), {})
+        read_signal("acceleration", steady, synthetic_case({}), {})
     bridged = uneven([0, 12, 24, 36, 96, 108], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert read_signal("acceleration", bridged, sketch_case({}), {}).tolist() == [0.0] * 6
+    assert read_signal("acceleration", bridged, synthetic_case({}), {}).tolist() == [0.0] * 6
 
 
 def test_being_set_down_is_no_acceleration_of_uneven_samples_either():
     placed = Event(30, EventKind.ROBOT_PLACED, "robot")
     trace = replace(uneven([0, 11, 25, 36, 48, 60], [0.0, 0.0, 0.0, 2.0, 2.0, 2.0]), events=(placed,))
-    assert np.abs(read_signal("acceleration", trace, sketch_case({}), {})).max() < 40.0
+    assert np.abs(read_signal("acceleration", trace, synthetic_case({}), {})).max() < 40.0
 
 
 def test_the_goal_is_the_one_accepted_last_also_one_that_an_event_sent():
@@ -229,31 +229,31 @@ def test_the_belief_error_is_held_from_one_belief_to_the_next():
 
 
 def test_the_position_is_as_unsure_as_its_worst_direction():
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     turn, variances = 0.7, np.diag([0.09, 0.01])
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     (xx, xy), (_, yy) = rotation @ variances @ rotation.T
     values = trace.belief.values.copy()
     values[:, 3:9] = [xx, xy, 0.0, yy, 0.0, 0.04]
     trace = replace(trace, belief=Samples(trace.belief.ticks, values))
-    assert read_signal("position_std", trace, sketch_case({}), {})[0] == pytest.approx(0.3)
-    assert read_signal("yaw_std", trace, sketch_case({}), {})[0] == pytest.approx(0.2)
+    assert read_signal("position_std", trace, synthetic_case({}), {})[0] == pytest.approx(0.3)
+    assert read_signal("yaw_std", trace, synthetic_case({}), {})[0] == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize(("std", "known"), [(0.5, 1.0), (0.51, 0.0)])
 def test_a_robot_that_is_unsure_is_not_localized(std, known):
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     values = trace.belief.values.copy()
     values[:, 3] = values[:, 6] = std * std
     unsure = replace(trace, belief=Samples(trace.belief.ticks, values))
-    assert set(read_signal("localized", unsure, sketch_case({}), {})) == {known}
+    assert set(read_signal("localized", unsure, synthetic_case({}), {})) == {known}
 
 
 def test_a_robot_is_localized_from_its_first_belief_until_a_second_after_its_last():
-    trace = sketch({"seconds": 6, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 6, "truth": [[0, 0, 0]]})
     some = (trace.belief.ticks >= 240) & (trace.belief.ticks <= 480)
     trace = replace(trace, belief=Samples(trace.belief.ticks[some], trace.belief.values[some]))
-    values = read_signal("localized", trace, sketch_case({}), {})
+    values = read_signal("localized", trace, synthetic_case({}), {})
     assert [at(values, t) for t in (0.975, 1.0, 2.0, 3.0, 3.025)] == [0, 1, 1, 1, 0]
 
 
@@ -266,10 +266,10 @@ def test_without_a_belief_a_robot_is_not_localized_and_has_no_error():
 
 
 def test_a_command_is_held_and_none_counts_as_zero_before_the_first():
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     command = Samples(np.array([120, 180]), np.array([[0.3, 0.4, -1.0], [0.0, 0.0, 0.0]]))
     trace = replace(trace, command=command)
-    speed, turn = (read_signal(name, trace, sketch_case({}), {}) for name in ("command_speed", "command_turn_rate"))
+    speed, turn = (read_signal(name, trace, synthetic_case({}), {}) for name in ("command_speed", "command_turn_rate"))
     assert [at(speed, t) for t in (0, 0.475, 0.5, 0.725, 0.75)] == [0, 0, 0.5, 0.5, 0]
     assert [at(turn, t) for t in (0.475, 0.5, 0.75)] == [0, 1, 0]
 
@@ -318,16 +318,16 @@ def test_a_newer_plan_takes_the_place_of_the_old_one():
 
 
 def test_a_plan_that_came_after_the_last_sample_was_never_followed():
-    trace = sketch({"seconds": 1, "truth": [[0, 1, 1]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 1, 1]]})
     late = Path(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]), 241)
     with pytest.raises(SignalUnavailable, match="no plan"):
-        read_signal("plan_deviation", replace(trace, plans=(late,)), sketch_case({}), {})
+        read_signal("plan_deviation", replace(trace, plans=(late,)), synthetic_case({}), {})
 
 
 def test_a_plan_of_one_point_is_a_place():
-    trace = sketch({"seconds": 1, "truth": [[0, 3, 4]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 3, 4]]})
     trace = replace(trace, plans=(Path(np.array([[0.0, 0.0, 0.0]]), 0), Path()))
-    assert set(read_signal("plan_deviation", trace, sketch_case({}), {})) == {5.0}
+    assert set(read_signal("plan_deviation", trace, synthetic_case({}), {})) == {5.0}
 
 
 def test_a_robot_is_in_a_region_with_its_center():
@@ -420,18 +420,18 @@ def test_a_signal_that_is_not_finite_names_itself_and_the_time():
 
 @pytest.mark.parametrize("name", ["clearance", "speed", "time", "goal_distance", "scan_age"])
 def test_without_the_truth_there_is_no_clock(name):
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     blind: Trace = replace(trace, truth=nothing)
     with pytest.raises(SignalUnavailable, match="true pose"):
-        read_signal(name, blind, sketch_case({"goals": [{"name": "a", "pose": [1, 0, 0]}]}), {})
+        read_signal(name, blind, synthetic_case({"goals": [{"name": "a", "pose": [1, 0, 0]}]}), {})
 
 
 def test_the_nearest_point_of_a_plan_is_found_among_long_and_short_steps():
     chance = np.random.default_rng(2)
     way = np.cumsum(chance.normal(0, [[1.0, 1.0]] * 10 + [[0.02, 0.02]] * 30, (40, 2)), axis=0)
     robot = chance.normal(0, 4, (81, 2))
-    trace = sketch({"seconds": 2, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 2, "truth": [[0, 0, 0]]})
     trace = replace(
         trace,
         truth=Samples(trace.truth.ticks, np.column_stack((robot, np.zeros(81)))),
@@ -439,11 +439,11 @@ def test_the_nearest_point_of_a_plan_is_found_among_long_and_short_steps():
     )
     fine = np.concatenate([np.linspace(a, b, 2000) for a, b in itertools.pairwise(way)])
     expected = [np.hypot(*(fine - point).T).min() for point in robot]
-    assert read_signal("plan_deviation", trace, sketch_case({}), {}) == pytest.approx(expected, abs=1e-3)
+    assert read_signal("plan_deviation", trace, synthetic_case({}), {}) == pytest.approx(expected, abs=1e-3)
 
 
 def test_events_are_counted_in_whatever_order_they_were_written():
     events = [[1, "recovery.started", "spin"], [2, "recovery.started", "wait"], [3, "recovery.started", "spin"]]
-    trace = sketch({"seconds": 4, "truth": [[0, 0, 0]], "events": events})
-    values = read_signal("recovery_count", replace(trace, events=trace.events[::-1]), sketch_case({}), {})
+    trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0]], "events": events})
+    values = read_signal("recovery_count", replace(trace, events=trace.events[::-1]), synthetic_case({}), {})
     assert [at(values, t) for t in (0, 1, 2, 3, 4)] == [0, 1, 2, 3, 3]

@@ -1,7 +1,7 @@
 """Sketched failures: a robot that does not reach the study, and what happened on the way."""
 
 from simscen.judge.diagnosis.causes import causes
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 GOAL = {"name": "study", "pose": [8, 0, 0]}
 DOOR = ["study", [5, 0.5], [5, -0.5], "west wall", "east wall"]
@@ -29,8 +29,8 @@ def by(event, at, *what):
 
 
 def why(criterion, events, at=10, trace=STANDS, case=CASE, **changes):
-    built = sketch({**trace, "events": [*REFUSED, *events], **changes})
-    return causes(criterion, round(at * 240), built, sketch_case(case))
+    built = synthetic_trace({**trace, "events": [*REFUSED, *events], **changes})
+    return causes(criterion, round(at * 240), built, synthetic_case(case))
 
 
 def slip(begin, felt, end=None, name="odom.slip", kind="slip", **about):

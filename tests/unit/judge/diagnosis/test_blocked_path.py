@@ -8,7 +8,7 @@ from diagnosis_cases import CASE, DOOR, STANDS, box, by, why
 
 from simscen.judge.diagnosis.goal_failure import diagnose_blocked_path
 from simscen.judge.diagnosis.objects import MovableObject, movable_objects
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 CLOSES = (
     "why: crate (spawned by event `crate falls` at t = 1.00 s) closes the passage of 1.00 m between `west wall` and "
@@ -151,7 +151,7 @@ class Fog(MovableObject):
 
 def told(*there, **changes):
     fogs = [Fog(name, (), "", 0, False, near) for name, near in there]
-    lines, _ = diagnose_blocked_path(sketch(STANDS), sketch_case({**CASE, **changes}), "study", 2400, fogs)
+    lines, _ = diagnose_blocked_path(synthetic_trace(STANDS), synthetic_case({**CASE, **changes}), "study", 2400, fogs)
     return " ".join(lines)
 
 
@@ -182,7 +182,9 @@ def test_of_what_closes_it_alone_the_last_is_named_and_not_what_leaves_room():
 
 
 def test_what_has_no_part_in_closing_it_is_not_named_with_what_has():
-    trace = sketch({**STANDS, "events": [*box(1, "a", 5, 0.4, 0.6, 0.4), *box(2, "b", 5, -0.4, 0.6, 0.4)]})
+    trace = synthetic_trace({**STANDS, "events": [*box(1, "a", 5, 0.4, 0.6, 0.4), *box(2, "b", 5, -0.4, 0.6, 0.4)]})
     fogs = [Fog("haze", (), "", 0, False, 0.49), Fog("mist", (), "", 0, False, 0.6)]
-    (line,), _ = diagnose_blocked_path(trace, sketch_case(CASE), "study", 2400, [*movable_objects(trace, 2400), *fogs])
+    (line,), _ = diagnose_blocked_path(
+        trace, synthetic_case(CASE), "study", 2400, [*movable_objects(trace, 2400), *fogs]
+    )
     assert line.startswith("a and b close the passage")

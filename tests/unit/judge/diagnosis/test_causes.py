@@ -4,14 +4,14 @@ from diagnosis_cases import STANDS, by, why
 
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.diagnosis.causes import explain_failures
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 
 def test_only_failures_are_explained_and_before_their_own_details():
-    trace = sketch({**STANDS, "events": by("gust", 9)})
+    trace = synthetic_trace({**STANDS, "events": by("gust", 9)})
     failed = Finding(Status.FAIL, "speed", "2", "≤ 1", tick=2400, detail=("own",))
     findings = (failed, Finding(Status.PASS, "speed", "0", "≤ 1", tick=2400), Finding(Status.FAIL, "speed", "2", "≤ 1"))
-    (verdict,) = explain_failures([Verdict("speed", "speed", "fail", findings)], trace, sketch_case({}))
+    (verdict,) = explain_failures([Verdict("speed", "speed", "fail", findings)], trace, synthetic_case({}))
     assert [finding.detail for finding in verdict.findings] == [
         ("meanwhile: event `gust` came 1.00 s before: something", "own"),
         (),

@@ -4,7 +4,7 @@ import pytest
 from diagnosis_cases import CASE, STANDS, box, why
 
 from simscen.judge.diagnosis.causes import causes
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 
 def test_a_thing_on_the_goal_is_named_once():
@@ -47,16 +47,16 @@ def test_only_a_goal_that_is_still_wanted_has_something_in_its_way():
     crate = box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")
     assert why("stuck", crate, at=9)
     reached = [[0, "goal.accepted", "study"], [8, "goal.reached", "study"]]
-    built = sketch({**STANDS, "events": [*reached, *crate]})
-    assert causes("stuck", 2160, built, sketch_case(CASE)) == []
-    assert causes("goals_reached", 1920, built, sketch_case(CASE)) == []
+    built = synthetic_trace({**STANDS, "events": [*reached, *crate]})
+    assert causes("stuck", 2160, built, synthetic_case(CASE)) == []
+    assert causes("goals_reached", 1920, built, synthetic_case(CASE)) == []
 
 
 def test_after_the_goal_has_failed_it_is_still_the_one_that_was_kept():
     crate = box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")
     failed = [[0, "goal.accepted", "study"], [8, "goal.failed", "study", {}], *crate]
-    built = sketch({**STANDS, "events": failed})
-    assert len(causes("result", 2400, built, sketch_case(CASE))) == 1
+    built = synthetic_trace({**STANDS, "events": failed})
+    assert len(causes("result", 2400, built, synthetic_case(CASE))) == 1
 
 
 def test_what_closes_the_way_and_is_near_is_told_once_and_what_else_is_near_as_well():
@@ -92,15 +92,15 @@ def test_what_is_further_than_thirty_centimeters_holds_nobody():
     ],
 )
 def test_a_goal_is_wanted_from_when_it_was_accepted_until_it_was_reached_or_given_up(events, at, wanted):
-    built = sketch({**STANDS, "events": [*box(0, "crate", 5, 0, 0.6, 2.0), *events]})
-    assert bool(causes("stuck", round(at * 240), built, sketch_case(CASE))) is wanted
+    built = synthetic_trace({**STANDS, "events": [*box(0, "crate", 5, 0, 0.6, 2.0), *events]})
+    assert bool(causes("stuck", round(at * 240), built, synthetic_case(CASE))) is wanted
 
 
 def test_what_stands_where_the_goal_before_was_does_not_keep_it_from_the_next():
     goals = [{"name": "kitchen", "pose": [2, 3, 0]}, {"name": "study", "pose": [8, 0, 0]}]
     told = [[0, "goal.accepted", "kitchen"], [2, "goal.reached", "kitchen"], [2, "goal.accepted", "study"]]
-    built = sketch({**STANDS, "events": [*told, *box(3, "crate", 2, 3, 1, 1)]})
-    assert causes("stuck", 2400, built, sketch_case({**CASE, "goals": goals})) == []
+    built = synthetic_trace({**STANDS, "events": [*told, *box(3, "crate", 2, 3, 1, 1)]})
+    assert causes("stuck", 2400, built, synthetic_case({**CASE, "goals": goals})) == []
 
 
 def test_a_passage_as_wide_as_the_robot_is_not_what_leaves_no_way():
@@ -137,7 +137,7 @@ def test_where_nothing_else_is_known_its_stack_is_quoted_with_what_it_had_tried(
     given_up.append([8, "goal.failed", "study", said])
 
     def told(*things):
-        return causes("result", 2400, sketch({**STANDS, "events": [*given_up, *things]}), sketch_case(CASE))
+        return causes("result", 2400, synthetic_trace({**STANDS, "events": [*given_up, *things]}), synthetic_case(CASE))
 
     assert told() == ["why: it gave up and said: no room to turn; spin, wait had not helped"]
     assert "said" not in "".join(told(*box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")))

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simscen.judge.diagnosis.objects import movable_objects
-from simscen.testing.sketch import sketch
+from simscen.testing.synthetic_trace import synthetic_trace
 
 SQUARE = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
 NOTCHED = [[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]]
@@ -18,7 +18,9 @@ def spawned(at, name, x, y, yaw=0.0, parts=(SQUARE,)):
 
 
 def there(events, at, **words):
-    return movable_objects(sketch({"seconds": 10, "truth": [[0, 0, 0]], "events": events, **words}), round(at * 240))
+    return movable_objects(
+        synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]], "events": events, **words}), round(at * 240)
+    )
 
 
 @settings(max_examples=200, deadline=None)
@@ -64,7 +66,7 @@ def test_what_an_event_did_is_told_of_what_it_did_it_to():
         [2, "object.moved", "crate", {}],
         [2, "event.ended", "cart comes", {}],
     ]
-    trace = sketch({"seconds": 10, "truth": [[0, 0, 0]], "events": events})
+    trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]], "events": events})
     assert [thing.told(trace) for thing in movable_objects(trace, 300)] == [
         "bin",
         "crate (spawned by event `crate falls` at t = 1.00 s)",

@@ -12,7 +12,7 @@ from simscen.core.records.trace import Samples
 from simscen.criteria.trace_signals.sparc_ldlj import ldlj, sparc
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.compute import barn_score, compute_metrics
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 NEES = getattr(stats, "NEES", None) or stats.NESS  # as filterpy 1.4.5 misspells it
 GOAL = {"goals": [{"name": "a", "pose": [3, 4, 0]}], "shortest": {"a": 5.0}}
@@ -21,7 +21,7 @@ STEP = 6 / 240
 
 
 def measured(words, case=None):
-    return compute_metrics(sketch(words), sketch_case(case or {})).values
+    return compute_metrics(synthetic_trace(words), synthetic_case(case or {})).values
 
 
 def circle(radius, seconds=20, turns=1.0):
@@ -32,7 +32,7 @@ def circle(radius, seconds=20, turns=1.0):
 
 
 def with_speeds(speeds):
-    trace = sketch({"seconds": (len(speeds) - 1) * STEP, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": (len(speeds) - 1) * STEP, "truth": [[0, 0, 0]]})
     zero = np.zeros(len(speeds))
     return replace(trace, velocity=Samples(trace.truth.ticks, np.column_stack((speeds, zero, zero))))
 
@@ -42,14 +42,14 @@ def test_every_run_reports_the_metrics_of_the_table_each_with_a_number_or_a_reas
         ({"seconds": 0, "truth": [[0, 0, 0]], "belief": None}, {}),
         ({"seconds": 10, "truth": circle(2, 10), "events": ARRIVED}, GOAL),
     ):
-        measures = compute_metrics(sketch(words), sketch_case(case))
+        measures = compute_metrics(synthetic_trace(words), synthetic_case(case))
         assert list(measures.values) == list(METRICS)
         assert {name for name, value in measures.values.items() if value is None} == set(measures.undefined)
         assert all(measures.undefined.values())
 
 
 def test_a_standing_robot_has_no_smoothness_and_says_why():
-    measures = compute_metrics(sketch({"seconds": 10, "truth": [[0, 0, 0]]}), sketch_case({}))
+    measures = compute_metrics(synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]]}), synthetic_case({}))
     assert measures.undefined["sparc"] == measures.undefined["ldlj"] == "the robot never moved"
     assert measures.undefined["aol"] == "the robot never drove"
     assert "too short a way" in measures.undefined["max_curvature"]
@@ -98,7 +98,7 @@ def test_who_touched_something_did_not_succeed():
 @pytest.mark.parametrize("shortest", [{}, {"a": math.inf}, {"a": 0.0}])
 def test_spl_is_left_out_when_no_shortest_way_is_known(shortest):
     measures = compute_metrics(
-        sketch({"seconds": 1, "truth": [[0, 0, 0]]}), sketch_case({**GOAL, "shortest": shortest})
+        synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]}), synthetic_case({**GOAL, "shortest": shortest})
     )
     for name in ("spl", "soft_spl", "path_length_ratio", "barn_score", "shortest_length"):
         assert measures.values[name] is None
@@ -150,12 +150,14 @@ def test_irregularity_is_what_was_turned_beyond_the_first_plan_to_each_goal():
     bent = Path(np.array([[0, 0, 0.0], [1, 0, 3.0], [1, 1, -3.0], [2, 1, -3.0]]), 250)
     other = Path(np.array([[0, 0, 0.0], [1, 0, 1.0]]), 900)
     early = Path(np.array([[0, 0, 0.0], [1, 0, 2.0]]), 100)
-    trace = replace(sketch(words), plans=(early, bent, other))
+    trace = replace(synthetic_trace(words), plans=(early, bent, other))
     turned = 3.0 + (2 * math.pi - 6.0)
-    assert compute_metrics(trace, sketch_case(GOAL)).values["path_irregularity"] == pytest.approx(2 * math.pi - turned)
-    straight = replace(trace, truth=sketch({"seconds": 20, "truth": [[0, 0, 0], [20, 9, 0]]}).truth)
-    assert compute_metrics(straight, sketch_case(GOAL)).values["path_irregularity"] == 0.0
-    unplanned = compute_metrics(replace(trace, plans=(early,)), sketch_case(GOAL))
+    assert compute_metrics(trace, synthetic_case(GOAL)).values["path_irregularity"] == pytest.approx(
+        2 * math.pi - turned
+    )
+    straight = replace(trace, truth=synthetic_trace({"seconds": 20, "truth": [[0, 0, 0], [20, 9, 0]]}).truth)
+    assert compute_metrics(straight, synthetic_case(GOAL)).values["path_irregularity"] == 0.0
+    unplanned = compute_metrics(replace(trace, plans=(early,)), synthetic_case(GOAL))
     assert "no plan" in unplanned.undefined["path_irregularity"]
 
 
@@ -183,7 +185,7 @@ def test_a_run_has_a_score_when_it_has_one_goal():
     metrics = measured({"seconds": 10, "truth": [[0, 0, 0], [8, 3, 4]], "events": ARRIVED}, GOAL)
     assert metrics["barn_score"] == pytest.approx(2.5 / 8.0)
     two = {"goals": [*GOAL["goals"], {"name": "b", "pose": [3, 4, 0]}], "shortest": {"a": 5.0, "b": 1.0}}
-    measures = compute_metrics(sketch({"seconds": 10, "truth": [[0, 0, 0]]}), sketch_case(two))
+    measures = compute_metrics(synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]]}), synthetic_case(two))
     assert "one goal" in measures.undefined["barn_score"]
 
 
@@ -201,14 +203,14 @@ def test_spinning_to_the_right_is_not_standing():
     [(0.009, 0.019, True), (0.01, 0.0, False), (-0.01, 0.0, False), (0.0, 0.02, False), (0.0, -0.02, False)],
 )
 def test_what_counts_as_not_moving(speed, turn, stands):
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     trace = replace(trace, velocity=Samples(trace.truth.ticks, np.tile([speed, 0.0, turn], (41, 1))))
-    assert compute_metrics(trace, sketch_case({})).values["time_not_moving"] == (1.0 if stands else 0.0)
+    assert compute_metrics(trace, synthetic_case({})).values["time_not_moving"] == (1.0 if stands else 0.0)
 
 
 def test_jerk_of_a_trapezoid_is_at_its_corners():
     speeds = np.interp(np.arange(81) * STEP, [0, 0.5, 1.5, 2], [0, 1, 1, 0])
-    metrics = compute_metrics(with_speeds(speeds), sketch_case({})).values
+    metrics = compute_metrics(with_speeds(speeds), synthetic_case({})).values
     assert metrics["max_jerk"] == pytest.approx(2 / STEP)
     assert metrics["mean_jerk"] == pytest.approx(2 * (2 / STEP) / 81)
     assert metrics["max_speed"] == 1.0
@@ -222,7 +224,7 @@ def test_sparc_and_ldlj_give_the_numbers_their_authors_print():
 
 def test_they_are_of_the_speed_over_ground_at_the_rate_of_the_truth():
     speeds = np.sin(np.linspace(0, math.pi, 201))
-    metrics = compute_metrics(with_speeds(-speeds), sketch_case({})).values
+    metrics = compute_metrics(with_speeds(-speeds), synthetic_case({})).values
     assert metrics["sparc"] == sparc(speeds, 40.0)
     assert metrics["ldlj"] == ldlj(speeds, 40.0)
 
@@ -249,7 +251,7 @@ def test_smoothness_is_not_defined_without_motion(speeds):
 
 
 def test_a_constant_speed_has_no_ldlj_but_a_reason():
-    measures = compute_metrics(with_speeds(np.full(81, 0.5)), sketch_case({}))
+    measures = compute_metrics(with_speeds(np.full(81, 0.5)), synthetic_case({}))
     assert measures.values["ldlj"] is None
     assert measures.undefined["ldlj"] == "the speed never changed"
     assert measures.values["sparc"] < 0
@@ -284,7 +286,7 @@ def test_two_contacts_at_once_last_as_long_as_their_union():
 def lost(seconds=60.0, seed=4):
     """A curved drive with a belief that wanders around the truth."""
     chance = np.random.default_rng(seed)
-    trace = sketch({"seconds": seconds, "truth": circle(3, seconds, turns=2)})
+    trace = synthetic_trace({"seconds": seconds, "truth": circle(3, seconds, turns=2)})
     values = trace.belief.values.copy()
     ticks = trace.belief.ticks
     yaw = np.interp(ticks, trace.truth.ticks, np.unwrap(trace.truth.values[:, 2]))
@@ -313,7 +315,7 @@ def test_pose_errors_are_those_of_evo_without_alignment(ours):
     trace = lost()
     reference = as_evo(trace.truth.at(trace.belief.ticks)[:, :3])
     theirs.process_data((reference, as_evo(trace.belief.values[:, :3])))
-    expected, metrics = theirs.get_all_statistics(), compute_metrics(trace, sketch_case({})).values
+    expected, metrics = theirs.get_all_statistics(), compute_metrics(trace, synthetic_case({})).values
     for name in ("rmse", "mean", "median", "max"):
         assert metrics[f"{ours}_{name}"] == pytest.approx(expected[name], abs=1e-7), name
 
@@ -325,7 +327,7 @@ def test_the_final_error_is_the_last():
 
 
 def test_a_short_drive_has_no_relative_error_but_a_reason():
-    measures = compute_metrics(sketch({"seconds": 10, "truth": [[0, 0, 0], [10, 0.9, 0]]}), sketch_case({}))
+    measures = compute_metrics(synthetic_trace({"seconds": 10, "truth": [[0, 0, 0], [10, 0.9, 0]]}), synthetic_case({}))
     assert measures.undefined["rpe_trans_rmse"] == measures.undefined["rpe_rot_max"] == "the robot drove less than 1 m"
 
 
@@ -338,7 +340,9 @@ def test_nees_is_that_of_filterpy():
     errors = values[:, :3] - true
     errors[:, 2] = (errors[:, 2] + math.pi) % (2 * math.pi) - math.pi
     expected = np.mean(NEES(errors, np.zeros_like(errors), covariances))
-    found = compute_metrics(replace(trace, belief=Samples(trace.belief.ticks, values)), sketch_case({})).values["nees"]
+    found = compute_metrics(replace(trace, belief=Samples(trace.belief.ticks, values)), synthetic_case({})).values[
+        "nees"
+    ]
     assert found == pytest.approx(expected)
 
 
@@ -354,23 +358,25 @@ def test_nees_of_errors_drawn_from_the_covariance_is_three():
     "covariance", [[0, 0, 0, 1, 0, 1], [1, 1, 0, 1, 0, 1], [1, 0, 1, 1, 0, 1], [1, 0, 0, 1, 0, 0], [0, 0, 0, 0, 0, 0]]
 )
 def test_a_depleted_particle_set_is_overconfident_not_a_number(covariance):
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]], "belief": {"offset": [0.1, 0, 0]}})
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "belief": {"offset": [0.1, 0, 0]}})
     values = trace.belief.values.copy()
     values[3, 3:9] = covariance
-    measures = compute_metrics(replace(trace, belief=Samples(trace.belief.ticks, values)), sketch_case({}))
+    measures = compute_metrics(replace(trace, belief=Samples(trace.belief.ticks, values)), synthetic_case({}))
     assert measures.values["nees"] is None
     assert "overconfident" in measures.undefined["nees"]
 
 
 def test_a_run_without_belief_has_no_localization():
-    measures = compute_metrics(sketch({"seconds": 1, "truth": [[0, 0, 0]], "belief": None}), sketch_case({}))
+    measures = compute_metrics(
+        synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "belief": None}), synthetic_case({})
+    )
     assert measures.values["ape_trans_rmse"] is measures.values["nees"] is None
     assert measures.undefined["nees"] == "the robot never said where it believes to be"
 
 
 def test_a_signal_that_is_not_a_number_leaves_its_metrics_undefined_and_no_others():
     words = {"seconds": 2, "truth": [[0, 0, 0], [1, math.nan, 0], [2, 0, 0]], "clearance": 0.5}
-    found = compute_metrics(sketch(words), sketch_case({}))
+    found = compute_metrics(synthetic_trace(words), synthetic_case({}))
     assert found.undefined["path_length"] == found.undefined["heading_change"]
     assert found.undefined["path_length"].startswith("the true pose is not finite at t = ")
     assert (found.values["min_clearance"], found.values["collisions"]) == (0.5, 0.0)

@@ -8,7 +8,7 @@ import pytest
 from simscen.core.records.trace import Samples
 from simscen.criteria.trace_signals.sparc_ldlj import sparc
 from simscen.judge.metrics.compute import barn_score, compute_metrics
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 NAMES = "abc"
 GOALS = {
@@ -27,7 +27,7 @@ TOLD = [
 
 
 def measures(events=(), case=GOALS, **words):
-    return compute_metrics(sketch({**TOUR, "events": list(events), **words}), sketch_case(case))
+    return compute_metrics(synthetic_trace({**TOUR, "events": list(events), **words}), synthetic_case(case))
 
 
 def test_the_time_is_from_the_first_acceptance_to_the_last_arrival():
@@ -65,7 +65,7 @@ def test_soft_spl_is_of_the_last_goal_and_the_last_place():
 
 def test_without_the_true_pose_there_is_no_soft_spl():
     nothing = Samples(np.empty(0, np.int64), np.empty((0, 3)))
-    found = compute_metrics(replace(sketch(TOUR), truth=nothing, velocity=nothing), sketch_case(GOALS))
+    found = compute_metrics(replace(synthetic_trace(TOUR), truth=nothing, velocity=nothing), synthetic_case(GOALS))
     assert found.undefined["soft_spl"] == "the true pose was not recorded"
     assert found.undefined["max_speed"] == found.undefined["sparc"] == "the true velocity was not recorded"
 
@@ -80,10 +80,10 @@ def test_ways_of_half_a_meter_have_a_score_too():
 
 
 def with_speeds(speeds, ticks=None):
-    trace = sketch({"seconds": (len(speeds) - 1) / 40, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": (len(speeds) - 1) / 40, "truth": [[0, 0, 0]]})
     values = np.column_stack((speeds, np.zeros((len(speeds), 2))))
     velocity = Samples(trace.truth.ticks if ticks is None else ticks, values)
-    return compute_metrics(replace(trace, velocity=velocity), sketch_case({}))
+    return compute_metrics(replace(trace, velocity=velocity), synthetic_case({}))
 
 
 def test_a_centimeter_a_second_is_motion():

@@ -10,7 +10,7 @@ from simscen.core.messages.navigation import Path
 from simscen.core.records.trace import Samples
 from simscen.criteria.trace_signals.ground_truth import drive
 from simscen.judge.metrics.trajectory import path_metrics, path_segments
-from simscen.testing.sketch import sketch
+from simscen.testing.synthetic_trace import synthetic_trace
 
 TICKS = 6
 CORNER = [(5, 7), (6, 7), (6, 8)]
@@ -19,7 +19,7 @@ CORNER = [(5, 7), (6, 7), (6, 8)]
 def driven(points, events=(), plans=()):
     """A trace whose robot is at one of the points (x, y) or (x, y, yaw) at each of its samples."""
     poses = np.array([[*point, 0.0][:3] for point in points], dtype=np.float64)
-    trace = sketch({"seconds": TICKS * (len(poses) - 1) / 240, "truth": [[0, 0, 0]], "events": list(events)})
+    trace = synthetic_trace({"seconds": TICKS * (len(poses) - 1) / 240, "truth": [[0, 0, 0]], "events": list(events)})
     return replace(trace, truth=Samples(trace.truth.ticks, poses), plans=tuple(plans))
 
 
@@ -101,7 +101,7 @@ def test_a_way_of_eighths_of_a_meter_is_one_piece():
 
 def test_without_a_true_pose_there_is_no_shape():
     trace = replace(
-        sketch({"seconds": 1, "truth": [[0, 0, 0]]}), truth=Samples(np.empty(0, np.int64), np.empty((0, 3)))
+        synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]}), truth=Samples(np.empty(0, np.int64), np.empty((0, 3)))
     )
     metrics = path_metrics(trace, drive(trace))
     assert metrics["aol"] == "the robot never drove"

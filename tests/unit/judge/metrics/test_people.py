@@ -3,16 +3,16 @@
 import pytest
 
 from simscen.judge.metrics.compute import compute_metrics, person_metrics
-from simscen.testing.sketch import sketch, sketch_case
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 ANNA = [0, "object.spawned", "anna", {"person": True, "size": [0.25, 1.7]}]
 
 
 def test_a_robot_that_drives_up_to_somebody_is_in_each_zone_for_the_time_that_its_way_takes():
     """At 1 m/s from a gap of 4.55 m to one of 0.05 m, then it stands: 0.95 s social are 2.4 m, and so on."""
-    trace = sketch({"seconds": 10, "truth": [[0, 0, 0], [4.5, 4.5, 0], [10, 4.5, 0]], "objects": {"anna": [[0, 5, 0]]},
+    trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0], [4.5, 4.5, 0], [10, 4.5, 0]], "objects": {"anna": [[0, 5, 0]]},
                     "events": [ANNA]})  # fmt: skip
-    found = person_metrics(trace, sketch_case({"inscribed_radius": 0.2}))
+    found = person_metrics(trace, synthetic_case({"inscribed_radius": 0.2}))
     assert found["min_person_distance"] == pytest.approx(0.05, abs=1e-6)
     assert found["intrusion_social"] == pytest.approx(0.24, abs=0.004)
     assert found["intrusion_personal"] == pytest.approx(0.075, abs=0.004)
@@ -21,14 +21,14 @@ def test_a_robot_that_drives_up_to_somebody_is_in_each_zone_for_the_time_that_it
 
 def test_of_several_people_the_nearest_counts_and_only_while_they_are_there():
     bert = [5, "object.spawned", "bert", {"person": True, "size": [0.25, 1.7]}]
-    trace = sketch({"seconds": 10, "truth": [[0, 0, 0]], "objects": {"anna": [[0, 2, 0]], "bert": [[0, 1, 0]]},
+    trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]], "objects": {"anna": [[0, 2, 0]], "bert": [[0, 1, 0]]},
                     "events": [ANNA, bert]})  # fmt: skip
-    found = person_metrics(trace, sketch_case({"footprint": [[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]]}))
+    found = person_metrics(trace, synthetic_case({"footprint": [[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]]}))
     assert found["min_person_distance"] == pytest.approx(0.55)
     assert (found["intrusion_social"], found["intrusion_personal"]) == pytest.approx((0.5, 0.5), abs=0.003)
 
 
 def test_without_people_there_is_no_number():
-    found = compute_metrics(sketch({"seconds": 1, "truth": [[0, 0, 0]]}), sketch_case({}))
+    found = compute_metrics(synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]}), synthetic_case({}))
     people = ["min_person_distance", "intrusion_intimate", "intrusion_personal", "intrusion_social"]
     assert {found.undefined[name] for name in people} == {"there were no people"}

@@ -7,12 +7,12 @@ import pytest
 
 from simscen.core.records.trace import Samples
 from simscen.judge.metrics.trajectory import pose_metrics
-from simscen.testing.sketch import sketch
+from simscen.testing.synthetic_trace import synthetic_trace
 
 
 def located(ticks, true, told, believed):
     """A trace with these poses (x, y, yaw) of truth, and of belief with the variance of 1 in each."""
-    trace = sketch({"seconds": max(ticks) / 240, "truth": [[0, 0, 0]]})
+    trace = synthetic_trace({"seconds": max(ticks) / 240, "truth": [[0, 0, 0]]})
     beliefs = np.array([[*pose, 1, 0, 0, 1, 0, 1] for pose in believed], dtype=np.float64)
     truth = Samples(np.array(ticks), np.array(true, dtype=np.float64))
     return replace(trace, truth=truth, belief=Samples(np.array(told), beliefs))

@@ -6,7 +6,7 @@ from simscen.core.errors import Problem
 from simscen.loading.schema.validate import check
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.robot import RobotSpec
-from simscen.model.rosmap import RosMapSpec
+from simscen.model.ros_map import RosMapSpec
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import WorldSpec
 

@@ -7,8 +7,8 @@ import pytest
 from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_scenario
-from simscen.model.anystack import ExternalStackSpec
 from simscen.model.stack import StackSpec
+from simscen.model.stack_files import ExternalStackSpec
 
 Write = Callable[[str, str], Path]
 Load = Callable[[str], LoadedScenario | list[Problem]]

@@ -22,7 +22,7 @@ from simscen.run.preparation.loaders import world_from_file
 from simscen.stack.installed.localizer import InstalledLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
 from simscen.stack.setting import Setting
-from simscen.testing.room import ROBOT, TICK_RATE
+from simscen.testing.synthetic_room import ROBOT, TICK_RATE
 from simscen.worlds.build import build
 from simscen.worlds.geometry.triangulation import fuse
 from simscen.worlds.raycasting.ray_scene import RayScene

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simscen.testing.room import BEAMS, BOXES, EACH, SCAN_PERIOD, TICK_RATE, Drive, cast
+from simscen.testing.synthetic_room import BEAMS, BOXES, EACH, SCAN_PERIOD, TICK_RATE, Drive, cast
 
 
 def kidnapped(before: Drive, after: Drive) -> Drive:

@@ -17,7 +17,7 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import Amcl, Ekf
 from simscen.model.localizers import Localizer as Spec
-from simscen.testing.room import USUAL, Drive, Noise, drive, errors, localizer, nees, run, scan
+from simscen.testing.synthetic_room import USUAL, Drive, Noise, drive, errors, localizer, nees, run, scan
 
 SUM = Amcl(laser_model_type="likelihood_field")
 PROB = Amcl(laser_model_type="likelihood_field_prob")

@@ -15,7 +15,7 @@ from simscen.model.localizers import Amcl
 from simscen.stack.localizers.build import amcl
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting
-from simscen.testing.room import BEAMS, cast, drive, grid, localizer, scan, surroundings
+from simscen.testing.synthetic_room import BEAMS, cast, drive, grid, localizer, scan, surroundings
 
 START = Pose2(-2.5, -1.8, 0.6)
 DEFAULT = Amcl()

@@ -5,7 +5,7 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.stack.localizers.beams import select_beams
-from simscen.testing.room import scan
+from simscen.testing.synthetic_room import scan
 
 inf, nan = np.inf, np.nan
 

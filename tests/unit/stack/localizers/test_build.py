@@ -15,7 +15,7 @@ from simscen.stack.localizers.ekf import EkfLocalizer
 from simscen.stack.localizers.ground_truth import GroundTruthLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
 from simscen.stack.setting import Setting
-from simscen.testing.room import ROBOT, surroundings
+from simscen.testing.synthetic_room import ROBOT, surroundings
 
 HERE = Estimate(Pose2(0, 0, 0))
 

@@ -8,7 +8,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import OdometryOnly
-from simscen.testing.room import Noise, drive, errors, localizer, run
+from simscen.testing.synthetic_room import Noise, drive, errors, localizer, run
 
 SPEC = OdometryOnly(type="odometry")
 SILENT = Noise(translation=0, rotation=0, drift=0)

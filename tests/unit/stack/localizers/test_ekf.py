@@ -10,7 +10,7 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.model.localizers import Ekf
 from simscen.stack.protocols import Localizer
-from simscen.testing.room import Noise, drive, errors, localizer, nees, run
+from simscen.testing.synthetic_room import Noise, drive, errors, localizer, nees, run
 
 SPEC = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
 AS_SPECIFIED = Noise(drift=0.01, gyro_bias=0.002)

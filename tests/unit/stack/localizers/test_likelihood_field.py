@@ -15,7 +15,7 @@ from simscen.stack.localizers.likelihood_field import (
     obstacle_field,
     surfaces,
 )
-from simscen.testing.room import BEAMS, cast, grid, scan
+from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
 
 Z_HIT, Z_RAND, SIGMA = 0.5, 0.5, 0.2
 POSE = Pose2(-2.5, -1.8, 0.6)

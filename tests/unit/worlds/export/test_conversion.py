@@ -13,7 +13,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, Mesh, MotionPath, Solid, Sphere
 from simscen.model.world import WorldSpec
-from simscen.spec.motions import route
+from simscen.spec.moving_objects import route
 from simscen.worlds.export.conversion import convert
 from simscen.worlds.export.cut_polygons import rings_of
 from simscen.worlds.geometry.cross_section import outlines

@@ -15,7 +15,7 @@ from simscen.core.records.trace import Samples, Ticks, Trace
 TICK_RATE, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
 
 
-def sketch(words: Mapping[str, Any]) -> Trace:
+def synthetic_trace(words: Mapping[str, Any]) -> Trace:
     """A trace at the usual rates (240 Hz ticks, truth 40 Hz, scans and belief 10 Hz).
 
     seconds: how long it is · truth: waypoints [t, x, y, yaw], driven straight at constant speed between them ·
@@ -105,7 +105,7 @@ def _lifted(points: Sequence[Sequence[float]]) -> Array:
     return np.column_stack((xy, np.append(yaw, yaw[-1:])))
 
 
-def sketch_case(words: Mapping[str, Any]) -> Case:
+def synthetic_case(words: Mapping[str, Any]) -> Case:
     """A case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · sent ·
     expected {goal: failed or a code} · shortest {goal: meters} · passages [[goal, [x, y], [x, y], name, name]] ·
     disturbances [{name, kind, …}] ·

@@ -7,13 +7,21 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import FrameType
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-LIMIT = 60.0
+from simscen.core.messages.navigation import ErrorCode
+from simscen.model.costmaps import Costmap as CostmapSpec
+from simscen.spec.base import Component
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
+from simscen.stack.setting import Setting
+from simscen.testing.flatland import RATE, Flatland, setting
+
+DEFAULT_LIMIT_S = 60.0
 """Seconds of wall time after which a promise counts as broken because its component does not come to an end."""
 
 T = TypeVar("T")
@@ -23,7 +31,7 @@ class PromiseBroken(AssertionError):
     """A component does not keep what its protocol promises; the message says what was seen."""
 
 
-def demand(kept: object, seen: str) -> None:
+def require(kept: object, seen: str) -> None:
     """Raise PromiseBroken, with what was seen, unless `kept`."""
     if not kept:
         raise PromiseBroken(seen)
@@ -41,10 +49,10 @@ class Promise:
     def __str__(self) -> str:
         return f"{self.subject} {self.name}" if self.subject else self.name
 
-    def check(self, limit: float = LIMIT) -> None:
+    def check(self, limit: float = DEFAULT_LIMIT_S) -> None:
         """Try it, with global random generators in a state that no other try has."""
-        disturb_global_chance()
-        with ending_within(limit):
+        reseed_global_generators()
+        with time_limit(limit):
             self.keep()
 
 
@@ -73,7 +81,7 @@ def _is_promise(value: Any) -> bool:
 _turn = 0
 
 
-def disturb_global_chance() -> None:
+def reseed_global_generators() -> None:
     """Put the global generators of Python and numpy into a state of their own: who draws from them shows it."""
     global _turn  # noqa: PLW0603
     _turn += 1
@@ -82,7 +90,7 @@ def disturb_global_chance() -> None:
 
 
 @contextmanager
-def ending_within(seconds: float) -> Iterator[None]:
+def time_limit(seconds: float) -> Iterator[None]:
     """Raise PromiseBroken in what does not come to an end. Only the main thread can be interrupted."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -99,3 +107,58 @@ def ending_within(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+# MERGED: What the contracts of all components of a stack share.
+@dataclass(frozen=True, eq=False)
+class ComponentContract(Contract):
+    """The promises of a component that is built as `Class(spec, setting)`, tried with this robot."""
+
+    spec: Any
+    robot: RobotModel
+    subject: str = ""
+
+    def setting(self) -> Setting:
+        """Where it is installed; each has a fresh random generator."""
+        return setting(self.robot, name=self.role)
+
+    def built(self) -> Any:
+        """A new one."""
+        spec: Component = self.spec
+        return call_component("is built", lambda: spec.implementation()(spec, self.setting()))
+
+
+def call_component(when: str, call: Callable[..., T], *given: Any, **named: Any) -> T:
+    """What a call answers. Raises PromiseBroken for every exception but a NavigationFailure with a code of Nav2's."""
+    try:
+        return call(*given, **named)
+    except NavigationFailure as failure:
+        require(isinstance(failure.code, ErrorCode), f"fails with {failure.code!r}, which is no ErrorCode")
+        raise
+    except PromiseBroken:
+        raise
+    except Exception as error:  # whatever a stranger's component raises
+        what = f"raises {type(error).__name__} when it {when}, not a NavigationFailure: {error}"
+        raise PromiseBroken(what) from error
+
+
+def view_of(world: Flatland, robot: RobotModel, bounds: tuple[float, float, float, float]) -> CostmapView:
+    """A costmap of all that is in the world, in cells of 5 cm."""
+    return Costmap(CostmapSpec(), Surroundings(robot, world.grid(bounds), RATE)).view
+
+
+def copy_costmap(view: CostmapView) -> CostmapView:
+    """The same costmap in arrays of its own."""
+    return replace(view, costs=view.costs.copy(), distance=view.distance.copy())
+
+
+def equal_costmaps(one: CostmapView, other: CostmapView) -> bool:
+    """Whether two costmaps say the same."""
+    return np.array_equal(one.costs, other.costs) and np.array_equal(one.distance, other.distance)
+
+
+def overwrite_costmap(view: CostmapView) -> None:
+    """What becomes of a costmap that somebody has kept: everything is lethal."""
+    view.costs.setflags(write=True)
+    view.distance.setflags(write=True)
+    view.costs[:], view.distance[:] = 254, 0.0

@@ -6,16 +6,19 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from _pytest._code.code import ReprEntryNative, ReprExceptionInfo, ReprFileLocation, ReprTraceback
 
 from simscen.cli.diagnostics import as_text
 from simscen.cli.session.selection import Checks, checked
 from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import InvalidInput, SimscenError, UsageError
 from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished
 from simscen.loading.files.discovery import default_root
-from simscen.pytesting.failure import ScenarioFailed, as_seen
 from simscen.pytesting.runner import runner_of
-from simscen.report.violations import short_run_name
+from simscen.report.session_lines import violation_lines
+from simscen.report.styled_line import plain_text
+from simscen.report.violations import error_summary, reported_violations, scenario_file, short_run_name
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
 if TYPE_CHECKING:
@@ -25,7 +28,7 @@ if TYPE_CHECKING:
     from simscen.core.records.session_events import RunFinished
     from simscen.loading.loaded import LoadedScenario
 
-OF_PYTEST = frozenset(
+PYTEST_MARKERS = frozenset(
     {"skip", "skipif", "xfail", "usefixtures", "filterwarnings", "parametrize", "tryfirst", "trylast"}
 )
 """Markers that pytest obeys: a tag of such a name is no marker."""
@@ -51,7 +54,7 @@ class ScenarioFile(pytest.File):
         options = SessionOptions(seed=_seed(config), repeat=config.getoption("--simscen-repeat"))
         for choice in checks.choices:
             scenarios, problems = checks.scenario(self.path, choice)
-            _refuse(problems)
+            _raise_errors(problems)
             for scenario in scenarios:
                 loaded = scenario.having(several_stacks=len(checks.choices) > 1)
                 for seed in scenario_seeds(loaded, options):
@@ -73,7 +76,7 @@ class ScenarioRun(pytest.Item):
         name = short_run_name(scenario.key(seed), every_seed, f"{folder}/" if folder else "")
         item: ScenarioRun = cls.from_parent(parent, name=name, scenario=scenario, seed=seed)
         for tag in ("simscen", *scenario.spec.tags):
-            if tag not in OF_PYTEST:
+            if tag not in PYTEST_MARKERS:
                 item.config.addinivalue_line("markers", f"{tag}: a tag of scenarios")
                 item.add_marker(tag)
         if scenario.spec.skip is not None:
@@ -82,7 +85,7 @@ class ScenarioRun(pytest.Item):
 
     def runtest(self) -> None:
         """Run it, in a process of its own."""
-        _refuse(checked(self._scenario))
+        _raise_errors(checked(self._scenario))
         run = runner_of(self.config).run(self._scenario, self._seed)
         self.user_properties += _properties(run)
         if run.outcome is Outcome.FAILED_AS_EXPECTED:
@@ -93,7 +96,7 @@ class ScenarioRun(pytest.Item):
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """What was violated, where and when, in place of a traceback."""
         if isinstance(excinfo.value, ScenarioFailed):
-            return as_seen(excinfo.value.run)
+            return failure_representation(excinfo.value.run)
         if isinstance(excinfo.value, InvalidInput):
             return as_text(excinfo.value.problems)
         return super().repr_failure(excinfo)
@@ -103,7 +106,7 @@ class ScenarioRun(pytest.Item):
         return self.path, 0, self.name
 
 
-def _refuse(problems: list[Problem]) -> None:
+def _raise_errors(problems: list[Problem]) -> None:
     """Raise InvalidInput for errors; warnings are what `simscen validate` is for."""
     if errors := [problem for problem in problems if problem.severity == "error"]:
         raise InvalidInput(errors)
@@ -125,3 +128,30 @@ def _properties(run: RunFinished) -> list[tuple[str, object]]:
     files = {"log": run.artifacts.mcap, "picture": run.artifacts.picture}
     facts = {"seed": run.key.seed, "simulated_seconds": f"{run.result.simulated:.3f}", "again": run.again, **files}
     return [(name, value) for name, value in facts.items() if value]
+
+
+# MERGED: A run that did not pass, as pytest shows it: here, in the summary, in junit.xml and from a worker of xdist.
+class ScenarioFailed(AssertionError):
+    """A run that did not pass, and was not expected to fail; or that could not be completed."""
+
+    def __init__(self, run: RunFinished) -> None:
+        self.run = run
+        super().__init__(_cause(run))
+
+
+def failure_representation(run: RunFinished) -> Any:
+    """What the command line prints below such a run.
+
+    pytest passes a failure on from worker to controller only in this form, which has no public name.
+    """
+    lines = [f"{plain_text(line).removeprefix('      ')}\n" for line in violation_lines(run)]
+    first = next((complaint.line for complaint in reported_violations(run) if not complaint.warning), 0)
+    crash = ReprFileLocation(path=scenario_file(run), lineno=first or 1, message=_cause(run))
+    return ReprExceptionInfo(ReprTraceback([ReprEntryNative(lines)], extraline=None, style="native"), crash)
+
+
+def _cause(run: RunFinished) -> str:
+    """The first reason, in a line."""
+    if run.outcome is Outcome.ERROR:
+        return error_summary(run)
+    return next((complaint.message for complaint in reported_violations(run) if not complaint.warning), "failed")

@@ -4,10 +4,10 @@ from typing import Annotated
 
 from pydantic import Field
 
-from simscen.spec.base import Spec, by_default
+from simscen.spec.base import Spec, Typed, by_default
+from simscen.spec.places import MaskFile, RegionName
 from simscen.spec.quantities import Frequency, PositiveAngle, PositiveLength, PositiveSpeed
-from simscen.spec.references import MaskFile, RegionName
-from simscen.spec.speedmask import SpeedMask
+from simscen.spec.speed_mask import SpeedMask
 
 
 class GoalTolerances(Spec):
@@ -48,3 +48,17 @@ class StackBase(Spec):
     def told_truth(self) -> bool:
         """Whether it is also told where it truly is."""
         return False
+
+
+# MERGED: What the parameters of all controllers have in common.
+Weight = Annotated[float, Field(ge=0, le=1e7)]
+"""Of a critic, against other critics."""
+
+
+class ControllerSpec(Typed):
+    """What follows a path."""
+
+    @property
+    def looks_ahead(self) -> float:
+        """Seconds for which it follows what it may command: the local costmap reaches so far."""
+        return 2.0

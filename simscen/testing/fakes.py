@@ -1,23 +1,27 @@
 """A run as triggers and actions see it, without a run: everything is as it is set, and what is done is written down."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import ZoneSwitch
 from simscen.core.environment.world_model import Patch, Polygon, WalkingPedestrian
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.geometry.ray_fans import RayCaster
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.core.messages.navigation import Belief, Goal, Path
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event
+from simscen.model.robot import Differential
 
 
 @dataclass
-class PuppetStage:
+class FakeStage:
     """A core.stage.Stage. `regions` and `objects` that nobody has set are squares and places near the origin."""
 
     tick: int = 0
@@ -45,7 +49,7 @@ class PuppetStage:
         """There is one only."""
         return ()
 
-    def of(self, robot: str) -> "PuppetStage":
+    def of(self, robot: str) -> "FakeStage":
         """All robots are the same."""
         return self
 
@@ -129,3 +133,54 @@ class PuppetStage:
     def note(self, event: Event) -> None:
         """Write it down."""
         self.done.append(("note", event))
+
+
+# MERGED: A robot that drives a circle in an empty square room, as sensors see it: closed forms, no physics.
+LINEAR_SPEED, ANGULAR_SPEED = 0.3, 0.2
+"""m/s and rad/s."""
+ROOM_HALF_WIDTH_M = 4.0
+"""Meters from the middle of the room to its walls."""
+DRIVE = Differential(type="differential", wheel_separation=0.3, wheel_radius=0.05)
+
+
+class FakeSensorView:
+    """A sensors.sensor.SensorView: where the robot is `seconds` after its start; that is set by hand."""
+
+    seconds = 0.0
+
+    def base_pose(self) -> Pose3:
+        """On a circle around (0, 1.5)."""
+        yaw, radius = ANGULAR_SPEED * self.seconds, LINEAR_SPEED / ANGULAR_SPEED
+        return Pose3.planar(Pose2(radius * math.sin(yaw), radius * (1 - math.cos(yaw)), yaw))
+
+    def base_velocity(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Along the world's axes."""
+        yaw = ANGULAR_SPEED * self.seconds
+        return (LINEAR_SPEED * math.cos(yaw), LINEAR_SPEED * math.sin(yaw), 0.0), (0.0, 0.0, ANGULAR_SPEED)
+
+    def encoders(self) -> tuple[float, ...]:
+        """Radians of the left and the right wheel."""
+        half = DRIVE.wheel_separation / 2
+        left, right = (LINEAR_SPEED - ANGULAR_SPEED * half), (LINEAR_SPEED + ANGULAR_SPEED * half)
+        return tuple(speed * self.seconds / DRIVE.wheel_radius for speed in (left, right))
+
+    def touching(self) -> bool:
+        """Every other second."""
+        return int(self.seconds) % 2 == 1
+
+    def image(
+        self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
+    ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
+        """Gray, two meters away."""
+        return np.full((height, width, 3), 128, np.uint8), np.full((height, width), min(2.0, far), np.float32)
+
+
+class SquareRoomRays(RayCaster):
+    """Rays to the four walls."""
+
+    def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
+        """See core.geometry.ray_fans.RayCaster."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            walls = (np.sign(directions[:, :2]) * ROOM_HALF_WIDTH_M - origins[:, :2]) / directions[:, :2]
+        far: Array = np.nanmin(np.where(walls > 0, walls, np.inf), axis=1)
+        return np.where(far <= reach, far, np.inf)

@@ -9,17 +9,17 @@ from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, ValidationError, core_schema
 
 from simscen.core.messages.navigation import RecoveryBehavior
-from simscen.spec.component import Typed
-from simscen.spec.lazy import LazySpec
+from simscen.spec.base import Typed
+from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped
 
-GROUP, NAMES, WHOLE = "simscen group", "simscen names", "simscen mappings"
+GROUP_KEY, NAMES_ALLOWED_KEY, MAPPINGS_ALLOWED_KEY = "simscen group", "simscen names", "simscen mappings"
 """Under these keys the metadata of a schema says to which group packages add, and whether names and mappings may stand
 there."""
 
 
 @dataclass(frozen=True)
-class ByType:
+class ExtensibleUnion:
     """Marks a field that holds a specification of a group; `own` is the type that holds for what is shipped.
 
     A mapping whose `type` is not shipped is validated by the specification that an installed package adds by that name;
@@ -32,7 +32,7 @@ class ByType:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         inner = handler.generate_schema(self.own)
-        told = {GROUP: self.group, NAMES: self.named, WHOLE: True}
+        told = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: self.named, MAPPINGS_ALLOWED_KEY: True}
         return core_schema.no_info_wrap_validator_function(self._validate, inner, metadata=told)
 
     def _validate(self, value: Any, own: core_schema.ValidatorFunctionWrapHandler) -> Any:
@@ -51,13 +51,13 @@ class ByType:
 
 
 @dataclass(frozen=True)
-class NameOf:
+class TypeName:
     """Marks a text that is the name of a shipped type, as the field says, or of one that an installed package adds."""
 
     group: str
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        told = {GROUP: self.group, NAMES: True, WHOLE: False}
+        told = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: True, MAPPINGS_ALLOWED_KEY: False}
         return core_schema.no_info_wrap_validator_function(self._validate, handler(source), metadata=told)
 
     def _validate(self, value: Any, own: core_schema.ValidatorFunctionWrapHandler) -> Any:
@@ -66,7 +66,7 @@ class NameOf:
         return own(value)
 
 
-BehaviorName = Annotated[RecoveryBehavior, NameOf("behavior")]
+BehaviorName = Annotated[RecoveryBehavior, TypeName("behavior")]
 """The name of a recovery behavior, as events of the log have it."""
 
 
@@ -75,7 +75,7 @@ def specification(entry: Entry, value: dict[str, Any]) -> BaseModel:
     return validate_plugin_spec(entry, {**value, "type": entry.name})
 
 
-def added(group: str) -> Iterator[tuple[str, type[BaseModel]]]:
+def installed_specs(group: str) -> Iterator[tuple[str, type[BaseModel]]]:
     """The specifications that installed packages add to a group, by name; broken ones are left out."""
     for entry in installed(group):
         if entry.flaw or entry.name in _names(group):

@@ -15,28 +15,24 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.plugin_metric import Measure
 from simscen.faults.base import Fault
 from simscen.model.checkers import GoalCheckerSpec
-from simscen.model.controllerspec import ControllerSpec
 from simscen.model.localizers import LocalizerSpec
 from simscen.model.planners import PlannerSpec
 from simscen.model.recovery import BehaviorSpec
 from simscen.model.robot import SensorSpec
-from simscen.model.stackbase import StackBase
+from simscen.model.stack_base import ControllerSpec, StackBase
 from simscen.spec.registry import GROUPS, BrokenPlugin, Entry, find
 from simscen.stack.protocols import RobotModel
-from simscen.testing.contracts.action import ActionContract
+from simscen.testing.contracts.actions_and_triggers import ActionContract, TriggerContract
+from simscen.testing.contracts.base import Contract, Promise
 from simscen.testing.contracts.behavior import BehaviorContract
 from simscen.testing.contracts.controller import ControllerContract
-from simscen.testing.contracts.criterion import CriterionContract
-from simscen.testing.contracts.fault import FaultContract
+from simscen.testing.contracts.criteria_and_metrics import CriterionContract, MetricContract
 from simscen.testing.contracts.goal_checker import GoalCheckerContract
 from simscen.testing.contracts.localizer import LocalizerContract
-from simscen.testing.contracts.metric import MetricContract
 from simscen.testing.contracts.planner import PlannerContract
-from simscen.testing.contracts.sensor import SensorContract
+from simscen.testing.contracts.sensors_and_faults import FaultContract, SensorContract
 from simscen.testing.contracts.stack import StackContract
-from simscen.testing.contracts.trigger import TriggerContract
 from simscen.testing.flatland import box_robot, round_robot
-from simscen.testing.promise import Contract, Promise
 from simscen.triggers.base import Condition
 
 ROBOTS = {"round robot": round_robot(), "long robot": box_robot(speed=0.8)}
@@ -59,7 +55,7 @@ _ALONE: dict[type, Callable[..., Contract]] = {
 }
 
 
-class NoSubject(Exception):
+class InvalidTarget(Exception):
     """What was named cannot be tried; the message says why."""
 
 
@@ -74,7 +70,7 @@ def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | N
     for kind, contract in _ALONE.items():
         if isinstance(spec, kind):
             return [contract(spec, subject=subject)]
-    raise NoSubject(f"{type(spec).__name__} is no specification of {', '.join(GROUPS)}")
+    raise InvalidTarget(f"{type(spec).__name__} is no specification of {', '.join(GROUPS)}")
 
 
 def promises_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Promise]:
@@ -86,7 +82,7 @@ def promises_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | No
     return [each for contract in contracts_of(spec, subject, robots) for each in contract.promises()]
 
 
-def named(target: str) -> list[Promise]:
+def promises_of_target(target: str) -> list[Promise]:
     """The promises of what a user names: `package.module:Class`, or the name of an entry point.
 
     The class is a specification, or a component whose first argument is one. A specification that needs values gets
@@ -96,7 +92,7 @@ def named(target: str) -> list[Promise]:
     try:
         values = json.loads(written) if written else {}
     except ValueError as error:
-        raise NoSubject(f"{target}: {written} is no JSON: {error}") from error
+        raise InvalidTarget(f"{target}: {written} is no JSON: {error}") from error
     return [each for model in _models(what) for each in promises_of(_instance(model, values, target), what)]
 
 
@@ -105,7 +101,9 @@ def _models(what: str) -> Sequence[Any]:
         return [specification_of(_resolved(what), what)]
     entries = [entry for group in GROUPS if (entry := find(group, what)) is not None]
     if not entries:
-        raise NoSubject(f"{what}: no installed package adds anything of that name, and it is no package.module:Class")
+        raise InvalidTarget(
+            f"{what}: no installed package adds anything of that name, and it is no package.module:Class"
+        )
     return [_loaded(entry) for entry in entries]
 
 
@@ -113,7 +111,7 @@ def _loaded(entry: Entry) -> Any:
     try:
         return entry.load()
     except BrokenPlugin as broken:
-        raise NoSubject(str(broken)) from broken
+        raise InvalidTarget(str(broken)) from broken
 
 
 def _resolved(what: str) -> Any:
@@ -121,29 +119,29 @@ def _resolved(what: str) -> Any:
     try:
         return getattr(import_module(module), name)
     except (ImportError, AttributeError) as error:
-        raise NoSubject(f"{what}: {error}") from error
+        raise InvalidTarget(f"{what}: {error}") from error
 
 
-def specification_of(named: Any, what: str) -> Any:
+def specification_of(promises_of_target: Any, what: str) -> Any:
     """A specification as it is; of a component the specification that its constructor takes."""
-    if not inspect.isclass(named):
-        raise NoSubject(f"{what} is no class")
-    if hasattr(named, "model_validate"):
-        return named
-    parameters = list(inspect.signature(named).parameters)
-    hint = get_type_hints(named.__init__).get(parameters[0]) if parameters else None
+    if not inspect.isclass(promises_of_target):
+        raise InvalidTarget(f"{what} is no class")
+    if hasattr(promises_of_target, "model_validate"):
+        return promises_of_target
+    parameters = list(inspect.signature(promises_of_target).parameters)
+    hint = get_type_hints(promises_of_target.__init__).get(parameters[0]) if parameters else None
     if not inspect.isclass(hint) or not hasattr(hint, "model_validate"):
-        raise NoSubject(f"{what}: its first argument is not annotated with a specification, so name that one")
+        raise InvalidTarget(f"{what}: its first argument is not annotated with a specification, so name that one")
     return hint
 
 
 def _instance(model: Any, values: Any, target: str) -> Any:
     if not isinstance(values, dict) and not issubclass(model, RootModel):
-        raise NoSubject(f"{target}: {json.dumps(values)} is no JSON object")
+        raise InvalidTarget(f"{target}: {json.dumps(values)} is no JSON object")
     try:
         return model.model_validate(values, by_alias=True, by_name=False)
     except ValidationError as error:
         wrong = "; ".join(f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in error.errors())
         example = "1.0" if issubclass(model, RootModel) else '{"key": 1}'
         hint = "" if values else f", e.g. {target}={example}"
-        raise NoSubject(f"{target}: {model.__name__} needs other values ({wrong}){hint}") from error
+        raise InvalidTarget(f"{target}: {model.__name__} needs other values ({wrong}){hint}") from error

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field
 
 from simscen.spec.base import Spec
-from simscen.spec.references import MaskFile
+from simscen.spec.places import MaskFile
 
 if TYPE_CHECKING:
     from simscen.core.environment.costmap_filters import SpeedLimits

@@ -8,17 +8,17 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field, model_validator
 
-from simscen.core.geometry import Pose2, wrap
-from simscen.core.geometry.shapes import MotionPath
+from simscen.core.geometry import Pose2, Pose3, wrap
+from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, MotionPath, Shape, Solid
 from simscen.spec.base import Spec
-from simscen.spec.named_places import PlaceOrPoint
-from simscen.spec.quantities import Angle, Duration, Length, PositiveSpeed
+from simscen.spec.places import PlaceOrPoint, Ring
+from simscen.spec.quantities import Angle, Duration, Length, NonNegativeLength, PositiveLength, PositiveSpeed
 
-TURN = 0.25
+CORNER_TURN_S = 0.25
 """Seconds before and after a corner in which something that drives through it turns, or a quarter of a shorter way."""
-EASED = 1.5
+SMOOTH_DURATION_FACTOR = 1.5
 """How much longer a way takes that is eased from rest to rest, at the same top speed."""
-CLOSED = 1e-6
+LOOP_TOLERANCE = 1e-6
 """Meters and radians within which the last keyframe of a loop is its first."""
 
 Keyframe = Annotated[tuple[Duration, Length, Length, Angle], Field(strict=False)]
@@ -74,7 +74,7 @@ class Motion(Spec):
         if self.repeat != "once" and (first[0] > 0 or len(self.keyframes) == 1):
             raise ValueError(f"`repeat: {self.repeat}` needs two keyframes or more, the first of them at 0 s")
         apart = max(math.dist(first[1:3], last[1:3]), abs(wrap(last[3] - first[3])))
-        if self.repeat == "loop" and apart > CLOSED:
+        if self.repeat == "loop" and apart > LOOP_TOLERANCE:
             raise ValueError("a loop jumps unless its last keyframe is where its first one is: repeat that at the end")
         lasts = last[0] * (2 if self.repeat == "back_and_forth" else 1)
         if self.phase and self.phase >= lasts:
@@ -141,7 +141,7 @@ def _even(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose
     stops, time = [(0.0, legs[0].begin)], 0.0
     for leg, following in itertools.zip_longest(legs, legs[1:]):
         lasts = leg.length / speed
-        turned = min(TURN, lasts / 4)
+        turned = min(CORNER_TURN_S, lasts / 4)
         if stops[-1][1].yaw != leg.begin.yaw:
             stops.append((time + turned, leg.along(turned * speed)))
         ahead = following or (legs[0] if repeat == "loop" else leg)
@@ -152,7 +152,7 @@ def _even(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose
         stops.append((time, leg.end._replace(yaw=wrap(leg.begin.yaw + turn / 2))))
     if repeat == "loop" and stops[-1][1].yaw != stops[0][1].yaw:
         first = stops[0]
-        turned = min(TURN, legs[0].length / speed / 4)
+        turned = min(CORNER_TURN_S, legs[0].length / speed / 4)
         stops[0] = (0.0, first[1]._replace(yaw=stops[-1][1].yaw))
         stops.insert(1, (turned, legs[0].along(turned * speed)))
     if repeat == "loop":
@@ -164,10 +164,49 @@ def _eased(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pos
     """From rest to rest along each way; in each corner it turns in place."""
     stops, time = [(0.0, legs[0].begin)], 0.0
     for leg, following in itertools.zip_longest(legs, legs[1:]):
-        time += EASED * leg.length / speed
+        time += SMOOTH_DURATION_FACTOR * leg.length / speed
         stops.append((time, leg.end))
         ahead = following or (legs[0] if repeat == "loop" else leg)
         if wrap(ahead.begin.yaw - leg.begin.yaw):
-            time += 2 * TURN
+            time += 2 * CORNER_TURN_S
             stops.append((time, leg.end._replace(yaw=ahead.begin.yaw)))
     return stops
+
+
+# MERGED: Things that stand or move in a world, as a user writes them.
+class Shaped(Spec):
+    """Something with one simple shape that stands on the ground, or `z` above it."""
+
+    box: Annotated[list[PositiveLength], Field(min_length=3, max_length=3)] | None = None
+    """A box: length along x, width along y, height."""
+    cylinder: Annotated[list[PositiveLength], Field(min_length=2, max_length=2)] | None = None
+    """An upright cylinder: radius, height."""
+    polygon: Ring | None = None
+    """An upright prism over these corners, `height` tall."""
+    height: PositiveLength = 1.0
+    """Height of the prism over `polygon`."""
+    z: NonNegativeLength = 0.0
+    """How far its underside is above the ground."""
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Shaped:
+        if sum(shape is not None for shape in (self.box, self.cylinder, self.polygon)) != 1:
+            raise ValueError("expected exactly one of: box, cylinder, polygon")
+        return self
+
+    @property
+    def tall(self) -> float:
+        """Its own height in meters."""
+        return self.box[2] if self.box is not None else self.cylinder[1] if self.cylinder is not None else self.height
+
+    def solid(self, name: str) -> Solid:
+        """The shape in the object's own frame, which is on the ground below it."""
+        shape: Shape
+        if self.box is not None:
+            shape, middle = Box((self.box[0], self.box[1], self.box[2])), self.box[2] / 2
+        elif self.cylinder is not None:
+            shape, middle = Cylinder(self.cylinder[0], self.cylinder[1]), self.cylinder[1] / 2
+        else:
+            assert self.polygon is not None
+            shape, middle = Extrusion(tuple((x, y) for x, y in self.polygon), self.height), 0.0
+        return Solid(shape, Pose3(z=self.z + middle), name)

@@ -1,0 +1,152 @@
+"""The promises of a criterion."""
+
+from __future__ import annotations
+
+import copy
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from simscen.core.records.case import Case
+from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import Evidence, Finding, Status
+from simscen.criteria.base import Criterion
+from simscen.testing.contracts.base import Contract, call_component, promise, require
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
+
+CASE: dict[str, Any] = {"goals": [{"name": "shelf", "pose": [2.5, 0.5, 0]}], "shortest": {"shelf": 2.5}}
+DRIVE: dict[str, Any] = {
+    "seconds": 8,
+    "truth": [[0, 0, 0], [4, 2, 0.5], [8, 2.5, 0.5]],
+    "events": [
+        [0.5, "goal.accepted", "shelf"],
+        [2, "fault.started", "lidar.off"],
+        [3, "plan.made", "", {"reason": "blocked"}],
+        [4, "recovery.started", "spin"],
+        [5, "collision.started", "wall", {"x": 1.0, "y": 2.0, "impulse": 1.0, "speed": 0.2}],
+        [7, "goal.reached", "shelf"],
+        [7, "navigation.ended", "SUCCEEDED", {"error_code": 0}],
+    ],
+}
+STATIONARY: dict[str, Any] = {"seconds": 2, "truth": [[0, 0, 0]], "belief": None, "scans": []}
+TRUNCATED: dict[str, Any] = {**DRIVE, "seconds": 3, "ended": None, "events": DRIVE["events"][:2]}
+TRACES = {
+    "a drive": DRIVE,
+    "a robot that stands, without belief or scans": STATIONARY,
+    "a log that was cut off": TRUNCATED,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class CriterionContract(Contract):
+    """Tried on the trace of a drive, of a robot that stands, and of a log that was cut off."""
+
+    role = "criterion"
+    spec: Any
+    subject: str = ""
+
+    def findings(self, trace: Trace, case: Case, what: str) -> list[Finding]:
+        """What it finds, looked at for type."""
+        criterion: Criterion = self.spec
+        found = call_component(f"judges {what}", criterion.judge, trace, case)
+        require(isinstance(found, list) and all(isinstance(f, Finding) for f in found), f"finds {found!r} in {what}")
+        return found
+
+    @promise
+    def every_bound_yields_a_finding(self) -> None:
+        """Given any trace then there is at least one finding: a criterion without findings has checked nothing."""
+        for what, words in TRACES.items():
+            found = self.findings(synthetic_trace(words), synthetic_case(CASE), what)
+            require(found, f"finds nothing in {what}, so it checks nothing")
+            for finding in found:
+                require(isinstance(finding.status, Status), f"has the status {finding.status!r}")
+                require(finding.what or finding.limit, f"does not say what it checked: {finding}")
+
+    @promise
+    def a_margin_has_the_sign_of_the_status(self) -> None:
+        """Given a finding with a margin then it passes exactly where the margin is not negative, and is a number."""
+        for what, words in TRACES.items():
+            for finding in self.findings(synthetic_trace(words), synthetic_case(CASE), what):
+                if finding.margin is None or finding.status not in (Status.PASS, Status.FAIL):
+                    continue
+                require(not math.isnan(finding.margin), f"has a margin of nan in {what}")
+                passes = finding.status is Status.PASS
+                require(passes == (finding.margin >= 0), f"{finding.status.value} with a margin of {finding.margin:g}")
+
+    @promise
+    def the_same_trace_gives_the_same_findings(self) -> None:
+        """Given the same trace and case then the same findings: no clock, no chance, nothing remembered."""
+        first = self.findings(synthetic_trace(DRIVE), synthetic_case(CASE), "a drive")
+        self.findings(synthetic_trace(STATIONARY), synthetic_case(CASE), "a robot that stands")
+        require(
+            self.findings(synthetic_trace(DRIVE), synthetic_case(CASE), "a drive") == first,
+            "the same drive is judged otherwise",
+        )
+
+    @promise
+    def a_trace_is_not_changed(self) -> None:
+        """Given a trace then it is not changed: other criteria judge it, too."""
+        trace, case = synthetic_trace(DRIVE), synthetic_case(CASE)
+        before = copy.deepcopy((trace, case))
+        self.findings(trace, case, "a drive")
+        require(repr((trace, case)) == repr(before), "the trace is not what it was")
+
+    @promise
+    def its_horizon_and_range_are_numbers(self) -> None:
+        """Given a criterion then its horizon (s) and clearance range (m) are finite and not negative."""
+        for what in ("horizon", "clearance_range"):
+            value = call_component(f"is asked for its {what}", getattr, self.spec, what)
+            require(
+                isinstance(value, float | int) and math.isfinite(value) and value >= 0, f"has a {what} of {value!r}"
+            )
+
+
+# MERGED: The promises of a metric.
+@dataclass(frozen=True, eq=False)
+class MetricContract(Contract):
+    """Tried on the trace of a drive, of a robot that stands, and of a log that was cut off."""
+
+    role = "metric"
+    spec: Any
+    subject: str = ""
+
+    def measured(self, words: dict[str, Any], what: str) -> float | str:
+        """What it measures."""
+        value: float | str = call_component(
+            f"measures {what}", self.spec.measure, synthetic_trace(words), synthetic_case(CASE)
+        )
+        return value
+
+    @promise
+    def it_is_a_number_or_says_why_there_is_none(self) -> None:
+        """Given any trace then a finite number, or a text that says why there is none."""
+        for what, words in TRACES.items():
+            value = self.measured(words, what)
+            if isinstance(value, str):
+                require(value, f"does not say why there is no number in {what}")
+            else:
+                number = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
+                require(number, f"measures {value!r} in {what}")
+
+    @promise
+    def the_same_trace_gives_the_same_number(self) -> None:
+        """Given the same trace and case then the same number: no clock, no chance, nothing remembered."""
+        first = self.measured(DRIVE, "a drive")
+        self.measured(STATIONARY, "a robot that stands")
+        require(self.measured(DRIVE, "a drive") == first, "the same drive is measured otherwise")
+
+    @promise
+    def a_trace_is_not_changed(self) -> None:
+        """Given a trace then it is not changed: criteria judge it, too."""
+        trace, case = synthetic_trace(DRIVE), synthetic_case(CASE)
+        before = copy.deepcopy((trace, case))
+        call_component("measures a drive", self.spec.measure, trace, case)
+        require(repr((trace, case)) == repr(before), "the trace is not what it was")
+
+    @promise
+    def it_says_in_what_unit_and_of_what(self) -> None:
+        """Given a metric then its unit is a text, and its evidence None or a set of what a log may hold."""
+        require(isinstance(self.spec.unit, str), f"has the unit {self.spec.unit!r}")
+        evidence = call_component("is asked for its evidence", getattr, self.spec, "evidence")
+        fine = evidence is None or all(isinstance(each, Evidence) for each in evidence)
+        require(fine, f"needs {evidence!r}, which is no evidence")
