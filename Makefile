@@ -77,6 +77,7 @@ check: setup  ## Lint, types, layers, drift of schemas and docs
 
 lint: setup
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet .
+	@$(BIN)/codespell simscen docs scenarios worlds *.md
 
 types: setup
 	@$(BIN)/mypy

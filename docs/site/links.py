@@ -15,7 +15,7 @@ log = get_plugin_logger("links")
 
 
 def on_page_markdown(markdown: str, /, *, page: Page, config: MkDocsConfig, **_: Files) -> str:
-    """Called for each page: what it links to outside docs/ becomes an address in the repository."""
+    """Turn links of a page to files outside docs/ into addresses in the repository."""
     folder = dirname(f"docs/{page.file.src_uri}")
 
     def leads(match: re.Match[str]) -> str:

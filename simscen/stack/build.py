@@ -17,10 +17,10 @@ from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.installed.behavior import InstalledBehavior
 from simscen.stack.installed.controller import InstalledController
 from simscen.stack.installed.goal_checker import InstalledGoalChecker
+from simscen.stack.installed.guarded_calls import made
 from simscen.stack.installed.localizer import InstalledLocalizer
 from simscen.stack.installed.planner import InstalledPlanner
 from simscen.stack.installed.stack import InstalledStack
-from simscen.stack.installed.watched import made
 from simscen.stack.navigator import ClearEntirely, ClearingPolicy, Navigator
 from simscen.stack.odometry_history import WAY, OdometryHistory
 from simscen.stack.plan_manager import PlanManager

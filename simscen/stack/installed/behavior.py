@@ -3,7 +3,7 @@
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.model.recovery import BehaviorSpec
-from simscen.stack.installed.watched import Watched
+from simscen.stack.installed.guarded_calls import Watched
 from simscen.stack.protocols import Behavior, CostmapView
 from simscen.stack.setting import Setting
 

@@ -6,7 +6,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Goal, Path
 from simscen.model.stack_base import ControllerSpec
-from simscen.stack.installed.watched import Watched
+from simscen.stack.installed.guarded_calls import Watched
 from simscen.stack.protocols import Controller, CostmapView
 from simscen.stack.setting import Setting
 

@@ -4,7 +4,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Goal
 from simscen.model.checkers import GoalCheckerSpec
-from simscen.stack.installed.watched import Watched
+from simscen.stack.installed.guarded_calls import Watched
 from simscen.stack.protocols import GoalChecker
 from simscen.stack.setting import Setting
 

@@ -5,7 +5,7 @@ import numpy as np
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import LocalizerSpec
-from simscen.stack.installed.watched import Watched, all_finite
+from simscen.stack.installed.guarded_calls import Watched, all_finite
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting
 

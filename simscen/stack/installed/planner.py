@@ -6,7 +6,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Path
 from simscen.model.planners import PlannerSpec
-from simscen.stack.installed.watched import Watched
+from simscen.stack.installed.guarded_calls import Watched
 from simscen.stack.protocols import LETHAL, CostmapView, Planner
 from simscen.stack.setting import Setting
 

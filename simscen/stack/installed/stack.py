@@ -10,8 +10,8 @@ from simscen.core.messages.sensor_data import Readings
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import CostGrid, Decision
 from simscen.model.stack import InProcessStack
+from simscen.stack.installed.guarded_calls import Watched
 from simscen.stack.installed.localizer import checked_belief
-from simscen.stack.installed.watched import Watched
 from simscen.stack.protocols import Stack
 from simscen.stack.setting import Setting
 
