@@ -31,7 +31,7 @@ from simscen.run.robot_interface import (
 from simscen.sensors.factory import build_sensors
 from simscen.sensors.sensor import Sensor
 from simscen.sim.robots.robot import Robot
-from simscen.sim.simulation import Placed, Simulation
+from simscen.sim.simulation import RobotPlacement, Simulation
 from simscen.stack.build import build_stack
 from simscen.stack.protocols import Stack, Surroundings
 from simscen.worlds.geometry.triangulation import triangulate
@@ -48,17 +48,17 @@ def assemble(prepared: PreparedScenario, seed: int, printed: Path | None = None)
     simulation = Simulation(
         prepared.built.mesh,
         world.bodies,
-        {name: Placed(part.body, part.start, part.obstacles) for name, part in prepared.each.items()},
+        {name: RobotPlacement(part.body, part.start, part.obstacles) for name, part in prepared.each.items()},
         triangulate,
         tick_rate=clock.rate,
         solver_iterations=spec.physics.solver_iterations,
         clearance_range=prepared.case.clearance_range,
-        pictures=any(
+        has_images=any(
             sensor.takes_pictures for part in prepared.each.values() for sensor in part.robot.sensors.values()
         ),
     )
     for region, friction in world.friction.items():
-        simulation.lay(region, Patch(world.regions[region], friction))
+        simulation.add_friction_patch(region, Patch(world.regions[region], friction))
     scene, stages = RayScene(prepared.built.mesh), dict[str, LiveStage]()
     walking = PedestrianSimulation(prepared.built, simulation, clock)
     agents = {
@@ -66,7 +66,7 @@ def assemble(prepared: PreparedScenario, seed: int, printed: Path | None = None)
         for name, part in prepared.each.items()
     }
     for name, stage in stages.items():
-        for body in (*world.bodies, *(robot.shape for robot in simulation.robots[name].others)):
+        for body in (*world.bodies, *(robot.body for robot in simulation.robots[name].others)):
             stage.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, body_data(body)))
     directors = tuple(director for director in _directors(prepared, streams, agents) if director.needed)
     for stage in stages.values():

@@ -27,7 +27,7 @@ from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
 from simscen.run.log_header import log_header
 from simscen.run.preparation.scenario import PreparedScenario, prepare
-from simscen.sim.single_robot import NAMELESS
+from simscen.sim.single_robot import ROBOT_NAME
 from simscen.spec.registry import Entry
 
 Attach = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]
@@ -119,7 +119,7 @@ def _stack_facts(externals: Mapping[str, ExternalStack]) -> dict[str, str]:
 def _with_stacks(run: Run, said: Mapping[str, Mapping[str, Any]]) -> Run:
     """Return the run with the descriptions of the external stacks by robot."""
     robots = {name: replace(one, stack=said.get(name, {})) for name, one in run.robots.items()}
-    return replace(run, robots=robots, stack=said.get(next(iter(robots), NAMELESS), {}))
+    return replace(run, robots=robots, stack=said.get(next(iter(robots), ROBOT_NAME), {}))
 
 
 def simulate_file(
@@ -132,7 +132,7 @@ def simulate_file(
 def judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Trace], log: Path | None = None) -> Run:
     """Judge the traces of all robots."""
     if not prepared.robots:
-        return _judged(prepared, seed, traces[NAMELESS], log)
+        return _judged(prepared, seed, traces[ROBOT_NAME], log)
     runs = {name: _judged(part, seed, traces[name], log) for name, part in prepared.robots.items()}
     result = combine_robots({name: run.result for name, run in runs.items()}, traces, prepared.loaded.expectation)
     return replace(next(iter(runs.values())), result=result, robots=runs)
@@ -201,7 +201,7 @@ def execute_run(
     (folder / "scenario.yaml").write_text(log_header(prepared, seed).scenario, encoding="utf-8")
     run = simulate(prepared, seed, log=log, attach=lambda *_: logs, printed=folder / "stack.log")
     (folder / "result.json").write_text(to_json(run.result), encoding="utf-8")
-    for name, one in (run.robots or {NAMELESS: run}).items():
+    for name, one in (run.robots or {ROBOT_NAME: run}).items():
         if one.stack:
             file = robot_file(folder / "stack.json", name)
             file.write_text(json.dumps(one.stack, indent=1) + "\n", encoding="utf-8")

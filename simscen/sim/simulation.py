@@ -1,4 +1,4 @@
-"""The world in motion: robots, what stands, what moves. Time is whole ticks."""
+"""Physics simulation of one run: robots, static world, and movable objects. Time is counted in ticks."""
 
 import itertools
 import math
@@ -24,16 +24,16 @@ from simscen.sim.scene.camera import RenderScene
 from simscen.sim.scene.terrain import Terrain
 from simscen.sim.scene.walls import Walls
 
-FIRMWARE_RATE = 60
-"""Hz at which a base's firmware updates its wheel speeds; Clearpath's and Robotis' run at 50 to 100 Hz."""
-HOMING = 5.0
-"""Seconds from one look at what lies still to the next: by ticks alone, whoever else looks."""
-SETTLING = 60
+FIRMWARE_RATE_HZ = 60
+"""Rate at which a base's firmware updates its wheel speeds; those of Clearpath and Robotis run at 50 to 100 Hz."""
+REST_UPDATE_PERIOD_S = 5.0
+"""Time between two updates of the rest poses of pushable objects."""
+SETTLING_TICKS = 60
 """Ticks before tick 0 in which everything comes to rest on the ground."""
 
 
-class Placed(NamedTuple):
-    """A robot, where it starts, and what of the static world is in its way, if that is not all of it."""
+class RobotPlacement(NamedTuple):
+    """Body and initial pose of a robot, and its obstacles if these are only a part of the static world."""
 
     body: RobotBody
     pose: Pose2
@@ -41,236 +41,249 @@ class Placed(NamedTuple):
 
 
 class Simulation:
-    """Physics of one run; make it in the process that uses it, and close it.
+    """Physics of one run. Create it in the process that uses it, and close it.
 
-    `robots` are there by name; what drives one and what looks out of it is `Robot`'s.
+    `robots` has the robots by name.
     """
 
     def __init__(
         self,
         static: TriangleMesh,
         bodies: Iterable[Body],
-        robots: Mapping[str, Placed],
+        robots: Mapping[str, RobotPlacement],
         triangulate: engine.Triangulate,
         tick_rate: int = 240,
         solver_iterations: int = 10,
         clearance_range: float = CLEARANCE_RANGE,
-        pictures: bool = True,
+        has_images: bool = True,
     ) -> None:
-        """Build the world with the robots at rest where they are placed.
+        """Build the world with the robots at rest at their initial poses.
 
-        Neither the order of `robots` nor that of `bodies` matters: the engine gets both by name. Clearance is searched
-        within `clearance_range` meters of a hull. `triangulate` gives the surface of a shape, for moving things that
-        the engine has no primitive for. Without `pictures` no robot has eyes that take any, and the renderer need not
-        be shown anything.
+        The order of `robots` and `bodies` does not matter, because the engine receives both sorted by name. Clearance
+        is measured up to `clearance_range` m. `triangulate` returns the surface of a shape, for movable objects that
+        are no engine primitive. Without `has_images`, nothing is prepared for the renderer.
         """
         client = CLIENT_POOL.take()
         engine.set_up(client, tick_rate, solver_iterations, one_by_one=len(robots) > 1)
         terrain = Terrain(client, static, max((w.radius for r in robots.values() for w in r.body.wheels), default=0.0))
-        walls = Walls(client, terrain.rest)
-        look = engine.AS_IT_IS if pictures else engine.speck(client)
-        film = RenderScene(client, static, triangulate) if pictures else None
-        actors = Actors(client, tick_rate, triangulate, look, all_present=pictures)
-        self._scene = Scene(client, tick_rate, walls, terrain, actors, film)
-        self._attends: tuple[int, Callable[[], None]] | None = None
-        self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
-        self._homing = math.ceil(HOMING * tick_rate)
+        walls = Walls(client, terrain.obstacles)
+        visual_shape = engine.AS_IT_IS if has_images else engine.speck(client)
+        render_scene = RenderScene(client, static, triangulate) if has_images else None
+        actors = Actors(client, tick_rate, triangulate, visual_shape, is_complete=has_images)
+        self._scene = Scene(client, tick_rate, walls, terrain, actors, render_scene)
+        self._periodic_call: tuple[int, Callable[[], None]] | None = None
+        self._firmware_period = max(1, round(tick_rate / FIRMWARE_RATE_HZ))
+        self._rest_update_period = math.ceil(REST_UPDATE_PERIOD_S * tick_rate)
         self.robots: dict[str, Robot] = self._scene.robots
-        self._each: tuple[Robot, ...] = ()
-        for name, (body, pose, obstacles) in sorted(robots.items()):
-            period = self._firmware / tick_rate
-            ways = static if obstacles is None else obstacles
-            self.robots[name] = Robot(name, self._scene, static, ways, body, pose, period, clearance_range, look)
-        actors.fill((terrain.lifted(thing) for thing in sorted(bodies, key=lambda body: body.name)), 0)
-        self._scene.meet()
-        if not walls.complete:
-            self._put_up_walls(SETTLING)
-        settling = actors.settling()
-        for tick in range(1 - SETTLING, 1):
-            if tick == 0:
-                actors.lay(settling.at_rest())
-            pybullet.stepSimulation(client)
-            if -SAMPLE_PERIOD_TICKS * SAMPLE_COUNT <= tick < 0 and tick % SAMPLE_PERIOD_TICKS == 0:
-                settling.look()
-        actors.settled(0)
+        self._robots: tuple[Robot, ...] = ()
+        for name, (body, pose, own_obstacles) in sorted(robots.items()):
+            period = self._firmware_period / tick_rate
+            obstacles = static if own_obstacles is None else own_obstacles
+            self.robots[name] = Robot(
+                name, self._scene, static, obstacles, body, pose, period, clearance_range, visual_shape
+            )
+        actors.add_all((terrain.raise_to_ground(body) for body in sorted(bodies, key=lambda body: body.name)), 0)
+        self._scene.activate_actors()
+        if not walls.is_complete:
+            self._build_walls(SETTLING_TICKS)
+        self._settle()
         for name, robot in self.robots.items():
-            robot.settled(robots[name].pose)
-        self._each = tuple(self.robots.values())
-        self._scene.changed()
+            robot.set_pose(robots[name].pose)
+        self._robots = tuple(self.robots.values())
+        self._scene.after_change()
+
+    def _settle(self) -> None:
+        """Let all objects come to rest, and let those that do sleep from tick 0 on."""
+        actors = self._scene.actors
+        rest_detector = actors.make_rest_detector()
+        for tick in range(1 - SETTLING_TICKS, 1):
+            if tick == 0:
+                actors.put_to_sleep(rest_detector.resting_ids())
+            pybullet.stepSimulation(self._scene.client)
+            if -SAMPLE_PERIOD_TICKS * SAMPLE_COUNT <= tick < 0 and tick % SAMPLE_PERIOD_TICKS == 0:
+                rest_detector.sample()
+        actors.update_rest_poses(0)
 
     @property
     def tick(self) -> int:
         """Ticks since the start."""
         return self._scene.tick
 
+    # Stepping
+
     def step(self, ticks: int) -> None:
-        """Let `ticks` ticks pass."""
+        """Simulate `ticks` ticks."""
         scene, until = self._scene, self._scene.tick + ticks
-        if scene.actors.loose:
-            for due in range(scene.tick - scene.tick % self._homing + self._homing, until + 1, self._homing):
+        if scene.actors.has_pushable:
+            period = self._rest_update_period
+            for due in range(scene.tick - scene.tick % period + period, until + 1, period):
                 self._step(due - scene.tick)
-                scene.actors.settled(due)
+                scene.actors.update_rest_poses(due)
         if scene.tick < until:
             self._step(until - scene.tick)
-        scene.meet()
+        scene.activate_actors()
 
     def _step(self, ticks: int) -> None:
-        scene, calm = self._scene, -1
-        until, plain = scene.tick + ticks, not (scene.presses or self._attends or scene.floor)
-        if plain and (calm := self._calm_until(ticks)) >= until:
-            self._step_calmly(until)
+        scene, no_contact_before = self._scene, -1
+        until, is_plain = scene.tick + ticks, not (scene.pushes or self._periodic_call or scene.floor)
+        if is_plain and (no_contact_before := self._no_contact_before(ticks)) >= until:
+            self._step_without_contact(until)
             return
         while scene.tick < until:
-            if scene.tick >= calm:
-                calm = self._calm_until(ticks)
-            if plain and scene.tick < calm:
-                self._step_calmly(min(until, calm))
+            if scene.tick >= no_contact_before:
+                no_contact_before = self._no_contact_before(ticks)
+            if is_plain and scene.tick < no_contact_before:
+                self._step_without_contact(min(until, no_contact_before))
                 continue
-            if self._attends is not None and scene.tick % self._attends[0] == 0:
-                self._attends[1]()
-            if scene.tick % self._firmware == 0:
-                for robot in self._each:
+            if self._periodic_call is not None and scene.tick % self._periodic_call[0] == 0:
+                self._periodic_call[1]()
+            if scene.tick % self._firmware_period == 0:
+                for robot in self._robots:
                     robot.advance()
             if scene.floor:
-                scene.hold()
-            if scene.presses and scene.press():
-                calm = -1
-            if scene.tick < calm:
+                scene.update_wheel_friction()
+            if scene.pushes and scene.apply_pushes():
+                no_contact_before = -1
+            if scene.tick < no_contact_before:
                 pybullet.stepSimulation(scene.client)
                 scene.tick += 1
             else:
-                self._careful_step()
+                self._step_with_contact()
 
-    def _step_calmly(self, until: int) -> None:
+    def _step_without_contact(self, until: int) -> None:
         scene, tick = self._scene, self._scene.tick
         while tick < until:
-            if tick % self._firmware == 0:
+            if tick % self._firmware_period == 0:
                 scene.tick = tick
-                for robot in self._each:
+                for robot in self._robots:
                     robot.advance()
             pybullet.stepSimulation(scene.client)
             tick += 1
         scene.tick = tick
 
-    def _calm_until(self, ticks: int) -> int:
-        """The tick until which no step counts; -1 where each does, as where something pushes something.
+    def _no_contact_before(self, ticks: int) -> int:
+        """Return the tick until which no contact is possible; -1 if one is possible in this step.
 
-        For so many ticks, the walls stand that what is loose may come to meanwhile.
+        Builds the walls that pushable objects can reach within `ticks`.
         """
         actors = self._scene.actors
-        if not actors.loose:
-            return min([robot.calm_until for robot in self._each])
-        if not self._scene.walls.complete:
-            self._put_up_walls(ticks)
-        calm = min([robot.calm_until for robot in self._each])
-        return min(calm, actors.apart_until(self._scene.tick, self._fastest))
+        if not actors.has_pushable:
+            return min([robot.no_contact_before for robot in self._robots])
+        if not self._scene.walls.is_complete:
+            self._build_walls(ticks)
+        no_contact_before = min([robot.no_contact_before for robot in self._robots])
+        return min(no_contact_before, actors.no_push_before(self._scene.tick, self._robot_speed_bound))
 
-    def _fastest(self) -> float:
-        return max([robot.clearance.own_speed() for robot in self._each])
+    def _robot_speed_bound(self) -> float:
+        return max([robot.clearance.speed_bound() for robot in self._robots])
 
-    def _careful_step(self) -> None:
-        """A step in which something might touch something; scripted bodies need to be in place only here."""
+    def _step_with_contact(self) -> None:
+        """Step with scripted bodies at their poses and contacts recorded."""
         scene = self._scene
-        if scene.tick < min([robot.calm_until for robot in self._each]):  # only things may touch each other
-            scene.actors.begin(scene.tick, everything=False)
+        if scene.tick < min([robot.no_contact_before for robot in self._robots]):  # only objects can touch each other
+            scene.actors.begin_step(scene.tick, everything=False)
             pybullet.stepSimulation(scene.client)
             scene.tick += 1
-            scene.actors.show(scene.tick, everything=False)
+            scene.actors.end_step(scene.tick, everything=False)
             return
-        scene.meet()
-        scene.actors.begin(scene.tick)
-        motions = {robot.base.id: robot.look() for robot in self.robots.values()}
-        if not scene.walls.complete:
-            self._put_up_walls(1)
-        others = scene.actors.velocities(scene.tick)
+        scene.activate_actors()
+        scene.actors.begin_step(scene.tick)
+        motions = {robot.base.id: robot.before_contact_step() for robot in self.robots.values()}
+        if not scene.walls.is_complete:
+            self._build_walls(1)
+        velocities = scene.actors.velocities(scene.tick)
         pybullet.stepSimulation(scene.client)
         scene.tick += 1
         for robot in self.robots.values():
-            robot.feel(PreStepMotion(motions[robot.base.id], others, motions))
-        scene.actors.show(scene.tick)
+            robot.after_contact_step(PreStepMotion(motions[robot.base.id], velocities, motions))
+        scene.actors.end_step(scene.tick)
 
-    def _put_up_walls(self, ticks: int) -> None:
-        """Those that anything could touch within the next ticks, robots only if they are not calm."""
+    def _build_walls(self, ticks: int) -> None:
+        """Build the walls that robots touch now, and those that pushable objects can reach within `ticks`."""
         scene = self._scene
-        near = [(robot.base.id, robot.base_pose().position, robot.clearance.size) for robot in self.robots.values()]
-        for body in itertools.chain(near, scene.actors.coming(scene.tick, ticks)):
-            if fresh := scene.walls.near(*body):
+        robots = [(robot.base.id, robot.base_pose().position, robot.clearance.size) for robot in self.robots.values()]
+        for sphere in itertools.chain(robots, scene.actors.reachable_spheres(scene.tick, ticks)):
+            if new_walls := scene.walls.build_near(*sphere):
                 for robot in self.robots.values():
-                    robot.know(dict.fromkeys(fresh))
+                    robot.add_bodies(dict.fromkeys(new_walls))
 
-    def lay(self, name: str, patch: Patch) -> None:
-        """Make a piece of floor slippery, or dry again; a patch of the same name is replaced."""
-        self._scene.floor.lay(name, patch)
+    def call_before_steps(self, period: int, function: Callable[[], None]) -> None:
+        """Call a function before each step from a tick that is a multiple of `period`."""
+        self._periodic_call = period, function
+
+    # Changing the world
+
+    def add_friction_patch(self, name: str, patch: Patch) -> None:
+        """Change the friction of a piece of floor; replaces a patch of the same name."""
+        self._scene.floor.add(name, patch)
 
     def spawn(self, body: Body) -> None:
-        """Put a body into the world."""
-        self._scene.settle()
-        self._scene.actors.add(self._scene.terrain.lifted(body), self.tick)
-        self._scene.changed()
+        """Add a body to the world."""
+        self._scene.before_change()
+        self._scene.actors.add(self._scene.terrain.raise_to_ground(body), self.tick)
+        self._scene.after_change()
 
     def remove(self, name: str) -> None:
-        """Take a body out of the world; unknown names are ignored."""
-        self._scene.settle()
+        """Remove a body from the world; unknown names are ignored."""
+        self._scene.before_change()
         self._scene.actors.remove(name)
-        self._scene.changed()
+        self._scene.after_change()
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Let a body follow a path that begins now. Raises KeyError for an unknown name."""
-        self._scene.settle()
+        """Let a body follow a path that begins now; raises KeyError for an unknown name."""
+        self._scene.before_change()
         self._scene.actors.move(name, path, self.tick)
-        self._scene.changed()
+        self._scene.after_change()
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Set a body down somewhere else, at rest; no path moves it any more. Raises KeyError for an unknown name."""
-        self._scene.settle()
+        """Place a body somewhere else at rest and end its path; raises KeyError for an unknown name."""
+        self._scene.before_change()
         self._scene.actors.place(name, pose, self.tick)
-        self._scene.changed()
-
-    def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """The path that moves a body now, and the seconds since it was set off; None when none does."""
-        return self._scene.actors.motion(name, self.tick)
-
-    def mass(self, name: str) -> float:
-        """In kg, of a body that can be pushed; 0 of anything else."""
-        return self._scene.actors.mass(name)
+        self._scene.after_change()
 
     def push_object(self, name: str, impulse: tuple[float, float], seconds: float = 0.0) -> None:
-        """Push a body evenly for so long, or for one tick, from the next tick on: N s in the world frame.
+        """Apply an impulse (N s, world frame) to a body, spread over `seconds` or one tick, from the next tick on.
 
-        What cannot be pushed, or is gone, is not.
+        Has no effect on a body that does not exist or cannot be pushed.
         """
         actors = self._scene.actors
         actors.wake(name)
-        self._scene.add_press(partial(actors.push, name), impulse, seconds, self.tick + 1)
+        self._scene.add_push(partial(actors.push, name), impulse, seconds, self.tick + 1)
 
-    def attend(self, period: int, act: Callable[[], None]) -> None:
-        """Have something done before each step from a tick that is a multiple of `period`."""
-        self._attends = period, act
-
-    def come(self, body: Body, speed: float) -> None:
-        """Let a round body come that `follow` will move, never faster than `speed` in m/s."""
-        self._scene.settle()
+    def add_steered(self, body: Body, max_speed: float) -> None:
+        """Add a round body that `follow` will move, never faster than `max_speed` m/s."""
+        self._scene.before_change()
         path = MotionPath((0.0,), (body.pose.plane,))
-        self._scene.actors.add(replace(body, path=path), self.tick, led=True)
-        self._scene.actors.follow(body.name, path, speed, self.tick)
-        self._scene.changed()
+        self._scene.actors.add(replace(body, path=path), self.tick, is_steered=True)
+        self._scene.actors.follow(body.name, path, max_speed, self.tick)
+        self._scene.after_change()
 
-    def follow(self, name: str, path: MotionPath, speed: float) -> None:
-        """Let what came so follow a path that begins where it is now."""
-        self._scene.actors.follow(name, path, speed, self.tick)
+    def follow(self, name: str, path: MotionPath, max_speed: float) -> None:
+        """Let a steered body follow a path that begins at its current pose."""
+        self._scene.actors.follow(name, path, max_speed, self.tick)
 
-    def things(self) -> dict[str, tuple[Body, Pose3]]:
-        """Everything that may move but robots, and where it is, by name in order."""
-        return self._scene.actors.placed(self.tick)
+    # Observing the world
+
+    def motion(self, name: str) -> tuple[MotionPath, float] | None:
+        """Return the path that moves a body now and the seconds since its start, or None."""
+        return self._scene.actors.motion(name, self.tick)
+
+    def mass(self, name: str) -> float:
+        """Return the mass in kg of a pushable body, 0 for others and unknown names."""
+        return self._scene.actors.mass(name)
+
+    def bodies_and_poses(self) -> dict[str, tuple[Body, Pose3]]:
+        """Return all movable objects, without robots, with their poses by name in order."""
+        return self._scene.actors.bodies_and_poses(self.tick)
 
     def object_pose(self, name: str) -> Pose3 | None:
-        """Where a body is now, or a robot; None when it is not there."""
+        """Return the current pose of an object or robot, or None if it does not exist."""
         if name in self.robots:
             return self.robots[name].base_pose()
         return self._scene.actors.poses(self.tick).get(name)
 
     def close(self) -> None:
-        """Give the engine back."""
+        """Release the engine."""
         for robot in self.robots.values():
             robot.close()
         CLIENT_POOL.give_back(self._scene.client)

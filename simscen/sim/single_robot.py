@@ -1,4 +1,4 @@
-"""One robot in a world, and no other: what is driven to try a robot out."""
+"""Simulation of a single robot, for trial drives and tests."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -6,22 +6,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry import Pose2, Pose3, Vector
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.core.records.events import Event
 from simscen.core.records.trace import Truth
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import engine
-from simscen.sim.robots.robot import Vector
-from simscen.sim.simulation import Placed, Simulation
+from simscen.sim.simulation import RobotPlacement, Simulation
 
-NAMELESS = ""
-"""What a robot is called that is the only one."""
+ROBOT_NAME = ""
+"""Name of a robot that is the only one."""
 
 
 class SingleRobotSimulation(Simulation):
-    """A simulation whose only robot has no name and need not be asked for."""
+    """A simulation with one unnamed robot, whose methods it offers directly; see Robot."""
 
     def __init__(
         self,
@@ -33,56 +32,56 @@ class SingleRobotSimulation(Simulation):
         obstacles: TriangleMesh | None = None,
         **physics: Any,
     ) -> None:
-        """See Simulation, which takes the same `physics`."""
-        super().__init__(static, bodies, {NAMELESS: Placed(robot, pose, obstacles)}, triangulate, **physics)
-        self.robot = self.robots[NAMELESS]
+        """Build the world; `physics` are the remaining arguments of Simulation."""
+        super().__init__(static, bodies, {ROBOT_NAME: RobotPlacement(robot, pose, obstacles)}, triangulate, **physics)
+        self.robot = self.robots[ROBOT_NAME]
 
     def drive(self, command: Twist) -> None:
-        """See Robot."""
+        """Command a velocity in the base frame."""
         self.robot.drive(command)
 
     def truth(self) -> Truth:
-        """See Robot."""
+        """Return the true state; raises RunError if the physics has diverged."""
         return self.robot.truth()
 
     def collisions(self) -> tuple[Event, ...]:
-        """See Robot."""
+        """Return the collision events since the last call."""
         return self.robot.collisions()
 
     def objects(self) -> Mapping[str, Pose3]:
-        """See Robot."""
+        """Return the poses of all movable objects."""
         return self.robot.objects()
 
     def base_pose(self) -> Pose3:
-        """See Robot."""
+        """Return the pose of the base frame in the world."""
         return self.robot.base_pose()
 
     def base_velocity(self) -> tuple[Vector, Vector]:
-        """See Robot."""
+        """Return the linear and angular velocity of the base frame along the world axes."""
         return self.robot.base_velocity()
 
     def base_twist(self) -> Twist:
-        """See Robot."""
+        """Return the velocity in the base frame."""
         return self.robot.base_twist()
 
     def encoders(self) -> tuple[float, ...]:
-        """See Robot."""
+        """Return the accumulated rotation of the wheels."""
         return self.robot.encoders()
 
     def touching(self) -> bool:
-        """See Robot."""
+        """Return whether the hull touches anything besides the ground."""
         return self.robot.touching()
 
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """See Robot."""
+        """Return the image of a camera at `mount` in the base frame."""
         return self.robot.image(mount, width, height, field_of_view, far)
 
     def place_robot(self, pose: Pose2) -> None:
-        """See Robot."""
+        """Place the robot somewhere else at rest."""
         self.robot.place(pose)
 
     def push(self, impulse: tuple[float, float]) -> None:
-        """See Robot."""
+        """Apply an impulse at the center of mass during the next tick."""
         self.robot.push(impulse)

@@ -129,7 +129,7 @@ def _watched(watch: Stopwatch, setup: RunSetup, own: Sequence[MomentSink]) -> Se
     watch.watch("physics", setup.simulation, "step")
     watch.watch("physics", agent.robot, "drive")
     watch.watch("truth and contacts", agent.robot, "truth", "sample", "collisions")
-    watch.watch("truth and contacts", agent.robot.samples, "settle")
+    watch.watch("truth and contacts", agent.robot.sampler, "compute_deferred")
     watch.watch("sensors", agent.sensors, "read")
     if isinstance(agent.stack, InstalledStack) and isinstance(agent.stack.inner, ReferenceStack):
         for name, component, methods in agent.stack.inner.components:

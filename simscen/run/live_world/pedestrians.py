@@ -68,8 +68,8 @@ class PedestrianSimulation:
         shape = Cylinder(walker.radius, walker.height)
         solids = (Solid(shape, Pose3(z=walker.height / 2), walker.name),)
         body = Body(walker.name, solids, Pose3.planar(walker.pose))
-        self._simulation.come(body, people.top_speed(walker.name))
-        self._simulation.attend(self._period, self._step)
+        self._simulation.add_steered(body, people.top_speed(walker.name))
+        self._simulation.call_before_steps(self._period, self._step)
         return body
 
     def walks(self, name: str) -> bool:
@@ -116,7 +116,7 @@ class PedestrianSimulation:
 
     def _surroundings(self) -> Surroundings:
         robots = tuple(self._seen(robot) for robot in self._simulation.robots.values())
-        things = self._simulation.things()
+        things = self._simulation.bodies_and_poses()
         known = [(name, body, pose) for name, (body, pose) in things.items() if name not in self._behaviors]
         return Surroundings(robots, tuple(ObservedObject(name, self._placed(body, pose)) for name, body, pose in known))
 
@@ -133,7 +133,7 @@ class PedestrianSimulation:
 
     def _seen(self, robot: Robot) -> ObservedRobot:
         if robot.name not in self._hulls:
-            self._hulls[robot.name] = np.array(footprint(robot.shape.solids))
+            self._hulls[robot.name] = np.array(footprint(robot.body.solids))
         outline = self._hulls[robot.name]
         (vx, vy, _), _ = robot.base_velocity()
         radius = float(np.hypot(outline[:, 0], outline[:, 1]).max())

@@ -45,7 +45,7 @@ class LiveRayCaster(RayCaster):
             self._meshes, self._bodies = self._surfaces(robot.bodies), robot.bodies
             self._extent = max([_extent(mesh) for mesh in self._meshes.values()], default=0.0)
             self._near = looked = None
-        where, homes = robot.objects(), robot.homes
+        where, homes = robot.objects(), robot.rest_poses
         names = self._names(where.predicted, place, reach) if type(where) is PosesAtTick else self._meshes
         # Identical objects mean that nothing has moved.
         if looked is None or names is not looked[0] or where is not looked[1] or homes is not looked[2]:

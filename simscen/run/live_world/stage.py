@@ -251,7 +251,7 @@ class LiveStage:
         if name is not None:
             self._simulation.push_object(name, impulse, seconds)
         elif seconds:
-            self._robot.press(impulse, seconds)
+            self._robot.push_for(impulse, seconds)
         else:
             self._robot.push(impulse)
         about: dict[str, Value] = {"impulse": list(impulse), **({"seconds": seconds} if seconds else {})}
@@ -260,7 +260,7 @@ class LiveStage:
 
     def lay(self, name: str, patch: Patch) -> None:
         """Change the friction of a patch of floor."""
-        self._simulation.lay(name, patch)
+        self._simulation.add_friction_patch(name, patch)
         outline: list[Value] = [[round(x, 3), round(y, 3)] for x, y in patch.outline]
         about: dict[str, Value] = {"outline": outline, "friction": patch.friction}
         about |= {} if math.isinf(patch.until) else {"until": patch.until / self.clock.rate}

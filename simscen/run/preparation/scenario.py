@@ -27,7 +27,7 @@ from simscen.run.preparation.goals import event_goals, expected_failures, scenar
 from simscen.run.preparation.loaders import load_map, load_robot, load_world
 from simscen.run.preparation.robot_size import blocking_solids, inscribed_radius
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.single_robot import NAMELESS
+from simscen.sim.single_robot import ROBOT_NAME
 from simscen.spec.registry import Entry
 from simscen.triggers.position import ClearanceBelow
 from simscen.worlds.build import build
@@ -66,7 +66,7 @@ class PreparedScenario:
     @property
     def each(self) -> Mapping[str, "PreparedScenario"]:
         """The prepared scenario of each robot by name; a single robot has no name."""
-        return self.robots or {NAMELESS: self}
+        return self.robots or {ROBOT_NAME: self}
 
     @property
     def spec(self) -> ScenarioSpec:

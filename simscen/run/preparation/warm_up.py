@@ -30,9 +30,9 @@ def precompute(prepared: PreparedScenario) -> None:
     from simscen.stack.costmap import costmap
 
     ray_scene.ready(prepared.built.mesh)
-    walls.ready(prepared.built.mesh)
+    walls.prepare_walls(prepared.built.mesh)
     for part in prepared.each.values():
-        walls.ready(part.obstacles)
+        walls.prepare_walls(part.obstacles)
         if part.map is not None and isinstance(part.stack, StackSpec):
             grid = part.map.refined(part.stack.costmap.resolution)
             costmap.ready(part.stack.costmap, robot_model(part.body), grid)

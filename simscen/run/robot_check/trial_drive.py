@@ -10,12 +10,12 @@ from simscen.model.robot import Ackermann
 from simscen.run.robot_interface import robot_model
 from simscen.sensors.odometry import integrate_arc, kinematics_of
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.simulation import FIRMWARE_RATE
+from simscen.sim.simulation import FIRMWARE_RATE_HZ
 from simscen.sim.single_robot import SingleRobotSimulation
 from simscen.worlds.geometry.triangulation import fuse, triangulate
 
 TICK_RATE = 240
-PERIOD = TICK_RATE // FIRMWARE_RATE
+PERIOD = TICK_RATE // FIRMWARE_RATE_HZ
 """Ticks between two commands; each is reached before the next one."""
 RESTING, SETTLING = 240, 60
 """Ticks at rest before the first trial and after each leg."""
@@ -113,7 +113,7 @@ def _trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: 
     for twist in (twist for leg in legs for twist in _commands(leg, body)):
         simulation.drive(twist)
         simulation.step(PERIOD)
-        told.to(told.last.compose(integrate_arc(Twist(*(part / FIRMWARE_RATE for part in twist)))))
+        told.to(told.last.compose(integrate_arc(Twist(*(part / FIRMWARE_RATE_HZ for part in twist)))))
         now = simulation.encoders()
         step = motion(tuple(b - a for a, b in zip(rolled, now, strict=True)))
         rolled = now
@@ -134,13 +134,13 @@ def _commands(leg: _Leg, body: RobotBody) -> Iterator[Twist]:
         (leg.turn, min(TURN, SHARE * model.max_angular), model.angular_acceleration),
     ]
     rate = min(speed / abs(span) for span, speed, _ in spans if span)
-    gain = min(EFFORT * most / abs(span) for span, _, most in spans if span) / FIRMWARE_RATE
+    gain = min(EFFORT * most / abs(span) for span, _, most in spans if span) / FIRMWARE_RATE_HZ
     ramp = [gain * k for k in range(1, math.ceil(rate / gain))]
-    rest = 1.0 - 2 * sum(ramp) / FIRMWARE_RATE
+    rest = 1.0 - 2 * sum(ramp) / FIRMWARE_RATE_HZ
     while rest < 0:
-        rest += 2 * ramp.pop() / FIRMWARE_RATE
-    cruising = math.ceil(rest * FIRMWARE_RATE / rate)
-    rates = [*ramp, *[rest * FIRMWARE_RATE / max(1, cruising)] * cruising, *reversed(ramp)]
+        rest += 2 * ramp.pop() / FIRMWARE_RATE_HZ
+    cruising = math.ceil(rest * FIRMWARE_RATE_HZ / rate)
+    rates = [*ramp, *[rest * FIRMWARE_RATE_HZ / max(1, cruising)] * cruising, *reversed(ramp)]
     yield from (Twist(leg.forward * r, leg.left * r, leg.turn * r) for r in rates)
     yield from [STOP] * (SETTLING // PERIOD)
 

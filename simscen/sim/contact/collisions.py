@@ -1,4 +1,4 @@
-"""What the robot touches: one event when it begins, one when it is over."""
+"""Collisions of a robot: one event when a contact begins and one when it ends."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -7,41 +7,39 @@ from typing import NamedTuple
 
 import pybullet
 
+from simscen.core.geometry import Vector
 from simscen.core.records.events import Event, EventKind
 
-PATIENCE = 0.1
-"""Seconds without contact after which a collision is over; a bouncing robot collides once."""
-STANDING = 0.02
-"""A robot that moves more slowly than this, in m/s, towards what it touches did not cause the contact.
+END_DELAY_S = 0.1
+"""Time without contact after which a collision has ended, so that a bouncing robot collides once."""
+MIN_CAUSING_SPEED_M_S = 0.02
+"""A robot that moves more slowly towards what it touches did not cause the contact.
 
-What never moves is touched because the robot moves, in whatever direction: it may graze.
+Contact with the static world counts as caused by any motion, because a robot may graze a wall.
 """
+NO_BODY = -1
 
-NOBODY = -1
-"""No number of the engine's."""
-
-Vector = tuple[float, float, float]
-Owner = Callable[[Vector], str]
-Stands = Callable[[int, int, float], bool]
+OwnerOf = Callable[[Vector], str]
+IsGroundContact = Callable[[int, int, float], bool]
 
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """The robot and something press on each other: `place` and unit `normal` towards the robot in the world frame.
+    """Contact of a robot: `point` and unit `normal` towards the robot in the world frame.
 
-    `other` is the engine's number of what is touched, `impulse` in N s during one tick; `fixed`: it never moves.
+    `other` is the body id of what is touched, `impulse` in N s during one tick, `is_static` tells that it never moves.
     """
 
     name: str
     other: int
-    place: Vector
+    point: Vector
     normal: Vector
     impulse: float
-    fixed: bool
+    is_static: bool
 
 
 class BaseMotion(NamedTuple):
-    """How a robot moves: its base frame's origin, m/s and rad/s along the world's axes."""
+    """Position and velocity (m/s and rad/s along the world axes) of the base frame of a robot."""
 
     origin: Vector
     linear: Vector
@@ -49,119 +47,126 @@ class BaseMotion(NamedTuple):
 
 
 class PreStepMotion(NamedTuple):
-    """How everything moved before a step: the robot, other bodies (m/s) and all robots, by the engine's numbers."""
+    """Motion before a step: of the robot, of actors (m/s), and of all robots, the latter two by body id."""
 
     robot: BaseMotion
-    others: Mapping[int, Vector]
+    actors: Mapping[int, Vector]
     robots: Mapping[int, BaseMotion]
 
 
 @dataclass
 class _Ongoing:
-    started: int
-    last: int
+    first_tick: int
+    last_tick: int
     impulse: float
 
 
 class CollisionTracker:
-    """Turns touches of single ticks into collisions with a beginning and an end."""
+    """Combines contacts of single ticks into collisions with a beginning and an end."""
 
     def __init__(self, tick_rate: int) -> None:
-        self._patience = round(PATIENCE * tick_rate)
+        self._end_delay = round(END_DELAY_S * tick_rate)
         self._ongoing: dict[str, _Ongoing] = {}
         self._events: list[Event] = []
 
-    def touched(self, tick: int) -> bool:
-        """Whether anything was touched at `tick`, which is now."""
-        return bool(self._ongoing) and any(seen.last == tick for seen in self._ongoing.values())
+    def has_contact_at(self, tick: int) -> bool:
+        """Return whether anything was touched at the current `tick`."""
+        return bool(self._ongoing) and any(collision.last_tick == tick for collision in self._ongoing.values())
 
     @property
-    def touching(self) -> bool:
-        """Whether anything was touched lately."""
+    def is_colliding(self) -> bool:
+        """Whether a collision has not ended."""
         return bool(self._ongoing)
 
-    def note(self, tick: int, contact_points: list[ContactPoint], before: PreStepMotion) -> None:
-        """Take what was touched at `tick`, and how everything moved just before."""
-        for touch in contact_points:
-            known = self._ongoing.get(touch.name)
-            if known is None:
-                self._ongoing[touch.name] = _Ongoing(tick, tick, touch.impulse)
-                self._events.append(_started(tick, touch, before))
+    def update(self, tick: int, contact_points: list[ContactPoint], before: PreStepMotion) -> None:
+        """Take the contacts at `tick` and the motion before the step."""
+        for contact in contact_points:
+            collision = self._ongoing.get(contact.name)
+            if collision is None:
+                self._ongoing[contact.name] = _Ongoing(tick, tick, contact.impulse)
+                self._events.append(_started_event(tick, contact, before))
             else:
-                known.last, known.impulse = tick, known.impulse + touch.impulse
-        self._end(tick)
+                collision.last_tick, collision.impulse = tick, collision.impulse + contact.impulse
+        self._end_collisions(tick)
 
-    def _end(self, tick: int) -> None:
-        for name in sorted(name for name, seen in self._ongoing.items() if tick - seen.last >= self._patience):
-            seen = self._ongoing.pop(name)
-            data = {"impulse": seen.impulse, "ticks": seen.last - seen.started + 1}
+    def _end_collisions(self, tick: int) -> None:
+        for name in sorted(name for name, one in self._ongoing.items() if tick - one.last_tick >= self._end_delay):
+            ended = self._ongoing.pop(name)
+            data = {"impulse": ended.impulse, "ticks": ended.last_tick - ended.first_tick + 1}
             self._events.append(Event(tick, EventKind.COLLISION_ENDED, name, data))
 
-    def take(self) -> tuple[Event, ...]:
-        """The events since last asked."""
+    def take_events(self) -> tuple[Event, ...]:
+        """Return the events since the last call."""
         if not self._events:
             return ()
         events, self._events = tuple(self._events), []
         return events
 
 
-def _nowhere(*_: float) -> bool:
+def _no_ground(*_: float) -> bool:
     return False
 
 
 def contact_points(
-    client: int, robot: int, names: Mapping[int, str | None], owner: Owner, seconds: float, stands: Stands = _nowhere
+    client: int,
+    robot_id: int,
+    names: Mapping[int, str | None],
+    owner_of: OwnerOf,
+    tick_seconds: float,
+    is_ground_contact: IsGroundContact = _no_ground,
 ) -> list[ContactPoint]:
-    """What presses on the robot now; `names` of bodies, None where the owner of the triangle is to be found.
+    """Return the current contacts of a robot, one for each touched object, sorted by name.
 
-    `stands` says of a body, a link of the robot and the z of the unit normal towards it whether that link stands on it.
+    `names` maps body ids to names; for None, `owner_of` returns the name of the static solid at a point.
+    `is_ground_contact` takes the other body, the link of the robot, and the z of the unit normal towards it.
     """
     found: dict[str, ContactPoint] = {}
-    for point in pybullet.getContactPoints(robot, physicsClientId=client):
-        other, place, normal, distance, force = point[2], point[6], point[7], point[8], point[9]
-        if other not in names or (force <= 0 and distance > 0) or stands(other, point[3], normal[2]):
+    for contact in pybullet.getContactPoints(robot_id, physicsClientId=client):
+        other, point, normal, distance, force = contact[2], contact[6], contact[7], contact[8], contact[9]
+        if other not in names or (force <= 0 and distance > 0) or is_ground_contact(other, contact[3], normal[2]):
             continue
-        name = names[other] or owner(place)
+        name = names[other] or owner_of(point)
         known = found.get(name)
-        impulse = force * seconds + (known.impulse if known else 0.0)
-        found[name] = ContactPoint(name, other, place, normal, impulse, names[other] is None)
+        impulse = force * tick_seconds + (known.impulse if known else 0.0)
+        found[name] = ContactPoint(name, other, point, normal, impulse, names[other] is None)
     return [found[name] for name in sorted(found)]
 
 
-def enclosed_contact(name: str, place: Vector) -> ContactPoint:
-    """The robot is wholly inside something, at a place of it: a touch from below, so that nobody moved towards it."""
-    return ContactPoint(name, NOBODY, place, (0.0, 0.0, 1.0), 0.0, fixed=True)
+def enclosed_contact(name: str, point: Vector) -> ContactPoint:
+    """Return the contact of a robot that is completely inside an object: from below, so that no motion caused it."""
+    return ContactPoint(name, NO_BODY, point, (0.0, 0.0, 1.0), 0.0, is_static=True)
 
 
-def _started(tick: int, touch: ContactPoint, before: PreStepMotion) -> Event:
-    robot = _at(before.robot, touch.place)
-    if touch.other in before.robots:
-        others = _at(before.robots[touch.other], touch.place)
+def _started_event(tick: int, contact: ContactPoint, before: PreStepMotion) -> Event:
+    robot_velocity = _velocity_at(before.robot, contact.point)
+    if contact.other in before.robots:
+        other_velocity = _velocity_at(before.robots[contact.other], contact.point)
     else:
-        others = before.others.get(touch.other, (0.0, 0.0, 0.0))
-    approach = -_along(robot, touch.normal)
+        other_velocity = before.actors.get(contact.other, (0.0, 0.0, 0.0))
+    approach = -_dot(robot_velocity, contact.normal)
+    is_grazing = contact.is_static and math.hypot(*robot_velocity) >= MIN_CAUSING_SPEED_M_S
     return Event(
         tick,
         EventKind.COLLISION_STARTED,
-        touch.name,
+        contact.name,
         {
-            "x": touch.place[0],
-            "y": touch.place[1],
-            "impulse": touch.impulse,
-            "speed": max(0.0, approach + _along(others, touch.normal)),
+            "x": contact.point[0],
+            "y": contact.point[1],
+            "impulse": contact.impulse,
+            "speed": max(0.0, approach + _dot(other_velocity, contact.normal)),
             "robot_speed": max(0.0, approach),
-            "robot_caused": approach >= STANDING or (touch.fixed and math.hypot(*robot) >= STANDING),
+            "robot_caused": approach >= MIN_CAUSING_SPEED_M_S or is_grazing,
             "robot_part": "hull",
         },
     )
 
 
-def _at(motion: BaseMotion, place: Vector) -> Vector:
-    """The robot's velocity at a place."""
+def _velocity_at(motion: BaseMotion, point: Vector) -> Vector:
+    """Return the velocity of a robot at a point."""
     (vx, vy, vz), (wx, wy, wz) = motion.linear, motion.angular
-    x, y, z = (place[i] - motion.origin[i] for i in range(3))
+    x, y, z = (point[i] - motion.origin[i] for i in range(3))
     return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
 
 
-def _along(velocity: Vector, normal: Vector) -> float:
+def _dot(velocity: Vector, normal: Vector) -> float:
     return sum(v * n for v, n in zip(velocity, normal, strict=True))

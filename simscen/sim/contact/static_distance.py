@@ -1,9 +1,8 @@
-"""How near the robot is to what never moves, solid by solid.
+"""Distance from a robot to the static world, and tests whether a closed surface encloses a point.
 
-Asking the fused mesh would be exact too, but costs 0.6 µs for each triangle within reach: 20 to 40 ms of CPU for each
-simulated second in a BARN world (28 facets a cylinder, 40 Hz). Here every solid that is convex is one convex shape,
-built when the robot first comes near, of an engine of its own that is never stepped and has no bodies. A concave solid
-as large as a map (188 000 triangles in one) is taken in tiles, each built and asked only when the robot is near it.
+Distances are measured solid by solid in a separate engine client that has no bodies and is never stepped. A convex
+solid becomes one convex shape when the robot first comes near; a large concave solid is split into tiles. Querying one
+fused mesh would cost time for each triangle within range.
 """
 
 import itertools
@@ -15,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Array, Pose3, Vector
 from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, is_convex, submesh
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.sim.body import outline
@@ -24,221 +23,222 @@ from simscen.sim.bullet import engine
 from simscen.sim.bullet.client_pool import CLIENT_POOL
 from simscen.sim.scene.walls import parts_of
 
-STRIDE = 4.0
-"""m that the robot may move before the list of solids around it is made anew."""
-SLACK = 0.15
-"""m beyond the nearest within which others are measured too, so that they need not be asked again at once."""
-MARGIN = 0.001
-"""m by which Bullet takes a mesh for larger than it is; of a body it could be told not to, but one takes 0.2 ms."""
-ROUNDED = 0.002
-"""m that a robot may extend farther than the corners of its shapes, by which it is bounded."""
-NO_PLACE, NO_TURN = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
-NOISE = 0.005
-"""m farther than the nearest may have gone within which it is measured; what lies farther costs time."""
+RELIST_DISTANCE_M = 4.0
+"""Distance that the robot can move before the list of parts near it is updated."""
+SEARCH_SLACK_M = 0.15
+"""Distance beyond the nearest part within which others are measured too, to postpone the next measurement."""
+BULLET_MARGIN_M = 0.001
+"""Collision margin of meshes without a body, which Bullet subtracts from distances."""
+EXTENT_MARGIN_M = 0.002
+"""Distance that a robot may extend beyond the vertices of its shapes."""
+NEAREST_SLACK_M = 0.005
+"""Additional distance within which the nearest part is searched again."""
+OWNER_TOLERANCE_M = 0.05
+"""Largest distance from a contact point to the bounding box of the touched part."""
+LINE_TILT = 0.0123, 0.0271
+"""Slope in x and y over z of the test line for enclosure, which must not hit the vertical edges of maps."""
+ORIGIN, IDENTITY = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 
-Around = tuple[float, int, tuple[float, float, float, float]]
-"""A lower bound of the distance to a part plus what had been travelled when that was known; the part; its extent."""
+PartBound = tuple[float, int, tuple[float, float, float, float]]
+"""Lower bound of the distance to a part plus the robot's travel when it was known; the part; its bounding rectangle."""
 
 
 class StaticDistance:
-    """The solids of a static world, as seen from one robot. `reach` is how far it looks, in meters."""
+    """Distance from one robot to the solids of a static world, at most `max_range` m."""
 
-    def __init__(self, static: TriangleMesh, robot: RobotBody, reach: float) -> None:
+    def __init__(self, static: TriangleMesh, robot: RobotBody, max_range: float) -> None:
         self._client = CLIENT_POOL.take()
-        self._mesh, self._reach = static, reach
+        self._mesh, self._max_range = static, max_range
         radius, self._height = outline.radius_and_height(robot.solid)
-        self._radius, self._extent = radius + ROUNDED, math.hypot(radius, self._height)
+        self._radius, self._extent = radius + EXTENT_MARGIN_M, math.hypot(radius, self._height)
         self._hull = engine.hull_shapes(self._client, robot.solid)
         self._parts = parts_of(static)
-        self._pairs: dict[int, list[tuple[int, int]]] = {}
-        self._others: list[Around] = []
-        """Parts around but for the nearest, as a heap: only while the first may be nearer has any to be looked at."""
-        self._travelled = 0.0
-        self._nearest: Around | None = None
+        self._shape_pairs: dict[int, list[tuple[int, int]]] = {}
+        self._others: list[PartBound] = []
+        """Heap of the parts near the robot except for the nearest one."""
+        self._travel = 0.0
+        """Upper bound of the distance that any point of the robot has moved since the start."""
+        self._nearest: PartBound | None = None
         self._distance = math.inf
-        self._pose, self._center = Pose3(), (math.inf, math.inf)
-        self._standing: npt.NDArray[np.int64] = np.flatnonzero(self._parts.high[:, 2] > FLOOR_HEIGHT_M)
-        low, high = self._parts.low[self._standing], self._parts.high[self._standing]
-        self._extents = np.ascontiguousarray((low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
+        self._pose, self._list_center = Pose3(), (math.inf, math.inf)
+        self._above_floor: npt.NDArray[np.int64] = np.flatnonzero(self._parts.high[:, 2] > FLOOR_HEIGHT_M)
+        low, high = self._parts.low[self._above_floor], self._parts.high[self._above_floor]
+        self._rectangles = np.ascontiguousarray((low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
 
     def distance(self, pose: Pose3) -> float:
-        """Distance in meters from the robot, with its base at `pose`, to the nearest solid; inf beyond the reach.
+        """Return the distance in m from the robot, with its base at `pose`, to the nearest solid; inf out of range.
 
-        The distance to a part changes at most by what the robot moves, so only those are measured again that may have
-        come nearer than the nearest, and the nearest no farther than it may have gone: what is asked costs time for
-        each triangle within reach.
+        The distance to a part changes at most by the motion of the robot, so that only parts are measured again that
+        may now be nearer than the nearest one.
         """
         moved = max_displacement(self._pose, pose, self._extent)
-        self._travelled += moved
+        self._travel += moved
         self._pose = pose
-        if math.dist(pose[:2], self._center) > STRIDE:
-            self._look_around(pose)
+        if math.dist(pose[:2], self._list_center) > RELIST_DISTANCE_M:
+            self._list_parts(pose)
         nearest = math.inf
         if self._nearest is not None:
-            nearest = self._measure(self._nearest[1], min(self._distance + moved + NOISE, self._reach))
+            nearest = self._measure(self._nearest[1], min(self._distance + moved + NEAREST_SLACK_M, self._max_range))
             if nearest == math.inf:
                 heappush(self._others, self._nearest)
                 self._nearest = None
-        if self._others and self._others[0][0] < min(nearest, self._reach) + self._travelled:
-            nearest = self._look_for_nearer(nearest)
+        if self._others and self._others[0][0] < min(nearest, self._max_range) + self._travel:
+            nearest = self._search_others(nearest)
         self._distance = nearest
         return nearest
 
-    def _look_for_nearer(self, nearest: float) -> float:
-        """Measures the other parts that may be nearer, unless what they extend over is too far by now."""
-        others, travelled, (x, y) = self._others, self._travelled, self._pose[:2]
-        radius = self._radius + 2 * self._height * math.hypot(*self._pose[3:5])  # where it is tilted, its top leans
-        limit = min(nearest, self._reach)
-        # Sums are compared, for of two that are rounded alike the greater stays so: each bound of `limit` ends this.
-        while others and others[0][0] < limit + travelled:
-            _, part, extent = others[0]
-            left, low, right, high = extent
+    def _search_others(self, nearest: float) -> float:
+        """Measure the other parts that may be nearer, unless their bounding rectangle is too far away."""
+        others, travel, (x, y) = self._others, self._travel, self._pose[:2]
+        # The top of a tilted robot extends beyond its radius.
+        radius = self._radius + 2 * self._height * math.hypot(*self._pose[3:5])
+        limit = min(nearest, self._max_range)
+        # Comparing sums rather than differences makes the loop end: each bound of `limit` fails its condition.
+        while others and others[0][0] < limit + travel:
+            _, part, rectangle = others[0]
+            left, low, right, high = rectangle
             bound = math.hypot(max(left - x, 0.0, x - right), max(low - y, 0.0, y - high)) - radius
             if bound < limit:
-                bound = min(nearest + SLACK, self._reach)
+                bound = min(nearest + SEARCH_SLACK_M, self._max_range)
                 found = self._measure(part, bound)
                 if found < nearest:
                     heappop(others)
                     if self._nearest is not None:
-                        heappush(others, (nearest + travelled, *self._nearest[1:]))
-                    self._nearest = 0.0, part, extent
+                        heappush(others, (nearest + travel, *self._nearest[1:]))
+                    self._nearest = 0.0, part, rectangle
                     nearest = limit = found
                     continue
                 bound = min(found, bound)
-            heapreplace(others, (bound + travelled, part, extent))
+            heapreplace(others, (bound + travel, part, rectangle))
         return nearest
 
-    def _measure(self, part: int, within: float) -> float:
-        """Distance to one part; inf if above `within`."""
-        pairs = self._pairs.get(part)
+    def _measure(self, part: int, max_distance: float) -> float:
+        """Return the distance to one part; inf above `max_distance`."""
+        pairs = self._shape_pairs.get(part)
         if pairs is None:
-            pairs = self._pairs[part] = list(itertools.product(self._hull, self._build(part)))
-        place, turn, client = self._pose[:3], self._pose[3:], self._client
+            pairs = self._shape_pairs[part] = list(itertools.product(self._hull, self._build_shapes(part)))
+        position, quaternion, client = self._pose[:3], self._pose[3:], self._client
         nearest = math.inf
         for hull, shape in pairs:
-            # In the order of PyBullet's manual: names would cost a fifth of the call. Both shapes have places.
+            # Positional arguments, because keywords cost a fifth of the call.
             for point in pybullet.getClosestPoints(
-                -1, -1, within, -1, -1, hull, shape, place, NO_PLACE, turn, NO_TURN, client
+                -1, -1, max_distance, -1, -1, hull, shape, position, ORIGIN, quaternion, IDENTITY, client
             ):
-                nearest = min(nearest, point[8] + MARGIN)
-        return nearest if nearest <= within else math.inf
+                nearest = min(nearest, point[8] + BULLET_MARGIN_M)
+        return nearest if nearest <= max_distance else math.inf
 
-    def _look_around(self, pose: Pose3) -> None:
-        """Lists the parts that may come within reach during the next stride."""
-        x, y = self._center = (pose.x, pose.y)
-        left, low, right, high = self._extents
+    def _list_parts(self, pose: Pose3) -> None:
+        """List the parts that may come within range before the next update of the list."""
+        x, y = self._list_center = (pose.x, pose.y)
+        left, low, right, high = self._rectangles
         outside = np.maximum(np.maximum(left - x, x - right), np.maximum(low - y, y - high))
-        bounds = outside - (self._radius + self._height)  # less than what is diagonal, which is told when it comes up
-        near = np.flatnonzero(bounds < self._reach + STRIDE)
-        parts, extents = self._standing[near].tolist(), map(tuple, self._extents[:, near].T.tolist())
+        bounds = outside - (self._radius + self._height)  # too small for diagonal directions; refined when needed
+        near = np.flatnonzero(bounds < self._max_range + RELIST_DISTANCE_M)
+        parts, rectangles = self._above_floor[near].tolist(), map(tuple, self._rectangles[:, near].T.tolist())
         known = {part: bound for bound, part, _ in self._others}
-        mine = None if self._nearest is None else self._nearest[1]
+        nearest_part = None if self._nearest is None else self._nearest[1]
         self._others = sorted(
-            (max(bound, known.get(part, bound)), part, extent)
-            for bound, part, extent in zip((bounds[near] + self._travelled).tolist(), parts, extents, strict=True)
-            if part != mine
+            (max(bound, known.get(part, bound)), part, rectangle)
+            for bound, part, rectangle in zip((bounds[near] + self._travel).tolist(), parts, rectangles, strict=True)
+            if part != nearest_part
         )
 
-    def _build(self, part: int) -> list[int]:
+    def _build_shapes(self, part: int) -> list[int]:
         vertices, hulls = self._mesh.vertices, self._mesh.hulls
         if hulls and (own := hulls[self._parts.owners[part]]):
             return [engine.convex_shape(self._client, vertices[own])]
         faces = self._mesh.faces[self._parts.faces(part)]
-        if self._parts.whole(part) and is_convex(solid := submesh(vertices, faces)):
+        if self._parts.is_whole_solid(part) and is_convex(solid := submesh(vertices, faces)):
             return [engine.convex_shape(self._client, solid.vertices)]
-        lots = engine.tiles(vertices, engine.above_floor(vertices, faces))
-        return [engine.concave_shape(self._client, submesh(vertices, lot)) for lot in lots]
+        tiles = engine.tiles(vertices, engine.above_floor(vertices, faces))
+        return [engine.concave_shape(self._client, submesh(vertices, tile)) for tile in tiles]
 
-    def around(self, place: tuple[float, float, float], but: Collection[int] = ()) -> list[int]:
-        """The solids that a place is inside of, by number, without those in `but`."""
-        asked = [owner for owner in self._parts.holding(place) if owner not in but]
-        return [owner for owner in asked if self._winds_around(owner, place)]
+    def enclosing(self, point: Vector, exclude: Collection[int] = ()) -> list[int]:
+        """Return the indices of the solids that enclose a point, except those in `exclude`."""
+        candidates = [owner for owner in self._parts.owners_around(point) if owner not in exclude]
+        return [owner for owner in candidates if self._encloses(owner, point)]
 
-    def _winds_around(self, owner: int, place: tuple[float, float, float]) -> bool:
-        """Of a solid of many tiles mostly those suffice that lie above and below the place: 0.2 ms for 100."""
+    def _encloses(self, owner: int, point: Vector) -> bool:
+        """Return whether a solid encloses a point; of a tiled solid, usually a few tiles on a line are sufficient."""
         parts, vertices = self._parts, self._mesh.vertices
-        tiles = parts.of(owner)
+        tiles = parts.of_owner(owner)
         if len(tiles) > 1:
             low, high = parts.low[tiles.start : tiles.stop], parts.high[tiles.start : tiles.stop]
-            leans = max(TILT) * max(high[:, 2].max() - place[2], place[2] - low[:, 2].min())
-            over = ((low[:, :2] - leans <= place[:2]) & (place[:2] <= high[:, :2] + leans)).all(axis=1)
-            meeting = [parts.faces(tile) for tile, meets in zip(tiles, over.tolist(), strict=True) if meets]
-            faces = np.concatenate([np.empty(0, np.int64), *meeting])
-            said = encloses_along_line(vertices[self._mesh.faces[faces]], place)
-            if said is not None:
-                return said
-        return encloses(vertices[self._faces(owner)], place)
+            tilt = max(LINE_TILT) * max(high[:, 2].max() - point[2], point[2] - low[:, 2].min())
+            is_on_line = ((low[:, :2] - tilt <= point[:2]) & (point[:2] <= high[:, :2] + tilt)).all(axis=1)
+            on_line = [parts.faces(tile) for tile, on in zip(tiles, is_on_line.tolist(), strict=True) if on]
+            faces = np.concatenate([np.empty(0, np.int64), *on_line])
+            answer = encloses_along_line(vertices[self._mesh.faces[faces]], point)
+            if answer is not None:
+                return answer
+        return encloses(vertices[self._faces_of(owner)], point)
 
-    def convex(self, owner: int) -> bool:
-        """Whether a solid is convex."""
-        return is_convex(submesh(self._mesh.vertices, self._faces(owner)))
+    def is_convex(self, owner: int) -> bool:
+        """Return whether a solid is convex."""
+        return is_convex(submesh(self._mesh.vertices, self._faces_of(owner)))
 
-    def _faces(self, owner: int) -> npt.NDArray[np.int32]:
-        return self._mesh.faces[self._parts.faces_of(owner)]
+    def _faces_of(self, owner: int) -> npt.NDArray[np.int32]:
+        return self._mesh.faces[self._parts.faces_of_owner(owner)]
 
     def name(self, owner: int) -> str:
-        """What a solid is called."""
+        """Return the name of a solid."""
         return self._mesh.names[owner]
 
-    def owner(self, place: tuple[float, float, float]) -> str:
-        """The name of the solid whose surface is nearest to a place where the hull touches something."""
-        point = np.array(place)
-        outside = np.maximum(np.maximum(self._parts.low - point, point - self._parts.high), 0.0)
-        near = np.flatnonzero((outside < 0.05).all(axis=1))
+    def nearest_owner(self, point: Vector) -> str:
+        """Return the name of the solid whose surface is nearest to a contact point; "" if none is near."""
+        position = np.array(point)
+        outside = np.maximum(np.maximum(self._parts.low - position, position - self._parts.high), 0.0)
+        near = np.flatnonzero((outside < OWNER_TOLERANCE_M).all(axis=1))
         if not len(near):
             return ""
         faces = np.concatenate([self._parts.faces(part) for part in near.tolist()])
-        distances = point_to_triangles(point, self._mesh.vertices[self._mesh.faces[faces]])
+        distances = point_to_triangles(position, self._mesh.vertices[self._mesh.faces[faces]])
         return self._mesh.names[int(self._mesh.owners[faces[int(np.argmin(distances))]])]
 
     def close(self) -> None:
-        """Give the engine back."""
+        """Release the engine client."""
         CLIENT_POOL.give_back(self._client)
 
 
 def max_displacement(before: Pose3, after: Pose3, extent: float) -> float:
-    """A bound on how far any point within `extent` of the base's origin has moved, in meters.
+    """Return an upper bound in m of the motion of any point within `extent` m of the base frame's origin.
 
-    A turn by an angle a moves it by 2 sin(a / 2) times that, and quaternions by 2 sin(a / 4).
+    A rotation by an angle a moves such a point by 2 sin(a / 2) extent, and changes the quaternion by 2 sin(a / 4).
     """
     return math.dist(before[:3], after[:3]) + 2 * extent * math.dist(before[3:], after[3:])
 
 
 def point_to_triangles(point: Array, corners: Array) -> Array:
-    """Distances (n,) in meters from a point (3,) to triangles (n, 3, 3)."""
+    """Return the distances (n,) in m from a point (3,) to triangles (n, 3, 3)."""
     a, b, c = corners.swapaxes(0, 1)
     normal = np.cross(b - a, c - a)
-    edges = np.min([_to_segments(point, p, q) for p, q in ((a, b), (b, c), (c, a))], axis=0)
+    edges = np.min([_distances_to_segments(point, p, q) for p, q in ((a, b), (b, c), (c, a))], axis=0)
     length = np.linalg.norm(normal, axis=1)
-    flat = length > 0
-    height = np.abs(np.sum((point - a) * normal, axis=1)) / np.where(flat, length, 1.0)
-    inside = flat.copy()
+    has_area = length > 0
+    height = np.abs(np.sum((point - a) * normal, axis=1)) / np.where(has_area, length, 1.0)
+    is_above = has_area.copy()
     for p, q in ((a, b), (b, c), (c, a)):
-        inside &= np.sum(np.cross(q - p, point - p) * normal, axis=1) >= 0
-    result: Array = np.where(inside, height, edges)
-    return result
+        is_above &= np.sum(np.cross(q - p, point - p) * normal, axis=1) >= 0
+    distances: Array = np.where(is_above, height, edges)
+    return distances
 
 
-def _to_segments(point: Array, start: Array, end: Array) -> Array:
-    along = end - start
-    squared = np.sum(along * along, axis=1)
-    part = np.sum((point - start) * along, axis=1) / np.where(squared > 0, squared, 1.0)
-    nearest = start + np.clip(part, 0.0, 1.0)[:, None] * along
-    distance: Array = np.linalg.norm(point - nearest, axis=1)
-    return distance
+def _distances_to_segments(point: Array, start: Array, end: Array) -> Array:
+    direction = end - start
+    squared = np.sum(direction * direction, axis=1)
+    share = np.sum((point - start) * direction, axis=1) / np.where(squared > 0, squared, 1.0)
+    nearest = start + np.clip(share, 0.0, 1.0)[:, None] * direction
+    distances: Array = np.linalg.norm(point - nearest, axis=1)
+    return distances
 
 
-Vector = tuple[float, float, float]
-TILT = 0.0123, 0.0271
-"""m by which the line through a place leans towards x and y for each m of its height: edges of maps lie upright."""
+def encloses(corners: Array, point: Vector) -> bool:
+    """Return whether a surface of triangles (n, 3, 3), counterclockwise from outside, encloses a point.
 
-
-def encloses(corners: Array, place: Vector) -> bool:
-    """Whether triangles (n, 3, 3), anticlockwise from outside, enclose a place.
-
-    Sums up their solid angles (van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983); small holes do no harm.
+    It does if its winding number, the sum of solid angles over 4 pi, exceeds one half, also with small holes (van
+    Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
     """
-    ax, ay, az, bx, by, bz, cx, cy, cz = np.ascontiguousarray(corners.reshape(-1, 9).T) - np.tile(place, 3)[:, None]
+    ax, ay, az, bx, by, bz, cx, cy, cz = np.ascontiguousarray(corners.reshape(-1, 9).T) - np.tile(point, 3)[:, None]
     la, lb, lc = (np.sqrt(x * x + y * y + z * z) for x, y, z in ((ax, ay, az), (bx, by, bz), (cx, cy, cz)))
     volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
     ab, bc, ca = ax * bx + ay * by + az * bz, bx * cx + by * cy + bz * cz, cx * ax + cy * ay + cz * az
@@ -246,20 +246,20 @@ def encloses(corners: Array, place: Vector) -> bool:
     return bool(angles.sum() > 2 * math.pi)
 
 
-def encloses_along_line(corners: Array, place: Vector) -> bool | None:
-    """`winds_around`, told by those triangles (n, 3, 3) of a surface alone that a line through the place may meet.
+def encloses_along_line(corners: Array, point: Vector) -> bool | None:
+    """Return the same as `encloses`, from the triangles (n, 3, 3) alone that a line through the point may cross.
 
-    Whoever goes to infinity leaves a closed surface so often more than it enters it as it winds around the place. None
-    where both ways along the line do not say the same, as through a hole, or where an edge lies on it.
+    The winding number is how many more times a ray to infinity leaves the surface than enters it. Returns None if both
+    directions of the line disagree, as through a hole, or if an edge lies on the line.
     """
-    x, y, z = np.moveaxis(corners - place, 2, 0)
-    x, y = x - TILT[0] * z, y - TILT[1] * z
-    # For each corner, twice the area that the line and the two others span: all are of one sign where it passes.
+    x, y, z = np.moveaxis(corners - point, 2, 0)
+    x, y = x - LINE_TILT[0] * z, y - LINE_TILT[1] * z
+    # For each corner, twice the area of the line and the two other corners; all have one sign if the line crosses.
     areas = np.roll(x, -1, 1) * np.roll(y, -2, 1) - np.roll(x, -2, 1) * np.roll(y, -1, 1)
-    passes = (areas >= 0).all(axis=1) | (areas <= 0).all(axis=1)
-    areas, z = areas[passes], z[passes]
+    is_crossed = (areas >= 0).all(axis=1) | (areas <= 0).all(axis=1)
+    areas, z = areas[is_crossed], z[is_crossed]
     if not areas.all():
         return None
-    facing, above = np.sign(areas[:, 0]), (areas * z).sum(axis=1) * areas[:, 0] > 0
-    up, down = facing[above].sum(), -facing[~above].sum()
+    facing, is_above = np.sign(areas[:, 0]), (areas * z).sum(axis=1) * areas[:, 0] > 0
+    up, down = facing[is_above].sum(), -facing[~is_above].sum()
     return bool(up > 0) if up == down else None

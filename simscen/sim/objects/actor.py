@@ -1,4 +1,4 @@
-"""One thing that moves by a script, or because it is pushed, or that may be moved some time."""
+"""A movable object, and precomputed poses of scripted objects."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,158 +7,156 @@ from dataclasses import dataclass, field
 import numpy as np
 import pybullet
 
-from simscen.core.geometry import Pose3, wrap
+from simscen.core.geometry import Pose3, Vector, wrap
 from simscen.core.geometry.motion_paths import MAX_STEP_M, PathSampler, SweptSegment
 from simscen.core.geometry.scripted_poses import BatchPathSampler, PosesAtTick, PredictedPoses
 from simscen.core.geometry.shapes import Body, Mesh, MotionPath
 from simscen.sim.body.inertia import GRAVITY
 
-FALLING = 0.1 * GRAVITY
-"""m/s that what rests may gain within a tenth of a second."""
+FALL_SPEED_M_S = 0.1 * GRAVITY
+"""Speed that a resting object can gain by falling for 0.1 s."""
+PRECOMPUTED_S = 4
+"""Simulated seconds for which scripted poses are computed in one batch."""
 
-Vector = tuple[float, float, float]
-Placing = tuple[Vector, tuple[float, float, float, float]]
+CenterPose = tuple[Vector, tuple[float, float, float, float]]
+"""Position and quaternion of a center of mass, as returned by PyBullet."""
 
 
 @dataclass
 class Actor:
-    """A body, and the `path` that it has followed since tick `since`, if any.
+    """A movable body and the `path` that it has followed since `path_start_tick`, if any.
 
-    `ways` are all on which its origin ever is, `speed` is the fastest that any part of it ever moves on them, in m/s,
-    `size` how far from its origin it extends, and `radius` how far from its axis, in meters. Where the engine has it as
-    a surface without an inside, `surface` is that, in the body's frame.
+    segments:  line segments that contain every position of its origin
+    max_speed: upper bound in m/s of the speed of any of its points on the path
+    size:      radius in m of its bounding sphere around the origin
+    radius:    radius in m of its bounding cylinder around the vertical axis
+    shell:     its surface in the body frame, if the engine only has a surface without an inside
     """
 
     body: Body
     path: MotionPath | None
-    since: int
-    ways: Sequence[SweptSegment]
-    speed: float
+    path_start_tick: int
+    segments: Sequence[SweptSegment]
+    max_speed: float
     size: float
     radius: float
-    surface: Mesh | None
-    led: bool = False
-    """Whether it may be given another path at any time."""
-    number: int | None = None
-    """The engine's, once that has it."""
-    shown: Pose3 | None = None
-    """Where the engine has it, once that has it."""
+    shell: Mesh | None
+    is_steered: bool = False
+    """Whether the path can be replaced at any time, as for pedestrians."""
+    body_id: int | None = None
+    """Body id in the engine; None while the actor is deferred."""
+    engine_pose: Pose3 | None = None
+    """Pose at which the engine currently has it."""
     center_from_base: Pose3 = Pose3()
-    placed: tuple[Placing, Pose3] | None = None
-    """What the engine last said of its center of mass, and the pose that comes of it."""
-    resting: bool = False
-    """Whether it has not moved at all since the engine was asked before."""
-    track: PathSampler | None = None
-    """Its path as it is asked for."""
-    scripted: dict[int, Pose3] = field(default_factory=dict)
-    """Where its path has it at the ticks that were asked for last."""
+    center_and_pose: tuple[CenterPose, Pose3] | None = None
+    """The last center of mass that the engine returned, and the resulting pose."""
+    is_resting: bool = False
+    """Whether it has not moved between the last two queries."""
+    _sampler: PathSampler | None = None
+    _path_poses: dict[int, Pose3] = field(default_factory=dict)
+    """Cache of recent path poses by tick."""
 
     @property
     def id(self) -> int:
-        """The engine's number of it. Raises LookupError where that has not got it: better no run than a wrong one."""
-        if self.number is None:
+        """Body id in the engine; raises LookupError for a deferred actor, whose absence would falsify the run."""
+        if self.body_id is None:
             raise LookupError(f'"{self.body.name}" is not in the engine')
-        return self.number
+        return self.body_id
 
     @property
-    def pushable(self) -> bool:
-        """Whether the engine moves it, rather than a script or nothing."""
+    def is_pushable(self) -> bool:
+        """Whether the engine moves it, rather than a script."""
         return self.body.mass > 0 and self.path is None
 
-    def parked(self, since: float, seconds: float) -> bool:
-        """Whether its path, set off `since` seconds ago, leaves it where it is for so many more."""
-        if self.path is None or self.led:
+    def is_parked(self, elapsed: float, horizon: float) -> bool:
+        """Return whether its path, `elapsed` seconds after its start, has no motion within `horizon` seconds."""
+        if self.path is None or self.is_steered:
             return False
-        return self.path.over(since) or since + seconds < self.path.start
+        return self.path.over(elapsed) or elapsed + horizon < self.path.start
 
-    def follow(self, path: MotionPath, speed: float, tick: int) -> None:
+    def follow(self, path: MotionPath, max_speed: float, tick: int) -> None:
         """Follow another path from `tick` on."""
-        self.path, self.since, self.speed, self.track = path, tick, speed, None
-        self.scripted.clear()
+        self.path, self.path_start_tick, self.max_speed, self._sampler = path, tick, max_speed, None
+        self._path_poses.clear()
 
-    def at(self, tick: int, rate: int) -> Pose3:
-        """Where its path has it."""
-        there = self.scripted.get(tick)
-        if there is None:
-            if len(self.scripted) > 1:
-                self.scripted.clear()
-            if self.track is None:
+    def path_pose(self, tick: int, tick_rate: int) -> Pose3:
+        """Return the pose on its path."""
+        pose = self._path_poses.get(tick)
+        if pose is None:
+            if len(self._path_poses) > 1:
+                self._path_poses.clear()
+            if self._sampler is None:
                 assert self.path is not None
-                self.track = PathSampler(self.path, self.body.pose.z)
-            self.scripted[tick] = there = self.track.at((tick - self.since) / rate)
-        return there
+                self._sampler = PathSampler(self.path, self.body.pose.z)
+            self._path_poses[tick] = pose = self._sampler.at((tick - self.path_start_tick) / tick_rate)
+        return pose
 
-    def velocity(self, tick: int, rate: int) -> tuple[Vector, float]:
-        """The velocity in m/s and rad/s that leads along its path to the next tick."""
-        here, there = self.at(tick, rate), self.at(tick + 1, rate)
-        vx, vy = (there.x - here.x) * rate, (there.y - here.y) * rate
-        if math.hypot(vx, vy) > MAX_STEP_M * rate:  # a path that jumps sets its body down elsewhere
+    def path_velocity(self, tick: int, tick_rate: int) -> tuple[Vector, float]:
+        """Return the velocity in m/s and rad/s that leads along its path to the next tick."""
+        pose, following = self.path_pose(tick, tick_rate), self.path_pose(tick + 1, tick_rate)
+        vx, vy = (following.x - pose.x) * tick_rate, (following.y - pose.y) * tick_rate
+        if math.hypot(vx, vy) > MAX_STEP_M * tick_rate:  # a jump of the path is a teleportation, not a motion
             return (0.0, 0.0, 0.0), 0.0
-        return (vx, vy, 0.0), wrap(there.yaw - here.yaw) * rate
+        return (vx, vy, 0.0), wrap(following.yaw - pose.yaw) * tick_rate
 
-    def width(self, pose: Pose3) -> float:
-        """How far from its origin it extends along the ground, at most, in meters: where it leans its top does, too."""
+    def ground_radius(self, pose: Pose3) -> float:
+        """Return the radius in m of its bounding disc on the ground around its origin, also if it is tilted."""
         height = math.sqrt(self.size**2 - self.radius**2)
         return min(self.size, self.radius + 2 * height * math.hypot(pose.qx, pose.qy))
 
-    def away(self, place: Vector, pose: Pose3) -> float:
-        """How far from a place it is in meters, being at `pose`, or is as the engine has it."""
-        away = math.dist(pose[:3], place)
-        return away if self.shown is None else min(away, math.dist(self.shown[:3], place))
+    def distance_to(self, point: Vector, pose: Pose3) -> float:
+        """Return the distance in m from a point to its origin, at `pose` or at its engine pose if that is nearer."""
+        distance = math.dist(pose[:3], point)
+        return distance if self.engine_pose is None else min(distance, math.dist(self.engine_pose[:3], point))
 
-    def show(self, client: int, pose: Pose3) -> None:
-        """Put it somewhere, if the engine has it."""
-        if self.number is not None and pose != self.shown:
-            self.shown = pose
+    def set_engine_pose(self, client: int, pose: Pose3) -> None:
+        """Move it in the engine, if the engine has it."""
+        if self.body_id is not None and pose != self.engine_pose:
+            self.engine_pose = pose
             pybullet.resetBasePositionAndOrientation(self.id, pose[:3], pose[3:], client)
 
-    def ask(self, client: int) -> Pose3 | None:
-        """See where the engine has moved it, which can be pushed; None where it has not."""
-        said: Placing = pybullet.getBasePositionAndOrientation(self.id, client)
-        self.resting = self.placed is not None and self.placed[0] == said
-        if self.resting:
-            return None
-        pose = Pose3(*said[0], *said[1]).compose(self.center_from_base)
-        self.placed = said, pose
-        return pose
+    def update_pose(self, client: int) -> bool:
+        """Query the pose of a pushable actor from the engine; return whether it has moved since the last query."""
+        center: CenterPose = pybullet.getBasePositionAndOrientation(self.id, client)
+        self.is_resting = self.center_and_pose is not None and self.center_and_pose[0] == center
+        if not self.is_resting:
+            self.center_and_pose = center, Pose3(*center[0], *center[1]).compose(self.center_from_base)
+        return not self.is_resting
 
-    def fastest(self, client: int) -> float:
-        """How fast any part of it may be within a tenth of a second, in m/s, which can be pushed."""
-        if self.resting:
-            return FALLING
+    def speed_bound(self, client: int) -> float:
+        """Return an upper bound in m/s of the speed of any point of a pushable actor within the next 0.1 s."""
+        if self.is_resting:
+            return FALL_SPEED_M_S
         linear, angular = pybullet.getBaseVelocity(self.id, physicsClientId=client)
-        return math.hypot(*linear) + math.hypot(*angular) * self.size + FALLING
-
-
-LOOKAHEAD_S = 4
-"""Seconds that are worked out at once."""
+        return math.hypot(*linear) + math.hypot(*angular) * self.size + FALL_SPEED_M_S
 
 
 class ScheduledPoses:
-    """Of things that follow paths; make another one when one of them is given another path."""
+    """Precomputed poses of scripted actors; create a new instance when a path changes."""
 
-    def __init__(self, travelling: Sequence[Actor], tick_rate: int) -> None:
-        self._travelling, self._rate = travelling, tick_rate
-        self._foreseen: PredictedPoses | None = None
-        self._tracks: BatchPathSampler | None = None
+    def __init__(self, scripted: Sequence[Actor], tick_rate: int) -> None:
+        self._scripted, self._tick_rate = scripted, tick_rate
+        self._predicted: PredictedPoses | None = None
+        self._sampler: BatchPathSampler | None = None
 
     def at(self, tick: int) -> PosesAtTick | None:
-        """Where everything is at a tick; None where that was not worked out."""
-        return None if self._foreseen is None else self._foreseen.at(tick)
+        """Return the poses of all actors at a tick, or None if they have not been computed."""
+        return None if self._predicted is None else self._predicted.at(tick)
 
-    def forget(self) -> None:
-        """Something else has moved than scripts say."""
-        self._foreseen = None
+    def invalidate(self) -> None:
+        """Discard the poses, because an actor without a script has moved."""
+        self._predicted = None
 
-    def look(self, tick: int, period: int, everything: Mapping[str, Pose3]) -> None:
-        """Work it out from `tick` on for every `period` ticks, unless it is; of `everything` there is, others stay."""
-        if (self._foreseen is not None and tick in self._foreseen.ticks) or any(a.led for a in self._travelling):
+    def compute(self, tick: int, period: int, poses: Mapping[str, Pose3]) -> None:
+        """Compute the poses for every `period` ticks from `tick` on, unless known; `poses` has those of all actors."""
+        is_known = self._predicted is not None and tick in self._predicted.ticks
+        if is_known or any(actor.is_steered for actor in self._scripted):
             return
-        if self._tracks is None:
-            paths = [(actor.path, actor.body.pose.z) for actor in self._travelling]
-            self._tracks = BatchPathSampler([(path, z) for path, z in paths if path is not None])
-        ticks = range(tick, tick + max(1, LOOKAHEAD_S * self._rate // period) * period, period)
-        since = np.array([actor.since for actor in self._travelling])
-        table = self._tracks.at((np.array(ticks)[:, np.newaxis] - since) / self._rate)
-        names = tuple(actor.body.name for actor in self._travelling)
-        self._foreseen = PredictedPoses(ticks, names, table, {**everything})
+        if self._sampler is None:
+            paths = [(actor.path, actor.body.pose.z) for actor in self._scripted]
+            self._sampler = BatchPathSampler([(path, z) for path, z in paths if path is not None])
+        ticks = range(tick, tick + max(1, PRECOMPUTED_S * self._tick_rate // period) * period, period)
+        starts = np.array([actor.path_start_tick for actor in self._scripted])
+        table = self._sampler.at((np.array(ticks)[:, np.newaxis] - starts) / self._tick_rate)
+        names = tuple(actor.body.name for actor in self._scripted)
+        self._predicted = PredictedPoses(ticks, names, table, {**poses})

@@ -1,4 +1,4 @@
-"""Things that move: by a script, or because they are pushed."""
+"""All movable objects of a simulation, scripted or pushable."""
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -8,7 +8,7 @@ import numpy as np
 import pybullet
 
 from simscen.core.errors import RunError
-from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry import Pose2, Pose3, Vector
 from simscen.core.geometry.motion_paths import (
     MAX_STEP_M,
     SweptSegment,
@@ -23,24 +23,23 @@ from simscen.sim.body.outline import radius_and_height
 from simscen.sim.bullet import engine
 from simscen.sim.bullet.divergence import divergence_reason
 from simscen.sim.contact.static_distance import encloses
-from simscen.sim.objects.actor import FALLING, Actor, ScheduledPoses, Vector
+from simscen.sim.objects.actor import FALL_SPEED_M_S, Actor, ScheduledPoses
 from simscen.sim.objects.broad_phase import BroadPhase
 from simscen.sim.objects.proximity import DeferredActors, NearbyActors, ProximityQuery, find_nearby
 from simscen.sim.objects.rest import RestDetector, RestPoses
 
 FRICTION = 0.6
-"""Of pushable things on the ground: about that of wood or cardboard on concrete."""
+"""Friction of pushable objects on the ground: about that of wood or cardboard on concrete."""
 NEVER = 2**62
-"""A tick that never comes."""
+"""A tick after the end of every run."""
 
 
 class Actors:
-    """All that moves but the robots, by name and in the order of names, so that the engine's order is always the same.
+    """All movable objects, sorted by name, so that their order in the engine is reproducible.
 
-    Scripted bodies are kept where the engine last needed them; `begin` and `show` around a step make them push
-    what they meet, with their true velocity. Without velocity they would push only by sinking in: a cart at 1 m/s by
-    20 mm, with it by 0.1 mm. What can be pushed sleeps where it lies until something comes near; see `encounters`.
-    Where nothing can be, the engine gets what a robot comes near to; see `presence`.
+    Scripted bodies are moved in the engine only where contact is possible: `begin_step` and `end_step` give them their
+    pose and velocity, so that they push others with the correct speed. Pushable objects sleep until something comes
+    near (see BroadPhase). If there are none, the engine only has the actors near robots (see DeferredActors).
     """
 
     def __init__(
@@ -48,363 +47,369 @@ class Actors:
         client: int,
         tick_rate: int,
         triangulate: engine.Triangulate,
-        look: int = engine.AS_IT_IS,
-        all_present: bool = True,
+        visual_shape: int = engine.AS_IT_IS,
+        is_complete: bool = True,
     ) -> None:
-        """The renderer is shown a `look` of the engine's of each; `all_present`: of all, wherever they are."""
-        self._client, self._rate, self._triangulate, self._shown_as = client, tick_rate, triangulate, look
-        self._all_present = all_present
+        """Begin without actors; `visual_shape` is what the renderer shows, `is_complete` disables deferred actors."""
+        self._client, self._tick_rate = client, tick_rate
+        self._triangulate, self._visual_shape = triangulate, visual_shape
+        self._is_complete = is_complete
         self._actors: dict[str, Actor] = {}
-        self._absent: DeferredActors | None = None
-        self._missing = 0
-        self._travelling: list[Actor] = []
-        self._driven: list[Actor] = []
-        self._fastest = 0.0
+        self._deferred: DeferredActors | None = None
+        self._deferred_count = 0
+        self._scripted: list[Actor] = []
+        self._scripted_in_engine: list[Actor] = []
+        self._scripted_speed = 0.0
+        """Upper bound of the speed of all scripted actors in m/s."""
         self._pushable: list[Actor] = []
         self._poses: Mapping[str, Pose3] = {}
-        self._posed_at: int | None = None
-        self._still_since: int | None = None
-        self._until_asleep = math.ceil(2 * engine.UNTIL_ASLEEP * tick_rate)
-        self._undisturbed: dict[int, int] = {}
-        self._meetings = BroadPhase(client, tick_rate, (), ())
+        self._poses_tick: int | None = None
+        self._resting_since: int | None = None
+        """Tick since when no pushable actor has moved."""
+        self._ticks_until_asleep = math.ceil(2 * engine.UNTIL_ASLEEP * tick_rate)
+        self._no_contact_before: dict[int, int] = {}
+        """For each robot's body id, the tick until which it cannot touch any actor."""
+        self._broad_phase = BroadPhase(client, tick_rate, (), ())
         self._moved: list[Actor] = []
-        self._about: dict[int, NearbyActors] = {}
-        self._ahead = ScheduledPoses((), tick_rate)
-        self._homes = RestPoses()
+        """Pushable actors that have moved since the last check for divergence."""
+        self._nearby: dict[int, NearbyActors] = {}
+        """Actors near each robot, by the robot's body id."""
+        self._scheduled_poses = ScheduledPoses((), tick_rate)
+        self._rest_poses = RestPoses()
 
-    def add(self, body: Body, tick: int, led: bool = False) -> None:
-        """Put a body into the world, maybe one that `follow` will move; one of the same name makes way."""
+    # Adding, removing, and changing actors
+
+    def add(self, body: Body, tick: int, is_steered: bool = False) -> None:
+        """Add a body, which replaces one of the same name; with `is_steered`, `follow` can change its path."""
         self.remove(body.name)
-        self._actors[body.name] = self._made(body, tick, led)
-        self._let_in(tick)
+        self._actors[body.name] = self._make_actor(body, tick, is_steered)
+        self._update_engine(tick)
 
-    def fill(self, bodies: Iterable[Body], tick: int) -> None:
-        """Put bodies into the world of whose names none is there."""
-        self._actors.update((body.name, self._made(body, tick)) for body in bodies)
-        self._let_in(tick)
+    def add_all(self, bodies: Iterable[Body], tick: int) -> None:
+        """Add bodies with new names."""
+        self._actors.update((body.name, self._make_actor(body, tick)) for body in bodies)
+        self._update_engine(tick)
 
-    def _made(self, body: Body, tick: int, led: bool = False) -> Actor:
+    def _make_actor(self, body: Body, tick: int, is_steered: bool = False) -> Actor:
         radius, height = radius_and_height(body.solids)
-        if body.path is not None and (step := largest_step(body.path, 1 / self._rate, radius)) > MAX_STEP_M:
+        if body.path is not None and (step := largest_step(body.path, 1 / self._tick_rate, radius)) > MAX_STEP_M:
             raise RunError("invalid", too_fast(body.name, step))
-        stays = (SweptSegment(body.pose.x, body.pose.y, body.pose.x, body.pose.y),)
-        on, speed = (stays, 0.0) if body.path is None else (swept_segments(body.path), top_speed(body.path, radius))
-        hollow = engine.hollow(body.solids, body.mass > 0 and body.path is None)
-        surface = engine.fused(body.solids, self._triangulate) if hollow else None
-        return Actor(body, body.path, tick, on, speed, math.hypot(radius, height), radius, surface, led)
+        segments, speed = [SweptSegment(body.pose.x, body.pose.y, body.pose.x, body.pose.y)], 0.0
+        if body.path is not None:
+            segments, speed = swept_segments(body.path), top_speed(body.path, radius)
+        is_hollow = engine.hollow(body.solids, body.mass > 0 and body.path is None)
+        shell = engine.fused(body.solids, self._triangulate) if is_hollow else None
+        size = math.hypot(radius, height)
+        return Actor(body, body.path, tick, segments, speed, size, radius, shell, is_steered)
 
-    def _let_in(self, tick: int) -> None:
-        """Let the engine have what may meet anything but a robot, or go anywhere."""
+    def _update_engine(self, tick: int) -> None:
+        """Create all actors in the engine that cannot be deferred."""
         self._actors = dict(sorted(self._actors.items()))
         actors = self._actors.values()
-        everything = self._all_present or any(actor.pushable for actor in actors)
+        none_deferred = self._is_complete or any(actor.is_pushable for actor in actors)
         for actor in actors:
-            if actor.number is None and (everything or actor.led):
-                self._enter(actor, tick)
-        self._sort()
+            if actor.body_id is None and (none_deferred or actor.is_steered):
+                self._create_in_engine(actor, tick)
+        self._update_lists()
 
-    def _enter(self, actor: Actor, tick: int) -> None:
-        """Let the engine have it from now on."""
-        client, body, look = self._client, actor.body, self._shown_as
-        shape = engine.body_shape(client, body.solids, actor.pushable, self._triangulate)
-        if actor.pushable:
+    def _create_in_engine(self, actor: Actor, tick: int) -> None:
+        client, body, visual = self._client, actor.body, self._visual_shape
+        shape = engine.body_shape(client, body.solids, actor.is_pushable, self._triangulate)
+        if actor.is_pushable:
             frame = inertia_of_solids(body.solids, body.mass).principal()
             actor.center_from_base = frame[1].inverse()
-            actor.number = engine.body(client, body.mass, shape, body.pose, frame, FRICTION, look)
+            actor.body_id = engine.body(client, body.mass, shape, body.pose, frame, FRICTION, visual)
         elif actor.path is None:
-            actor.number = engine.fixed(client, shape, look, body.pose, FRICTION)
+            actor.body_id = engine.fixed(client, shape, visual, body.pose, FRICTION)
         else:
-            actor.number = engine.body(client, 0.0, shape, body.pose, ((0.0, 0.0, 0.0), Pose3()), FRICTION, look)
+            actor.body_id = engine.body(client, 0.0, shape, body.pose, ((0.0, 0.0, 0.0), Pose3()), FRICTION, visual)
         if actor.path is None:
-            actor.shown = body.pose
-        else:  # to the last bit as if it had been there for long, which where the engine makes it is not
-            actor.show(client, actor.at(tick, self._rate))
+            actor.engine_pose = body.pose
+        else:
+            # Setting the pose again makes it bit-identical to that of an actor that has been there before.
+            actor.set_engine_pose(client, actor.path_pose(tick, self._tick_rate))
 
     @property
-    def all_here(self) -> bool:
-        """Whether the engine has all of them."""
-        return not self._missing
+    def is_engine_complete(self) -> bool:
+        """Whether no actor is deferred."""
+        return not self._deferred_count
 
-    def meet(self, robots: Iterable[ProximityQuery], tick: int) -> dict[int, str | None]:
-        """Let the engine have what any robot may find within its reach: names by numbers of what it had not got."""
-        if self._absent is None:
-            self._absent = DeferredActors([actor for actor in self._actors.values() if actor.number is None])
-        met = self._absent.met(robots)
-        for actor in met:
-            self._enter(actor, tick)
-        if met:
-            self._missing -= len(met)
-            self._driven = [actor for actor in self._travelling if actor.number is not None]
-        return {actor.id: actor.body.name for actor in met}
+    def activate_near(self, queries: Iterable[ProximityQuery], tick: int) -> dict[int, str | None]:
+        """Create the deferred actors that any robot could reach; return their names by body id."""
+        if self._deferred is None:
+            self._deferred = DeferredActors([actor for actor in self._actors.values() if actor.body_id is None])
+        activated = self._deferred.activate_near(queries)
+        for actor in activated:
+            self._create_in_engine(actor, tick)
+        if activated:
+            self._deferred_count -= len(activated)
+            self._scripted_in_engine = [actor for actor in self._scripted if actor.body_id is not None]
+        return {actor.id: actor.body.name for actor in activated}
 
     def remove(self, name: str) -> None:
-        """Take a body out of the world; an unknown name is none."""
+        """Remove a body; unknown names are ignored."""
         actor = self._actors.pop(name, None)
         if actor is not None:
-            if actor.number is not None:
-                pybullet.removeBody(actor.number, physicsClientId=self._client)
-            self._sort()
+            if actor.body_id is not None:
+                pybullet.removeBody(actor.body_id, physicsClientId=self._client)
+            self._update_lists()
 
     def move(self, name: str, path: MotionPath, tick: int) -> None:
-        """Let a body follow a path from `tick` on; from then on nothing can push it."""
+        """Let a body follow a path from `tick` on; it cannot be pushed any more."""
         actor = self._actors[name]
         self.add(replace(actor.body, pose=self.poses(tick)[name], mass=0.0, path=path), tick)
 
     def place(self, name: str, pose: Pose2, tick: int) -> None:
-        """Set a body down somewhere else, upright and at rest; no path moves it any more."""
+        """Place a body somewhere else, upright and at rest, and end its path."""
         body = self._actors[name].body
         self.add(replace(body, pose=Pose3.planar(pose, body.pose.z), path=None), tick)
 
+    def follow(self, name: str, path: MotionPath, max_speed: float, tick: int) -> None:
+        """Replace the path of an upright, round, steered body from `tick` on.
+
+        The path must begin at its current pose and not exceed `max_speed` m/s, so that clearances remain valid.
+        """
+        actor = self._actors[name]
+        actor.follow(path, max_speed, tick)
+        self._scheduled_poses = ScheduledPoses(self._scripted, self._tick_rate)
+        self._scripted_speed = max(self._scripted_speed, max_speed)
+
+    def _update_lists(self) -> None:
+        self._poses_tick = self._resting_since = None
+        actors = self._actors.values()
+        self._deferred, self._deferred_count = None, sum(actor.body_id is None for actor in actors)
+        self._scripted = [actor for actor in actors if actor.path is not None]
+        self._scripted_in_engine = [actor for actor in self._scripted if actor.body_id is not None]
+        self._scripted_speed = max((actor.max_speed for actor in self._scripted), default=0.0)
+        self._pushable = [actor for actor in actors if actor.is_pushable]
+        self._broad_phase = BroadPhase(self._client, self._tick_rate, self._scripted, self._pushable)
+        self._nearby.clear()
+        self._scheduled_poses = ScheduledPoses(self._scripted, self._tick_rate)
+        self._moved = list(self._pushable)
+        for actor in self._pushable:
+            engine.wake(self._client, actor.id)  # it may have stood on a removed object
+
     def motion(self, name: str, tick: int) -> tuple[MotionPath, float] | None:
-        """The path that moves a body now, and the seconds since it was set off."""
+        """Return the path that moves a body now and the seconds since its start, or None."""
         actor = self._actors.get(name)
         if actor is None or actor.path is None:
             return None
-        since = (tick - actor.since) / self._rate
-        return None if actor.path.over(since) else (actor.path, since)
+        elapsed = (tick - actor.path_start_tick) / self._tick_rate
+        return None if actor.path.over(elapsed) else (actor.path, elapsed)
+
+    # Pushing and sleeping
+
+    @property
+    def has_pushable(self) -> bool:
+        """Whether any actor can be pushed."""
+        return bool(self._pushable)
 
     def mass(self, name: str) -> float:
-        """In kg, of what can be pushed; 0 of anything else."""
+        """Return the mass in kg of a pushable body, 0 for others and unknown names."""
         actor = self._actors.get(name)
-        return actor.body.mass if actor is not None and actor.pushable else 0.0
+        return actor.body.mass if actor is not None and actor.is_pushable else 0.0
 
     def wake(self, name: str) -> None:
-        """See to it that a body can be pushed one tick from now: Bullet forgets forces on what it has to wake."""
+        """Wake a body, so that it can be pushed one tick later: Bullet discards forces on sleeping bodies."""
         if self.mass(name):
             engine.wake(self._client, self._actors[name].id)
 
     def push(self, name: str, impulse: tuple[float, float]) -> None:
-        """Push a body's center of mass during the next tick, in N s; what cannot be pushed, or is gone, is not."""
+        """Apply an impulse (N s) at the center of mass during the next tick; ignored if it cannot be pushed."""
         if not self.mass(name):
             return
-        number = self._actors[name].id
-        center = pybullet.getBasePositionAndOrientation(number, physicsClientId=self._client)[0]
-        force = (impulse[0] * self._rate, impulse[1] * self._rate, 0.0)
-        pybullet.applyExternalForce(number, -1, force, center, pybullet.WORLD_FRAME, physicsClientId=self._client)
-        self._still_since = None
+        body_id = self._actors[name].id
+        center = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=self._client)[0]
+        force = (impulse[0] * self._tick_rate, impulse[1] * self._tick_rate, 0.0)
+        pybullet.applyExternalForce(body_id, -1, force, center, pybullet.WORLD_FRAME, physicsClientId=self._client)
+        self._resting_since = None
 
-    def follow(self, name: str, path: MotionPath, speed: float, tick: int) -> None:
-        """Let an upright round body that is led follow another path from `tick` on, nowhere faster than `speed`.
-
-        Where it is now does not change, nor does how fast it may come along: no clearance has to be measured anew.
-        """
-        actor = self._actors[name]
-        actor.follow(path, speed, tick)
-        self._ahead = ScheduledPoses(self._travelling, self._rate)
-        self._fastest = max(self._fastest, speed)
-
-    def _sort(self) -> None:
-        self._posed_at = self._still_since = None
-        actors = self._actors.values()
-        self._absent, self._missing = None, sum(actor.number is None for actor in actors)
-        self._travelling = [actor for actor in actors if actor.path is not None]
-        self._driven = [actor for actor in self._travelling if actor.number is not None]
-        self._fastest = max((actor.speed for actor in self._travelling), default=0.0)
-        self._pushable = [actor for actor in actors if actor.pushable]
-        self._meetings = BroadPhase(self._client, self._rate, self._travelling, self._pushable)
-        self._about.clear()
-        self._ahead = ScheduledPoses(self._travelling, self._rate)
-        self._moved = list(self._pushable)
-        for actor in self._pushable:
-            engine.wake(self._client, actor.id)  # what lay on something that is gone has to fall
-
-    def settling(self) -> RestDetector:
-        """Looks at all that can be pushed, for `lay`."""
+    def make_rest_detector(self) -> RestDetector:
+        """Return a detector for all pushable actors, whose result goes to `put_to_sleep`."""
         return RestDetector(self._client, [actor.id for actor in self._pushable])
 
-    def lay(self, at_rest: Collection[int]) -> None:
-        """Let those sleep after the next step that are at rest, by the engine's numbers; others wake what they touch.
+    def put_to_sleep(self, body_ids: Collection[int]) -> None:
+        """Let bodies at rest sleep after the next step; queried poses are invalid after that step."""
+        for body_id in body_ids:
+            engine.lay(self._client, body_id)
+        self._poses_tick = None
 
-        Who has asked where they are has to ask again after that step.
-        """
-        for number in at_rest:
-            engine.lay(self._client, number)
-        self._posed_at = None
-
-    def settled(self, tick: int) -> None:
-        """It is time to see what lies where it lay when this was called before: there it is at home."""
+    def update_rest_poses(self, tick: int) -> None:
+        """Record the poses of pushable actors that have not moved since the last call."""
         poses = self.poses(tick)
-        self._homes.look({actor.body.name: poses[actor.body.name] for actor in self._pushable})
+        self._rest_poses.update({actor.body.name: poses[actor.body.name] for actor in self._pushable})
 
     @property
-    def homes(self) -> Mapping[str, Pose3]:
-        """Where things that can be pushed lay when all had settled, or came to rest later; most lie there for good."""
-        return self._homes.poses
+    def rest_poses(self) -> Mapping[str, Pose3]:
+        """Poses in which pushable actors have come to rest; most remain there until the end."""
+        return self._rest_poses.poses
 
-    def shaken(self, tick: int) -> None:
-        """Something is pushed during the step from `tick` on: how fast things are now says nothing about it."""
-        self._meetings.shaken(tick)
+    def on_push(self, tick: int) -> None:
+        """Note that something is pushed during the step from `tick`, so that current speeds are no bound."""
+        self._broad_phase.invalidate(tick)
 
-    def apart_until(self, tick: int, robots: Callable[[], float]) -> int:
-        """The tick until which no scripted body can push anything; -1 where one may push something during this step.
+    def no_push_before(self, tick: int, robot_speed: Callable[[], float]) -> int:
+        """Return the tick until which no scripted body can push anything; -1 if one may do so during this step.
 
-        What one may meet soon is awake from now on. `robots` says how fast any robot may be for a while, in m/s.
+        Wakes the pushable actors that may be touched soon. `robot_speed` returns an upper bound in m/s for all robots.
         """
-        if not (self._travelling and self._pushable):
+        if not (self._scripted and self._pushable):
             return NEVER
-        meetings = self._meetings
-        if tick >= meetings.until and meetings.look(tick, robots(), self.poses(tick), self._asleep(tick)):
-            self._still_since = None
-        return -1 if meetings.scripted else meetings.until
+        broad_phase = self._broad_phase
+        if tick >= broad_phase.valid_until and broad_phase.update(
+            tick, robot_speed(), self.poses(tick), self._is_asleep(tick)
+        ):
+            self._resting_since = None
+        return -1 if broad_phase.near_contact else broad_phase.valid_until
 
-    def begin(self, tick: int, everything: bool = True) -> None:
-        """Before the step that leads from `tick` to the next: scripted bodies in place and with their velocity.
+    def _is_asleep(self, tick: int) -> bool:
+        """Return whether all pushable actors sleep in the engine and no robot can have touched one.
 
-        Not `everything`: only those that may push something.
+        A body that is only approached wakes and creeps by less than a micrometer until it is touched.
         """
-        for actor in self._driven if everything else self._meetings.scripted:
-            actor.show(self._client, actor.at(tick, self._rate))
-            velocity, turning = actor.velocity(tick, self._rate)
-            if turning or any(velocity):
-                pybullet.resetBaseVelocity(actor.id, velocity, (0.0, 0.0, turning), physicsClientId=self._client)
+        is_resting = self._resting_since is not None and tick - self._resting_since > self._ticks_until_asleep
+        return is_resting and tick <= min(self._no_contact_before.values())
+
+    def set_no_contact_before(self, robot_id: int, tick: int) -> None:
+        """Note that this robot cannot touch any actor before `tick`."""
+        self._no_contact_before[robot_id] = tick
+
+    # Stepping
+
+    def begin_step(self, tick: int, everything: bool = True) -> None:
+        """Give scripted bodies, or only those near contact, their pose and velocity before the step from `tick`."""
+        for actor in self._scripted_in_engine if everything else self._broad_phase.near_contact:
+            actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
+            velocity, turn_rate = actor.path_velocity(tick, self._tick_rate)
+            if turn_rate or any(velocity):
+                pybullet.resetBaseVelocity(actor.id, velocity, (0.0, 0.0, turn_rate), physicsClientId=self._client)
+
+    def end_step(self, tick: int, everything: bool = True) -> None:
+        """Move scripted bodies, or only those near contact, to their pose at `tick`."""
+        for actor in self._scripted_in_engine if everything else self._broad_phase.near_contact:
+            actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
 
     def velocities(self, tick: int) -> dict[int, Vector]:
-        """How everything moves at `tick` that the engine has, in m/s, by its numbers."""
-        moving = {actor.id: actor.velocity(tick, self._rate)[0] for actor in self._driven}
+        """Return the velocities in m/s of all actors in the engine by body id."""
+        scripted = {actor.id: actor.path_velocity(tick, self._tick_rate)[0] for actor in self._scripted_in_engine}
         pushed = {actor.id: pybullet.getBaseVelocity(actor.id, self._client)[0] for actor in self._pushable}
-        return {**moving, **pushed}
+        return {**scripted, **pushed}
 
-    def show(self, tick: int, everything: bool = True) -> None:
-        """Put the scripted bodies where they are at `tick`, or those that may push something."""
-        for actor in self._driven if everything else self._meetings.scripted:
-            actor.show(self._client, actor.at(tick, self._rate))
+    # Poses
 
     def poses(self, tick: int) -> Mapping[str, Pose3]:
-        """Where everything is, by name in order; the engine is asked at most once for each tick."""
-        if self._posed_at == tick:
+        """Return the poses of all actors by name in order; queries the engine at most once per tick."""
+        if self._poses_tick == tick:
             return self._poses
-        if self._posed_at is None or (self._pushable and not self._asleep(tick)):
+        if self._poses_tick is None or (self._pushable and not self._is_asleep(tick)):
             self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
-            self._ahead.forget()
-            if self._still_since is None or not all(actor.resting for actor in self._pushable):
-                self._still_since = tick
-        elif self._travelling:
-            predicted = self._ahead.at(tick)
-            if predicted is not None:
-                self._poses = predicted
+            self._scheduled_poses.invalidate()
+            if self._resting_since is None or not all(actor.is_resting for actor in self._pushable):
+                self._resting_since = tick
+        elif self._scripted:
+            scheduled = self._scheduled_poses.at(tick)
+            if scheduled is not None:
+                self._poses = scheduled
             else:
-                self._poses = {**self._poses, **{a.body.name: self._pose(a, tick) for a in self._travelling}}
-        self._posed_at = tick
+                self._poses = {**self._poses, **{a.body.name: self._pose(a, tick) for a in self._scripted}}
+        self._poses_tick = tick
         return self._poses
-
-    def look_ahead(self, tick: int, period: int) -> None:
-        """`poses` will be asked at `tick`, which is now, and every `period` ticks after it.
-
-        Where scripts have things then is worked out for some seconds at once, as long as nothing comes, goes or is
-        pushed.
-        """
-        if self._travelling and self._posed_at is not None and (not self._pushable or self._asleep(tick)):
-            self._ahead.look(tick, period, self._poses)
-
-    def _asleep(self, tick: int) -> bool:
-        """Whether all that can be pushed has long been lying, so that the engine lets it lie, and nobody touched it.
-
-        What something only comes near to wakes in the engine and creeps by less than a micrometer until it is touched.
-        """
-        still = self._still_since is not None and tick - self._still_since > self._until_asleep
-        return still and tick <= min(self._undisturbed.values())
-
-    def undisturbed(self, by: int, until: int) -> None:
-        """The robot of this number cannot touch any of these until this tick."""
-        self._undisturbed[by] = until
-
-    def placed(self, tick: int) -> dict[str, tuple[Body, Pose3]]:
-        """Everything and where it is, by name in order."""
-        return {name: (self._actors[name].body, pose) for name, pose in self.poses(tick).items()}
-
-    def bodies(self) -> dict[str, Body]:
-        """Everything, by name in order."""
-        return {name: actor.body for name, actor in self._actors.items()}
 
     def _pose(self, actor: Actor, tick: int) -> Pose3:
         if actor.path is not None:
-            return actor.at(tick, self._rate)
-        if not actor.pushable:
-            actor.resting = True
+            return actor.path_pose(tick, self._tick_rate)
+        if not actor.is_pushable:
+            actor.is_resting = True
             return actor.body.pose
-        if actor.ask(self._client) is not None:
+        if actor.update_pose(self._client):
             self._moved.append(actor)
-        assert actor.placed is not None
-        return actor.placed[1]
+        assert actor.center_and_pose is not None
+        return actor.center_and_pose[1]
 
-    def around(self, place: Vector, tick: int) -> str | None:
-        """The first thing that a place is inside of, of those that the engine knows as a surface only."""
+    def prefetch_poses(self, tick: int, period: int) -> None:
+        """Precompute scripted poses for `poses` queries at the current `tick` and every `period` ticks after it."""
+        if self._scripted and self._poses_tick is not None and (not self._pushable or self._is_asleep(tick)):
+            self._scheduled_poses.compute(tick, period, self._poses)
+
+    def bodies_and_poses(self, tick: int) -> dict[str, tuple[Body, Pose3]]:
+        """Return all bodies with their poses by name in order."""
+        return {name: (self._actors[name].body, pose) for name, pose in self.poses(tick).items()}
+
+    def bodies(self) -> dict[str, Body]:
+        """Return all bodies by name in order."""
+        return {name: actor.body for name, actor in self._actors.items()}
+
+    def names_by_id(self) -> dict[int, str | None]:
+        """Return the names of all actors in the engine by body id."""
+        return {actor.body_id: name for name, actor in self._actors.items() if actor.body_id is not None}
+
+    def find_enclosing(self, point: Vector, tick: int) -> str | None:
+        """Return the name of the first actor that encloses a point, of those that are hollow in the engine."""
         for name, pose in self.poses(tick).items():
-            surface = self._actors[name].surface
-            if surface is not None:
-                x, y, z = pose.inverse().apply(np.array(place)).tolist()
-                if encloses(surface.vertices[surface.faces], (x, y, z)):
+            shell = self._actors[name].shell
+            if shell is not None:
+                x, y, z = pose.inverse().apply(np.array(point)).tolist()
+                if encloses(shell.vertices[shell.faces], (x, y, z)):
                     return name
         return None
 
-    def lost(self, tick: int) -> str | None:
-        """What has become of the first thing that the engine has lost, or None."""
+    def find_divergence(self, tick: int) -> str | None:
+        """Return what is wrong with the first actor that the simulation has lost, or None."""
         self.poses(tick)
         moved, self._moved = self._moved, []
         for actor in moved:
-            if actor.placed is not None:
-                place, turn = actor.placed[0]
-                if trouble := divergence_reason(f'object "{actor.body.name}"', *place, sum(turn)):
-                    return trouble
+            if actor.center_and_pose is not None:
+                position, quaternion = actor.center_and_pose[0]
+                if reason := divergence_reason(f'object "{actor.body.name}"', *position, sum(quaternion)):
+                    return reason
         return None
 
-    def within(self, place: Vector, distance: float, level: float, tick: int, by: int) -> list[int]:
-        """The engine's numbers of those that may be as near to a place as a distance in meters, for it to be asked.
+    # Distances and speeds
 
-        Along the ground they need not be farther than `level` to be too far.
-        `by` is the number of the robot that asks. A scripted one is put where it is now if that is so near, or where
-        the engine has had it until now: nobody is to run into what has gone.
+    def ids_near(self, robot_id: int, point: Vector, distance: float, ground_distance: float, tick: int) -> list[int]:
+        """Return the body ids of the actors that may be within `distance` m of a point, for a robot's clearance.
+
+        Along the ground, `ground_distance` is sufficient. Scripted actors that are that near are moved to their pose in
+        the engine, as are those whose engine pose is that near, so that nothing collides with an outdated pose.
         """
         poses = self.poses(tick)
-        asleep = self._still_since if not self._pushable or self._asleep(tick) else None
-        about = self._about.get(by)
-        if (
-            about is None
-            or about.asleep != asleep
-            or not about.holds(place, distance, tick, self._fastest / self._rate)
-        ):
-            about = self._about[by] = find_nearby(self._actors.values(), poses, place, distance, tick, asleep)
-        return about.near(self._client, place, distance, level, poses)
+        asleep_since = self._resting_since if not self._pushable or self._is_asleep(tick) else None
+        max_step = self._scripted_speed / self._tick_rate
+        nearby = self._nearby.get(robot_id)
+        if nearby is None or nearby.asleep_since != asleep_since or not nearby.covers(point, distance, tick, max_step):
+            nearby = find_nearby(self._actors.values(), poses, point, distance, tick, asleep_since)
+            self._nearby[robot_id] = nearby
+        return nearby.ids_near(self._client, point, distance, ground_distance, poses)
 
-    def gap(self, place: Vector, distance: float, tick: int, by: int) -> float | None:
-        """How much farther than a distance from a place, in meters, `within` would have to look to find anybody.
+    def free_distance(self, robot_id: int, point: Vector, distance: float, tick: int) -> float | None:
+        """Return by how many meters `ids_near`, called just before, could extend `distance` and still find no actor.
 
-        None where what is pushed or led may come from anywhere soon. `within` was asked just now.
+        None if actors can come from anywhere, because they can be pushed or steered.
         """
-        about = self._about[by]
-        if self._pushable or any(actor.led for actor in self._travelling):
+        nearby = self._nearby[robot_id]
+        if self._pushable or any(actor.is_steered for actor in self._scripted):
             return None
-        return about.gap(place, self.poses(tick), self.come_in(tick - about.tick)) - distance
+        travel = self.max_scripted_travel(tick - nearby.tick)
+        return nearby.free_distance(point, self.poses(tick), travel) - distance
 
-    def come_in(self, ticks: int) -> float:
-        """How far in meters any script moves anything in so many ticks, at most."""
-        return self._fastest * ticks / self._rate
+    def max_scripted_travel(self, ticks: int) -> float:
+        """Return an upper bound in m of the distance that a scripted actor moves within `ticks`."""
+        return self._scripted_speed * ticks / self._tick_rate
 
-    @property
-    def loose(self) -> bool:
-        """Whether there is anything that can be pushed."""
-        return bool(self._pushable)
-
-    def coming(self, tick: int, ticks: int) -> Iterator[tuple[int, Vector, float]]:
-        """Of all that can be pushed: number, place, and how far from there any part of it can be so many ticks on."""
+    def reachable_spheres(self, tick: int, ticks: int) -> Iterator[tuple[int, Vector, float]]:
+        """Yield body id, position, and the radius in m that each pushable actor can reach within `ticks`."""
         if self._pushable:
-            poses, travelled = self.poses(tick), self.top_speed(tick) * ticks / self._rate
+            poses, travel = self.poses(tick), self.speed_bound(tick) * ticks / self._tick_rate
             for actor in self._pushable:
-                yield actor.id, poses[actor.body.name].position, actor.size + travelled
+                yield actor.id, poses[actor.body.name].position, actor.size + travel
 
-    def ids(self) -> dict[int, str | None]:
-        """Names by the engine's numbers, of those that it has."""
-        return {actor.number: name for name, actor in self._actors.items() if actor.number is not None}
-
-    def top_speed(self, tick: int) -> float:
-        """How fast anything may come along within a tenth of a second from `tick` on, which is now, in m/s.
-
-        A thing that is hit by a heavier one leaves with up to twice its speed.
-        """
+    def speed_bound(self, tick: int) -> float:
+        """Return an upper bound in m/s of the speed of all actors within 0.1 s from the current `tick`."""
         if not self._pushable:
-            return self._fastest
+            return self._scripted_speed
         self.poses(tick)
-        if self._asleep(tick):
-            return max(self._fastest, FALLING) * (2 if len(self._pushable) > 1 else 1)
-        speeds = [actor.fastest(self._client) for actor in self._pushable]
-        return max(self._fastest, *speeds) * (2 if len(self._pushable) > 1 else 1)
+        # A body that is hit by a heavier one leaves with up to twice its speed.
+        factor = 2 if len(self._pushable) > 1 else 1
+        if self._is_asleep(tick):
+            return max(self._scripted_speed, FALL_SPEED_M_S) * factor
+        return max(self._scripted_speed, *(actor.speed_bound(self._client) for actor in self._pushable)) * factor

@@ -1,8 +1,8 @@
-"""When what a script moves may meet what can be pushed: until then both can be left alone.
+"""Broad phase: how long no scripted object can touch a pushable one, so that both can be skipped until then.
 
-Bullet does not wake what a body without mass meets. So nothing that can be pushed may sleep where a scripted body
-comes; elsewhere it may, which spares nearly all that it costs. Whatever else touches it wakes it in the engine, and
-with it all that it is in touch with (Bullet's islands).
+Bullet does not wake a body that is touched by a body without mass. Pushable objects must therefore be awake where a
+scripted object arrives; elsewhere they sleep, which saves nearly all of their computing time. Any other contact wakes
+them in the engine, together with everything that they touch (Bullet's islands).
 """
 
 import math
@@ -17,92 +17,91 @@ from simscen.sim.bullet import engine
 from simscen.sim.objects.actor import Actor
 
 HORIZON_S = 0.1
-"""Seconds for which bounds on speeds hold: those of what may fall, or be hit, meanwhile."""
+"""Time for which the bounds of speeds hold, including those of objects that fall or are hit."""
 NEAR_CONTACT_S = 0.05
-"""Seconds within which a meeting is near: what may be met is awake by then, and every tick is stepped with care."""
+"""Time to contact below which pushable objects are woken and every tick is stepped with scripted motion."""
 SHAPE_MARGIN_M = 0.05
-"""m that shapes may extend further than their corners, which is where sizes come from."""
+"""Distance that collision shapes may extend beyond their vertices, from which sizes are computed."""
 
 
 class BoundingDiscs(NamedTuple):
-    """Bodies seen from above: each within its radius (n,) in m of its place (n, 2), at most so fast, in m/s."""
+    """Top view of bodies: radii (n,) in m around centers (n, 2), and maximum speeds (n,) in m/s."""
 
-    places: Array
+    centers: Array
     radii: Array
     speeds: Array
 
     @classmethod
-    def of(cls, balls: Iterable[tuple[Vector, float, float]]) -> "BoundingDiscs":
-        """From place in space, radius and speed of each."""
-        each = list(balls)
-        places, radii, speeds = zip(*each, strict=True) if each else ((), (), ())
-        return cls(np.array(places).reshape(-1, 3)[:, :2], np.array(radii), np.array(speeds))
+    def of(cls, spheres: Iterable[tuple[Vector, float, float]]) -> "BoundingDiscs":
+        """Return the discs of bounding spheres, each with its center, radius, and speed."""
+        rows = list(spheres)
+        centers, radii, speeds = zip(*rows, strict=True) if rows else ((), (), ())
+        return cls(np.array(centers).reshape(-1, 3)[:, :2], np.array(radii), np.array(speeds))
 
 
 class CollisionCandidates(NamedTuple):
-    """Who may meet within `seconds`: the numbers of the scripted ones, and of those that can be pushed.
-
-    Where nobody may meet soon, nobody can within `seconds`.
-    """
+    """Indices of the scripted and pushable bodies that may touch soon; without any, none can touch for `seconds`."""
 
     scripted: tuple[int, ...]
     pushable: tuple[int, ...]
     seconds: float
 
 
-def find_candidates(scripted: BoundingDiscs, pushable: BoundingDiscs, hit: float) -> CollisionCandidates:
-    """Who may meet soon; what can be pushed may get to `hit` m/s within the horizon, for something may hit it."""
-    apart = np.linalg.norm(scripted.places[:, np.newaxis] - pushable.places, axis=2)
-    gaps = apart - scripted.radii[:, np.newaxis] - pushable.radii - 2 * SHAPE_MARGIN_M
-    closing = scripted.speeds[:, np.newaxis] + np.maximum(pushable.speeds, hit)
-    near = gaps < NEAR_CONTACT_S * closing
+def find_candidates(scripted: BoundingDiscs, pushable: BoundingDiscs, hit_speed: float) -> CollisionCandidates:
+    """Return the bodies that may touch soon; a pushable body can reach `hit_speed` m/s if something hits it."""
+    distances = np.linalg.norm(scripted.centers[:, np.newaxis] - pushable.centers, axis=2)
+    gaps = distances - scripted.radii[:, np.newaxis] - pushable.radii - 2 * SHAPE_MARGIN_M
+    closing_speeds = scripted.speeds[:, np.newaxis] + np.maximum(pushable.speeds, hit_speed)
+    near = gaps < NEAR_CONTACT_S * closing_speeds
     if near.any():
-        return CollisionCandidates(_numbers(near.any(axis=1)), _numbers(near.any(axis=0)), NEAR_CONTACT_S)
-    return CollisionCandidates((), (), min(HORIZON_S, float((gaps / closing).min(initial=math.inf))))
+        return CollisionCandidates(_indices(near.any(axis=1)), _indices(near.any(axis=0)), NEAR_CONTACT_S)
+    return CollisionCandidates((), (), min(HORIZON_S, float((gaps / closing_speeds).min(initial=math.inf))))
 
 
-def _numbers(chosen: npt.NDArray[np.bool_]) -> tuple[int, ...]:
-    return tuple(chosen.nonzero()[0].tolist())
+def _indices(mask: npt.NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple(mask.nonzero()[0].tolist())
 
 
-# Scripted objects that may push something soon. Wake what they may push before contact.
 class BroadPhase:
-    """Of scripted things and those that can be pushed; make another one when one comes or goes."""
+    """Broad phase of a fixed set of scripted and pushable actors; create a new instance when the set changes."""
 
-    def __init__(self, client: int, rate: int, travelling: Sequence[Actor], pushable: Sequence[Actor]) -> None:
-        self._client, self._rate, self._travelling, self._pushable = client, rate, travelling, pushable
-        self._lying: BoundingDiscs | None = None
-        self._shaken_at = -1
-        self.until = -1
-        """The tick until which nobody else than these can push anything."""
-        self.scripted: list[Actor] = []
-        """Those that may push something soon."""
+    def __init__(self, client: int, tick_rate: int, scripted: Sequence[Actor], pushable: Sequence[Actor]) -> None:
+        self._client, self._tick_rate, self._scripted, self._pushable = client, tick_rate, scripted, pushable
+        self._pushable_discs: BoundingDiscs | None = None
+        self._push_tick = -1
+        self.valid_until = -1
+        """Tick until which only the actors in `near_contact` can push anything."""
+        self.near_contact: list[Actor] = []
+        """Scripted actors that may push something soon."""
 
-    def shaken(self, tick: int) -> None:
-        """Something is pushed during the step from `tick` on: how fast things are now says nothing about it."""
-        self.until, self._shaken_at = -1, tick
+    def invalidate(self, tick: int) -> None:
+        """Discard the result, because a push during the step from `tick` changes speeds."""
+        self.valid_until, self._push_tick = -1, tick
 
-    def look(self, tick: int, robots: float, poses: Mapping[str, Pose3], asleep: bool) -> bool:
-        """See who may meet: whether any that can be pushed was woken for that.
+    def update(self, tick: int, robot_speed: float, poses: Mapping[str, Pose3], is_asleep: bool) -> bool:
+        """Find the actors that may touch soon, and wake the pushable ones; return whether there were any.
 
-        All are put where they are, for until the next look nobody may run into what has gone. `robots` is how fast any
-        robot may be for a while, in m/s; `asleep`: all that can be pushed has long been lying.
+        All scripted actors are moved to their poses in the engine, where they remain until the next update.
+        `robot_speed` is an upper bound in m/s for all robots; `is_asleep` tells that all pushable actors sleep.
         """
         moving = list[Actor]()
-        for actor in self._travelling:
-            actor.show(self._client, poses[actor.body.name])
-            if not actor.parked((tick - actor.since) / self._rate, HORIZON_S):
+        for actor in self._scripted:
+            actor.set_engine_pose(self._client, poses[actor.body.name])
+            if not actor.is_parked((tick - actor.path_start_tick) / self._tick_rate, HORIZON_S):
                 moving.append(actor)
-        if self._lying is None or not asleep:
-            self._lying = BoundingDiscs.of(
-                (poses[a.body.name][:3], a.size, a.fastest(self._client)) for a in self._pushable
+        if self._pushable_discs is None or not is_asleep:
+            self._pushable_discs = BoundingDiscs.of(
+                (poses[a.body.name][:3], a.size, a.speed_bound(self._client)) for a in self._pushable
             )
-        scripted = BoundingDiscs.of((poses[a.body.name][:3], a.radius, a.speed) for a in moving)  # upright, all of them
-        fastest = max(actor.speed for actor in self._travelling)
-        # What is hit by something heavier leaves with up to twice its speed.
-        found = find_candidates(scripted, self._lying, 2 * max(robots, fastest, float(self._lying.speeds.max())))
-        self.scripted = [moving[number] for number in found.scripted]
-        for number in found.pushable:
-            engine.wake(self._client, self._pushable[number].id)
-        self.until = tick + (1 if tick == self._shaken_at else max(1, math.floor(found.seconds * self._rate)))
+        # Scripted actors are upright, so that their horizontal radius is sufficient.
+        scripted_discs = BoundingDiscs.of((poses[a.body.name][:3], a.radius, a.max_speed) for a in moving)
+        scripted_speed = max(actor.max_speed for actor in self._scripted)
+        # A body that is hit by a heavier one leaves with up to twice its speed.
+        hit_speed = 2 * max(robot_speed, scripted_speed, float(self._pushable_discs.speeds.max()))
+        found = find_candidates(scripted_discs, self._pushable_discs, hit_speed)
+        self.near_contact = [moving[index] for index in found.scripted]
+        for index in found.pushable:
+            engine.wake(self._client, self._pushable[index].id)
+        ticks = 1 if tick == self._push_tick else max(1, math.floor(found.seconds * self._tick_rate))
+        self.valid_until = tick + ticks
         return bool(found.pushable)

@@ -10,107 +10,121 @@ from simscen.core.geometry import Array, Pose3, Vector
 from simscen.sim.objects.actor import Actor
 
 EXTRA_RADIUS_M = 2.0
-"""m farther than was asked for within which things are looked for, so that the others need not be looked at soon."""
+"""Additional search radius, so that the next queries can use the same list of nearby actors."""
+REQUERY_DISTANCE_M = 1.0
+"""Distance that a robot can move before it queries deferred actors again."""
+ROUNDING_MARGIN_M = 1e-3
+"""Upper bound of rounding errors in the distances of deferred actors."""
 
 
 class NearbyActors(NamedTuple):
-    """The actors that at a tick were within a distance in meters of a place, and all that may be pushed unless asleep.
+    """The actors within `distance` of a point at a tick, and all pushable actors unless they sleep.
 
-    `asleep` is since when all of those have been lying still; None where they have not. `lying` are each, its place
-    on the ground and its width, where none of these moves.
+    `asleep_since` is the tick since when all pushable actors have been at rest, or None. `resting` has each actor with
+    its position and its radius on the ground if none of them moves, else None.
     """
 
     actors: tuple[Actor, ...]
-    place: Vector
+    point: Vector
     distance: float
     tick: int
-    asleep: int | None
-    lying: tuple[tuple[Actor, tuple[float, float], float], ...] | None
+    asleep_since: int | None
+    resting: tuple[tuple[Actor, tuple[float, float], float], ...] | None
 
-    def holds(self, place: Vector, distance: float, tick: int, step: float) -> bool:
-        """Whether no other can be within a distance of a place at a tick, moving `step` meters a tick at most."""
-        return math.dist(place, self.place) + step * (tick - self.tick) + distance <= self.distance
+    def covers(self, point: Vector, distance: float, tick: int, max_step: float) -> bool:
+        """Return whether no other actor can be within `distance` of `point`, moving at most `max_step` m per tick."""
+        return math.dist(point, self.point) + max_step * (tick - self.tick) + distance <= self.distance
 
-    def near(self, client: int, place: Vector, distance: float, level: float, poses: Mapping[str, Pose3]) -> list[int]:
-        """The engine's numbers of those that may be as near to a place as a distance, being where `poses` has them.
+    def ids_near(
+        self, client: int, point: Vector, distance: float, ground_distance: float, poses: Mapping[str, Pose3]
+    ) -> list[int]:
+        """Return the body ids of the actors that may be within `distance` of a point.
 
-        `level` is enough of it along the ground; what stands has neighbors nearer than it is high.
-        A scripted one is put there if that is so near, or where the engine has had it until now.
+        Along the ground, `ground_distance` is sufficient. Scripted actors that are that near, at their pose or at their
+        engine pose, are moved to their pose in the engine.
         """
-        if self.lying is not None:
-            return [actor.id for actor, there, width in self.lying if math.dist(there, place[:2]) <= level + width]
+        if self.resting is not None:
+            return [
+                actor.id for actor, xy, radius in self.resting if math.dist(xy, point[:2]) <= ground_distance + radius
+            ]
         near = list[int]()
         for actor in self.actors:
             pose, reach = poses[actor.body.name], distance + actor.size
-            if actor.path is not None and actor.away(place, pose) <= reach:
-                actor.show(client, pose)
-            if math.dist(pose[:3], place) <= reach:
+            if actor.path is not None and actor.distance_to(point, pose) <= reach:
+                actor.set_engine_pose(client, pose)
+            if math.dist(pose[:3], point) <= reach:
                 near.append(actor.id)
         return near
 
-    def gap(self, place: Vector, poses: Mapping[str, Pose3], come_in: float) -> float:
-        """How far from a place anybody is at least, now that any may have come in so far since it was looked."""
-        gap = self.distance - math.dist(place, self.place) - come_in
-        return min([gap, *(actor.away(place, poses[actor.body.name]) - actor.size for actor in self.actors)])
+    def free_distance(self, point: Vector, poses: Mapping[str, Pose3], travel: float) -> float:
+        """Return a lower bound of the distance to any actor if others may have come nearer by `travel` m since."""
+        free = self.distance - math.dist(point, self.point) - travel
+        return min([free, *(actor.distance_to(point, poses[actor.body.name]) - actor.size for actor in self.actors)])
 
 
 def find_nearby(
-    actors: Iterable[Actor], poses: Mapping[str, Pose3], place: Vector, distance: float, tick: int, asleep: int | None
+    actors: Iterable[Actor],
+    poses: Mapping[str, Pose3],
+    point: Vector,
+    distance: float,
+    tick: int,
+    asleep_since: int | None,
 ) -> NearbyActors:
-    """Those about a place within a distance in meters of what anybody will ask."""
+    """Return the actors within `distance` of a point, plus EXTRA_RADIUS_M for the next queries."""
     distance += EXTRA_RADIUS_M
-    about = tuple(
+    is_awake = asleep_since is None
+    nearby = tuple(
         actor
         for actor in actors
-        if (asleep is None and actor.pushable) or actor.away(place, poses[actor.body.name]) <= distance + actor.size
+        if (is_awake and actor.is_pushable) or actor.distance_to(point, poses[actor.body.name]) <= distance + actor.size
     )
-    lying = None
-    if not any(actor.path is not None or (asleep is None and actor.pushable) for actor in about):
-        placed = ((actor, poses[actor.body.name]) for actor in about)
-        lying = tuple((actor, pose[:2], actor.width(pose)) for actor, pose in placed)
-    return NearbyActors(about, place, distance, tick, asleep, lying)
-
-
-REQUERY_DISTANCE_M = 1.0
-"""m that a robot may move before it is looked anew whose ways it has come near to."""
-ROUNDING_MARGIN_M = 1e-3
-"""m by which any distance here may be wrong, which are sums of few numbers."""
+    resting = None
+    if not any(actor.path is not None or (is_awake and actor.is_pushable) for actor in nearby):
+        with_poses = ((actor, poses[actor.body.name]) for actor in nearby)
+        resting = tuple((actor, pose[:2], actor.ground_radius(pose)) for actor, pose in with_poses)
+    return NearbyActors(nearby, point, distance, tick, asleep_since, resting)
 
 
 class ProximityQuery(NamedTuple):
-    """Where a robot is, and how far from there it looks for what moves, in meters."""
+    """Position of a robot and the radius in m around it in which actors must be simulated."""
 
-    place: Vector
-    reach: float
+    point: Vector
+    radius: float
 
 
 class DeferredActors:
-    """Actors that the engine has not got, which stand or follow one path for good."""
+    """Actors that are not in the engine yet, because no robot has come near their path.
+
+    They stand still or follow a fixed path. An actor is activated, for good, before a robot can reach any point of its
+    path, regardless of time and speed, so that no collision can be missed. docs/design/speed.md has the measurements.
+    """
 
     def __init__(self, actors: Sequence[Actor]) -> None:
         self._actors = actors
-        rows = np.array([way for actor in actors for way in actor.ways])
-        self._owners = np.repeat(np.arange(len(actors)), [len(actor.ways) for actor in actors])
-        self._starts, self._along = rows[:, :2], rows[:, 2:4] - rows[:, :2]
-        self._squared = np.maximum((self._along**2).sum(axis=1), 1e-12)
-        self._wide = rows[:, 4] + np.array([actor.size for actor in actors])[self._owners] + ROUNDING_MARGIN_M
-        self._missing = np.ones(len(actors), dtype=np.bool_)
+        segments = np.array([segment for actor in actors for segment in actor.segments])
+        self._owners = np.repeat(np.arange(len(actors)), [len(actor.segments) for actor in actors])
+        self._starts, self._directions = segments[:, :2], segments[:, 2:4] - segments[:, :2]
+        self._squared_lengths = np.maximum((self._directions**2).sum(axis=1), 1e-12)
+        sizes = np.array([actor.size for actor in actors])[self._owners]
+        self._radii = segments[:, 4] + sizes + ROUNDING_MARGIN_M
+        self._is_deferred = np.ones(len(actors), dtype=np.bool_)
 
-    def met(self, robots: Iterable[ProximityQuery]) -> list[Actor]:
-        """Those of them, in their order, that any robot might find within its reach some time; absent no more.
+    def activate_near(self, queries: Iterable[ProximityQuery]) -> list[Actor]:
+        """Return the deferred actors that any robot could reach, in order, and mark them as active.
 
-        For as long as each is no more than a stride away from there, those are all.
+        The result holds until a robot has moved by REQUERY_DISTANCE_M.
         """
-        met = np.zeros(len(self._actors), dtype=np.bool_)
-        for place, reach in robots:
-            met[self._owners[self._apart(place) <= reach + REQUERY_DISTANCE_M]] = True
-        met &= self._missing
-        self._missing &= ~met
-        return [self._actors[number] for number in np.flatnonzero(met).tolist()]
+        is_near = np.zeros(len(self._actors), dtype=np.bool_)
+        for point, radius in queries:
+            is_near[self._owners[self._distances(point) <= radius + REQUERY_DISTANCE_M]] = True
+        is_near &= self._is_deferred
+        self._is_deferred &= ~is_near
+        return [self._actors[index] for index in np.flatnonzero(is_near).tolist()]
 
-    def _apart(self, place: Vector) -> Array:
-        """How far a place is from what anybody covers of the ground on any of the ways, in meters, at least."""
-        to = np.array(place[:2]) - self._starts
-        share = np.clip((to * self._along).sum(axis=1) / self._squared, 0.0, 1.0)
-        away: Array = np.linalg.norm(to - share[:, np.newaxis] * self._along, axis=1) - self._wide
-        return away
+    def _distances(self, point: Vector) -> Array:
+        """Return lower bounds of the distance in m from a point to the area that each segment sweeps."""
+        offsets = np.array(point[:2]) - self._starts
+        shares = np.clip((offsets * self._directions).sum(axis=1) / self._squared_lengths, 0.0, 1.0)
+        centers = offsets - shares[:, np.newaxis] * self._directions
+        distances: Array = np.linalg.norm(centers, axis=1) - self._radii
+        return distances

@@ -1,9 +1,8 @@
-"""What has come to rest before a run begins sleeps from its first tick on.
+"""Detects objects at rest, so that they can sleep from the first tick, and records where they rest.
 
-Bullet lets a body lie after two seconds at rest, in which a chair costs what a robot costs. A world settles before tick
-0, so that it shows by then what rests: it is slow at every look, and not faster at each than at the one before, as what
-begins to slide or to tip over is. What else there is of speed are contacts that are solved a little differently each
-time.
+Bullet deactivates a body after two seconds at rest; until then a chair costs as much as a robot. The world settles
+before tick 0: an object rests if it is slow at every sample and not faster at each sample than at the one before, as an
+object is that begins to slide or tip over. The remaining speeds are solver jitter of the contacts.
 """
 
 import itertools
@@ -16,49 +15,48 @@ from simscen.core.geometry import Pose3
 from simscen.sim.bullet import engine
 
 SAMPLE_PERIOD_TICKS = 6
-"""Ticks from one look to the next: what is at the end of a swing is fast at another."""
+"""Ticks between two samples. A swinging object is slow at one sample and fast at another."""
 SAMPLE_COUNT = 5
-"""Looks at which something has to be slow."""
+"""Number of samples at which an object must be slow."""
 
 
 class RestDetector:
-    """Looks at bodies while the world settles."""
+    """Samples the speeds of bodies while the world settles."""
 
-    def __init__(self, client: int, bodies: Iterable[int]) -> None:
+    def __init__(self, client: int, body_ids: Iterable[int]) -> None:
         self._client = client
-        self._speeds: dict[int, list[float]] = {body: [] for body in bodies}
+        self._speeds: dict[int, list[float]] = {body_id: [] for body_id in body_ids}
 
-    def look(self) -> None:
-        """See how fast they are now, in m/s and rad/s."""
-        for body, speeds in self._speeds.items():
-            linear, angular = pybullet.getBaseVelocity(body, self._client)
+    def sample(self) -> None:
+        """Record the current speed of each body (norm of m/s and rad/s)."""
+        for body_id, speeds in self._speeds.items():
+            linear, angular = pybullet.getBaseVelocity(body_id, self._client)
             speeds.append(math.hypot(*linear, *angular))
 
-    def at_rest(self) -> set[int]:
-        """Those that are."""
-        return {body for body, speeds in self._speeds.items() if _rests(speeds)}
+    def resting_ids(self) -> set[int]:
+        """Return the ids of the bodies at rest."""
+        return {body_id for body_id, speeds in self._speeds.items() if _is_at_rest(speeds)}
 
 
-def _rests(speeds: list[float]) -> bool:
-    slow = max(speeds) ** 2 < engine.AT_REST
-    return slow and any(now <= before for before, now in itertools.pairwise(speeds))
+def _is_at_rest(speeds: list[float]) -> bool:
+    is_slow = max(speeds) ** 2 < engine.AT_REST
+    return is_slow and any(now <= before for before, now in itertools.pairwise(speeds))
 
 
-# Rest poses of movable objects.
 class RestPoses:
-    """By name, the `poses` in which things lay at two looks in a row, or at the first."""
+    """Poses in which pushable objects rested at two updates in a row, or at the first one, by name."""
 
     def __init__(self) -> None:
         self.poses: Mapping[str, Pose3] = {}
-        """Another mapping whenever one of them is another."""
-        self._lay: Mapping[str, Pose3] | None = None
+        """Replaced by another mapping whenever one of the poses changes."""
+        self._last: Mapping[str, Pose3] | None = None
 
-    def look(self, lie: Mapping[str, Pose3]) -> None:
-        """See how everything lies that can be pushed.
+    def update(self, poses: Mapping[str, Pose3]) -> None:
+        """Take the current poses of all pushable objects.
 
-        What has left its home, or is gone, keeps it for when it is there again to the last bit.
+        An object that has moved or was removed keeps its rest pose in case it returns to exactly this pose.
         """
-        before, self._lay = lie if self._lay is None else self._lay, lie
-        come = {name: pose for name, pose in lie.items() if before.get(name) == pose != self.poses.get(name)}
-        if come:
-            self.poses = {**self.poses, **come}
+        before, self._last = poses if self._last is None else self._last, poses
+        changed = {name: pose for name, pose in poses.items() if before.get(name) == pose != self.poses.get(name)}
+        if changed:
+            self.poses = {**self.poses, **changed}

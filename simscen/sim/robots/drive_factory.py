@@ -1,4 +1,4 @@
-"""How velocity commands become motion, for each type of drive."""
+"""Interfaces of bases and drives, and the choice of both for a robot."""
 
 from collections.abc import Callable, Mapping
 from typing import Protocol
@@ -14,81 +14,75 @@ from simscen.sim.robots.robot_state import RobotState
 from simscen.sim.robots.wheeled_base import WheeledBase
 from simscen.sim.scene.terrain import Terrain
 
-Vector = tuple[float, float, float]
-
 
 class Base(Protocol):
-    """A robot in the engine: body `id`, of which the links `hull_links` touch obstacles."""
+    """Body of a robot in the engine with the body id `id`; its links `hull_links` collide with obstacles."""
 
     id: int
     hull_links: tuple[int, ...]
-    rolling: Mapping[int, float]
-    """Links that stand on uneven ground, wheels and casters; see `terrain.stands`. None where it knows only z = 0."""
+    ground_links: Mapping[int, float]
+    """Links that stand on uneven ground, with the smallest z of the contact normal; see `terrain.is_ground_contact`.
+    Empty for a base that is bound to z = 0."""
 
     def place(self, pose: Pose2) -> None:
-        """Set it down at rest, its base frame on the ground."""
+        """Place the robot at rest with its base frame on the ground."""
         ...
 
     def state(self) -> RobotState:
-        """Where it is and how it moves now, asked of the engine."""
+        """Query the current state from the engine."""
         ...
 
-    def hold(self, friction: Callable[[float, float], float]) -> None:
-        """Hold on the floor during the next step as its `friction` at x, y in the world lets wheels hold."""
+    def set_friction(self, friction: Callable[[float, float], float]) -> None:
+        """Set the friction of its wheels for the next step; `friction` returns that of the floor at x, y."""
         ...
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Push its center of mass during the next step, which lasts `seconds`: N s along the world's x and y."""
+        """Apply an impulse (N s, world frame) at its center of mass during the next step of `seconds`."""
         ...
 
 
 class Drive(Protocol):
-    """The firmware and motors of a base.
+    """Firmware and motors of a base.
 
     *Given* any command *then* neither speeds nor accelerations exceed the robot's limits.
-    *Given* no obstacle and steady commands *then* the base drives what was commanded, within its wheels' slip.
-    *Given* that the robot is set down elsewhere *then* the encoders do not notice.
+    *Given* no obstacle and steady commands *then* the base drives what was commanded, except for wheel slip.
+    *Given* that the robot is placed elsewhere *then* the encoders do not change.
     """
 
     def command(self, twist: Twist) -> None:
-        """Drive this from now on: a velocity in the base frame."""
+        """Set the velocity in the base frame to drive from now on."""
         ...
 
     def advance(self) -> None:
-        """One period of the firmware's loop: follow the command within the limits."""
+        """Run one period of the firmware: follow the command within the limits."""
         ...
 
     def rest(self) -> None:
-        """The robot was set down at rest."""
+        """Reset the velocity after the robot was placed at rest."""
         ...
 
     def encoders(self) -> tuple[float, ...]:
-        """What has been rolled so far.
-
-        On wheels: the mean angle in rad of the driven wheels on the left, and of those on the right. Mecanum: the
-        angles in rad of the wheels front left, front right, rear left, rear right. Omnidirectional: meters forward,
-        meters to the left, and radians.
-        """
+        """Return the accumulated rotation of the wheels; see `SensorView.encoders`."""
         ...
 
 
 def build_drive(
-    client: int, body: RobotBody, pose: Pose2, period: float, tick: float, terrain: Terrain, look: int
+    client: int, body: RobotBody, pose: Pose2, period: float, tick: float, terrain: Terrain, visual_shape: int
 ) -> tuple[Base, Drive]:
-    """A robot set down at `pose`, and its drive, whose firmware runs every `period` seconds; a step lasts `tick`.
+    """Return the base of a robot at `pose` and its drive, whose firmware runs every `period` seconds.
 
-    The renderer is shown a `look` of the engine's.
+    A physics step lasts `tick` seconds; the renderer shows `visual_shape`.
     """
     match body.drive:
         case Omnidirectional():
-            base = PlanarBase(client, body, pose, look)
+            base = PlanarBase(client, body, pose, visual_shape)
             return base, OmnidirectionalDrive(base, body, period)
         case Mecanum():
-            base = PlanarBase(client, body, pose, look)
+            base = PlanarBase(client, body, pose, visual_shape)
             return base, MecanumDrive(base, body, period)
         case Ackermann():
-            vehicle = WheeledBase(client, body, pose, terrain, tick, look)
+            vehicle = WheeledBase(client, body, pose, terrain, tick, visual_shape)
             return vehicle, AckermannDrive(client, vehicle, body, period)
         case Differential() | SkidSteer():
-            vehicle = WheeledBase(client, body, pose, terrain, tick, look)
+            vehicle = WheeledBase(client, body, pose, terrain, tick, visual_shape)
             return vehicle, DifferentialDrive(client, vehicle, body, period)

@@ -1,4 +1,4 @@
-"""A base that moves in any direction, idealised as a motor for each direction."""
+"""Omnidirectional and mecanum bases: a body on three planar joints with a motor for each direction."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -15,39 +15,39 @@ from simscen.sim.bullet import engine
 from simscen.sim.robots.robot_state import RobotState
 from simscen.sim.robots.velocity_ramp import VelocityRamp
 
-GRIP = 0.7
-"""Most force of the motors over the robot's weight."""
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-SLED = 0.001
-"""Mass in kg of the two carriers between the world and the hull; the engine wants one."""
+MAX_FORCE_PER_WEIGHT = 0.7
+"""Largest motor force relative to the weight of the robot."""
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+CARRIER_MASS_KG = 0.001
+"""Mass of the two carriers between the world and the hull, because the engine requires one."""
+CARRIERS = 2
 
 
 class PlanarBase:
-    """A hull on three joints from the world: along x, along y, about z. It cannot tip, and no wheel slips.
+    """Hull on three joints from the world: along x, along y, and about z. It cannot tip, and no wheel slips.
 
-    It stays at z = 0: a ramp is a wall to it, and a sill that its hull clears nothing at all.
+    It stays at z = 0: a ramp is a wall to it, and it ignores a sill that is lower than its hull.
     """
 
-    rolling: Mapping[int, float]
+    ground_links: Mapping[int, float]
 
-    def __init__(self, client: int, body: RobotBody, pose: Pose2, look: int = engine.AS_IT_IS) -> None:
-        """Set down at `pose`; the renderer is shown a `look` of the engine's."""
+    def __init__(self, client: int, body: RobotBody, pose: Pose2, visual_shape: int = engine.AS_IT_IS) -> None:
+        """Place the base at `pose`; the renderer shows `visual_shape`."""
         self._client = client
-        moments, base_from_center = _whole(body).principal()
-        sleds = 2
+        moments, base_from_center = _total_mass_properties(body).principal()
         hulls = engine.hull_shapes(client, body.solid)
         extra = len(hulls) - 1
         self.id: int = pybullet.createMultiBody(
             0,
-            linkMasses=[SLED] * sleds + [body.mass] + [SLED] * extra,
-            linkCollisionShapeIndices=[-1] * sleds + hulls,
-            linkVisualShapeIndices=[-1] * sleds + [look] * len(hulls),
-            linkPositions=[(0, 0, 0)] * (sleds + len(hulls)),
-            linkOrientations=[UPRIGHT] * (sleds + len(hulls)),
-            linkInertialFramePositions=[(0, 0, 0)] * sleds + [base_from_center.position] + [(0, 0, 0)] * extra,
-            linkInertialFrameOrientations=[UPRIGHT] * sleds + [base_from_center.quaternion] + [UPRIGHT] * extra,
+            linkMasses=[CARRIER_MASS_KG] * CARRIERS + [body.mass] + [CARRIER_MASS_KG] * extra,
+            linkCollisionShapeIndices=[-1] * CARRIERS + hulls,
+            linkVisualShapeIndices=[-1] * CARRIERS + [visual_shape] * len(hulls),
+            linkPositions=[(0, 0, 0)] * (CARRIERS + len(hulls)),
+            linkOrientations=[IDENTITY] * (CARRIERS + len(hulls)),
+            linkInertialFramePositions=[(0, 0, 0)] * CARRIERS + [base_from_center.position] + [(0, 0, 0)] * extra,
+            linkInertialFrameOrientations=[IDENTITY] * CARRIERS + [base_from_center.quaternion] + [IDENTITY] * extra,
             linkParentIndices=[0, 1, 2] + [3] * extra,
-            linkJointTypes=[pybullet.JOINT_PRISMATIC] * sleds
+            linkJointTypes=[pybullet.JOINT_PRISMATIC] * CARRIERS
             + [pybullet.JOINT_REVOLUTE]
             + [pybullet.JOINT_FIXED] * extra,
             linkJointAxis=[(1, 0, 0), (0, 1, 0), (0, 0, 1)] + [(0, 0, 1)] * extra,
@@ -55,7 +55,7 @@ class PlanarBase:
         )
         self.joints = (0, 1, 2)
         self.hull_links = tuple(range(2, 2 + len(hulls)))
-        self.rolling = {}
+        self.ground_links = {}
         pybullet.changeDynamics(self.id, 2, localInertiaDiagonal=moments, physicsClientId=client)
         for link in range(2 + len(hulls)):
             pybullet.changeDynamics(
@@ -64,126 +64,129 @@ class PlanarBase:
             )  # fmt: skip
         for link in self.hull_links:
             engine.touch(client, self.id, link, engine.HULL, ~engine.GROUND)
-        self._mass, self._held, self._power = body.mass, 1.0, body.power
+        self._mass, self._floor_friction, self._power = body.mass, 1.0, body.power
         self._radius = body.circumscribed_radius
         self.place(pose)
 
     def place(self, pose: Pose2) -> None:
-        """Set it down at rest."""
+        """Place the base at rest."""
         for joint, value in zip(self.joints, pose, strict=True):
             pybullet.resetJointState(self.id, joint, value, 0.0, physicsClientId=self._client)
 
     def state(self) -> RobotState:
-        """Where it is and how it moves now."""
+        """Query the current state from the engine."""
         states = pybullet.getJointStates(self.id, self.joints, physicsClientId=self._client)
         (x, vx, *_), (y, vy, *_), (yaw, wz, *_) = states
         return RobotState(Pose3.planar(Pose2(x, y, yaw)), (vx, vy, 0.0), (0.0, 0.0, wz))
 
-    def plane(self) -> Pose2:
-        """Where it is; the heading counts full turns."""
+    def pose(self) -> Pose2:
+        """Return the pose; the heading is not limited to one turn."""
         states = pybullet.getJointStates(self.id, self.joints, physicsClientId=self._client)
         return Pose2(*(state[0] for state in states))
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Push its center of mass during the next step, which lasts `seconds`."""
-        place = pybullet.getLinkState(self.id, 2, physicsClientId=self._client)[0]
+        """Apply an impulse (N s, world frame) at its center of mass during the next step of `seconds`."""
+        center = pybullet.getLinkState(self.id, 2, physicsClientId=self._client)[0]
         force = (impulse[0] / seconds, impulse[1] / seconds, 0.0)
-        pybullet.applyExternalForce(self.id, 2, force, place, pybullet.WORLD_FRAME, physicsClientId=self._client)
+        pybullet.applyExternalForce(self.id, 2, force, center, pybullet.WORLD_FRAME, physicsClientId=self._client)
 
-    def hold(self, friction: Callable[[float, float], float]) -> None:
-        """Its motors have no more force than the floor below its middle holds."""
-        x, y, _ = self.plane()
-        self._held = friction(x, y)
+    def set_friction(self, friction: Callable[[float, float], float]) -> None:
+        """Limit the motor force to the friction of the floor at the center of the base."""
+        x, y, _ = self.pose()
+        self._floor_friction = friction(x, y)
 
-    def motors(self, velocity: Twist) -> None:
-        """Run the motors: a velocity along the world's axes, with no more force than wheels have grip."""
-        grip = min(GRIP * self._power, self._held) * self._mass * GRAVITY
+    def set_motors(self, velocity: Twist) -> None:
+        """Set the motors to a velocity along the world axes, with at most the force that the wheels can transmit."""
+        max_force = min(MAX_FORCE_PER_WEIGHT * self._power, self._floor_friction) * self._mass * GRAVITY
         pybullet.setJointMotorControlArray(
             self.id,
             self.joints,
             pybullet.VELOCITY_CONTROL,
             targetVelocities=velocity,
-            forces=(grip, grip, grip * self._radius),
+            forces=(max_force, max_force, max_force * self._radius),
             physicsClientId=self._client,
         )
 
 
-def _whole(body: RobotBody) -> MassProperties:
-    """The chassis with its wheels, if it has any: they do not move in it."""
+def _total_mass_properties(body: RobotBody) -> MassProperties:
+    """Return the mass properties of the chassis with its wheels, which do not turn in this model."""
     wheels = [wheel.inertia.placed(Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
     return combine([body.chassis, *wheels]) if wheels else body.chassis
 
 
 class OmnidirectionalDrive:
-    """Follows any twist; its encoders see every motion over the ground, in the base frame."""
+    """Drive that follows any twist; its encoders measure every motion over the ground in the base frame."""
 
     def __init__(self, base: PlanarBase, body: RobotBody, period: float) -> None:
         self._base, self._period = base, period
         self._ramp = VelocityRamp(body.limits, period, holonomic=True)
-        self._rolled = (0.0, 0.0, 0.0)
-        self._seen = base.plane()
-        base.motors(STOP)
+        self._traveled = (0.0, 0.0, 0.0)
+        self._last_pose = base.pose()
+        base.set_motors(STOP)
 
     def command(self, twist: Twist) -> None:
-        """Drive this from now on."""
+        """Set the velocity to drive from now on."""
         self._ramp.command(twist)
 
     def advance(self) -> None:
-        """Turn the motors' velocity with the base, half a period ahead, so that it drives arcs."""
+        """Rotate the motor velocity to the heading half a period ahead, so that the base drives arcs."""
         changed = self._ramp.advance()
-        velocity = self._driven(self._ramp.velocity)
+        velocity = self._actual_velocity(self._ramp.velocity)
         if not changed and velocity == STOP:
             return
-        self._count()
-        heading = self._seen.yaw + velocity.wz * self._period / 2
+        self._update_encoders()
+        heading = self._last_pose.yaw + velocity.wz * self._period / 2
         c, s = math.cos(heading), math.sin(heading)
-        self._base.motors(Twist(c * velocity.vx - s * velocity.vy, s * velocity.vx + c * velocity.vy, velocity.wz))
+        self._base.set_motors(Twist(c * velocity.vx - s * velocity.vy, s * velocity.vx + c * velocity.vy, velocity.wz))
 
-    def _driven(self, velocity: Twist) -> Twist:
-        """What the motors make of a velocity."""
+    def _actual_velocity(self, velocity: Twist) -> Twist:
+        """Return the velocity that the motors produce for a commanded one."""
         return velocity
 
     def rest(self) -> None:
-        """Start again from standstill."""
+        """Reset the velocity to zero."""
         self._ramp.rest()
-        self._seen = self._base.plane()
-        self._base.motors(STOP)
+        self._last_pose = self._base.pose()
+        self._base.set_motors(STOP)
 
     def encoders(self) -> tuple[float, ...]:
-        """Meters forward, meters to the left and radians so far."""
-        self._count()
-        return self._rolled
+        """Return accumulated meters forward, meters to the left, and radians."""
+        self._update_encoders()
+        return self._traveled
 
-    def _count(self) -> None:
-        """Add the motion since last counted, as the constant twist that leads there (the logarithm in SE(2))."""
-        now = self._base.plane()
-        step, turn = self._seen.between(now), wrap(now.yaw - self._seen.yaw)
-        self._seen = now
+    def _update_encoders(self) -> None:
+        """Add the motion since the last update as a constant twist (the logarithm in SE(2))."""
+        now = self._base.pose()
+        step, turn = self._last_pose.between(now), wrap(now.yaw - self._last_pose.yaw)
+        self._last_pose = now
         half = turn / 2
         scale = half / math.tan(half) if abs(half) > 1e-9 else 1.0
         forward, left = scale * step.x + half * step.y, scale * step.y - half * step.x
-        self._rolled = (self._rolled[0] + forward, self._rolled[1] + left, self._rolled[2] + turn)
+        x, y, yaw = self._traveled
+        self._traveled = x + forward, y + left, yaw + turn
 
 
-# Four mecanum wheels under a planar base: the wheels roll without slip, the rollers without friction.
 class MecanumDrive(OmnidirectionalDrive):
-    """Firmware that reckons with the drive's dimensions, on wheels that are where the body has them."""
+    """Four mecanum wheels under a planar base: the wheels roll without slip, their rollers without friction.
+
+    The firmware uses the dimensions of the drive, which may differ from those of the wheels as built.
+    """
 
     def __init__(self, base: PlanarBase, body: RobotBody, period: float) -> None:
         assert isinstance(body.drive, Mecanum)
-        self._firmware, self._wheels = body.drive.wheels, wheels_of(body)
+        self._firmware, self._wheels = body.drive.wheels, mecanum_wheels(body)
         super().__init__(base, body, period)
 
     def encoders(self) -> tuple[float, ...]:
-        """Angles in rad of the wheels front left, front right, rear left, rear right."""
+        """Return the angles in rad of the front left, front right, rear left, and rear right wheel."""
         return self._wheels.speeds(Twist(*super().encoders()))
 
-    def _driven(self, velocity: Twist) -> Twist:
+    def _actual_velocity(self, velocity: Twist) -> Twist:
         return self._wheels.motion(self._firmware.speeds(velocity))
 
 
-def wheels_of(body: RobotBody) -> MecanumWheels:
-    """Wheels with their dimensions as built; a URDF's need not be those of the drive."""
+def mecanum_wheels(body: RobotBody) -> MecanumWheels:
+    """Return the dimensions of the wheels as built, which in a URDF can differ from those of the drive."""
     assert isinstance(body.drive, Mecanum)
     return MecanumWheels(
         radius=float(np.mean([wheel.radius for wheel in body.wheels])),

@@ -1,4 +1,4 @@
-"""One robot in a simulation: how it moves, what it touches, and how near it is to anything."""
+"""One robot of a simulation: its motion, collisions, and clearance."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.errors import RunError
-from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry import Pose2, Pose3, Vector
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.core.records.events import Event
@@ -26,90 +26,87 @@ from simscen.sim.scene.camera import RenderScene, render_image
 from simscen.sim.scene.terrain import FloorFriction, Terrain, is_ground_contact
 from simscen.sim.scene.walls import Walls
 
-Vector = tuple[float, float, float]
-NOWHERE = (math.inf, math.inf, math.inf)
-
 
 @dataclass(frozen=True)
 class TimedPush:
-    """A force on something in the ticks from `since` to before `until`: an `impulse` in N s for each of them."""
+    """An `impulse` in N s for each tick from `start_tick` to before `end_tick`, applied by `push`."""
 
     push: Callable[[tuple[float, float]], None]
     impulse: tuple[float, float]
-    since: int
-    until: int
+    start_tick: int
+    end_tick: int
 
 
 @dataclass(eq=False)
 class Scene:
-    """What all robots of a simulation share, and the robots by name."""
+    """Everything that the robots of a simulation share, and the robots by name."""
 
     client: int
-    rate: int
+    tick_rate: int
     walls: Walls
     terrain: Terrain
     actors: Actors
-    film: RenderScene | None
+    render_scene: RenderScene | None
     robots: dict[str, "Robot"] = field(default_factory=dict)
     tick: int = 0
-    presses: list[TimedPush] = field(default_factory=list)
+    pushes: list[TimedPush] = field(default_factory=list)
     floor: FloorFriction = field(default_factory=FloorFriction)
 
-    def hold(self) -> None:
-        """Let wheels hold during the next step as the floor does where they are."""
-        self.floor.pass_time(self.tick)
+    def update_wheel_friction(self) -> None:
+        """Set the friction of all wheels to that of the floor below them for the next step."""
+        self.floor.remove_expired(self.tick)
         for robot in self.robots.values():
-            robot.base.hold(self.floor.friction)
+            robot.base.set_friction(self.floor.friction)
 
-    def press(self) -> bool:
-        """Let the forces that last press on during the next step; whether there are any."""
-        self.presses = [press for press in self.presses if press.until > self.tick]
-        for press in self.presses:
-            if press.since <= self.tick:
-                press.push(press.impulse)
-        if self.presses:
-            self.shaken()
-        return bool(self.presses)
+    def apply_pushes(self) -> bool:
+        """Apply all pushes that are due for the next step; return whether any is due now or later."""
+        self.pushes = [push for push in self.pushes if push.end_tick > self.tick]
+        for push in self.pushes:
+            if push.start_tick <= self.tick:
+                push.push(push.impulse)
+        if self.pushes:
+            self.on_push()
+        return bool(self.pushes)
 
-    def add_press(
-        self, push: Callable[[tuple[float, float]], None], impulse: tuple[float, float], seconds: float, since: int
+    def add_push(
+        self, push: Callable[[tuple[float, float]], None], impulse: tuple[float, float], seconds: float, tick: int
     ) -> None:
-        """Spread an impulse in N s evenly over the ticks from `since` on, over one at least."""
-        ticks = max(1, round(seconds * self.rate))
-        self.presses.append(TimedPush(push, (impulse[0] / ticks, impulse[1] / ticks), since, since + ticks))
+        """Spread an impulse in N s evenly over the given time from `tick` on, at least over one tick."""
+        ticks = max(1, round(seconds * self.tick_rate))
+        self.pushes.append(TimedPush(push, (impulse[0] / ticks, impulse[1] / ticks), tick, tick + ticks))
 
-    def shaken(self) -> None:
-        """Something is pushed during the next step."""
-        self.actors.shaken(self.tick)
+    def on_push(self) -> None:
+        """Note that something is pushed during the next step."""
+        self.actors.on_push(self.tick)
         for robot in self.robots.values():
-            robot.shaken()
+            robot.on_push()
 
-    def settle(self) -> None:
-        """Something is about to be put into or taken out of the world, or moved: see what is before."""
+    def before_change(self) -> None:
+        """Compute deferred samples before an object is added, removed, or moved."""
         for robot in self.robots.values():
-            robot.samples.settle()
+            robot.sampler.compute_deferred()
 
-    def meet(self, anew: bool = False) -> None:
-        """Let the engine have what a robot may come near to; asked at every tick at which one looks about itself.
+    def activate_actors(self, all_robots: bool = False) -> None:
+        """Create the deferred actors near robots in the engine; called at every tick at which a robot is observed.
 
-        It is looked `anew` once something has come or gone.
+        Only robots that have moved since their last query are considered, or `all_robots`, after objects changed.
         """
-        if self.actors.all_here:
+        if self.actors.is_engine_complete:
             return
-        lookers = [robot.look_out() for robot in self.robots.values() if anew or robot.gone]
-        if lookers and (met := self.actors.meet(lookers, self.tick)):
+        queries = [robot.make_query() for robot in self.robots.values() if all_robots or robot.needs_query]
+        if queries and (activated := self.actors.activate_near(queries, self.tick)):
             for robot in self.robots.values():
-                robot.know(met)
+                robot.add_bodies(activated)
 
-    def changed(self) -> None:
-        """Something was put into or taken out of the world, or set down elsewhere."""
-        self.meet(anew=True)
+    def after_change(self) -> None:
+        """Update everything that depends on the objects of the world."""
+        self.activate_actors(all_robots=True)
         for robot in self.robots.values():
-            robot.changed()
+            robot.on_change()
 
 
 class Robot:
-    """A robot: it can be driven and looked at; to the others it is a thing that moves."""
+    """A robot that can be driven and observed."""
 
     def __init__(
         self,
@@ -120,207 +117,229 @@ class Robot:
         body: RobotBody,
         pose: Pose2,
         period: float,
-        reach: float,
-        look: int,
+        clearance_range: float,
+        visual_shape: int,
     ) -> None:
-        """Set down at `pose`; its firmware runs every `period` seconds, clearance is searched within `reach` meters.
+        """Place the robot at `pose`; its firmware runs every `period` seconds, and the renderer shows `visual_shape`.
 
-        The renderer is shown a `look` of the engine's.
-
-        `obstacles` are what of the `static` world is in its way.
+        `obstacles` is the part of the `static` world that blocks it. Clearance is measured up to `clearance_range` m.
         """
         self.name, self._scene = name, scene
-        self.base, self._drive = build_drive(scene.client, body, pose, period, 1 / scene.rate, scene.terrain, look)
+        tick_seconds = 1 / scene.tick_rate
+        self.base, self._drive = build_drive(
+            scene.client, body, pose, period, tick_seconds, scene.terrain, visual_shape
+        )
         self.advance = self._drive.advance
-        """One period of the firmware's loop; for the simulation."""
-        self._driven: Twist | None = None
-        self._seen = CachedState(self.base.state, scene)
-        self._who = f'robot "{name}"' if name else "the robot"
+        """Run one period of the firmware; called by the simulation."""
+        self._command: Twist | None = None
+        self._state = CachedState(self.base.state, scene)
+        self._label = f'robot "{name}"' if name else "the robot"
         self.others: tuple[Robot, ...] = ()
         """The other robots, by name."""
         self.bodies: Mapping[str, Body] = {}
-        """Everything that may move by name, the same one for as long as nothing comes or goes."""
-        self.shape = Body(name, body.solid, Pose3.planar(pose), body.mass)
-        self._contacts = CollisionTracker(scene.rate)
-        uneven = bool(scene.terrain and self.base.rolling)
+        """All movable bodies by name; the same object until one is added or removed."""
+        self.body = Body(name, body.solid, Pose3.planar(pose), body.mass)
+        self._collisions = CollisionTracker(scene.tick_rate)
+        is_uneven = bool(scene.terrain and self.base.ground_links)
         self.clearance = Clearance(
-            scene.client, scene.rate, static, obstacles, uneven, body, self.base, self._seen, scene.actors, reach
+            scene.client,
+            scene.tick_rate,
+            static,
+            obstacles,
+            is_uneven,
+            body,
+            self.base,
+            self._state,
+            scene.actors,
+            clearance_range,
         )
-        self.samples = TruthSampler(self.clearance)
+        self.sampler = TruthSampler(self.clearance)
         self._names: dict[int, str | None] = {}
-        self._looked_from = NOWHERE
+        self._query_point: Vector = (math.inf, math.inf, math.inf)
+
+    # Driving and observing
 
     def drive(self, command: Twist) -> None:
         """Command a velocity in the base frame; the base follows within its limits."""
-        if command is not self._driven:  # most commands are the one before, said again
-            self._driven = command
+        if command is not self._command:  # most commands are the previous object again
+            self._command = command
             self._drive.command(command)
 
     def truth(self) -> Truth:
-        """The robot as it really is. Raises RunError when the physics has lost it or anything else."""
+        """Return the true state; raises RunError if the physics has diverged."""
         tick = self._scene.tick
-        return self._truth(tick, self._sound(tick))
+        return self._truth(tick, self._checked_state(tick))
 
-    def sample(self, ticks: int) -> Truth | DeferredTruth:
-        """The same, to be looked at later; it is asked again after so many ticks. Raises as `truth`."""
+    def sample(self, period: int) -> Truth | DeferredTruth:
+        """Return the true state, to be evaluated later, if the next sample is `period` ticks later; raises RunError."""
         tick = self._scene.tick
-        state = self._sound(tick)
-        self._scene.actors.look_ahead(tick, ticks)
-        if not self._contacts.touching and self.clearance.can_wait(tick, ticks, state.pose):
-            return self.samples.take(state, self.objects())
-        self.samples.settle()
-        return self._truth(tick, state, ticks)
+        state = self._checked_state(tick)
+        self._scene.actors.prefetch_poses(tick, period)
+        if not self._collisions.is_colliding and self.clearance.can_defer(tick, period, state.pose):
+            return self.sampler.defer(state, self.objects())
+        self.sampler.compute_deferred()
+        return self._truth(tick, state, period)
 
-    def _sound(self, tick: int) -> RobotState:
-        """Its state. Raises RunError when the physics has lost it or anything else."""
-        (x, y, z, i, j, k, w), (vx, vy, vz), (wx, wy, wz) = state = self._seen()
+    def _checked_state(self, tick: int) -> RobotState:
+        """Return the state; raises RunError if the robot or an actor is lost."""
+        (x, y, z, i, j, k, w), (vx, vy, vz), (wx, wy, wz) = state = self._state()
         actors = self._scene.actors
-        trouble = divergence_reason(self._who, x, y, z, i + j + k + w + vx + vy + vz + wx + wy + wz)
-        if trouble is None and actors.loose:
-            trouble = actors.lost(tick)
-        if trouble is not None:
-            raise RunError("diverged", f"simulation diverged at t={tick / self._scene.rate:.3f} s: {trouble}")
+        reason = divergence_reason(self._label, x, y, z, i + j + k + w + vx + vy + vz + wx + wy + wz)
+        if reason is None and actors.has_pushable:
+            reason = actors.find_divergence(tick)
+        if reason is not None:
+            raise RunError("diverged", f"simulation diverged at t={tick / self._scene.tick_rate:.3f} s: {reason}")
         return state
 
-    def _truth(self, tick: int, state: RobotState, ticks: int = NEVER) -> Truth:
-        clearance = self.clearance.measure(tick, ticks)
-        if self._contacts.touched(tick):
-            clearance = min(clearance, 0.0)  # surfaces that press on each other may be a hair apart
+    def _truth(self, tick: int, state: RobotState, period: int = NEVER) -> Truth:
+        clearance = self.clearance.measure(tick, period)
+        if self._collisions.has_contact_at(tick):
+            clearance = min(clearance, 0.0)  # surfaces in contact can have a tiny distance
         return Truth(state.pose, state.twist, clearance, self.objects())
 
     def collisions(self) -> tuple[Event, ...]:
-        """collision.started and collision.ended since last asked.
+        """Return the events collision.started and collision.ended since the last call.
 
-        `robot_caused` says whether the robot itself moved towards what it hit, rather than being hit.
+        `robot_caused` tells whether the robot moved towards the object rather than being hit.
         """
-        return self._contacts.take()
+        return self._collisions.take_events()
 
     def objects(self) -> Mapping[str, Pose3]:
-        """Where everything is that may move, other robots with it."""
+        """Return the poses of all movable objects and of the other robots."""
         poses = self._scene.actors.poses(self._scene.tick)
         return {**poses, **{robot.name: robot.base_pose() for robot in self.others}} if self.others else poses
 
     @property
-    def homes(self) -> Mapping[str, Pose3]:
-        """Where things that can be pushed lay at tick 0, or have come to rest since."""
-        return self._scene.actors.homes
+    def rest_poses(self) -> Mapping[str, Pose3]:
+        """Poses in which pushable objects have come to rest."""
+        return self._scene.actors.rest_poses
 
-    def moving(self) -> Mapping[str, tuple[Body, Pose3]]:
-        """Everything that may move and where it is, with its body."""
+    def bodies_and_poses(self) -> Mapping[str, tuple[Body, Pose3]]:
+        """Return all movable objects and other robots with their poses."""
         return {name: (self.bodies[name], pose) for name, pose in self.objects().items()}
 
     def base_pose(self) -> Pose3:
-        """The robot's base frame in the world."""
-        return self._seen().pose
+        """Return the pose of the base frame in the world."""
+        return self._state().pose
 
     def base_velocity(self) -> tuple[Vector, Vector]:
-        """Linear (m/s) and angular (rad/s) velocity of the base frame along the world's axes."""
-        state = self._seen()
+        """Return the linear (m/s) and angular (rad/s) velocity of the base frame along the world axes."""
+        state = self._state()
         return state.linear, state.angular
 
     def base_twist(self) -> Twist:
-        """The robot's velocity in its own frame."""
-        return self._seen().twist
+        """Return the velocity in the base frame."""
+        return self._state().twist
 
     def encoders(self) -> tuple[float, ...]:
-        """What the drive has rolled so far; see `drives.Drive.encoders`."""
+        """Return the accumulated rotation of the wheels; see `SensorView.encoders`."""
         return self._drive.encoders()
 
     def touching(self) -> bool:
-        """Whether the hull touches anything but the ground."""
-        return self._contacts.touching
+        """Return whether the hull touches anything besides the ground."""
+        return self._collisions.is_colliding
 
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """What a camera at `mount` in the base frame sees; see `camera.picture`. Only where there are pictures."""
-        film = self._scene.film
-        assert film is not None, "nobody was to take pictures"
-        self._scene.actors.show(self._scene.tick)
-        film.set(self.moving())
+        """Return the image of a camera at `mount` in the base frame; see `render_image`."""
+        render_scene = self._scene.render_scene
+        assert render_scene is not None, "the simulation was built without images"
+        self._scene.actors.end_step(self._scene.tick)
+        render_scene.update(self.bodies_and_poses())
         return render_image(self._scene.client, self.base_pose().compose(mount), width, height, field_of_view, far)
 
     def place(self, pose: Pose2) -> None:
-        """Set it down somewhere else, at rest."""
-        self.settled(pose)
-        self._scene.changed()
+        """Place the robot somewhere else at rest."""
+        self.set_pose(pose)
+        self._scene.after_change()
 
-    def press(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Push it evenly from now on for so long: an impulse in N s in the world frame, at its center of mass."""
-        self._scene.add_press(self.push, impulse, seconds, self._scene.tick)
+    def push_for(self, impulse: tuple[float, float], seconds: float) -> None:
+        """Apply an impulse (N s, world frame) at the center of mass, spread over `seconds` from now on."""
+        self._scene.add_push(self.push, impulse, seconds, self._scene.tick)
 
     def push(self, impulse: tuple[float, float]) -> None:
-        """Push it during the next tick: an impulse in N s in the world frame, at its center of mass."""
-        self.base.push(impulse, 1 / self._scene.rate)
-        self._scene.shaken()
+        """Apply an impulse (N s, world frame) at the center of mass during the next tick."""
+        self.base.push(impulse, 1 / self._scene.tick_rate)
+        self._scene.on_push()
 
-    # what the simulation tells it
+    # Called by the simulation
 
-    def settled(self, pose: Pose2) -> None:
-        """It stands at `pose`, at rest."""
+    def set_pose(self, pose: Pose2) -> None:
+        """Place the robot at rest, without updating the scene."""
         self.base.place(pose)
-        self._seen.forget()
+        self._state.invalidate()
         self._drive.rest()
 
-    def shaken(self) -> None:
-        """Something is pushed during the next step."""
-        self.clearance.shaken(self._scene.tick)
+    def on_push(self) -> None:
+        """Note that something is pushed during the next step."""
+        self.clearance.on_push(self._scene.tick)
 
-    def changed(self) -> None:
-        """Something was put into or taken out of the world, or set down elsewhere."""
+    def on_change(self) -> None:
+        """Update the lists of other robots and objects after one was added, removed, or placed elsewhere."""
         scene = self._scene
         self.others = tuple(robot for robot in scene.robots.values() if robot is not self)
         self.clearance.others = [robot.clearance for robot in self.others]
-        self.bodies = {**scene.actors.bodies(), **{robot.name: robot.shape for robot in self.others}}
+        self.bodies = {**scene.actors.bodies(), **{robot.name: robot.body for robot in self.others}}
         others = {robot.base.id: robot.name for robot in self.others}
-        self._names = {**dict.fromkeys(scene.walls.bodies), **scene.terrain.names, **scene.actors.ids(), **others}
-        self.clearance.forget()
+        self._names = {
+            **dict.fromkeys(scene.walls.bodies),
+            **scene.terrain.names,
+            **scene.actors.names_by_id(),
+            **others,
+        }
+        self.clearance.invalidate()
 
     @property
-    def gone(self) -> bool:
-        """Whether it has moved more than a stride since it looked out."""
-        return math.dist(self._looked_from, self._seen().pose[:3]) > REQUERY_DISTANCE_M
+    def needs_query(self) -> bool:
+        """Whether it has moved too far since its last query of deferred actors."""
+        return math.dist(self._query_point, self._state().pose[:3]) > REQUERY_DISTANCE_M
 
-    def look_out(self) -> ProximityQuery:
-        """Where it is, and how far it looks for what moves."""
-        self._looked_from = self._seen().pose.position
-        return ProximityQuery(self._looked_from, self.clearance.looks)
+    def make_query(self) -> ProximityQuery:
+        """Return its query of deferred actors."""
+        self._query_point = self._state().pose.position
+        return ProximityQuery(self._query_point, self.clearance.query_radius)
 
-    def know(self, bodies: Mapping[int, str | None]) -> None:
-        """The engine has these now, too: names by its numbers, None of walls."""
-        self._names.update(bodies)
+    def add_bodies(self, names: Mapping[int, str | None]) -> None:
+        """Add new bodies of the engine that it can touch: names by body id, None for walls."""
+        self._names.update(names)
 
     @property
-    def calm_until(self) -> int:
-        """The tick until which it cannot touch anything; -1 where a contact is open, and has to end in time."""
-        return -1 if self._contacts.touching else self.clearance.no_contact_before
+    def no_contact_before(self) -> int:
+        """Tick until which it cannot touch anything; -1 during a collision, whose end must be noticed."""
+        return -1 if self._collisions.is_colliding else self.clearance.no_contact_before
 
-    def look(self) -> BaseMotion:
-        """Before a step in which something might touch something: see what is near; how it moves."""
+    def before_contact_step(self) -> BaseMotion:
+        """Measure the clearance, if needed, before a step with possible contact; return the current motion."""
         tick, clearance = self._scene.tick, self.clearance
-        if clearance.unsure or (tick >= clearance.no_contact_before and not self._contacts.touching):
+        is_outdated = tick >= clearance.no_contact_before and not self._collisions.is_colliding
+        if clearance.may_be_enclosed or is_outdated:
             clearance.measure(tick)
-        state = self._seen()
+        state = self._state()
         return BaseMotion(state.pose.position, state.linear, state.angular)
 
-    def feel(self, before: PreStepMotion) -> None:
-        """After that step: note what is touched."""
+    def after_contact_step(self, before: PreStepMotion) -> None:
+        """Record the contacts of the step."""
         tick, clearance = self._scene.tick, self.clearance
-        if not self._contacts.touching and tick <= clearance.no_contact_before:
+        if not self._collisions.is_colliding and tick <= clearance.no_contact_before:
             return
-        touched = contact_points(
-            self._scene.client, self.base.id, self._names, clearance.owner, 1 / self._scene.rate, self._stands
+        contacts = contact_points(
+            self._scene.client,
+            self.base.id,
+            self._names,
+            clearance.static_owner,
+            1 / self._scene.tick_rate,
+            self._is_ground_contact,
         )
-        around = clearance.enclosed_by
-        if around is not None and around not in {touch.name for touch in touched}:
-            touched.append(enclosed_contact(around, before.robot.origin))
-        self._contacts.note(tick, touched, before)
+        enclosing = clearance.enclosed_by
+        if enclosing is not None and enclosing not in {contact.name for contact in contacts}:
+            contacts.append(enclosed_contact(enclosing, before.robot.origin))
+        self._collisions.update(tick, contacts, before)
 
-    def _stands(self, other: int, link: int, up: float) -> bool:
-        """Whether a contact is that of a wheel or caster with the ground."""
-        return is_ground_contact(self._scene.terrain.names, self.base.rolling, other, link, up)
+    def _is_ground_contact(self, other: int, link: int, normal_z: float) -> bool:
+        return is_ground_contact(self._scene.terrain.names, self.base.ground_links, other, link, normal_z)
 
     def close(self) -> None:
-        """Give back what it has of engines of its own, and look at none any more."""
-        self.samples.settle()
+        """Compute deferred samples and release the engine clients of the clearance."""
+        self.sampler.compute_deferred()
         self.clearance.close()

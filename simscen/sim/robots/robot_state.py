@@ -1,4 +1,4 @@
-"""Where a robot is and how it moves: asked of the engine once for each tick, however many want to know."""
+"""Pose and velocity of a robot, queried from the engine at most once per tick."""
 
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
@@ -6,11 +6,11 @@ from typing import NamedTuple, Protocol
 from simscen.core.geometry import Pose3, Vector
 from simscen.core.geometry.kinematics import Twist
 
-_made = tuple.__new__  # a twist without the calls of its class
+_new = tuple.__new__  # creates a named tuple without the call overhead of its class
 
 
 class RobotState(NamedTuple):
-    """The base frame in the world, and the velocity of its origin (m/s, rad/s) along the world's axes."""
+    """Pose of the base frame in the world, and velocity of its origin (m/s, rad/s) along the world axes."""
 
     pose: Pose3
     linear: Vector
@@ -18,16 +18,16 @@ class RobotState(NamedTuple):
 
     @property
     def twist(self) -> Twist:
-        """The velocity in the base frame; as `geometry.rotated`, of which three components are needed, not six."""
+        """The velocity in the base frame, computed as by `geometry.rotated` for the three components that matter."""
         (_, _, _, x, y, z, w), (a, b, c), (f, g, h) = self
         x, y, z = -x, -y, -z
         p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
         i, j, k = 2 * (y * h - z * g), 2 * (z * f - x * h), 2 * (x * g - y * f)
-        return _made(Twist, (a + w * p + y * r - z * q, b + w * q + z * p - x * r, h + w * k + x * j - y * i))
+        return _new(Twist, (a + w * p + y * r - z * q, b + w * q + z * p - x * r, h + w * k + x * j - y * i))
 
 
 class TickClock(Protocol):
-    """Something that says which tick it is."""
+    """Provides the current tick."""
 
     @property
     def tick(self) -> int:
@@ -36,19 +36,19 @@ class TickClock(Protocol):
 
 
 class CachedState:
-    """Remembers the state of the tick that it was last asked for at; whoever sets a robot down has it forget that."""
+    """State of a robot, cached for the current tick; must be invalidated when the robot is placed elsewhere."""
 
-    def __init__(self, ask: Callable[[], RobotState], now: TickClock) -> None:
-        self._ask, self._now = ask, now
+    def __init__(self, query: Callable[[], RobotState], clock: TickClock) -> None:
+        self._query, self._clock = query, clock
         self._tick, self._state = -1, RobotState(Pose3(), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
     def __call__(self) -> RobotState:
-        """The state at this tick."""
-        tick = self._now.tick
+        """Return the state at the current tick."""
+        tick = self._clock.tick
         if tick != self._tick:
-            self._tick, self._state = tick, self._ask()
+            self._tick, self._state = tick, self._query()
         return self._state
 
-    def forget(self) -> None:
-        """The robot is elsewhere all of a sudden."""
+    def invalidate(self) -> None:
+        """Discard the cached state."""
         self._tick = -1

@@ -1,7 +1,7 @@
-"""Samples of the truth that nobody has looked at yet: what comes of the engine's numbers can wait.
+"""Truth samples whose clearance is computed later, several in a row.
 
-Who looks is the log, up to 0.9 s later: what works samples out has left the processor's caches after each beat, so that
-several in a row take half the time.
+The log needs a sample up to 0.9 s later. Computing samples in batches uses the processor's caches better and takes half
+the time.
 """
 
 from collections.abc import Mapping
@@ -11,43 +11,43 @@ from simscen.core.records.trace import Truth
 from simscen.sim.contact.clearance import Clearance
 from simscen.sim.robots.robot_state import RobotState
 
-_made = tuple.__new__  # a truth without the calls of its class
+_new = tuple.__new__  # creates a named tuple without the call overhead of its class
 
 
 class DeferredTruth:
-    """How a robot was at a tick, and where things were."""
+    """State of a robot and poses of all objects at one tick; see core.records.trace.DeferredTruth."""
 
-    __slots__ = ("made", "objects", "samples", "state")
+    __slots__ = ("objects", "result", "sampler", "state")
 
-    def __init__(self, samples: "TruthSampler", state: RobotState, objects: Mapping[str, Pose3]) -> None:
-        self.samples, self.state, self.objects = samples, state, objects
-        self.made: Truth | None = None
+    def __init__(self, sampler: "TruthSampler", state: RobotState, objects: Mapping[str, Pose3]) -> None:
+        self.sampler, self.state, self.objects = sampler, state, objects
+        self.result: Truth | None = None
 
     def truth(self) -> Truth:
-        """All of it; see core.trace.Late."""
-        if self.made is None:
-            self.samples.settle()
-        assert self.made is not None
-        return self.made
+        """Return the complete sample."""
+        if self.result is None:
+            self.sampler.compute_deferred()
+        assert self.result is not None
+        return self.result
 
 
 class TruthSampler:
-    """Those of one robot. Only while it is far from all that moves do any wait."""
+    """Deferred samples of one robot, which must be far from all moving objects."""
 
     def __init__(self, clearance: Clearance) -> None:
         self._clearance = clearance
-        self._waiting: list[DeferredTruth] = []
+        self._deferred: list[DeferredTruth] = []
 
-    def take(self, state: RobotState, objects: Mapping[str, Pose3]) -> DeferredTruth:
-        """One that is worked out when somebody asks for it, or for another."""
+    def defer(self, state: RobotState, objects: Mapping[str, Pose3]) -> DeferredTruth:
+        """Return a sample that is computed when it, or another one, is needed."""
         sample = DeferredTruth(self, state, objects)
-        self._waiting.append(sample)
+        self._deferred.append(sample)
         return sample
 
-    def settle(self) -> None:
-        """Work out all that wait."""
-        waiting, self._waiting = self._waiting, []
-        standing = self._clearance.standing
-        for sample in waiting:
+    def compute_deferred(self) -> None:
+        """Compute all deferred samples."""
+        deferred, self._deferred = self._deferred, []
+        static_clearance = self._clearance.static_clearance
+        for sample in deferred:
             state = sample.state
-            sample.made = _made(Truth, (state.pose, state.twist, standing(state.pose), sample.objects))
+            sample.result = _new(Truth, (state.pose, state.twist, static_clearance(state.pose), sample.objects))

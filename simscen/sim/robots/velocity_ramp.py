@@ -1,51 +1,52 @@
-"""What a base's firmware makes of velocity commands: clipped, and never faster than it can accelerate."""
+"""Velocity limits of a base's firmware: clips commands and limits accelerations."""
 
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.robot import Limits
 
 
 class VelocityRamp:
-    """Follows commands within the limits of a base, one step every `period` seconds."""
+    """Follows velocity commands within the limits of a base, one step every `period` seconds."""
 
     def __init__(self, limits: Limits, period: float, holonomic: bool) -> None:
         self._limits = limits
-        self._lateral = (limits.lateral or limits.linear) if holonomic else 0.0
-        self._speed_up = limits.linear_acceleration * period
-        self._slow_down = (limits.linear_deceleration or limits.linear_acceleration) * period
-        self._turn = limits.angular_acceleration * period
-        self._asked = self.target = STOP
+        self._max_lateral = (limits.lateral or limits.linear) if holonomic else 0.0
+        self._speed_up_step = limits.linear_acceleration * period
+        self._slow_down_step = (limits.linear_deceleration or limits.linear_acceleration) * period
+        self._turn_step = limits.angular_acceleration * period
+        self._command = self.target = STOP
         self.velocity = STOP
 
     def command(self, twist: Twist) -> None:
-        """What to drive from now on."""
-        if twist == self._asked:
+        """Set the velocity to reach."""
+        if twist == self._command:
             return
-        limits, self._asked = self._limits, twist
+        limits, self._command = self._limits, twist
         self.target = Twist(
             min(limits.linear, max(-(limits.reverse or limits.linear), twist.vx)),
-            min(self._lateral, max(-self._lateral, twist.vy)),
+            min(self._max_lateral, max(-self._max_lateral, twist.vy)),
             min(limits.angular, max(-limits.angular, twist.wz)),
         )
 
     def advance(self) -> bool:
-        """Take one step towards the command; whether there was one to take."""
-        (vx, vy, wz), (to_x, to_y, to_w) = now, target = self.velocity, self.target
+        """Take one step towards the command; return whether the velocity changed."""
+        (vx, vy, wz), (target_vx, target_vy, target_wz) = now, target = self.velocity, self.target
         if now == target:
             return False
+        up, down, turn = self._speed_up_step, self._slow_down_step, self._turn_step
         self.velocity = Twist(
-            vx if vx == to_x else _towards(vx, to_x, self._speed_up, self._slow_down),
-            vy if vy == to_y else _towards(vy, to_y, self._speed_up, self._slow_down),
-            wz if wz == to_w else _towards(wz, to_w, self._turn, self._turn),
+            vx if vx == target_vx else _step_towards(vx, target_vx, up, down),
+            vy if vy == target_vy else _step_towards(vy, target_vy, up, down),
+            wz if wz == target_wz else _step_towards(wz, target_wz, turn, turn),
         )
         return True
 
     def rest(self) -> None:
-        """Stand still now; the command stays."""
+        """Set the velocity to zero; the command remains."""
         self.velocity = STOP
 
 
-def _towards(now: float, target: float, speed_up: float, slow_down: float) -> float:
-    """One step; a change of direction brakes to zero first."""
+def _step_towards(now: float, target: float, speed_up: float, slow_down: float) -> float:
+    """Return the next velocity; a change of direction first brakes to zero."""
     step = speed_up if now * target >= 0 and abs(target) > abs(now) else slow_down
     if now * target < 0:
         target = 0.0

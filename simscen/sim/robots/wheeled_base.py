@@ -1,4 +1,4 @@
-"""A robot in the engine: its hull as base, its wheels as links, and where its base frame is."""
+"""Base on wheels: a multibody with the hull as its base and the wheels as links."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -13,28 +13,27 @@ from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.body.undercarriage import Wheel, caster_gap, compliant_casters
 from simscen.sim.bullet import engine
 from simscen.sim.robots.robot_state import RobotState
-from simscen.sim.scene.terrain import ON_CASTERS, ON_WHEELS, Terrain
+from simscen.sim.scene.terrain import MIN_NORMAL_Z_CASTER, MIN_NORMAL_Z_WHEEL, Terrain
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-_made = tuple.__new__  # a state without the calls of its class
-KNUCKLE = 0.2
-"""Mass of a steering knuckle over that of its wheel."""
-PIN = 0.001
-"""Radius in m of what widens a wheel's extent."""
-SPARE = 1.1
-"""How much farther than its limits say a wheel may roll in a step."""
-HULL_PIECE = 0.001
-"""Mass in kg of a piece of the hull that the engine needs as a link; the chassis holds the true mass."""
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+_new = tuple.__new__  # creates a named tuple without the call overhead of its class
+KNUCKLE_MASS_RATIO = 0.2
+"""Mass of a steering knuckle relative to that of its wheel."""
+PIN_RADIUS_M = 0.001
+"""Radius of the sphere that enlarges the extent of a wheel; see `_wheel_shape`."""
+ROLL_MARGIN = 1.1
+"""Factor by which a wheel may roll farther in a step than its limits allow."""
+HULL_LINK_MASS_KG = 0.001
+"""Mass of a hull link, because the engine requires one; the chassis has the true mass."""
 
 
 class WheeledBase:
-    """A robot on wheels, resting on the ground.
+    """Robot on wheels.
 
-    A wheel touches the ground as a ball of its radius: one point of contact in the wheel's middle plane, so that the
-    radius and the separation in the datasheet are those of the contact, and half the time of a cylinder's contact. A
-    pin along its axle keeps it at one point however fast it rolls; see `_ball`.
-    Only the hull touches obstacles. On uneven ground the casters are a link of their own, so that one that stands on a
-    ramp can be told from a hull that scrapes it.
+    The contact shape of a wheel is a sphere of its radius: it has a single contact point in the center plane of the
+    wheel, so that radius and separation of the datasheet apply to the contact, and it takes half the time of a
+    cylinder. Only the hull collides with obstacles. On uneven ground, the casters are a separate link, to distinguish
+    a caster that stands on a ramp from a hull that scrapes it.
     """
 
     def __init__(
@@ -44,36 +43,36 @@ class WheeledBase:
         pose: Pose2,
         terrain: Terrain | None = None,
         tick: float = 0.0,
-        look: int = engine.AS_IT_IS,
+        visual_shape: int = engine.AS_IT_IS,
     ) -> None:
-        """Set down at `pose`; one step of the engine lasts `tick` seconds, 0 where nothing will ever drive it.
+        """Place the base at `pose`; a physics step lasts `tick` seconds, 0 for a robot that never drives.
 
-        The renderer is shown a `look` of the engine's.
+        The renderer shows `visual_shape`.
         """
         self._client, self._terrain = client, terrain
         moments, self._base_from_center = body.chassis.principal()
         self._center = self._base_from_center.position
         self._center_from_base = self._base_from_center.inverse()
-        self._level = self._center_from_base.quaternion == UPRIGHT
+        self._is_aligned = self._center_from_base.quaternion == IDENTITY
         casters = compliant_casters(body.casters) if terrain else ()
-        self.id, self.joints, self.hull_links = _build(client, body, casters, tick, look)
-        self.rolling: Mapping[int, float] = _rolling(body, self.joints, self.hull_links, casters)
-        standing = [(caster.pose.x, caster.pose.y) for caster in body.casters if not caster_gap(caster)]
-        self._feet = np.array([*((wheel.x, wheel.y) for wheel in body.wheels), *standing])
+        self.id, self.joints, self.hull_links = _build(client, body, casters, tick, visual_shape)
+        self.ground_links: Mapping[int, float] = _ground_links(body, self.joints, self.hull_links, casters)
+        on_ground = [(caster.pose.x, caster.pose.y) for caster in body.casters if not caster_gap(caster)]
+        self._supports = np.array([*((wheel.x, wheel.y) for wheel in body.wheels), *on_ground])
         pybullet.changeDynamics(self.id, -1, localInertiaDiagonal=moments, physicsClientId=client)
         for wheel, joint in zip(body.wheels, self.joints, strict=True):
-            self._set_up(wheel, joint)
+            self._set_up_wheel(wheel, joint)
         self._wheels: dict[int, Vector] = {
             joint + 1 if wheel.steered else joint: (wheel.x, wheel.y, 0.0)
             for wheel, joint in zip(body.wheels, self.joints, strict=True)
         }
-        self._grip = dict.fromkeys(self._wheels, 1.0)
+        self._frictions = dict.fromkeys(self._wheels, 1.0)
         self.place(pose)
 
-    def _set_up(self, wheel: Wheel, joint: int) -> None:
-        xx, yy, zz = wheel.inertia.tensor.diagonal().tolist()  # a wheel turns about y and is round
+    def _set_up_wheel(self, wheel: Wheel, joint: int) -> None:
+        xx, yy, zz = wheel.inertia.tensor.diagonal().tolist()  # the axle is the y axis
         link = joint + 1 if wheel.steered else joint
-        # The ball reaches out beyond a narrow wheel's sides: its guard in the hull stands for it there.
+        # The sphere extends beyond the sides of a narrow wheel; against obstacles, the wheel guard in the hull is used.
         engine.touch(self._client, self.id, link, engine.WHEEL, engine.GROUND | engine.TERRAIN)
         pybullet.changeDynamics(
             self.id,
@@ -88,8 +87,8 @@ class WheeledBase:
         )
 
     def place(self, pose: Pose2) -> None:
-        """Set it down at rest, its base frame on the ground."""
-        base = self._terrain.seat(pose, self._feet) if self._terrain else Pose3.planar(pose)
+        """Place the base at rest with its base frame on the ground."""
+        base = self._terrain.standing_pose(pose, self._supports) if self._terrain else Pose3.planar(pose)
         center = base.compose(self._base_from_center)
         pybullet.resetBasePositionAndOrientation(
             self.id, center.position, center.quaternion, physicsClientId=self._client
@@ -100,56 +99,57 @@ class WheeledBase:
             pybullet.resetJointState(self.id, joint, angle, 0.0, physicsClientId=self._client)
 
     def state(self) -> RobotState:
-        """Where it is and how it moves now."""
-        (px, py, pz), turn = pybullet.getBasePositionAndOrientation(self.id, self._client)
+        """Query the current state from the engine."""
+        (px, py, pz), quaternion = pybullet.getBasePositionAndOrientation(self.id, self._client)
         (vx, vy, vz), angular = pybullet.getBaseVelocity(self.id, self._client)
-        if self._level:
-            x, y, z = rotated(turn, self._center)
-            pose = _made(Pose3, (px - x, py - y, pz - z, *turn))
+        if self._is_aligned:
+            x, y, z = rotated(quaternion, self._center)
+            pose = _new(Pose3, (px - x, py - y, pz - z, *quaternion))
         else:
-            pose = Pose3(px, py, pz, *turn).compose(self._center_from_base)
+            pose = Pose3(px, py, pz, *quaternion).compose(self._center_from_base)
             x, y, z = rotated(pose.quaternion, self._center)
         wx, wy, wz = angular
-        return _made(
-            RobotState, (pose, (vx - (wy * z - wz * y), vy - (wz * x - wx * z), vz - (wx * y - wy * x)), angular)
-        )
+        linear = (vx - (wy * z - wz * y), vy - (wz * x - wx * z), vz - (wx * y - wy * x))
+        return _new(RobotState, (pose, linear, angular))
 
-    def hold(self, friction: Callable[[float, float], float]) -> None:
-        """Give each wheel the friction of the floor below it."""
+    def set_friction(self, friction: Callable[[float, float], float]) -> None:
+        """Set the friction of each wheel to that of the floor below it."""
         base = self.state().pose
-        for link, place in self._wheels.items():
-            x, y, _ = rotated(base.quaternion, place)
-            found = friction(base.x + x, base.y + y)
-            if found != self._grip[link]:
-                self._grip[link] = found
-                pybullet.changeDynamics(self.id, link, lateralFriction=found, physicsClientId=self._client)
+        for link, position in self._wheels.items():
+            x, y, _ = rotated(base.quaternion, position)
+            value = friction(base.x + x, base.y + y)
+            if value != self._frictions[link]:
+                self._frictions[link] = value
+                pybullet.changeDynamics(self.id, link, lateralFriction=value, physicsClientId=self._client)
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Push its center of mass during the next step, which lasts `seconds`."""
+        """Apply an impulse (N s, world frame) at its center of mass during the next step of `seconds`."""
         center = pybullet.getBasePositionAndOrientation(self.id, physicsClientId=self._client)[0]
         force = (impulse[0] / seconds, impulse[1] / seconds, 0.0)
         pybullet.applyExternalForce(self.id, -1, force, center, pybullet.WORLD_FRAME, physicsClientId=self._client)
 
 
-def _rolling(body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]) -> dict[int, float]:
-    """The links of wheels, and of casters that are a link of their own, which is the hull's last."""
+def _ground_links(
+    body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]
+) -> dict[int, float]:
+    """Return the links of wheels and of separate casters (the last link of the hull); see `Base.ground_links`."""
     wheels = [joint + 1 if wheel.steered else joint for wheel, joint in zip(body.wheels, joints, strict=True)]
-    return dict.fromkeys(wheels, ON_WHEELS) | ({hull[-1]: ON_CASTERS} if casters else {})
+    return dict.fromkeys(wheels, MIN_NORMAL_Z_WHEEL) | ({hull[-1]: MIN_NORMAL_Z_CASTER} if casters else {})
 
 
 def _build(
-    client: int, body: RobotBody, casters: Sequence[Solid], tick: float, look: int
+    client: int, body: RobotBody, casters: Sequence[Solid], tick: float, visual_shape: int
 ) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
-    """The multibody; for each wheel its first joint, steering before rolling; and the links of the hull.
+    """Return the body id, the first joint of each wheel (steering before rolling), and the links of the hull.
 
-    `casters` become the hull's last link; without any, those of the body are part of its first.
+    `casters` become the last link of the hull; without any, those of the body are part of its first link.
     """
     links: list[_Link] = []
     joints: list[int] = []
     for wheel in body.wheels:
         joints.append(len(links))
-        rolled = tick * (body.limits.linear + body.limits.angular * abs(wheel.y))
-        links += _links(client, wheel, len(links), rolled)
+        max_roll = tick * (body.limits.linear + body.limits.angular * abs(wheel.y))
+        links += _wheel_links(client, wheel, len(links), max_roll)
     shapes = (
         [*engine.hull_shapes(client, body.hull), *engine.hull_shapes(client, casters)]
         if casters
@@ -157,21 +157,21 @@ def _build(
     )
     first, *others = shapes
     hull = (-1, *range(len(links), len(links) + len(others)))
-    links += [_Link(HULL_PIECE, shape, (0.0, 0.0, 0.0), 0, pybullet.JOINT_FIXED, (0, 0, 1)) for shape in others]
+    links += [_Link(HULL_LINK_MASS_KG, shape, (0.0, 0.0, 0.0), 0, pybullet.JOINT_FIXED, (0, 0, 1)) for shape in others]
     _, center = body.chassis.principal()
     robot: int = pybullet.createMultiBody(
         body.chassis.mass,
         first,
-        look,
+        visual_shape,
         baseInertialFramePosition=center.position,
         baseInertialFrameOrientation=center.quaternion,
         linkMasses=[link.mass for link in links],
         linkCollisionShapeIndices=[link.shape for link in links],
-        linkVisualShapeIndices=[look] * len(links),
-        linkPositions=[link.place for link in links],
-        linkOrientations=[UPRIGHT] * len(links),
+        linkVisualShapeIndices=[visual_shape] * len(links),
+        linkPositions=[link.position for link in links],
+        linkOrientations=[IDENTITY] * len(links),
         linkInertialFramePositions=[(0, 0, 0)] * len(links),
-        linkInertialFrameOrientations=[UPRIGHT] * len(links),
+        linkInertialFrameOrientations=[IDENTITY] * len(links),
         linkParentIndices=[link.parent for link in links],
         linkJointTypes=[link.joint for link in links],
         linkJointAxis=[link.axis for link in links],
@@ -187,37 +187,37 @@ def _build(
 
 
 class _Link(NamedTuple):
-    """A link as createMultiBody wants it; parent 0 is the base, k + 1 is link k."""
+    """Link of a multibody for createMultiBody; parent 0 is the base, k + 1 is link k."""
 
     mass: float
     shape: int
-    place: Vector
+    position: Vector
     parent: int
     joint: int
     axis: tuple[int, int, int]
 
 
-def _links(client: int, wheel: Wheel, number: int, rolled: float) -> list[_Link]:
-    ball, place = _ball(client, wheel, rolled), (wheel.x, wheel.y, wheel.radius)
+def _wheel_links(client: int, wheel: Wheel, index: int, max_roll: float) -> list[_Link]:
+    shape, position = _wheel_shape(client, wheel, max_roll), (wheel.x, wheel.y, wheel.radius)
     if not wheel.steered:
-        return [_Link(wheel.inertia.mass, ball, place, 0, pybullet.JOINT_REVOLUTE, (0, 1, 0))]
+        return [_Link(wheel.inertia.mass, shape, position, 0, pybullet.JOINT_REVOLUTE, (0, 1, 0))]
     return [
-        _Link(KNUCKLE * wheel.inertia.mass, -1, place, 0, pybullet.JOINT_REVOLUTE, (0, 0, 1)),
-        _Link(wheel.inertia.mass, ball, (0.0, 0.0, 0.0), number + 1, pybullet.JOINT_REVOLUTE, (0, 1, 0)),
+        _Link(KNUCKLE_MASS_RATIO * wheel.inertia.mass, -1, position, 0, pybullet.JOINT_REVOLUTE, (0, 0, 1)),
+        _Link(wheel.inertia.mass, shape, (0.0, 0.0, 0.0), index + 1, pybullet.JOINT_REVOLUTE, (0, 1, 0)),
     ]
 
 
-def _ball(client: int, wheel: Wheel, rolled: float) -> int:
-    """A wheel that rolls at most so many meters in one step.
+def _wheel_shape(client: int, wheel: Wheel, max_roll: float) -> int:
+    """Return the contact shape of a wheel that rolls at most `max_roll` m in one step: a sphere, with a pin if needed.
 
-    Bullet takes a contact for the one of the step before if it is no farther from it on the wheel than a share of the
-    shape's extent, and otherwise keeps both: a bare ball that rolls by more than 2 % of its radius in a step trails up
-    to three points behind that carry nothing and double what a step costs. A pin along the axle, at whose height
-    nothing touches it, makes the extent large enough; it ends within the ball on the other side.
+    Bullet identifies a contact with one of the last step if its point on the wheel has moved by at most a share of the
+    extent of the shape; otherwise it keeps both. A sphere that rolls by more than 2 % of its radius per step would
+    accumulate up to three outdated points, which double the cost of a step. A small sphere along the axle, where
+    nothing touches it, makes the extent large enough; it lies within the wheel on the other side.
     """
-    reach = min(SPARE * rolled / engine.BREAKING, 2 * abs(wheel.y) + wheel.radius / 2)
-    if reach <= wheel.radius:
+    pin_distance = min(ROLL_MARGIN * max_roll / engine.BREAKING, 2 * abs(wheel.y) + wheel.radius / 2)
+    if pin_distance <= wheel.radius:
         shape: int = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel.radius, physicsClientId=client)
         return shape
-    pin = Solid(Sphere(PIN), Pose3(y=-math.copysign(reach, wheel.y)))
+    pin = Solid(Sphere(PIN_RADIUS_M), Pose3(y=-math.copysign(pin_distance, wheel.y)))
     return engine.compound_shape(client, [Solid(Sphere(wheel.radius)), pin])

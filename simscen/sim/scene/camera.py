@@ -1,4 +1,4 @@
-"""Pictures from PyBullet's own software renderer: slow, headless, deterministic."""
+"""Camera images from PyBullet's software renderer, which is slow but headless and deterministic."""
 
 import math
 from collections.abc import Mapping
@@ -12,95 +12,94 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Body, Solid, TriangleMesh
 from simscen.sim.bullet import engine
 
-NEAR = 0.02
-"""m in front of the lens from which on something is seen."""
+NEAR_PLANE_M = 0.02
+FACES_PER_SHAPE = 20_000
+"""Bullet accepts at most 131072 vertices per shape; here, each face has three vertices of its own."""
 
 
 def render_image(
     client: int, camera: Pose3, width: int, height: int, field_of_view: float, far: float
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-    """Colors (h, w, 3) and depths (h, w) in meters along the optical axis, inf beyond `far`.
+    """Return colors (h, w, 3) and depths (h, w) in meters along the optical axis, inf beyond `far`.
 
-    The camera looks along the x axis of its pose, z is up; `field_of_view` is horizontal, in rad.
+    The optical axis is the x axis of the camera pose, and z is up; `field_of_view` is horizontal, in rad.
     """
-    eye, ahead, up = camera.apply(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])).tolist()
-    over = [a - b for a, b in zip(up, eye, strict=True)]
-    vertical = 2 * math.atan(math.tan(field_of_view / 2) * height / width)
+    eye, target, above = camera.apply(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])).tolist()
+    up = [a - b for a, b in zip(above, eye, strict=True)]
+    vertical_field_of_view = 2 * math.atan(math.tan(field_of_view / 2) * height / width)
     _, _, rgba, depth, _ = pybullet.getCameraImage(
         width,
         height,
-        pybullet.computeViewMatrix(eye, ahead, over),
-        pybullet.computeProjectionMatrixFOV(math.degrees(vertical), width / height, NEAR, far),
+        pybullet.computeViewMatrix(eye, target, up),
+        pybullet.computeProjectionMatrixFOV(math.degrees(vertical_field_of_view), width / height, NEAR_PLANE_M, far),
         shadow=0,
         renderer=pybullet.ER_TINY_RENDERER,
         flags=pybullet.ER_NO_SEGMENTATION_MASK,
         physicsClientId=client,
     )
     buffer = np.reshape(np.asarray(depth, dtype=np.float64), (height, width))
-    meters = far * NEAR / (far - (far - NEAR) * buffer)
+    meters = far * NEAR_PLANE_M / (far - (far - NEAR_PLANE_M) * buffer)
     meters[buffer >= 1.0] = np.inf
     colors = np.reshape(np.asarray(rgba, dtype=np.uint8), (height, width, 4))[:, :, :3]
     return np.ascontiguousarray(colors), meters.astype(np.float32)
 
 
-# The scene for the renderer. Built with the first image, because most runs take none.
-FACES_AT_ONCE = 20_000
-"""Bullet's commands hold at most 131072 vertices, and here every face brings its own three."""
-
-
 @dataclass(frozen=True, eq=False)
-class _Prop:
-    """A thing that moves: what the renderer shows of `solids`, by the engine's numbers."""
+class _VisualBody:
+    """Bodies with the ids `body_ids` that show the `solids` of a movable object."""
 
     solids: tuple[Solid, ...]
-    numbers: tuple[int, ...]
+    body_ids: tuple[int, ...]
 
 
 class RenderScene:
-    """Bodies without substance, which the renderer sees: it does not see collision shapes made of triangles."""
+    """Visual bodies for the renderer, which does not show collision shapes made of triangles.
+
+    They are built with the first image, because most runs take none.
+    """
 
     def __init__(self, client: int, static: TriangleMesh, triangulate: engine.Triangulate) -> None:
         self._client, self._static, self._triangulate = client, static, triangulate
-        self._begun = False
-        self._props: dict[str, _Prop] = {}
+        self._is_built = False
+        self._visuals: dict[str, _VisualBody] = {}
 
-    def set(self, moving: Mapping[str, tuple[Body, Pose3]]) -> None:
-        """Show everything where it is now."""
-        if not self._begun:
-            self._begun = True
+    def update(self, moving: Mapping[str, tuple[Body, Pose3]]) -> None:
+        """Move all visual bodies to the current poses of the movable objects."""
+        if not self._is_built:
+            self._is_built = True
             engine.touch(self._client, engine.plane(self._client), -1, engine.NOTHING, engine.NOTHING)
-            self._shown(self._static.vertices, self._static.faces)
-        for name in [name for name in self._props if name not in moving]:
-            self._strike(name)
+            self._create_bodies(self._static.vertices, self._static.faces)
+        for name in [name for name in self._visuals if name not in moving]:
+            self._remove(name)
         for name, (body, pose) in moving.items():
             if not engine.simple(body.solids):
                 self._place(name, body, pose)
 
     def _place(self, name: str, body: Body, pose: Pose3) -> None:
-        known = self._props.get(name)
+        known = self._visuals.get(name)
         if known is None or known.solids is not body.solids:
-            self._strike(name)
+            self._remove(name)
             mesh = engine.fused(body.solids, self._triangulate)
-            known = self._props[name] = _Prop(body.solids, self._shown(mesh.vertices, mesh.faces))
-        for number in known.numbers:
+            known = self._visuals[name] = _VisualBody(body.solids, self._create_bodies(mesh.vertices, mesh.faces))
+        for body_id in known.body_ids:
             pybullet.resetBasePositionAndOrientation(
-                number, pose.position, pose.quaternion, physicsClientId=self._client
+                body_id, pose.position, pose.quaternion, physicsClientId=self._client
             )
 
-    def _strike(self, name: str) -> None:
-        prop = self._props.pop(name, None)
-        for number in prop.numbers if prop else ():
-            pybullet.removeBody(number, physicsClientId=self._client)
+    def _remove(self, name: str) -> None:
+        visual = self._visuals.pop(name, None)
+        for body_id in visual.body_ids if visual else ():
+            pybullet.removeBody(body_id, physicsClientId=self._client)
 
-    def _shown(self, vertices: Array, faces: engine.Faces) -> tuple[int, ...]:
+    def _create_bodies(self, vertices: Array, faces: engine.Faces) -> tuple[int, ...]:
         return tuple(
-            pybullet.createMultiBody(0, -1, self._visible(vertices[faces[k : k + FACES_AT_ONCE]]),
+            pybullet.createMultiBody(0, -1, self._create_shape(vertices[faces[k : k + FACES_PER_SHAPE]]),
                                      physicsClientId=self._client)
-            for k in range(0, len(faces), FACES_AT_ONCE)
+            for k in range(0, len(faces), FACES_PER_SHAPE)
         )  # fmt: skip
 
-    def _visible(self, corners: Array) -> int:
-        """A shape for the renderer of triangles (n, 3, 3). Every face has its own normal."""
+    def _create_shape(self, corners: Array) -> int:
+        """Return a visual shape of triangles (n, 3, 3), each with its own normal."""
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         shape: int = pybullet.createVisualShape(

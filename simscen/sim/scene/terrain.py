@@ -1,7 +1,7 @@
-"""Ground that is not level: what wheels roll on besides the plane z = 0, and how a robot stands there.
+"""Uneven ground besides the plane z = 0, the pose of a robot on it, and the friction of the floor.
 
-Each convex solid is one convex shape, so that a wheel which rolls over a ramp meets no edges between triangles. Concave
-ones (height fields, meshes) stay triangles; on those a wheel loses some millimeters per second at each edge.
+Each convex solid becomes one convex shape, so that a wheel on a ramp does not bump into edges between triangles.
+Concave solids (height fields, meshes) remain triangles; there, a wheel loses some millimeters per second at each edge.
 """
 
 import math
@@ -18,48 +18,49 @@ from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.sim.bullet import engine
 
-SKY = 1000.0
-"""m above and below which nobody looks for ground."""
-ON_WHEELS, ON_CASTERS = 0.6, 0.1
-"""z of the unit normal above which a wheel or caster stands on what it touches; below, it has hit an edge too high.
+RAY_HEIGHT_M = 1000.0
+"""Height above and below the floor between which the ground is searched."""
+MIN_NORMAL_Z_WHEEL, MIN_NORMAL_Z_CASTER = 0.6, 0.1
+"""z of the contact normal above which a wheel or caster stands on the ground; below, it has hit an obstacle.
 
-A driven wheel gets up an edge of 0.29 of its radius by its own grip, and of 0.4 (this) with some run-up; a caster is
-pushed over anything lower than its middle.
+A driven wheel climbs an edge of 0.29 of its radius from standstill, and of 0.4 (this limit) with some speed; a caster
+is pushed over anything lower than its center.
 """
 
 
 class Terrain:
-    """The solids of a static world that wheels may roll on, each a body of the engine's: `names` by its number.
+    """The solids of a static world that wheels can roll on, as bodies in the engine; empty if the world is flat.
 
-    Where the world is flat there are none.
+    `names` are their names by body id.
     """
 
-    def __init__(self, client: int, static: TriangleMesh, reach: float) -> None:
-        """`reach` is the highest step in m that any robot could get onto: the radius of its wheels."""
+    def __init__(self, client: int, static: TriangleMesh, max_step: float) -> None:
+        """Build the solids; `max_step` is the highest step in m that any robot can climb: the radius of its wheels."""
         self._client = client
-        self.owners: Owners = drivable_solids(static, reach)
+        self.owners: Owners = drivable_solids(static, max_step)
         self.names: dict[int, str | None] = {}
-        self.rest = static
-        """What stands in the world besides: walls to wheels."""
+        self.obstacles = static
+        """The rest of the static world, on which no wheel can roll."""
         for owner in sorted(self.owners):
             self._add(static, owner)
         if self.owners:
-            # The engine's rays meet nothing that has never been looked at.
+            # Rays only hit bodies after a first collision detection.
             pybullet.performCollisionDetection(physicsClientId=client)
-            stays = ~np.isin(static.owners, sorted(self.owners))
-            self.rest = TriangleMesh(static.vertices, static.faces[stays], static.owners[stays], static.names)
+            is_obstacle = ~np.isin(static.owners, sorted(self.owners))
+            faces, owners = static.faces[is_obstacle], static.owners[is_obstacle]
+            self.obstacles = TriangleMesh(static.vertices, faces, owners, static.names)
 
     def __bool__(self) -> bool:
         return bool(self.names)
 
     def _add(self, static: TriangleMesh, owner: int) -> None:
-        whole = static.faces[static.owners == owner]
-        solid = submesh(static.vertices, whole)
+        faces = static.faces[static.owners == owner]
+        solid = submesh(static.vertices, faces)
         if is_convex(solid):
             shapes = [engine.convex_shape(self._client, solid.vertices)]
         else:
-            lots = engine.tiles(static.vertices, engine.above_floor(static.vertices, whole))
-            shapes = [engine.concave_shape(self._client, submesh(static.vertices, lot)) for lot in lots]
+            tiles = engine.tiles(static.vertices, engine.above_floor(static.vertices, faces))
+            shapes = [engine.concave_shape(self._client, submesh(static.vertices, tile)) for tile in tiles]
         friction = static.frictions[owner] if static.frictions else 1.0
         for shape in shapes:
             body = engine.fixed(self._client, shape)
@@ -70,72 +71,76 @@ class Terrain:
             self.names[body] = static.names[owner]
 
     def heights(self, points: Array) -> Array:
-        """The height (n,) in m of the ground at points (n, 2); of several floors the uppermost."""
+        """Return the heights (n,) in m of the ground at points (n, 2); the highest surface counts."""
         if not self.names:
             return np.zeros(len(points))
-        above = np.column_stack((points, np.full(len(points), SKY))).tolist()
-        below = np.column_stack((points, np.full(len(points), -SKY))).tolist()
-        found = pybullet.rayTestBatch(
-            above, below, collisionFilterMask=engine.TERRAIN, physicsClientId=self._client
-        )  # fmt: skip
-        return np.array([max(0.0, hit[3][2]) if hit[0] in self.names else 0.0 for hit in found])
+        above = np.column_stack((points, np.full(len(points), RAY_HEIGHT_M))).tolist()
+        below = np.column_stack((points, np.full(len(points), -RAY_HEIGHT_M))).tolist()
+        hits = pybullet.rayTestBatch(above, below, collisionFilterMask=engine.TERRAIN, physicsClientId=self._client)
+        return np.array([max(0.0, hit[3][2]) if hit[0] in self.names else 0.0 for hit in hits])
 
-    def lifted(self, body: Body) -> Body:
-        """A thing that is put where its own frame is on the ground, which may be a platform."""
+    def raise_to_ground(self, body: Body) -> Body:
+        """Return a body raised by the height of the ground below its origin."""
         height = float(self.heights(np.array([body.pose.position[:2]]))[0])
         return replace(body, pose=body.pose._replace(z=body.pose.z + height)) if height else body
 
-    def seat(self, pose: Pose2, feet: Array) -> Pose3:
-        """The base frame of a robot that is set down with its `feet` (n, 2), in its own frame, on the ground.
+    def standing_pose(self, pose: Pose2, supports: Array) -> Pose3:
+        """Return the base frame of a robot that stands at `pose` on its `supports` (n, 2), given in its own frame.
 
-        It lies on the plane that fits the ground below them best, lifted so that none is inside of it.
+        It lies on the plane that fits the ground below the supports best, raised so that none is below the ground.
         """
-        heights = self.heights(pose.apply(feet))
-        if len(feet) < 3 or not np.ptp(heights):
+        heights = self.heights(pose.apply(supports))
+        if len(supports) < 3 or not np.ptp(heights):
             return Pose3.planar(pose, float(heights.max(initial=0.0)))
-        plane, *_ = np.linalg.lstsq(np.column_stack((feet, np.ones(len(feet)))), heights, rcond=None)
-        ahead, left, base = plane.tolist()
-        lift = float((heights - feet @ plane[:2] - base).max())
-        tilt = Pose3.from_rpy(0.0, 0.0, 0.0, math.atan2(left, math.hypot(1.0, ahead)), -math.atan(ahead), 0.0)
+        plane, *_ = np.linalg.lstsq(np.column_stack((supports, np.ones(len(supports)))), heights, rcond=None)
+        slope_x, slope_y, base = plane.tolist()
+        lift = float((heights - supports @ plane[:2] - base).max())
+        roll, pitch = math.atan2(slope_y, math.hypot(1.0, slope_x)), -math.atan(slope_x)
+        tilt = Pose3.from_rpy(0.0, 0.0, 0.0, roll, pitch, 0.0)
         return Pose3.planar(pose, base + lift).compose(tilt)
 
 
 def is_ground_contact(
-    drivable_solids: Mapping[int, str | None], rolling: Mapping[int, float], other: int, link: int, up: float
+    ground: Mapping[int, str | None], min_normal_z: Mapping[int, float], other: int, link: int, normal_z: float
 ) -> bool:
-    """Whether a contact is that of a wheel or caster with the ground, rather than a collision.
+    """Return whether the contact of a link with the body `other` is that of a wheel or caster with the ground.
 
-    `rolling` are those links, and the least `up` at which they stand: the z of the unit normal towards the robot.
-    `other` is the engine's number of what the robot's `link` touches.
+    `ground` has the bodies of the terrain. `min_normal_z` has the links of wheels and casters, each with the smallest z
+    of the unit normal towards the robot at which it stands on the ground.
     """
-    return other in drivable_solids and link in rolling and up >= rolling[link]
+    return other in ground and link in min_normal_z and normal_z >= min_normal_z[link]
 
 
 class FloorFriction:
-    """Patches of the floor by name; one that is laid later lies upon the others."""
+    """Named patches of the floor with a friction of their own; later patches cover earlier ones.
+
+    The engine multiplies the frictions of both bodies. A wheel has friction 1, so that the friction of the floor is
+    that of the contact; on a patch, the wheel gets the friction of the patch instead. On a ramp with a friction of its
+    own, both are multiplied.
+    """
 
     def __init__(self) -> None:
         self._patches: dict[str, tuple[Patch, tuple[float, float, float, float]]] = {}
-        self._over = False
+        self._has_expired = False
 
     def __bool__(self) -> bool:
-        """Whether there has ever been one, so that wheels have to be looked after."""
-        return bool(self._patches) or self._over
+        """Whether there has ever been a patch, so that the friction of wheels must be updated."""
+        return bool(self._patches) or self._has_expired
 
-    def lay(self, name: str, patch: Patch) -> None:
-        """Make a piece of floor slippery, or dry again; a patch of the same name is replaced."""
+    def add(self, name: str, patch: Patch) -> None:
+        """Add a patch; replaces a patch of the same name."""
         xs, ys = zip(*patch.outline, strict=True)
         self._patches.pop(name, None)
         self._patches[name] = patch, (min(xs), min(ys), max(xs), max(ys))
 
-    def pass_time(self, tick: int) -> None:
-        """What is over by now dries up."""
+    def remove_expired(self, tick: int) -> None:
+        """Remove the patches whose time is over."""
         for name in [name for name, (patch, _) in self._patches.items() if patch.until <= tick]:
-            self._over = True
+            self._has_expired = True
             del self._patches[name]
 
     def friction(self, x: float, y: float) -> float:
-        """At a place: that of the uppermost patch there, else 1."""
+        """Return the friction of the top patch at a point, 1 without a patch."""
         found = 1.0
         for patch, (left, low, right, high) in self._patches.values():
             if left <= x <= right and low <= y <= high and polygon_contains(patch.outline, (x, y)):

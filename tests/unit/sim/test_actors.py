@@ -37,7 +37,7 @@ def test_spawned_bodies_are_there_and_removed_ones_are_gone(simulate):
     simulation = simulate()
     simulation.spawn(Body("crate", CRATE, Pose3(1.0, 2.0)))
     assert simulation.object_pose("crate") == Pose3(1.0, 2.0)
-    assert list(simulation.robot.moving()) == ["crate"]
+    assert list(simulation.robot.bodies_and_poses()) == ["crate"]
     simulation.remove("crate")
     simulation.remove("no such thing")
     assert simulation.object_pose("crate") is None

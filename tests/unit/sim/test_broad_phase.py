@@ -11,9 +11,9 @@ def test_nobody_meets_within_the_time_that_is_promised():
     for _ in range(300):
         scripted = BoundingDiscs(rng.uniform(-2, 2, (3, 2)), rng.uniform(0.1, 0.3, 3), rng.uniform(0, 2, 3))
         pushable = BoundingDiscs(rng.uniform(-2, 2, (4, 2)), rng.uniform(0.1, 0.3, 4), rng.uniform(0, 1, 4))
-        found = find_candidates(scripted, pushable, hit=1.5)
+        found = find_candidates(scripted, pushable, hit_speed=1.5)
         assert 0 < found.seconds <= HORIZON_S
-        apart = np.linalg.norm(scripted.places[:, None] - pushable.places, axis=2)
+        apart = np.linalg.norm(scripted.centers[:, None] - pushable.centers, axis=2)
         reach = scripted.radii[:, None] + pushable.radii + found.seconds * (scripted.speeds[:, None] + 1.5)
         for mover, thing in np.argwhere(apart < reach).tolist():
             assert mover in found.scripted

@@ -57,7 +57,7 @@ def test_what_no_picture_is_taken_of_moves_no_differently(simulate):
     path = MotionPath((0.0, 1.0), (Pose2(5, 0), Pose2(3, 0)))
     cart = Body("cart", (box("cart", 0, 0, 0.2, 2, 2),), Pose3(5), path=path)
     seen, unseen = (
-        simulate(solids=[box("wall", 1.5, 0.5, 0.1, 1)], bodies=[cart], drive=(0.5, 0.0, 0.3), pictures=pictures)
+        simulate(solids=[box("wall", 1.5, 0.5, 0.1, 1)], bodies=[cart], drive=(0.5, 0.0, 0.3), has_images=pictures)
         for pictures in (True, False)
     )
     for _ in range(60):

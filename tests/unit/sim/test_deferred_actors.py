@@ -16,7 +16,7 @@ from simscen.core.records.events import EventKind
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.objects.actor import Actor
 from simscen.sim.objects.proximity import REQUERY_DISTANCE_M, DeferredActors, ProximityQuery
-from simscen.sim.simulation import Placed, Simulation
+from simscen.sim.simulation import RobotPlacement, Simulation
 from simscen.worlds.geometry.triangulation import fuse, triangulate
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
@@ -47,10 +47,10 @@ def test_all_whose_ways_lead_a_robot_within_its_reach_are_met_and_few_others(sim
     """Held against where paths are at many moments."""
     chance = random.Random(seed)
     bodies = [thing(chance, f"{k}", (chance.uniform(-20, 20), chance.uniform(-20, 20))) for k in range(60)]
-    simulation = simulate(bodies=bodies, pose=Pose2(100.0, 100.0), pictures=False)
+    simulation = simulate(bodies=bodies, pose=Pose2(100.0, 100.0), has_images=False)
     actors = list(simulation._scene.actors._actors.values())
     absent, place = DeferredActors(actors), (chance.uniform(-5, 5), chance.uniform(-5, 5), 0.0)
-    met = absent.met([ProximityQuery(place, 3.0)])
+    met = absent.activate_near([ProximityQuery(place, 3.0)])
 
     def nearest(actor: Actor) -> float:
         if actor.path is None:
@@ -59,12 +59,15 @@ def test_all_whose_ways_lead_a_robot_within_its_reach_are_met_and_few_others(sim
         return min(math.dist(pose_at(actor.path, actor.path.start + at)[:2], place[:2]) for at in moments) - actor.size
 
     away = {actor.body.name: nearest(actor) for actor in actors}
-    strays = {actor.body.name: max(way.deviation for way in actor.ways) for actor in actors}
+    strays = {actor.body.name: max(way.deviation for way in actor.segments) for actor in actors}
     names = {actor.body.name for actor in met}
     assert 0 < len(names) < 50
     assert {name for name, distance in away.items() if distance <= 3.0 + REQUERY_DISTANCE_M} <= names
     assert {name for name in names if away[name] > 3.2 + REQUERY_DISTANCE_M + strays[name]} == set()
-    assert absent.met([ProximityQuery((place[0] + REQUERY_DISTANCE_M, *place[1:]), 3.0 - REQUERY_DISTANCE_M)]) == []
+    assert (
+        absent.activate_near([ProximityQuery((place[0] + REQUERY_DISTANCE_M, *place[1:]), 3.0 - REQUERY_DISTANCE_M)])
+        == []
+    )
 
 
 def course(seed, present):
@@ -74,8 +77,11 @@ def course(seed, present):
     quick = replace(quick, limits=quick.limits.model_copy(update={"linear": 2.0, "linear_acceleration": 4.0}))
     bodies = [thing(chance, name, (chance.uniform(-9, 9), chance.uniform(-9, 9))) for name in NAMES]
     bodies += [thing(chance, f"far {number}", (60.0, 10.0 * number)) for number in range(3)]
-    placed = {"a": Placed(quick, Pose2(0.0, 0.0)), "b": Placed(build_robot_body(shipped("jackal")), Pose2(2.0, 1.5))}
-    simulation = Simulation(fuse([box("post", 3, -2, 0.3, 0.3)]), bodies, placed, triangulate, pictures=present)
+    placed = {
+        "a": RobotPlacement(quick, Pose2(0.0, 0.0)),
+        "b": RobotPlacement(build_robot_body(shipped("jackal")), Pose2(2.0, 1.5)),
+    }
+    simulation = Simulation(fuse([box("post", 3, -2, 0.3, 0.3)]), bodies, placed, triangulate, has_images=present)
     beats = []
     for beat in range(48):
         simulation.step(6)
@@ -95,7 +101,7 @@ def course(seed, present):
                 simulation.move(name, wild_path(chance, there[:2], 3))
             else:
                 simulation.place(name, Pose2(*beside))
-    count = len(simulation._scene.actors.ids()), len(simulation._scene.actors.bodies())
+    count = len(simulation._scene.actors.names_by_id()), len(simulation._scene.actors.bodies())
     simulation.close()
     return beats, count
 
@@ -111,7 +117,7 @@ def test_robots_meet_what_they_would_if_all_were_in_the_engine_from_the_start(se
 
 
 def there(simulation):
-    return set(simulation._scene.actors.ids().values())
+    return set(simulation._scene.actors.names_by_id().values())
 
 
 RADIUS = build_robot_body(shipped("turtlebot")).radius
@@ -120,7 +126,7 @@ COMES = Body("comes", CRATE, Pose3(0, 30), path=MotionPath((0.0, 60.0), (Pose2(0
 
 
 def test_the_engine_has_what_comes_near_some_time_and_what_a_robot_comes_near_to(simulate):
-    simulation = simulate(bodies=[FAR, COMES], pictures=False)
+    simulation = simulate(bodies=[FAR, COMES], has_images=False)
     assert there(simulation) == {"comes"}
     simulation.place_robot(Pose2(4.0, 0.0))
     assert there(simulation) == {"comes", "far"}
@@ -131,7 +137,7 @@ def test_the_engine_has_what_comes_near_some_time_and_what_a_robot_comes_near_to
 
 @pytest.mark.parametrize("every", [12, 18 * 240], ids=["asked", "not asked"])
 def test_what_a_robot_drives_into_from_afar_is_touched(simulate, every):
-    simulation = simulate(bodies=[FAR], drive=(0.5, 0.0, 0.0), pictures=False)
+    simulation = simulate(bodies=[FAR], drive=(0.5, 0.0, 0.0), has_images=False)
     for _ in range(18 * 240 // every):
         simulation.step(every)
         clearance = simulation.truth().clearance
@@ -140,20 +146,20 @@ def test_what_a_robot_drives_into_from_afar_is_touched(simulate, every):
 
 
 def test_where_anything_can_be_pushed_the_engine_has_everything(simulate):
-    simulation = simulate(bodies=[FAR], pictures=False)
+    simulation = simulate(bodies=[FAR], has_images=False)
     assert there(simulation) == set()
     simulation.spawn(Body("light", CRATE, Pose3(-3.0), mass=1.0))
     assert there(simulation) == {"far", "light"}
 
 
 def test_who_is_led_is_in_the_engine_for_it_may_go_anywhere(simulate):
-    simulation = simulate(pictures=False)
-    simulation.come(FAR, 1.0)
+    simulation = simulate(has_images=False)
+    simulation.add_steered(FAR, 1.0)
     assert there(simulation) == {"far"}
 
 
 def test_nobody_is_measured_against_what_is_missing(simulate):
     """Rather than that a collision with it is not seen."""
-    simulation = simulate(bodies=[FAR], pictures=False)
+    simulation = simulate(bodies=[FAR], has_images=False)
     with pytest.raises(LookupError, match='"far" is not in the engine'):
-        simulation._scene.actors.within((7.0, 0.0, 0.0), 2.0, 2.0, 0, simulation.robot.base.id)
+        simulation._scene.actors.ids_near(simulation.robot.base.id, (7.0, 0.0, 0.0), 2.0, 2.0, 0)

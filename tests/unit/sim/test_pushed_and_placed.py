@@ -97,7 +97,7 @@ def test_a_force_on_the_robot_adds_up_to_its_impulse_evenly_and_ends(simulate):
     number, client = simulation.robot.base.id, simulation._scene.client
     place, turn = pybullet.getBasePositionAndOrientation(number, physicsClientId=client)
     pybullet.resetBasePositionAndOrientation(number, (*place[:2], place[2] + 0.5), turn, physicsClientId=client)
-    simulation.robot.press((0.9, 0.0), 0.1)
+    simulation.robot.push_for((0.9, 0.0), 0.1)
     speeds = []
     for _ in range(3):
         simulation.step(12)

@@ -43,7 +43,7 @@ def test_who_else_looks_changes_not_one_bit_of_a_scan(simulate):
     other, at_home = [], []
 
     def look(simulation):
-        homes = simulation.robot.homes
+        homes = simulation.robot.rest_poses
         other or other.append(LiveRayCaster(RayScene(fuse([WALL])), simulation.robot, frozenset({"crate 1"})))
         other[0].sweep(FAN, Pose3.from_rpy(0.0, 0.5, 0.3, 0.1, 0.2, 0.0), 9.0)
         at_home.append({name for name, pose in simulation.objects().items() if homes.get(name) == pose})
@@ -62,7 +62,9 @@ def test_a_scan_sees_what_it_would_see_of_each_thing_alone(simulate):
 
     def look(simulation):
         scene = RayScene(fuse([WALL]))
-        scene.set_moving({name: (fuse(body.solids), pose) for name, (body, pose) in simulation.robot.moving().items()})
+        scene.set_moving(
+            {name: (fuse(body.solids), pose) for name, (body, pose) in simulation.robot.bodies_and_poses().items()}
+        )
         apart.append(np.minimum(scene.sweep(FAN, simulation.base_pose()._replace(z=0.2), 6.0), 6.0))
 
     _, scans = drive(simulate, 48, look)

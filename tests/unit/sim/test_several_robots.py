@@ -10,7 +10,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.run.live_world.ray_caster import LiveRayCaster
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.simulation import Placed, Simulation
+from simscen.sim.simulation import RobotPlacement, Simulation
 from simscen.worlds.geometry.triangulation import fuse, triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
 
@@ -24,7 +24,8 @@ def meet():
 
     def make(solids=(), **robots):
         placed = {
-            name: Placed(build_robot_body(shipped(model)), Pose2(*pose)) for name, (model, *pose) in robots.items()
+            name: RobotPlacement(build_robot_body(shipped(model)), Pose2(*pose))
+            for name, (model, *pose) in robots.items()
         }
         made.append(Simulation(fuse(list(solids)), [], placed, triangulate))
         return made[-1]

@@ -67,8 +67,8 @@ def test_what_rests_is_slow_at_every_look_and_not_faster_at_each(monkeypatch, sp
     monkeypatch.setattr(pybullet, "getBaseVelocity", lambda *_: ((next(seen), 0.0, 0.0), (0.0, 0.0, 0.0)))
     settling = RestDetector(0, [7])
     for _ in speeds:
-        settling.look()
-    assert settling.at_rest() == ({7} if rests else set())
+        settling.sample()
+    assert settling.resting_ids() == ({7} if rests else set())
 
 
 def test_what_rolls_slowly_rolls_on(simulate):

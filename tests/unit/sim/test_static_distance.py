@@ -66,9 +66,9 @@ def proximity():
 
 
 def test_the_owner_is_the_solid_whose_surface_is_nearest(proximity):
-    assert proximity.owner((1.01, 0.5, 0.2)) == "shelf"
-    assert proximity.owner((2.71, 0.0, 0.2)) == "post"
-    assert proximity.owner((50.0, 0.0, 0.2)) == ""
+    assert proximity.nearest_owner((1.01, 0.5, 0.2)) == "shelf"
+    assert proximity.nearest_owner((2.71, 0.0, 0.2)) == "post"
+    assert proximity.nearest_owner((50.0, 0.0, 0.2)) == ""
 
 
 def test_distances_are_to_the_nearest_solid_but_the_floor(proximity):
@@ -149,7 +149,7 @@ def test_what_stands_behind_nearer_solids_is_not_built():
     made = StaticDistance(fuse(rows), drum_robot(0.2, 0.4), 2.0)
     for k in range(200):
         assert made.distance(Pose3(0.1 * k)) == pytest.approx(0.4, abs=1e-6)
-    assert 20 <= len(made._pairs) <= 44
+    assert 20 <= len(made._shape_pairs) <= 44
     made.close()
 
 
@@ -193,9 +193,9 @@ def test_a_solid_as_large_as_a_map_is_asked_where_the_robot_is_only():
     wall = wall_of_many_triangles(400, 60)
     made = StaticDistance(fuse([Solid(wall, Pose3(), "wall")]), build_robot_body(shipped("turtlebot")), 2.0)
     assert made.distance(Pose3(4.0, 0.0)) == pytest.approx(1.0 - 0.22, abs=1e-3)
-    assert sum(len(made._parts.faces(part)) for part in made._pairs) < 0.5 * len(wall.faces)
-    assert made.owner((5.0, 1.0, 0.5)) == "wall"
-    assert made.around((4.0, 0.0, 0.5)) == []
+    assert sum(len(made._parts.faces(part)) for part in made._shape_pairs) < 0.5 * len(wall.faces)
+    assert made.nearest_owner((5.0, 1.0, 0.5)) == "wall"
+    assert made.enclosing((4.0, 0.0, 0.5)) == []
 
 
 def room_of_many_triangles():
@@ -210,11 +210,11 @@ def test_a_place_is_inside_a_solid_of_many_tiles_as_in_any_other():
         build_robot_body(shipped("turtlebot")),
         2.0,
     )
-    assert [made.name(k) for k in made.around((1.0, 1.0, 0.5))] == ["block"]
-    assert [made.name(k) for k in made.around((20.0, 0.0, 0.5))] == ["shelf"]
+    assert [made.name(k) for k in made.enclosing((1.0, 1.0, 0.5))] == ["block"]
+    assert [made.name(k) for k in made.enclosing((20.0, 0.0, 0.5))] == ["shelf"]
     assert made.distance(Pose3(6.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
-    assert not made.convex(0)
-    assert made.convex(1)
+    assert not made.is_convex(0)
+    assert made.is_convex(1)
 
 
 def test_a_line_through_a_place_tells_whether_a_surface_winds_around_it():

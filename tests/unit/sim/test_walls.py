@@ -40,7 +40,7 @@ def test_a_large_world_is_that_in_which_all_walls_stand_from_the_start(simulate,
     """To the last bit until something touches a wall; from then on the engine solves contacts in another order."""
     courses = []
     for few in (10**9, 0):
-        monkeypatch.setattr(walls, "FEW", few)
+        monkeypatch.setattr(walls, "SMALL_WORLD_FACES", few)
         simulation = simulate(solids=WORLD, bodies=[CRATE])
         happens(simulation)
         course = []
@@ -60,7 +60,7 @@ def test_a_large_world_is_that_in_which_all_walls_stand_from_the_start(simulate,
 
 
 def test_walls_that_nothing_comes_near_are_not_put_up(simulate, monkeypatch):
-    monkeypatch.setattr(walls, "FEW", 0)
+    monkeypatch.setattr(walls, "SMALL_WORLD_FACES", 0)
     simulation = simulate(solids=WORLD, pose=Pose2(0.0, 4.0, math.pi))
     simulation.drive(Twist(0.5, 0.0, 0.0))
     for _ in range(320):
