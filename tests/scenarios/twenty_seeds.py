@@ -41,7 +41,7 @@ def table(runs: Iterable[Run]) -> str:
         themes[name.split("/")[0]].append(_row(name, by_scenario[name]))
     return "".join(
         f"\n## {theme.replace('_', ' ').capitalize()}\n\n"
-        "| scenario | why a team would want it | passed | simulated | what failed |\n|---|---|---|---|---|\n"
+        "| scenario | description | passed | simulated time | failed criteria |\n|---|---|---|---|---|\n"
         + "".join(rows)
         for theme, rows in themes.items()
     )

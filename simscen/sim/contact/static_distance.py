@@ -235,8 +235,8 @@ def _distances_to_segments(point: Array, start: Array, end: Array) -> Array:
 def encloses(corners: Array, point: Vector) -> bool:
     """Return whether a surface of triangles (n, 3, 3), counterclockwise from outside, encloses a point.
 
-    It does if its winding number, the sum of solid angles over 4 pi, exceeds one half, also with small holes (van
-    Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
+    It does if its winding number, the sum of solid angles over 4 pi, exceeds one half, also with small holes
+    (van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
     """
     ax, ay, az, bx, by, bz, cx, cy, cz = np.ascontiguousarray(corners.reshape(-1, 9).T) - np.tile(point, 3)[:, None]
     la, lb, lc = (np.sqrt(x * x + y * y + z * z) for x, y, z in ((ax, ay, az), (bx, by, bz), (cx, cy, cz)))
