@@ -85,8 +85,8 @@ if TYPE_CHECKING:
         Planner,
         RobotModel,
         Stack,
+        SupportsZones,
         Surroundings,
-        SwitchesZones,
     )
     from simscen.stack.setting import Setting
     from simscen.stack.tasks import Task
@@ -186,8 +186,8 @@ __all__ = [
     "Stage",
     "Status",
     "Streams",
+    "SupportsZones",
     "Surroundings",
-    "SwitchesZones",
     "Task",
     "TaskResult",
     "Trace",
@@ -287,7 +287,7 @@ _WHERE = {
         "RobotModel",
         "Stack",
         "Surroundings",
-        "SwitchesZones",
+        "SupportsZones",
     ),
     "simscen.stack.setting": ("Setting",),
     "simscen.stack.footprint": (

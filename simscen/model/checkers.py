@@ -22,7 +22,7 @@ class GoalCheckerSpec(GoalTolerances, Typed):
 class SimpleGoalChecker(GoalCheckerSpec):
     """nav2_controller::SimpleGoalChecker."""
 
-    component: ClassVar[str] = "simscen.stack.goal_checker:SimpleGoalChecker"
+    component: ClassVar[str] = "simscen.stack.checkers:SimpleGoalChecker"
     type: Literal["simple"] = "simple"
     stateful: bool = True
     """Once the position was reached only the heading counts."""

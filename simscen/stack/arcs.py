@@ -9,9 +9,9 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import Twist
 
-NO_TURN = 1e-6
+MIN_YAW_RATE = 1e-6
 """rad/s below which an arc is a straight line."""
-SHOWN = tuple(0.25 * step for step in range(7))
+LOCAL_PLAN_TIMES_S = tuple(0.25 * step for step in range(7))
 """Seconds of an arc that a local plan shows: at 0.5 m/s and 1 rad/s its chords are 4 mm off the arc."""
 
 
@@ -19,7 +19,7 @@ def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
     """Poses (n, 3) of a base that starts at `pose` and keeps its `twist`, after `times` (n,) seconds."""
     vx, vy, wz = twist
     turned = wz * times
-    if abs(wz) < NO_TURN:
+    if abs(wz) < MIN_YAW_RATE:
         x, y = vx * times, vy * times
     else:
         forward, left = np.sin(turned) / wz, (1.0 - np.cos(turned)) / wz
@@ -31,14 +31,14 @@ def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
     return poses
 
 
-def arc(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
+def arc_poses(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
     """The same poses (n, 3) for a dozen `times`, in floats: a third of the time that arrays of so few take."""
     (x, y, yaw), (vx, vy, wz) = pose, twist
     start, going = complex(x, y), cmath.rect(1.0, yaw) * complex(vx, vy)
     poses: list[tuple[float, float, float]] = []
     for time in times:
         turned = wz * time
-        way = time if abs(wz) < NO_TURN else (cmath.rect(1.0, turned) - 1.0) / complex(0.0, wz)
+        way = time if abs(wz) < MIN_YAW_RATE else (cmath.rect(1.0, turned) - 1.0) / complex(0.0, wz)
         place = start + going * way
         poses.append((place.real, place.imag, wrap(yaw + turned)))
     return np.array(poses)

@@ -11,8 +11,9 @@ from simscen.core.random_streams import Streams
 from simscen.model.latency import Latency
 from simscen.model.recovery import Recovery
 from simscen.model.stack import InProcessStack, StackSpec
+from simscen.stack.checkers import ProgressChecker
 from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.commands import Commands
+from simscen.stack.commands import CommandPipeline, VelocitySmoother
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.installed.behavior import InstalledBehavior
 from simscen.stack.installed.controller import InstalledController
@@ -22,15 +23,13 @@ from simscen.stack.installed.localizer import InstalledLocalizer
 from simscen.stack.installed.planner import InstalledPlanner
 from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.navigator import ClearEntirely, ClearingPolicy, Navigator
-from simscen.stack.odometry_history import WAY, OdometryHistory
+from simscen.stack.odometry_history import TRAIL_S, OdometryHistory
 from simscen.stack.plan_manager import PlanManager
-from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import Behavior, Controller, Localizer, Planner, Surroundings
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.reference import ReferenceStack
 from simscen.stack.setting import Setting
 from simscen.stack.tasks import Task
-from simscen.stack.velocity_smoother import VelocitySmoother
 
 
 def build_stack(
@@ -82,7 +81,7 @@ class StackBuilder:
         """Build all components and the stack."""
         spec, setting, robot = self.spec, self.setting, self.robot
         period = setting.clock.period(spec.controller_frequency)
-        odometry = OdometryHistory(self.surroundings.tick_rate, way=WAY)
+        odometry = OdometryHistory(self.surroundings.tick_rate, way=TRAIL_S)
         driving = replace(
             setting,
             surroundings=self.surroundings,
@@ -114,7 +113,7 @@ class StackBuilder:
             spec.failure_tolerance,
             self.make_clearing_policy(),
         )
-        commands = Commands(
+        commands = CommandPipeline(
             VelocitySmoother(spec.velocity_smoother, robot, setting.control_period),
             monitor,
             period,

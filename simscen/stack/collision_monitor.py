@@ -17,17 +17,17 @@ from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
 from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
 from simscen.stack.protocols import RobotModel
 
-STEPS = 8
+SAMPLES = 8
 """Moments within the prediction at which the hull is compared with the scan."""
-HERE = Pose2(0.0, 0.0)
-NEARER = 0.005
+ORIGIN = Pose2(0.0, 0.0)
+MIN_APPROACH_M = 0.005
 """Meters by which something that moves must come nearer than to a robot that stood, for braking to help."""
-ROUNDING = 1e-6
+ROUNDING_M = 1e-6
 """Meters: who is that near to coming near has his hull looked at."""
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class RecordedScan:
     """The newest scan of a lidar: taken at `odometry`, with nothing nearer to the base than `nearest` meters."""
 
     scan: Scan
@@ -45,12 +45,12 @@ class CollisionMonitor:
         self.hold_ticks = spec.hold_timeout * tick_rate or math.inf
         """For how long it may allow nothing until that is a failure."""
         self._seen, self._oldest, self._began = dict.fromkeys(lidars, -math.inf), -math.inf, 0
-        self._scans: dict[str, Seen] = {}
+        self._scans: dict[str, RecordedScan] = {}
         self._moving, self._moves = no_moving_obstacles(), False
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
-        self._times = np.linspace(0.0, spec.time_before_collision, STEPS + 1)
+        self._times = np.linspace(0.0, spec.time_before_collision, SAMPLES + 1)
         self._near = robot.circumscribed_radius + spec.stop_margin
         self._normal = normal / np.hypot(normal[:, 0], normal[:, 1])[:, None]
         self._offset = np.sum(self._normal * corners, axis=1)
@@ -70,7 +70,7 @@ class CollisionMonitor:
             return
         self._seen[scan.sensor] = scan.tick
         self._oldest = min(self._seen.values())
-        self._scans[scan.sensor] = Seen(scan, odometry, nearest - math.hypot(scan.mount.x, scan.mount.y))
+        self._scans[scan.sensor] = RecordedScan(scan, odometry, nearest - math.hypot(scan.mount.x, scan.mount.y))
 
     def on_moving(self, moving: MovingObstacles) -> None:
         """What moves around the robot now, in its base frame; beams that hit it are left to this."""
@@ -110,7 +110,7 @@ class CollisionMonitor:
         scale = free / horizon
         return Twist(wanted.vx * scale, wanted.vy * scale, wanted.wz * scale) if scale > 0.0 else STOP
 
-    def _time_free(self, seen: "Seen", wanted: Twist, odometry: Pose2, horizon: float) -> float:
+    def _time_free(self, seen: "RecordedScan", wanted: Twist, odometry: Pose2, horizon: float) -> float:
         """Seconds until a point of the scan would be within the stop margin; points it moves away from are no harm."""
         (vx, vy, _), (x, y, _), (then_x, then_y, _) = wanted, odometry, seen.odometry
         reach = self._near + math.hypot(vx, vy) * horizon + math.hypot(x - then_x, y - then_y)
@@ -121,7 +121,7 @@ class CollisionMonitor:
         if not len(points):
             return horizon
         times = self._times
-        gap = self._gaps(points[None], poses_along(HERE, wanted, times))
+        gap = self._gaps(points[None], poses_along(ORIGIN, wanted, times))
         now, least = gap[0], self._spec.stop_margin
         touched = (gap[1:] < least) & (gap[1:] < now - 1e-4)
         when = touched.sum(axis=1) >= self._spec.min_points
@@ -140,7 +140,7 @@ class CollisionMonitor:
             square = towards.real * towards.real + towards.imag * towards.imag
             when = -(place * towards.conjugate()).real / square if square > 0.0 else 0.0
             near = abs(place + min(max(when, 0.0), horizon) * towards) - bent
-            if near <= (self._half + radius + margin) * self._mitre + ROUNDING:
+            if near <= (self._half + radius + margin) * self._mitre + ROUNDING_M:
                 return True
         return False
 
@@ -158,13 +158,13 @@ class CollisionMonitor:
         standing = self._gaps_to(centers, STOP)
         anyway = (standing[1:] < 0.0) & (standing[1:] < standing[0] - 1e-4)
         first = (met | anyway).argmax(axis=0)  # of each thing, the moment that tells which of the two is worse
-        worse = (gaps < standing - NEARER)[1 + first, np.arange(len(first))]
+        worse = (gaps < standing - MIN_APPROACH_M)[1 + first, np.arange(len(first))]
         when = (met & worse).any(axis=1)
         return float(times[int(when.argmax())]) if when.any() else horizon
 
     def _gaps_to(self, centers: Array, twist: Twist) -> Array:
         """How far (times, things) what moves is from the stop margin when the robot goes with `twist`."""
-        return self._gaps(centers, poses_along(HERE, twist, self._times)) - (
+        return self._gaps(centers, poses_along(ORIGIN, twist, self._times)) - (
             self._moving.radii + self._spec.stop_margin
         )
 

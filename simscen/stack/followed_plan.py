@@ -1,16 +1,17 @@
-"""The plan that the robot follows, and its position on it."""
+"""The plan that the robot follows: in the map frame, and in the odom frame for the controller."""
 
 import math
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.navigation import Path
+from simscen.core.messages.navigation import Goal, Path
 from simscen.stack.controllers.tracking import PathTracker
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import distances
+from simscen.stack.frames import Frames, transform_poses
 from simscen.stack.localizers.beams import Plane
-from simscen.stack.protocols import CostmapView
+from simscen.stack.protocols import Controller, CostmapView
 
 WATCH_DISTANCE_M = 0.5
 """Changes of the costmap this close to the plan are compared with the plan, or closer if the robot is larger."""
@@ -20,6 +21,13 @@ UNLOCATED_M = 0.5
 """Distance that the robot may move before its position on the plan is determined even if it is not needed."""
 MISSED_M, END_M = 0.2, 0.03
 """A car needs a new plan this far beside its plan, or this close to its end, because it cannot turn in place."""
+COMPARISON_DISTANCE_M = 1.0
+"""Distance ahead of the robot at which a shift between map and odom frame is measured."""
+MIN_SHIFT_M = 0.01
+"""Shift of the map frame in the odom frame from which on the controller gets the path again. Corrections of the
+localizer are larger; the continuous drift of odometry between two controller periods is smaller."""
+ROUNDING_M = 1e-9
+"""Shift that rounding alone can cause."""
 
 
 class FollowedPlan:
@@ -93,3 +101,39 @@ class FollowedPlan:
             return False
         out = int((~occupied).argmax())
         return bool(occupied[out:].any() or occupied.all())
+
+
+class LocalPath:
+    """Pass the plan to the controller in the odom frame.
+
+    Nav2's controllers transform the plan in each cycle. Here, the controller gets the plan once, and the rest of it
+    again whenever the transform between map and odom frame has changed, so that it can keep what it computed for the
+    path.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        """Take the controller that follows the path."""
+        self._controller = controller
+        self._plan: FollowedPlan | None = None
+        self._sent_odom_from_map = self._odom_from_map = Pose2(0.0, 0.0)
+        self._goal: Goal | None = None
+        self._local_goal: Goal | None = None
+
+    def update(self, plan: FollowedPlan, goal: Goal, frames: Frames) -> Goal:
+        """Update the controller's path for the current plan and frames. Return the goal in the odom frame."""
+        is_unchanged = frames.moved(self._odom_from_map, COMPARISON_DISTANCE_M) <= ROUNDING_M
+        if not is_unchanged:
+            self._odom_from_map = frames.odom_from_map
+        if plan is not self._plan:
+            self._send(plan, plan.path.points)
+        elif not is_unchanged and frames.moved(self._sent_odom_from_map, COMPARISON_DISTANCE_M) > MIN_SHIFT_M:
+            plan.locate(frames.pose)
+            self._send(plan, plan.ahead)
+        local = self._local_goal
+        if local is None or goal is not self._goal or not is_unchanged:
+            self._goal, self._local_goal = goal, (local := goal.at(self._odom_from_map.compose(goal.pose)))
+        return local
+
+    def _send(self, plan: FollowedPlan, points: Array) -> None:
+        self._plan, self._sent_odom_from_map = plan, self._odom_from_map
+        self._controller.set_path(Path(transform_poses(self._sent_odom_from_map, points), plan.path.tick))

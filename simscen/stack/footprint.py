@@ -62,7 +62,7 @@ class Footprint:
         inner = _inner_points(corners, resolution, self.inscribed)
         self._hull = np.concatenate((_edge_points(corners, resolution), inner))
         self._depth = _depths(corners, self._hull).astype(np.float32)
-        self._corners, self.discs = corners, Discs(robot)
+        self._corners, self.discs = corners, CoveringDiscs(robot)
 
     def gaps(self, points: Array, poses: Array) -> Array:
         """How far (n, k) the hull's edge at poses (n, 3) is from points (k, 2); negative where they are inside."""
@@ -120,7 +120,7 @@ class Footprint:
         return np.stack((x, y), axis=-1)
 
 
-class Discs:
+class CoveringDiscs:
     """A row of equal discs along the base's x axis that covers the hull: `offsets` (k,) and their `radius`.
 
     `reach` is how far from the base they reach; `centered` is whether it is one about the base, however that is turned.

@@ -36,14 +36,14 @@ class Frames(NamedTuple):
         return math.hypot(dx, dy) + reach * abs(math.remainder(yaw + mapped_yaw - now_yaw, math.tau))
 
 
-def placed(frame: Pose2, poses: Array) -> Array:
+def transform_poses(frame: Pose2, poses: Array) -> Array:
     """Poses (n, 3) given in `frame`, in the frame around it."""
     moved = np.empty((len(poses), 3))
     moved[:, :2], moved[:, 2] = frame.apply(poses[:, :2]), wrap_array(poses[:, 2] + frame.yaw)
     return moved
 
 
-def placed_polygon(frame: Pose2, polygon: Polygon) -> Polygon:
+def transform_polygon(frame: Pose2, polygon: Polygon) -> Polygon:
     """A polygon given in `frame`, in the frame around it."""
     c, s = math.cos(frame.yaw), math.sin(frame.yaw)
     return tuple((frame.x + c * x - s * y, frame.y + s * x + c * y) for x, y in polygon)

@@ -13,11 +13,11 @@ from typing import NamedTuple, Protocol
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal
 from simscen.core.records.events import Event, EventKind, Value
+from simscen.stack.checkers import ProgressChecker
 from simscen.stack.costmap.costmaps import Costmaps
+from simscen.stack.followed_plan import LocalPath
 from simscen.stack.frames import Frames
-from simscen.stack.local_path import LocalPath
 from simscen.stack.plan_manager import PlanManager
-from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import Behavior, Controller, GoalChecker, NavigationFailure
 from simscen.stack.recovery import RoundRobin
 
@@ -136,7 +136,7 @@ class Navigator:
             return STOP
         self._replanned = False
         following = self.via[0] if self.via else goal  # a tour may end where it begins: only its last drive ends it
-        local = self._path.tell(plan, following, frames)
+        local = self._path.update(plan, following, frames)
         command = self._controller.command(frames.odometry, twist, self._costmaps.near.view, local)
         if held:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")

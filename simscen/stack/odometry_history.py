@@ -5,15 +5,15 @@ from bisect import bisect_left
 
 from simscen.core.geometry import Pose2
 
-KEPT = 10
+HISTORY_S = 10
 """s of readings: what tf2 keeps."""
-WAY = 60
+TRAIL_S = 60
 """s of the way that a stack remembers having come: longer than a robot that is stuck waits between two tries."""
 # No odometry frame is this far from its origin; squares of what a broken encoder may say would overflow.
 _LARGEST = 1e6
 
 
-def believable(values: tuple[float, float, float]) -> bool:
+def is_plausible(values: tuple[float, float, float]) -> bool:
     """Whether these are numbers that a position, or a velocity, can have."""
     x, y, yaw = values
     return -_LARGEST < x < _LARGEST and -_LARGEST < y < _LARGEST and -_LARGEST < yaw < _LARGEST
@@ -22,9 +22,9 @@ def believable(values: tuple[float, float, float]) -> bool:
 class OdometryHistory:
     """The poses of one odometry of the last KEPT seconds, by tick; what is older is thrown away a second at a time."""
 
-    def __init__(self, tick_rate: int, way: float = KEPT) -> None:
+    def __init__(self, tick_rate: int, way: float = HISTORY_S) -> None:
         """`way`: seconds for which poses are remembered beyond that, as the way that the robot came."""
-        self._span, self._way, self._most = KEPT * tick_rate, way * tick_rate, (way + 1) * tick_rate
+        self._span, self._way, self._most = HISTORY_S * tick_rate, way * tick_rate, (way + 1) * tick_rate
         self.forget()
 
     def forget(self) -> None:

@@ -98,7 +98,7 @@ class Localizer(Protocol):
         ...
 
 
-class TellsPose(Protocol):
+class SupportsPose(Protocol):
     """What a localizer that ships can do besides: say where the robot is, and not how sure that is.
 
     That is asked at each step of the controller, and half as often published.
@@ -110,7 +110,7 @@ class TellsPose(Protocol):
         ...
 
 
-def tells_pose(localizer: object) -> TypeGuard[TellsPose]:
+def supports_pose(localizer: object) -> TypeGuard[SupportsPose]:
     """Whether a localizer does. Its class is asked: it would itself work the pose out, of particles anywhere in ms."""
     return hasattr(type(localizer), "pose")
 
@@ -199,7 +199,7 @@ class Controller(Protocol):
 
 
 @runtime_checkable
-class DrivesArcs(Protocol):
+class SupportsArc(Protocol):
     """What a controller that ships can do besides: say of which arc its local plan is the beginning.
 
     Nobody need place it point by point in another frame then.
@@ -244,7 +244,7 @@ class GoalChecker(Protocol):
         ...
 
 
-class SwitchesZones(Protocol):
+class SupportsZones(Protocol):
     """What a stack can do besides, whose costmap filters can be switched while it drives."""
 
     def set_zones(self, tick: int, zones: Zones) -> None:

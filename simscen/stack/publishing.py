@@ -10,10 +10,10 @@ from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Belief, Path
 from simscen.core.records.trace import CostGrid
-from simscen.stack.arcs import SHOWN, arc
+from simscen.stack.arcs import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.frames import Frames, placed
-from simscen.stack.protocols import Controller, CostmapView, DrivesArcs, Localizer
+from simscen.stack.frames import Frames, transform_poses
+from simscen.stack.protocols import Controller, CostmapView, Localizer, SupportsArc
 
 BELIEF_RATE, LOCAL_PLAN_RATE = 10.0, 5.0
 """Hz: of beliefs without a scan, and of local plans."""
@@ -27,12 +27,12 @@ _PUBLISHED = np.array(
 ).tobytes()
 
 
-Published = tuple[Path | None, Path | None, tuple[CostGrid, ...]]
+Updates = tuple[Path | None, Path | None, tuple[CostGrid, ...]]
 """The plan, the local plan and costmaps, where they are new."""
-NOTHING_NEW: Published = (None, None, ())
+NO_UPDATES: Updates = (None, None, ())
 
 
-class Publishing:
+class Publisher:
     """Picks what is new."""
 
     def __init__(
@@ -45,7 +45,7 @@ class Publishing:
         self.belief_due = 0
         """The tick from which on the belief is told without a scan."""
         self._local_plan_due = self._local_plan_period
-        self._arcs = controller if isinstance(controller, DrivesArcs) else None
+        self._arcs = controller if isinstance(controller, SupportsArc) else None
         self._plan: Path | None = None
         self._wide, self._near = _Drawn("global", "map", GLOBAL_RATE), _Drawn("local", local_frame, LOCAL_RATE)
 
@@ -54,7 +54,7 @@ class Publishing:
         self.belief_due = tick + self._belief_period
         return self._localizer.belief
 
-    def news(self, tick: int, frames: Frames, plan: Path | None, costmaps: Costmaps) -> Published:
+    def news(self, tick: int, frames: Frames, plan: Path | None, costmaps: Costmaps) -> Updates:
         """What is new after a step of the controller, which follows this plan."""
         local_plan: Path | None = None
         drawn: tuple[CostGrid, ...] = ()
@@ -63,7 +63,7 @@ class Publishing:
         if tick >= self._wide.due or tick >= self._near.due:
             drawn = self._drawn(tick, costmaps)
         if plan is None or plan is self._plan:
-            return NOTHING_NEW if local_plan is None and not drawn else (None, local_plan, drawn)
+            return NO_UPDATES if local_plan is None and not drawn else (None, local_plan, drawn)
         self._plan = plan
         return plan, local_plan, drawn
 
@@ -72,9 +72,13 @@ class Publishing:
         self._local_plan_due = tick + self._local_plan_period
         if self._arcs is not None:
             driven = self._arcs.arc
-            return None if driven is None else Path(arc(frames.map_from_odom.compose(driven[0]), driven[1], SHOWN))
+            return (
+                None
+                if driven is None
+                else Path(arc_poses(frames.map_from_odom.compose(driven[0]), driven[1], LOCAL_PLAN_TIMES_S))
+            )
         plan = self._controller.local_plan
-        return None if plan is None else Path(placed(frames.map_from_odom, plan.points), plan.tick)
+        return None if plan is None else Path(transform_poses(frames.map_from_odom, plan.points), plan.tick)
 
     def _drawn(self, tick: int, costmaps: Costmaps) -> tuple[CostGrid, ...]:
         """Both costmaps, each at its rate and when it has changed."""

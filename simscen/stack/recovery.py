@@ -10,7 +10,7 @@ from simscen.stack.protocols import Behavior, NavigationFailure
 PLANNER_CODES = frozenset(get_args(PlannerCode))
 
 
-NEARER = 1.0
+PROGRESS_M = 1.0
 """Meters by which a robot must have come nearer to its goal than at any recovery before, for that to be progress."""
 
 
@@ -33,7 +33,7 @@ class RoundRobin:
 
     def next(self, to_go: float) -> Behavior | None:
         """The next behavior, with the goal `to_go` meters away; None when the retries are used up."""
-        if self._anew and to_go <= self._nearest - NEARER and self._used:
+        if self._anew and to_go <= self._nearest - PROGRESS_M and self._used:
             self._used = self._next = 0
         self._nearest = min(self._nearest, to_go)
         if not self._behaviors or self._used >= self._retries:

@@ -11,18 +11,18 @@ from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readin
 from simscen.core.records.events import Event
 from simscen.core.records.trace import Decision
 from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.commands import Commands
+from simscen.stack.commands import CommandPipeline
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.localizers.ground_truth import TRUTH
 from simscen.stack.navigator import Navigator
-from simscen.stack.odometry_history import OdometryHistory, believable
-from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings, tells_pose
-from simscen.stack.publishing import NOTHING_NEW, Published, Publishing
-from simscen.stack.standstill import Standstill
+from simscen.stack.odometry_history import OdometryHistory, is_plausible
+from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings, supports_pose
+from simscen.stack.publishing import NO_UPDATES, Publisher, Updates
+from simscen.stack.speed_filter import SpeedFilter
+from simscen.stack.standstill import StandstillReporter
 from simscen.stack.tasks import Task
-from simscen.stack.zones import SpeedFilter
 
 MOTION_READINGS = frozenset((Odometry, Imu, Bump))
 """Readings that only tell how the robot moves. They can wait until the next scan or the next controller period."""
@@ -43,7 +43,7 @@ class ReferenceStack:
         controller: Controller,
         navigator: Navigator,
         task: Task,
-        commands: Commands,
+        commands: CommandPipeline,
         monitor: CollisionMonitor,
         odometry: OdometryHistory,
         control_period: int,
@@ -56,13 +56,11 @@ class ReferenceStack:
         """
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
-        self._pose_source = localizer if tells_pose(localizer) else None
+        self._pose_source = localizer if supports_pose(localizer) else None
         self._navigator, self._task, self._commands, self._monitor = navigator, task, commands, monitor
         self._tick_rate, self._lidars = surroundings.tick_rate, frozenset(surroundings.lidars)
         self._control_period = control_period
-        self._publishing = Publishing(
-            surroundings.tick_rate, localizer, controller, "map" if fuses_odometry else "odom"
-        )
+        self._publishing = Publisher(surroundings.tick_rate, localizer, controller, "map" if fuses_odometry else "odom")
         self._fuses_odometry = fuses_odometry
         self._localizer_scans = LatencyQueue[Scan](localizer_latency)
         self._events: list[Event] = []
@@ -70,7 +68,7 @@ class ReferenceStack:
         self._twist = STOP
         self._odometry, self._has_wheel_odometry = odometry, False
         self._zones: Zones | None = None
-        self._standstill = Standstill(surroundings.tick_rate)
+        self._standstill = StandstillReporter(surroundings.tick_rate)
         self._unchanged = Decision(STOP)
         self._pending: Readings = ()
 
@@ -130,7 +128,7 @@ class ReferenceStack:
             self._pending += readings
             return self._repeated_decision(self._commands.sent)
         scanned = self._process_readings(tick, readings)
-        plan, local_plan, costmaps = self._control_step(tick) if controls else NOTHING_NEW
+        plan, local_plan, costmaps = self._control_step(tick) if controls else NO_UPDATES
         if controls or self._commands.late:
             self._commands.step(tick, self._odometry.now)
         if scanned or (tick >= self._publishing.belief_due and (readings or controls)):
@@ -231,7 +229,7 @@ class ReferenceStack:
             self._odometry.forget()
         pose = self._believed_pose() if self._fuses_odometry else reading.pose
         self._on_odometry_step(reading.pose, pose)
-        if believable(reading.twist) and self._odometry.add(reading.tick, pose):
+        if is_plausible(reading.twist) and self._odometry.add(reading.tick, pose):
             self._twist = reading.twist
             self._on_motion(reading)
 
@@ -241,7 +239,7 @@ class ReferenceStack:
 
     # Control ----------------------------------------------------------------------------------------------------------
 
-    def _control_step(self, tick: int) -> Published:
+    def _control_step(self, tick: int) -> Updates:
         """Run one controller period: costmaps, navigation, publishing."""
         pose = self._believed_pose()
         frames = Frames(pose, self._odometry.now if self._odometry.begun else pose)

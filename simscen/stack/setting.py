@@ -16,7 +16,7 @@ from simscen.core.random_streams import Streams
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings
 
-ANYWHERE = Estimate(None)
+UNKNOWN_POSE = Estimate(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Setting:
     streams: Streams
     control_period: float = 0.05
     resolution: float = 0.05
-    estimate: Estimate = ANYWHERE
+    estimate: Estimate = UNKNOWN_POSE
     stop_on_failure: bool = True
     mode: Mode = "navigate_to_pose"
     clear_costmap: Callable[[], None] = lambda: None

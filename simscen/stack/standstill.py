@@ -4,15 +4,15 @@ from collections.abc import Callable
 
 from simscen.core.records.events import Event, EventKind
 
-AFTER = 1.0
+REPORT_AFTER_S = 1.0
 """Seconds that it stands for the same reason until that is told; a plan or a scan may well be a little late."""
 
 
-class Standstill:
+class StandstillReporter:
     """Turns what holds the robot at each step into an event when it has for a while, and one when it no longer does."""
 
     def __init__(self, tick_rate: int) -> None:
-        self._after = round(AFTER * tick_rate)
+        self._after = round(REPORT_AFTER_S * tick_rate)
         self.holds = ""
         """What holds it; "" for nothing."""
         self._since, self._told = 0, False

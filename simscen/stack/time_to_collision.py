@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.stack.arcs import NO_TURN, poses_along
+from simscen.stack.arcs import MIN_YAW_RATE, poses_along
 from simscen.stack.footprint import Footprint, distance_at, distances, lethal_near
 from simscen.stack.protocols import CostmapView
 
@@ -49,7 +49,7 @@ def _clearly_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twist
     3 µs where checking all poses takes 60.
     """
     vx, vy, wz = twist
-    speed, turns = math.hypot(vx, vy), abs(wz) >= NO_TURN
+    speed, turns = math.hypot(vx, vy), abs(wz) >= MIN_YAW_RATE
     cosine, sine, resolution = math.cos(pose.yaw), math.sin(pose.yaw), costmap.resolution
     slack = radius + 1.4143 * resolution
     time, at_x, at_y = 0.0, pose.x, pose.y

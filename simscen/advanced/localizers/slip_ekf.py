@@ -16,7 +16,7 @@ from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.stack.localizers.dead_reckoning import start_of
-from simscen.stack.odometry_history import believable
+from simscen.stack.odometry_history import is_plausible
 
 # No robot turns faster than this, in rad/s: a gyroscope that says so is broken.
 _FASTEST = 100.0
@@ -61,7 +61,7 @@ class SlipEkfLocalizer:
     def on_odometry(self, odometry: Odometry) -> None:
         """Take a step along the heading that both sensors agree on."""
         last = self._last
-        if not believable(odometry.pose) or (last is not None and odometry.tick <= last.tick):
+        if not is_plausible(odometry.pose) or (last is not None and odometry.tick <= last.tick):
             return
         self._last = odometry
         if last is not None:

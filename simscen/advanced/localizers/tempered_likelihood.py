@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.environment.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
+from simscen.stack.distance_transform import MAX_REACH_CELLS, squared_distances_within
 from simscen.stack.localizers.distance_field import DistanceField, Float32
 from simscen.stack.localizers.likelihood_field import BeamSkipping, LikelihoodFieldProb
-from simscen.stack.nearest import FARTHEST, squared_within
 
 UNINFORMATIVE_SHARE_OF_HIT = 0.4
 """Likelihood of a beam that ends outside the map, relative to a hit.
@@ -52,9 +52,9 @@ def beyond_the_map(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
     if border_only and math.sqrt(2) * grid.resolution <= MAX_WALL_THICKNESS_M:
         next_to_free: npt.NDArray[np.bool_] = np.pad(grid.cells == FREE, 1, mode="edge")
         return unknown & next_to_free
-    reach = min(FARTHEST, math.ceil(MAX_WALL_THICKNESS_M / grid.resolution))
-    known = squared_within(~unknown, reach)
-    beyond: npt.NDArray[np.bool_] = squared_within(np.pad(grid.cells == FREE, 1), reach) == known
+    reach = min(MAX_REACH_CELLS, math.ceil(MAX_WALL_THICKNESS_M / grid.resolution))
+    known = squared_distances_within(~unknown, reach)
+    beyond: npt.NDArray[np.bool_] = squared_distances_within(np.pad(grid.cells == FREE, 1), reach) == known
     beyond |= known > (MAX_WALL_THICKNESS_M / grid.resolution) ** 2
     beyond &= unknown
     return beyond

@@ -17,7 +17,7 @@ from simscen.advanced.prediction.rollouts import HORIZON, TIMES, Followed, Reper
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.guards import Prediction
-from simscen.stack.footprint import Discs
+from simscen.stack.footprint import CoveringDiscs
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles, Reals
 from simscen.stack.protocols import CostmapView, RobotModel
 
@@ -52,7 +52,7 @@ class Avoidance:
         self._spec, self._robot = spec, robot
         self._speed = max(full_speed, 0.3)
         round_enough = robot.circumscribed_radius - robot.inscribed_radius < NEARLY_ROUND
-        self._discs = Discs(replace(robot, radius=robot.circumscribed_radius) if round_enough else robot)
+        self._discs = CoveringDiscs(replace(robot, radius=robot.circumscribed_radius) if round_enough else robot)
         self._last: Twist | None = None
 
     @cached_property

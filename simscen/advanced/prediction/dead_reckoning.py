@@ -11,7 +11,7 @@ from math import cos, remainder, sin, tau
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.messages.sensor_data import Imu, Odometry
-from simscen.stack.odometry_history import KEPT
+from simscen.stack.odometry_history import HISTORY_S
 
 FASTEST = 100.0
 """rad/s: no robot turns faster; a gyroscope that says so is broken."""
@@ -73,7 +73,7 @@ class DeadReckoning:
         self._last, self._turned, self._turns = last, turned, turns
         self._waiting.clear()
         self._now = _pose(poses[-1])
-        oldest = newest - KEPT * self._rate
+        oldest = newest - HISTORY_S * self._rate
         while poses[0][0] < oldest:
             poses.popleft()
 

@@ -6,7 +6,7 @@ from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.controllers import RegulatedPurePursuit as RppSpec
-from simscen.stack.arcs import SHOWN, arc
+from simscen.stack.arcs import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.controllers.following import PathFollower
 from simscen.stack.controllers.free_way import FreeWay
 from simscen.stack.controllers.goal_pose import GoalPose
@@ -48,7 +48,7 @@ class RegulatedPurePursuit(PathFollower):
     @property
     def local_plan(self) -> Path | None:
         """The arc it expects to drive in the next second and a half."""
-        return None if self.arc is None else Path(arc(*self.arc, SHOWN))
+        return None if self.arc is None else Path(arc_poses(*self.arc, LOCAL_PLAN_TIMES_S))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
         """The velocity to drive now. Raises NO_VALID_CONTROL when the arc to the carrot is blocked."""
@@ -85,7 +85,7 @@ class RegulatedPurePursuit(PathFollower):
                 aside = _bearing(carrot, backward)
         if turn is not None:
             return self._turn(turn, pose, twist, costmap)
-        free, horizon, command = max(arcs, key=lambda arc: arc[0])
+        free, horizon, command = max(arcs, key=lambda arc_poses: arc_poses[0])
         demanded = self._spec.max_allowed_time_to_collision_up_to_carrot
         try:
             slower = self._free_way.within(command, free, horizon, demanded)
@@ -96,7 +96,7 @@ class RegulatedPurePursuit(PathFollower):
         return self._letting_pass(slower, pose, costmap, horizon)
 
     def _straight_is_free(
-        self, carrot: tuple[float, float], backward: bool, arc: Twist, pose: Pose2, costmap: CostmapView
+        self, carrot: tuple[float, float], backward: bool, arc_poses: Twist, pose: Pose2, costmap: CostmapView
     ) -> bool:
         """Whether the robot, turned to the carrot first, could drive to it, where the arc there swings into something.
 
@@ -107,7 +107,7 @@ class RegulatedPurePursuit(PathFollower):
         if not self._spec.use_rotate_to_heading or self._robot.radius is None or abs(angle) < ASIDE:
             return False
         free, horizon = self._time_free(
-            Twist(arc.vx, 0.0, 0.0), Pose2(pose.x, pose.y, pose.yaw + angle), costmap, math.hypot(*carrot)
+            Twist(arc_poses.vx, 0.0, 0.0), Pose2(pose.x, pose.y, pose.yaw + angle), costmap, math.hypot(*carrot)
         )
         return free >= horizon
 

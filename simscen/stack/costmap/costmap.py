@@ -20,9 +20,9 @@ from simscen.stack.costmap.live_layer import EVERYWHERE, NONE, LiveLayer, Window
 from simscen.stack.costmap.obstacle_layer import crossed
 from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
 from simscen.stack.costmap.static_layer import Mask, StaticLayer, empty_layer, free_layer, static_layer, walls_within
+from simscen.stack.distance_transform import MAX_REACH_CELLS, SquaredDistanceTransform
 from simscen.stack.localizers.beams import Plane
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES
-from simscen.stack.nearest import FARTHEST, SquaredWithin
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 
 BEYOND_HULL = 0.5
@@ -209,7 +209,7 @@ class Costmap:
         rows, columns = layer.frame.shape
         self._whole = (0, 0), (rows - 1, columns - 1)
         # Who looks for what has changed in such a window finds that most of it is near that.
-        self._small = max(rows, columns) <= 4 * self._margin and self._margin <= FARTHEST
+        self._small = max(rows, columns) <= 4 * self._margin and self._margin <= MAX_REACH_CELLS
         grid = None if self._forbidding else self._surroundings.map
         if grid is None:
             self._static_squared = squared_distances(layer.lethal, self._margin)
@@ -290,9 +290,9 @@ class Costmap:
         self._costs[inner] = self._inflation.costs(squared, self._unknown[inner] if self._tracks else None)
 
     @cached_property
-    def _around(self) -> SquaredWithin:
+    def _around(self) -> SquaredDistanceTransform:
         """What tells distances in a small window."""
-        return SquaredWithin(self._frame.shape, self._margin)
+        return SquaredDistanceTransform(self._frame.shape, self._margin)
 
     def _refresh_all(self) -> None:
         """The same for all of it."""

@@ -11,7 +11,7 @@ from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.costmap.rolling import NO_FARTHER
-from simscen.stack.frames import Frames, placed_polygon
+from simscen.stack.frames import Frames, transform_polygon
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
@@ -102,7 +102,7 @@ class Costmaps:
             return
         moved, self._painted = frames.odom_from_map, True
         self._odom_from_map = moved
-        polygons = tuple(placed_polygon(moved, polygon) for polygon in self._zones.keepout)
+        polygons = tuple(transform_polygon(moved, polygon) for polygon in self._zones.keepout)
         here = None if mask is None else replace(mask, origin=moved.compose(mask.origin))
         self.near.set_zones(Zones(polygons, (), replace(self._zones.masks, keepout=here)))
 

@@ -8,10 +8,15 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from simscen.stack.nearest import BEYOND, FARTHEST, squared_cells, squared_within
+from simscen.stack.distance_transform import (
+    MAX_REACH_CELLS,
+    OUT_OF_REACH,
+    squared_distance_blocks,
+    squared_distances_within,
+)
 
 FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 255
-FAR = BEYOND
+FAR = OUT_OF_REACH
 """The largest squared distance kept: 256 cells, 12.8 m at 5 cm."""
 
 Squared = npt.NDArray[np.uint16]
@@ -22,10 +27,10 @@ def squared_distances(lethal: npt.NDArray[np.bool_], reach: int) -> Squared:
     """For each cell the exact squared distance in cells to the nearest lethal cell; more beyond `reach`."""
     if not lethal.any():
         return np.full(lethal.shape, FAR, dtype=np.uint16)
-    if reach <= FARTHEST:
-        return squared_within(lethal, reach)
+    if reach <= MAX_REACH_CELLS:
+        return squared_distances_within(lethal, reach)
     squared = np.empty(lethal.shape, dtype=np.uint16)
-    for rows, distances in squared_cells(lethal):
+    for rows, distances in squared_distance_blocks(lethal):
         squared[rows] = np.where(distances <= reach * reach, np.minimum(distances, FAR), FAR)
     return squared
 

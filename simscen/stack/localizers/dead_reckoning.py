@@ -7,7 +7,7 @@ from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
 from simscen.stack.localizers.planar_motion import grown
-from simscen.stack.odometry_history import believable
+from simscen.stack.odometry_history import is_plausible
 
 _UNKNOWN_STD = (100.0, 100.0, np.pi / np.sqrt(3))
 """Standard deviations of an unknown pose: 100 m, and any heading."""
@@ -35,7 +35,7 @@ class DeadReckoning:
 
     def on_odometry(self, odometry: Odometry) -> None:
         """Move the pose by the odometry since the last reading."""
-        if not believable(odometry.pose):
+        if not is_plausible(odometry.pose):
             return
         last, self._odometry = self._odometry, odometry.pose
         belief, step = self._belief, (last or odometry.pose).between(odometry.pose)

@@ -9,8 +9,13 @@ import numpy.typing as npt
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array
+from simscen.stack.distance_transform import (
+    MAX_REACH_CELLS,
+    OUT_OF_REACH,
+    squared_distance_blocks,
+    squared_distances_within,
+)
 from simscen.stack.localizers.beams import Cells, Plane
-from simscen.stack.nearest import BEYOND, FARTHEST, squared_cells, squared_within
 
 Float32 = npt.NDArray[np.float32]
 Kind = TypeVar("Kind", np.float32, np.uint8)
@@ -44,11 +49,11 @@ class DistanceField:
         bordered = np.pad(obstacles, 1, constant_values=walled)
         distance = np.full(bordered.shape, limit, dtype=np.float32)
         if bordered.any():
-            if limit <= FARTHEST * grid.resolution:
-                meters = np.minimum(np.sqrt(np.arange(BEYOND + 1)) * grid.resolution, limit).astype(np.float32)
-                distance = meters.take(squared_within(bordered, math.ceil(limit / grid.resolution)))
+            if limit <= MAX_REACH_CELLS * grid.resolution:
+                meters = np.minimum(np.sqrt(np.arange(OUT_OF_REACH + 1)) * grid.resolution, limit).astype(np.float32)
+                distance = meters.take(squared_distances_within(bordered, math.ceil(limit / grid.resolution)))
             else:
-                for rows, squared in squared_cells(bordered):
+                for rows, squared in squared_distance_blocks(bordered):
                     distance[rows] = np.minimum(np.sqrt(squared) * grid.resolution, limit)
         if not walled:
             distance[[0, -1], :] = distance[:, [0, -1]] = limit

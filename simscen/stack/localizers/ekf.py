@@ -12,7 +12,7 @@ from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
 from simscen.stack.localizers.dead_reckoning import start_of
-from simscen.stack.odometry_history import believable
+from simscen.stack.odometry_history import is_plausible
 
 X, Y, YAW, VX, VY, VYAW, BIAS = range(7)
 """State: the pose in the map frame, the velocity in the base frame, and the bias of the gyroscope."""
@@ -58,7 +58,7 @@ class EkfLocalizer:
     def on_odometry(self, odometry: Odometry) -> None:
         """Measure the velocity since the last reading, and move the pose by it."""
         last = self._last
-        if not believable(odometry.pose) or (last is not None and odometry.tick <= last.tick):
+        if not is_plausible(odometry.pose) or (last is not None and odometry.tick <= last.tick):
             return
         self._last = odometry
         if last is not None:

@@ -6,7 +6,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.stack.localizers.dead_reckoning import start_of
-from simscen.stack.odometry_history import believable
+from simscen.stack.odometry_history import is_plausible
 
 TRUTH = "ground_truth"
 """The name of the sensor whose odometry readings are true poses in the map frame."""
@@ -33,7 +33,7 @@ class GroundTruthLocalizer:
 
     def on_odometry(self, odometry: Odometry) -> None:
         """Store the true pose, or move it by wheel odometry."""
-        if not believable(odometry.pose):
+        if not is_plausible(odometry.pose):
             return
         if odometry.sensor == TRUTH:
             self._pose, self._covariance, self._updated = odometry.pose, _COVARIANCE, odometry.tick

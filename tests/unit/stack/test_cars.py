@@ -7,11 +7,11 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Path
 from simscen.model.guards import VelocitySmoother as SmootherSpec
+from simscen.stack.commands import VelocitySmoother
 from simscen.stack.costmap.costmap import CostmapView
 from simscen.stack.cusps import cusps
 from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import RobotModel
-from simscen.stack.velocity_smoother import VelocitySmoother
 from simscen.testing.flatland import box_robot
 
 CAR = RobotModel(box_robot(0.6, 0.4).footprint, None, 1.0, 1.0, 0.0, 1.5, 2.0, 2.0, 3.0, turning_radius=0.6)

@@ -23,19 +23,18 @@ from simscen.model.recovery import Wait as WaitSpec
 from simscen.model.stack import StackSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import Wait
+from simscen.stack.checkers import STANDSTILL_CHECKS, ProgressChecker, SimpleGoalChecker
 from simscen.stack.collision_monitor import CollisionMonitor
+from simscen.stack.commands import VelocitySmoother
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.footprint import Footprint
-from simscen.stack.goal_checker import AT_REST, SimpleGoalChecker
 from simscen.stack.moving_obstacles import MovingObstacles
-from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.stack.recovery import RoundRobin
+from simscen.stack.speed_filter import SpeedFilter
 from simscen.stack.tasks import Task
 from simscen.stack.time_to_collision import time_to_collision
-from simscen.stack.velocity_smoother import VelocitySmoother
-from simscen.stack.zones import SpeedFilter
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
 GOAL = Goal("g", Pose2(1.0, 0.0, 0.0), xy_tolerance=0.2, yaw_tolerance=0.2)
@@ -66,7 +65,7 @@ def test_a_goal_is_reached_well_inside_its_tolerance_or_standing_anywhere_inside
     pose: Pose2, twist: Twist, reached: bool
 ) -> None:
     checker = checker_that(stateful=True)
-    assert [checker.reached(GOAL, pose, twist) for _ in range(AT_REST)][-1] == reached
+    assert [checker.reached(GOAL, pose, twist) for _ in range(STANDSTILL_CHECKS)][-1] == reached
 
 
 def test_nav2s_goal_checker_takes_the_edge_of_the_tolerance_for_there_while_the_robot_moves() -> None:

@@ -1,7 +1,7 @@
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.stack.odometry_history import KEPT, OdometryHistory
+from simscen.stack.odometry_history import HISTORY_S, OdometryHistory
 
 RATE = 10
 
@@ -54,7 +54,7 @@ def test_before_any_reading_it_is_at_the_origin() -> None:
 
 def test_what_is_older_than_tf_keeps_is_forgotten() -> None:
     long = straight(*range(0, 1000, 10))
-    oldest = 990 - KEPT * RATE
+    oldest = 990 - HISTORY_S * RATE
     assert long.at(oldest - 1) is None
     assert long.at(oldest + 1) == pytest.approx((0.1 * (oldest + 1), 0, 0))
     assert long.held(0).x == pytest.approx(0.1 * oldest)
@@ -80,7 +80,7 @@ def test_the_way_reaches_farther_back_than_what_can_be_looked_up_and_begins_anew
         kept.add(tick, Pose2(0.1 * tick, 0.0, 0.0))
     assert 990 - 61 * RATE <= kept.way()[0].x / 0.1 <= 990 - 60 * RATE
     assert kept.way()[-1] == kept.now
-    assert kept.at(990 - KEPT * RATE - 1) is None
+    assert kept.at(990 - HISTORY_S * RATE - 1) is None
     kept.forget()
     assert not kept.way()
     assert kept.add(5, Pose2(1.0, 0.0, 0.0))

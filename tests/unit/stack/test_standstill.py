@@ -7,7 +7,7 @@ from simscen.core.messages.navigation import Goal
 from simscen.core.records.events import Event
 from simscen.model.latency import Latency
 from simscen.model.stack import StackSpec
-from simscen.stack.standstill import Standstill
+from simscen.stack.standstill import StandstillReporter
 from simscen.testing.flatland import Flatland, drive
 
 
@@ -16,7 +16,7 @@ def kinds(events: tuple[Event, ...]) -> list[tuple[str, str]]:
 
 
 def test_a_reason_is_told_once_after_a_second_and_its_end_as_well() -> None:
-    standstill = Standstill(240)
+    standstill = StandstillReporter(240)
     assert [kinds(standstill.held(tick, "planner", lambda: "why")) for tick in (12, 251, 252, 264)] == [
         [], [], [("robot.held", "planner")], [],
     ]  # fmt: skip
@@ -27,7 +27,7 @@ def test_a_reason_is_told_once_after_a_second_and_its_end_as_well() -> None:
 
 
 def test_another_reason_ends_the_one_before() -> None:
-    standstill = Standstill(240)
+    standstill = StandstillReporter(240)
     standstill.held(0, "planner", lambda: "why")
     standstill.held(240, "planner", lambda: "why")
     assert kinds(standstill.held(300, "controller", lambda: "why")) == [("robot.released", "planner")]

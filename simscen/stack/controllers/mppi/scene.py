@@ -11,7 +11,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.stack.controllers.limits import Limits
 from simscen.stack.controllers.local_plan import LocalPlan
 from simscen.stack.controllers.mppi.rollouts import Rollouts
-from simscen.stack.footprint import Discs, Footprint
+from simscen.stack.footprint import CoveringDiscs, Footprint
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
 from simscen.stack.protocols import CostmapView
 
@@ -156,7 +156,7 @@ class Scene:
 
     def gap(self, spots: Spots, yaw: Floats, whole: bool) -> Floats:
         """Meters (…,) between the hull, or its inscribed circle, and the nearest obstacle."""
-        discs: Discs = self.footprint.discs
+        discs: CoveringDiscs = self.footprint.discs
         if not whole:
             return np.asarray(self._distance(spots) - np.float32(self.footprint.inscribed))
         if discs.centered:

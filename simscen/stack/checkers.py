@@ -1,0 +1,78 @@
+"""Goal checker and progress checker, like those of nav2_controller."""
+
+import math
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Goal
+from simscen.model.checkers import ProgressChecker as ProgressSpec
+from simscen.model.checkers import SimpleGoalChecker as GoalSpec
+from simscen.stack.setting import Setting
+
+STANDSTILL_SPEED, STANDSTILL_YAW_RATE = 0.02, 0.1
+"""m/s and rad/s below which the robot stands still."""
+STANDSTILL_CHECKS = 10
+"""Consecutive checks in which the robot must stand still: half a second at the default controller rate. The robot also
+stops for a moment between reaching the position and turning to the heading."""
+
+
+class SimpleGoalChecker:
+    """Check whether the goal is reached, like nav2_controller::SimpleGoalChecker.
+
+    Checks the position first and then the heading. If `stateful`, a position that was reached stays reached while the
+    robot turns. With `well_inside` below 1, a moving robot must come closer than the tolerance by this factor.
+    """
+
+    def __init__(self, spec: GoalSpec, setting: Setting) -> None:
+        """Take the parameters of the specification."""
+        self._is_stateful, self._well_inside = spec.stateful, spec.well_inside
+        self._is_position_reached, self._standstill_checks = False, 0
+
+    def reset(self) -> None:
+        """Prepare for a new goal."""
+        self._is_position_reached, self._standstill_checks = False, 0
+
+    def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
+        """Return whether the robot has reached the goal, given its estimated pose in the map frame and its velocity."""
+        stands = abs(twist.vx) + abs(twist.vy) < STANDSTILL_SPEED and abs(twist.wz) < STANDSTILL_YAW_RATE
+        self._standstill_checks = self._standstill_checks + 1 if stands else 0
+        factor = 1.0 if self._standstill_checks >= STANDSTILL_CHECKS else self._well_inside
+        distance = math.hypot(pose.x - goal.pose.x, pose.y - goal.pose.y)
+        is_close = distance <= factor * goal.xy_tolerance
+        stays_close = self._is_stateful and self._is_position_reached and distance <= goal.xy_tolerance
+        self._is_position_reached = is_close or stays_close
+        heading_error = abs(wrap(goal.pose.yaw - pose.yaw))
+        return self._is_position_reached and heading_error <= factor * goal.yaw_tolerance
+
+
+class ProgressChecker:
+    """Check whether the robot makes progress, like nav2_controller's SimpleProgressChecker and PoseProgressChecker.
+
+    The robot must move by `required_movement_radius` (m), or turn by `required_movement_angle` (rad) if given, within
+    `movement_time_allowance` (s).
+    """
+
+    def __init__(self, spec: ProgressSpec) -> None:
+        """Take the parameters of the specification."""
+        self._radius, self._angle = spec.required_movement_radius, spec.required_movement_angle
+        self._allowance = spec.movement_time_allowance
+        self._baseline: Pose2 | None = None
+        self._baseline_time = 0.0
+
+    def reset(self) -> None:
+        """Restart with the next pose."""
+        self._baseline = None
+
+    def stuck(self, pose: Pose2, now: float) -> bool:
+        """Return whether the time allowance has passed without progress.
+
+        `now` in s is a clock that does not advance while the robot is not allowed to move.
+        """
+        baseline = self._baseline
+        if (
+            baseline is None
+            or math.hypot(pose.x - baseline.x, pose.y - baseline.y) >= self._radius
+            or (self._angle is not None and abs(wrap(pose.yaw - baseline.yaw)) >= self._angle)
+        ):
+            self._baseline, self._baseline_time = pose, now
+        return now - self._baseline_time > self._allowance
