@@ -179,7 +179,7 @@ def _stack(
         clock,
         stop_on_failure=prepared.spec.on_goal_failure != "continue",
         mode=prepared.spec.navigation.mode,
-        heard=lambda localizer: LocalizerWithFaults(localizer, told) if prepared.spec.faults else localizer,
+        wrap_localizer=lambda localizer: LocalizerWithFaults(localizer, told) if prepared.spec.faults else localizer,
     )
 
 

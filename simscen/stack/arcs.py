@@ -1,4 +1,4 @@
-"""The motion of a base at a constant velocity: arcs, in closed form (Thrun et al., Probabilistic Robotics, eq. 5.9)."""
+"""Motion of a base at constant velocity: arcs in closed form (Thrun et al., Probabilistic Robotics, eq. 5.9)."""
 
 import cmath
 import math
@@ -12,11 +12,11 @@ from simscen.core.geometry.kinematics import Twist
 MIN_YAW_RATE = 1e-6
 """rad/s below which an arc is a straight line."""
 LOCAL_PLAN_TIMES_S = tuple(0.25 * step for step in range(7))
-"""Seconds of an arc that a local plan shows: at 0.5 m/s and 1 rad/s its chords are 4 mm off the arc."""
+"""Times of the poses in a logged local plan. At 0.5 m/s and 1 rad/s, the chords are at most 4 mm off the arc."""
 
 
 def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
-    """Poses (n, 3) of a base that starts at `pose` and keeps its `twist`, after `times` (n,) seconds."""
+    """Return the poses (n, 3) of a base that starts at `pose` with constant `twist`, after `times` (n,) in s."""
     vx, vy, wz = twist
     turned = wz * times
     if abs(wz) < MIN_YAW_RATE:
@@ -32,13 +32,13 @@ def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
 
 
 def arc_poses(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
-    """The same poses (n, 3) for a dozen `times`, in floats: a third of the time that arrays of so few take."""
+    """Return the same poses (n, 3), computed with scalars: faster than with arrays for about a dozen times."""
     (x, y, yaw), (vx, vy, wz) = pose, twist
-    start, going = complex(x, y), cmath.rect(1.0, yaw) * complex(vx, vy)
+    start, velocity = complex(x, y), cmath.rect(1.0, yaw) * complex(vx, vy)
     poses: list[tuple[float, float, float]] = []
     for time in times:
         turned = wz * time
-        way = time if abs(wz) < MIN_YAW_RATE else (cmath.rect(1.0, turned) - 1.0) / complex(0.0, wz)
-        place = start + going * way
-        poses.append((place.real, place.imag, wrap(yaw + turned)))
+        effective_time = time if abs(wz) < MIN_YAW_RATE else (cmath.rect(1.0, turned) - 1.0) / complex(0.0, wz)
+        position = start + velocity * effective_time
+        poses.append((position.real, position.imag, wrap(yaw + turned)))
     return np.array(poses)

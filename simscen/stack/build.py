@@ -39,16 +39,23 @@ def build_stack(
     clock: Clock,
     *,
     stop_on_failure: bool = True,
-    heard: Callable[[Localizer], Localizer] = lambda localizer: localizer,
+    wrap_localizer: Callable[[Localizer], Localizer] = lambda localizer: localizer,
     mode: Mode = "navigate_to_pose",
 ) -> InstalledStack:
     """Build the stack of a specification, ready to `start`.
 
-    `heard` wraps the localizer that the rest of the stack uses. Raises ValueError if a rate does not divide the clock.
+    `wrap_localizer` wraps the localizer that the rest of the stack uses, for example to inject faults. Raises
+    ValueError if a rate does not divide the tick rate.
     """
     period = clock.seconds(clock.period(spec.controller_frequency))
     setting = Setting(
-        surroundings, "stack", streams, control_period=period, stop_on_failure=stop_on_failure, mode=mode, heard=heard
+        surroundings,
+        "stack",
+        streams,
+        control_period=period,
+        stop_on_failure=stop_on_failure,
+        mode=mode,
+        wrap_localizer=wrap_localizer,
     )
     return InstalledStack(spec, setting)
 
@@ -81,13 +88,13 @@ class StackBuilder:
         """Build all components and the stack."""
         spec, setting, robot = self.spec, self.setting, self.robot
         period = setting.clock.period(spec.controller_frequency)
-        odometry = OdometryHistory(self.surroundings.tick_rate, way=TRAIL_S)
+        odometry = OdometryHistory(self.surroundings.tick_rate, trail=TRAIL_S)
         driving = replace(
             setting,
             surroundings=self.surroundings,
             name="controller",
             resolution=spec.local_costmap.completed(spec.costmap).resolution,
-            way=odometry.way,
+            trail=odometry.trail,
         )
         controller: Controller = made(InstalledController, spec.controller, driving)
         costmaps = Costmaps(
@@ -98,7 +105,7 @@ class StackBuilder:
         )
         monitor = CollisionMonitor(spec.collision_monitor, robot, self.surroundings.lidars, self.surroundings.tick_rate)
         driving = replace(
-            driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around, allowed=monitor.allow
+            driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around, limit_command=monitor.allow
         )
         planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
         plans = self.make_plan_manager(InstalledPlanner(spec.planner, planning), costmaps, controller)
@@ -121,7 +128,7 @@ class StackBuilder:
         )
         return self.make_stack(
             self.surroundings,
-            setting.heard(made(InstalledLocalizer, spec.localizer, driving.named("localizer"))),
+            setting.wrap_localizer(made(InstalledLocalizer, spec.localizer, driving.named("localizer"))),
             costmaps,
             controller,
             navigator,

@@ -1,6 +1,6 @@
-"""The last word before the base: nav2_collision_monitor on the raw scan, knowing nothing of map or costmap.
+"""Collision monitor: limits the velocity by the latest scans, independent of map and costmap (nav2_collision_monitor).
 
-What motion prediction tells of things that move is met where both will be: APPROACH by the relative velocity.
+Predicted moving obstacles are checked at their predicted positions.
 """
 
 import math
@@ -18,17 +18,17 @@ from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
 from simscen.stack.protocols import RobotModel
 
 SAMPLES = 8
-"""Moments within the prediction at which the hull is compared with the scan."""
+"""Number of times within the horizon at which the footprint is compared with the scan."""
 ORIGIN = Pose2(0.0, 0.0)
 MIN_APPROACH_M = 0.005
-"""Meters by which something that moves must come nearer than to a robot that stood, for braking to help."""
+"""Braking for a moving obstacle helps only if it would come closer by this much than to a robot that stands still."""
 ROUNDING_M = 1e-6
-"""Meters: who is that near to coming near has his hull looked at."""
+"""Tolerance of the quick check of moving obstacles."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedScan:
-    """The newest scan of a lidar: taken at `odometry`, with nothing nearer to the base than `nearest` meters."""
+    """The latest scan of a lidar, the odometry pose at its time, and a lower bound of the distance to its hits in m."""
 
     scan: Scan
     odometry: Pose2
@@ -36,15 +36,17 @@ class RecordedScan:
 
 
 class CollisionMonitor:
-    """Stops when a lidar is silent; slows down (APPROACH) or stops (STOP) before what the newest scan shows."""
+    """Stop if a lidar is silent, and slow down before obstacles in the latest scans (APPROACH)."""
 
     def __init__(self, spec: MonitorSpec, robot: RobotModel, lidars: tuple[str, ...], tick_rate: int) -> None:
+        """Take the parameters, the robot, the names of its lidars, and the tick rate in Hz."""
         self._spec, self._robot = spec, robot
         self._timeout, self._tick_rate = round(spec.source_timeout * tick_rate), tick_rate
-        self._came: dict[str, tuple[int, int]] = {}
+        self._arrivals: dict[str, tuple[int, int]] = {}
+        """For each lidar, the tick at which its latest message arrived and the tick of the scan."""
         self.hold_ticks = spec.hold_timeout * tick_rate or math.inf
-        """For how long it may allow nothing until that is a failure."""
-        self._seen, self._oldest, self._began = dict.fromkeys(lidars, -math.inf), -math.inf, 0
+        """Time in ticks for which the monitor may stop the robot before that counts as a failure."""
+        self._scan_ticks, self._oldest, self._began = dict.fromkeys(lidars, -math.inf), -math.inf, 0
         self._scans: dict[str, RecordedScan] = {}
         self._moving, self._moves = no_moving_obstacles(), False
         corners = np.array(robot.footprint, dtype=np.float64)
@@ -59,65 +61,68 @@ class CollisionMonitor:
             self._half, self._mitre = robot.radius, 1.0
 
     def start(self, tick: int) -> None:
-        """A lidar that nobody has heard yet is silent, and has been since now."""
+        """Start the timeout of lidars that have not sent a scan yet."""
         self._began = tick
 
     def on_scan(self, scan: Scan, odometry: Pose2, tick: int = 0) -> None:
-        """A scan that came at `tick`, and where odometry was; one in which no beam answers is silence."""
-        self._came[scan.sensor] = tick, scan.tick
+        """Process a scan that arrived at `tick`, with the odometry pose of its time; ignored without returns."""
+        self._arrivals[scan.sensor] = tick, scan.tick
         nearest = _nearest(scan)
         if nearest is None:
             return
-        self._seen[scan.sensor] = scan.tick
-        self._oldest = min(self._seen.values())
+        self._scan_ticks[scan.sensor] = scan.tick
+        self._oldest = min(self._scan_ticks.values())
         self._scans[scan.sensor] = RecordedScan(scan, odometry, nearest - math.hypot(scan.mount.x, scan.mount.y))
 
     def on_moving(self, moving: MovingObstacles) -> None:
-        """What moves around the robot now, in its base frame; beams that hit it are left to this."""
+        """Set the moving obstacles in the base frame. Beams that hit them must be marked in the scans."""
         self._moving, self._moves = moving, len(moving) > 0
 
     def silent(self, tick: int) -> bool:
-        """Whether a lidar has not been heard for `source_timeout`, or not at all: nobody drives off blind."""
-        return tick - self._oldest > self._timeout and self._spec.enabled and bool(self._seen)
+        """Return whether any lidar has sent no usable scan for `source_timeout`, or none at all."""
+        return tick - self._oldest > self._timeout and self._spec.enabled and bool(self._scan_ticks)
 
     def silence(self, tick: int) -> str:
-        """Why the lidar that was heard longest ago is taken for silent."""
-        name = min(self._seen, key=lambda sensor: self._seen[sensor])
+        """Return the reason why a lidar counts as silent."""
+        name = min(self._scan_ticks, key=lambda sensor: self._scan_ticks[sensor])
         limit, ago = f"source_timeout is {self._spec.source_timeout:g} s", self._since(name, tick)
-        came, taken = self._came.get(name, (None, 0))
-        if came is None or (tick - came) > self._timeout:
+        arrived, taken = self._arrivals.get(name, (None, 0))
+        if arrived is None or (tick - arrived) > self._timeout:
             return f"lidar `{name}` has been silent for {ago:.2f} s; {limit}"
-        if taken != self._seen[name]:
-            return f"lidar `{name}` has been blind for {ago:.2f} s, as no beam of its scans answers; {limit}"
-        late = (came - taken) / self._tick_rate
-        return f"scans of lidar `{name}` are {late:.2f} s old when they come; {limit}"
+        if taken != self._scan_ticks[name]:
+            return f"lidar `{name}` has been blind for {ago:.2f} s: its scans contain no returns; {limit}"
+        late = (arrived - taken) / self._tick_rate
+        return f"scans of lidar `{name}` are {late:.2f} s old when they arrive; {limit}"
 
     def _since(self, name: str, tick: int) -> float:
-        """For how many seconds the lidar has been silent."""
-        return (tick - max(self._seen[name], self._began)) / self._tick_rate
+        """Return the time in s since the last usable scan of a lidar."""
+        return (tick - max(self._scan_ticks[name], self._began)) / self._tick_rate
 
     def allow(self, wanted: Twist, odometry: Pose2) -> Twist:
-        """The command, slowed down so that the first contact is at least `time_before_collision` away."""
+        """Return the command, scaled so that the first contact is at least `time_before_collision` away."""
         if not self._spec.enabled or wanted == STOP:
             return wanted
         free = horizon = self._spec.time_before_collision
-        for seen in self._scans.values():
-            free = min(free, self._time_free(seen, wanted, odometry, horizon))
-        if self._moves and self._comes_near(wanted, horizon):
-            free = min(free, self._time_unmet(wanted, horizon))
+        for recorded in self._scans.values():
+            free = min(free, self._time_to_scan_points(recorded, wanted, odometry, horizon))
+        if self._moves and self._may_meet_moving(wanted, horizon):
+            free = min(free, self._time_to_moving(wanted, horizon))
         if free >= horizon:
             return wanted
         scale = free / horizon
         return Twist(wanted.vx * scale, wanted.vy * scale, wanted.wz * scale) if scale > 0.0 else STOP
 
-    def _time_free(self, seen: "RecordedScan", wanted: Twist, odometry: Pose2, horizon: float) -> float:
-        """Seconds until a point of the scan would be within the stop margin; points it moves away from are no harm."""
-        (vx, vy, _), (x, y, _), (then_x, then_y, _) = wanted, odometry, seen.odometry
+    def _time_to_scan_points(self, recorded: RecordedScan, wanted: Twist, odometry: Pose2, horizon: float) -> float:
+        """Return the time in s until enough points of a scan are within the stop margin, at most `horizon`.
+
+        Points that the robot moves away from do not count.
+        """
+        (vx, vy, _), (x, y, _), (then_x, then_y, _) = wanted, odometry, recorded.odometry
         reach = self._near + math.hypot(vx, vy) * horizon + math.hypot(x - then_x, y - then_y)
-        if seen.nearest > reach:
+        if recorded.nearest > reach:
             return horizon
-        moved = seen.odometry.between(odometry)
-        points = moved.inverse().apply(_points_within(seen.scan, reach))
+        moved = recorded.odometry.between(odometry)
+        points = moved.inverse().apply(_points_within(recorded.scan, reach))
         if not len(points):
             return horizon
         times = self._times
@@ -127,27 +132,27 @@ class CollisionMonitor:
         when = touched.sum(axis=1) >= self._spec.min_points
         return float(times[int(when.argmax())]) if when.any() else horizon
 
-    def _comes_near(self, wanted: Twist, horizon: float) -> bool:
-        """Whether anything that moves can be within the stop margin of the hull by then: rarely, and soon told.
+    def _may_meet_moving(self, wanted: Twist, horizon: float) -> bool:
+        """Return whether a moving obstacle can come within the stop margin of the footprint within the horizon.
 
-        On a straight way the nearest moment is known in closed form; a bend leads off it by no more than `bent`.
+        For straight motion, the closest approach has a closed form; a turning robot deviates at most by `deviation`.
         """
-        going = complex(wanted.vx, wanted.vy)
-        bent = abs(going) * abs(wanted.wz) * horizon * horizon / 2
+        own_velocity = complex(wanted.vx, wanted.vy)
+        deviation = abs(own_velocity) * abs(wanted.wz) * horizon * horizon / 2
         margin = self._spec.stop_margin
         for place, velocity, radius, *_ in self._moving.things:
-            towards = velocity - going
+            towards = velocity - own_velocity
             square = towards.real * towards.real + towards.imag * towards.imag
             when = -(place * towards.conjugate()).real / square if square > 0.0 else 0.0
-            near = abs(place + min(max(when, 0.0), horizon) * towards) - bent
+            near = abs(place + min(max(when, 0.0), horizon) * towards) - deviation
             if near <= (self._half + radius + margin) * self._mitre + ROUNDING_M:
                 return True
         return False
 
-    def _time_unmet(self, wanted: Twist, horizon: float) -> float:
-        """Seconds until something that moves would be within the stop margin of the hull, both on their ways.
+    def _time_to_moving(self, wanted: Twist, horizon: float) -> float:
+        """Return the time in s until a moving obstacle is within the stop margin of the footprint, at most `horizon`.
 
-        The whole horizon where a robot that stood would be met as soon and as closely: to brake for that is no help.
+        Obstacles that would come as close to a robot that stands still do not count, because braking does not help.
         """
         times = self._times
         centers = self._moving.at(times)
@@ -156,22 +161,22 @@ class CollisionMonitor:
         if not met.any():
             return horizon
         standing = self._gaps_to(centers, STOP)
-        anyway = (standing[1:] < 0.0) & (standing[1:] < standing[0] - 1e-4)
-        first = (met | anyway).argmax(axis=0)  # of each thing, the moment that tells which of the two is worse
+        unavoidable = (standing[1:] < 0.0) & (standing[1:] < standing[0] - 1e-4)
+        first = (met | unavoidable).argmax(axis=0)  # for each obstacle, the time at which both are compared
         worse = (gaps < standing - MIN_APPROACH_M)[1 + first, np.arange(len(first))]
         when = (met & worse).any(axis=1)
         return float(times[int(when.argmax())]) if when.any() else horizon
 
     def _gaps_to(self, centers: Array, twist: Twist) -> Array:
-        """How far (times, things) what moves is from the stop margin when the robot goes with `twist`."""
+        """Return distances (times, obstacles) of moving obstacles from the stop margin for a constant `twist`."""
         return self._gaps(centers, poses_along(ORIGIN, twist, self._times)) - (
             self._moving.radii + self._spec.stop_margin
         )
 
     def _gaps(self, points: Array, poses: Array) -> Array:
-        """Distance (poses, n) from the hull's edge at each pose to points (poses or 1, n, 2); negative inside.
+        """Return distances (poses, n) from the footprint at each pose to points (poses or 1, n, 2); negative inside.
 
-        For a polygon it is the distance to the farthest of its edge lines, which is never more than the true one.
+        For a polygon, it is the distance to the farthest of its edge lines, a lower bound of the true distance.
         """
         dx = points[:, :, 0] - poses[:, None, 0]
         dy = points[:, :, 1] - poses[:, None, 1]
@@ -184,16 +189,16 @@ class CollisionMonitor:
 
 
 def _mitre(normals: Array) -> float:
-    """How many meters from the middle something may be at most that is less than a meter beyond each of these lines.
+    """Return the miter factor of a convex polygon with edge normals (n, 2).
 
-    They have the `normals` (n, 2), and it is farthest off between the two that lie widest apart.
+    A point within the distance d of all edge lines is at most d times this factor from the origin.
     """
     angles = np.sort(np.arctan2(normals[:, 1], normals[:, 0]))
     return float(1.0 / np.cos(np.diff(angles, append=angles[0] + math.tau).max() / 2))
 
 
 def _nearest(scan: Scan) -> float | None:
-    """Meters to the nearest thing that a beam answers; None where none does."""
+    """Return the shortest valid range in m; None if there is no return."""
     nearest = float(np.fmin.reduce(scan.ranges, initial=math.inf))
     if nearest >= scan.range_min and nearest < math.inf:
         return nearest
@@ -202,7 +207,7 @@ def _nearest(scan: Scan) -> float | None:
 
 
 def _points_within(scan: Scan, reach: float) -> Array:
-    """The hits (n, 2) at most `reach` meters from the base, in its frame; few of a scan, so little to compute."""
+    """Return the hits (n, 2) within `reach` meters of the base, in the base frame."""
     most = reach + math.hypot(scan.mount.x, scan.mount.y)
     hits = (scan.ranges >= scan.range_min) & (scan.ranges <= min(most, scan.range_max))
     near = np.flatnonzero(hits & ~scan.moving if isinstance(scan, ScanAmongMoving) else hits)

@@ -1,4 +1,4 @@
-"""Exact squared Euclidean distance transforms of grids: of a whole grid, in blocks of rows, or up to a maximum distance.
+"""Exact squared Euclidean distance transforms of grids, complete or up to a maximum distance.
 
 scipy's transform keeps several copies of the grid in double precision. Where only distances up to a few meters matter,
 comparing neighbors in 16-bit integers is faster; docs/design/speed.md has the measurements.

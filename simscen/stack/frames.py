@@ -1,4 +1,4 @@
-"""Where the robot is, in the map frame and in the odom frame: what tf2 would know."""
+"""Pose of the robot in the map frame and in the odom frame, and the transform between them (REP 105)."""
 
 import math
 from typing import NamedTuple
@@ -10,9 +10,9 @@ from simscen.core.geometry import Array, Pose2, wrap_array
 
 
 class Frames(NamedTuple):
-    """Where the robot is now: `pose` in the map frame, as believed, and `odometry` in the odom frame, as rolled.
+    """The estimated pose of the robot in the map frame, and its odometry pose in the odom frame.
 
-    Corrections of the localizer make `pose` jump; `odometry` never jumps, but drifts.
+    The pose in the map frame jumps when the localizer corrects it; odometry is continuous but drifts.
     """
 
     pose: Pose2
@@ -20,16 +20,19 @@ class Frames(NamedTuple):
 
     @property
     def map_from_odom(self) -> Pose2:
-        """The correction that a localizer publishes."""
+        """The transform that a localizer publishes."""
         return self.pose.compose(self.odometry.inverse())
 
     @property
     def odom_from_map(self) -> Pose2:
-        """Its inverse."""
+        """The inverse transform."""
         return self.odometry.compose(self.pose.inverse())
 
     def moved(self, odom_from_map: Pose2, reach: float) -> float:
-        """Meters by which what lies up to `reach` meters from the robot moved in odom since this was the correction."""
+        """Return by how many meters points within `reach` m of the robot have moved in the odom frame.
+
+        `odom_from_map` is the earlier transform to compare with.
+        """
         (x, y, yaw), (mapped_x, mapped_y, mapped_yaw), (now_x, now_y, now_yaw) = odom_from_map, self.pose, self.odometry
         c, s = math.cos(yaw), math.sin(yaw)
         dx, dy = x + c * mapped_x - s * mapped_y - now_x, y + s * mapped_x + c * mapped_y - now_y
@@ -37,13 +40,13 @@ class Frames(NamedTuple):
 
 
 def transform_poses(frame: Pose2, poses: Array) -> Array:
-    """Poses (n, 3) given in `frame`, in the frame around it."""
+    """Return poses (n, 3) given in `frame`, expressed in its parent frame."""
     moved = np.empty((len(poses), 3))
     moved[:, :2], moved[:, 2] = frame.apply(poses[:, :2]), wrap_array(poses[:, 2] + frame.yaw)
     return moved
 
 
 def transform_polygon(frame: Pose2, polygon: Polygon) -> Polygon:
-    """A polygon given in `frame`, in the frame around it."""
+    """Return a polygon given in `frame`, expressed in its parent frame."""
     c, s = math.cos(frame.yaw), math.sin(frame.yaw)
     return tuple((frame.x + c * x - s * y, frame.y + s * x + c * y) for x, y in polygon)

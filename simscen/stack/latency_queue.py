@@ -1,4 +1,4 @@
-"""What is worked out, but not there yet."""
+"""Queue of results that become available after a computation time."""
 
 import math
 from collections import deque
@@ -8,33 +8,34 @@ T = TypeVar("T")
 
 
 class LatencyQueue(Generic[T]):
-    """Results that are there `latency` ticks after their work began, in the order in which it did.
+    """Results that become available `latency` ticks after their computation started, in the same order.
 
-    `due` is the tick at which the oldest of them is there: `while tick >= underway.due: underway.take()`.
+    `due` is the tick at which the oldest result is available: `while tick >= queue.due: queue.take()`.
     """
 
     def __init__(self, latency: int) -> None:
+        """Create an empty queue; `latency` in ticks."""
         self._latency = latency
         self._waiting: deque[tuple[int, T]] = deque()
         self.due: float = math.inf
 
     def put(self, tick: int, result: T) -> None:
-        """Work on this begins at `tick`."""
+        """Add a result whose computation starts at `tick`."""
         if not self._waiting:
             self.due = tick + self._latency
         self._waiting.append((tick + self._latency, result))
 
     def take(self) -> T:
-        """The oldest of them."""
+        """Remove and return the oldest result."""
         _, oldest = self._waiting.popleft()
         self.due = self._waiting[0][0] if self._waiting else math.inf
         return oldest
 
     def busy(self, tick: int) -> bool:
-        """Whether the work on anything goes on beyond this tick."""
+        """Return whether a computation continues beyond this tick."""
         return bool(self._waiting) and self._waiting[-1][0] > tick
 
     def clear(self) -> None:
-        """Nothing of it is wanted any more."""
+        """Discard all results."""
         self._waiting.clear()
         self.due = math.inf

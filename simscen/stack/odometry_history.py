@@ -1,4 +1,4 @@
-"""Where odometry was at any recent tick, as tf knows it: a scan that comes late was taken from there."""
+"""Recent odometry poses by tick, like the tf buffer: a delayed scan was taken at an earlier pose."""
 
 import math
 from bisect import bisect_left
@@ -6,78 +6,78 @@ from bisect import bisect_left
 from simscen.core.geometry import Pose2
 
 HISTORY_S = 10
-"""s of readings: what tf2 keeps."""
+"""Time for which readings are available: the default of tf2's buffer."""
 TRAIL_S = 60
-"""s of the way that a stack remembers having come: longer than a robot that is stuck waits between two tries."""
-# No odometry frame is this far from its origin; squares of what a broken encoder may say would overflow.
+"""Time for which poses are kept as the trail of the robot, longer than a stuck robot waits between two recoveries."""
+# Larger values, as from a broken encoder, are rejected: their squares could overflow.
 _LARGEST = 1e6
 
 
 def is_plausible(values: tuple[float, float, float]) -> bool:
-    """Whether these are numbers that a position, or a velocity, can have."""
+    """Return whether these values are a plausible pose or velocity: finite and not absurdly large."""
     x, y, yaw = values
     return -_LARGEST < x < _LARGEST and -_LARGEST < y < _LARGEST and -_LARGEST < yaw < _LARGEST
 
 
 class OdometryHistory:
-    """The poses of one odometry of the last KEPT seconds, by tick; what is older is thrown away a second at a time."""
+    """The odometry poses of the last HISTORY_S seconds by tick. Older ones are removed about once per second."""
 
-    def __init__(self, tick_rate: int, way: float = HISTORY_S) -> None:
-        """`way`: seconds for which poses are remembered beyond that, as the way that the robot came."""
-        self._span, self._way, self._most = HISTORY_S * tick_rate, way * tick_rate, (way + 1) * tick_rate
-        self.forget()
+    def __init__(self, tick_rate: int, trail: float = HISTORY_S) -> None:
+        """Create an empty history. `trail` in s: time for which poses are kept for `trail()`."""
+        self._span, self._trail, self._capacity = HISTORY_S * tick_rate, trail * tick_rate, (trail + 1) * tick_rate
+        self.clear()
 
-    def forget(self) -> None:
-        """Begin anew, with another odometry."""
+    def clear(self) -> None:
+        """Remove all poses, for example to switch to another source of odometry."""
         self._readings: list[tuple[int, Pose2]] = []
         self._newest: float = -math.inf
-        self._full: float = -math.inf
+        self._prune_at: float = -math.inf
         self.now = Pose2(0.0, 0.0)
-        """The newest pose; the origin before there is any."""
+        """The latest pose; the origin if there is none."""
 
     @property
     def begun(self) -> bool:
-        """Whether there is any."""
-        return self._full > -math.inf
+        """Whether there is any pose."""
+        return self._prune_at > -math.inf
 
     def add(self, tick: int, pose: Pose2) -> bool:
-        """Take a reading in; False when it is of no use: not a place, or not newer than the last one."""
+        """Add a pose. Return False if it is rejected: not plausible, or not newer than the latest."""
         x, y, yaw = pose
-        here = -_LARGEST < x < _LARGEST and -_LARGEST < y < _LARGEST and -_LARGEST < yaw < _LARGEST
-        if tick <= self._newest or not here:
+        plausible = -_LARGEST < x < _LARGEST and -_LARGEST < y < _LARGEST and -_LARGEST < yaw < _LARGEST
+        if tick <= self._newest or not plausible:
             return False
         self._newest, self.now = tick, pose
         self._readings.append((tick, pose))
-        if tick > self._full:
-            self._throw_away()
+        if tick > self._prune_at:
+            self._prune()
         return True
 
-    def _throw_away(self) -> None:
-        """Throw away what is too old, and note when the oldest of the rest will be."""
-        del self._readings[: bisect_left(self._readings, (self._newest - self._way,))]
-        self._full = self._readings[0][0] + self._most
+    def _prune(self) -> None:
+        """Remove poses that are too old, and determine when to do so again."""
+        del self._readings[: bisect_left(self._readings, (self._newest - self._trail,))]
+        self._prune_at = self._readings[0][0] + self._capacity
 
     def _first(self) -> int:
-        """Where what counts still begins."""
+        """Return the index of the oldest pose within HISTORY_S."""
         return bisect_left(self._readings, (self._newest - self._span,))
 
-    def way(self) -> list[Pose2]:
-        """The poses that the robot came by, the oldest first."""
+    def trail(self) -> list[Pose2]:
+        """Return all poses that are kept, the oldest first."""
         return [pose for _, pose in self._readings]
 
     def reaches(self, tick: int) -> bool:
-        """Whether there is odometry at `tick` or later."""
+        """Return whether there is odometry at `tick` or later."""
         return self._newest >= tick
 
     def held(self, tick: int) -> Pose2:
-        """The newest pose up to `tick`, for who cannot wait for the next; the oldest known before that."""
+        """Return the latest pose up to `tick` without interpolation, or the oldest pose if all are later."""
         if tick >= self._newest:
             return self.now
         first = self._first()
         return self._readings[max(first, bisect_left(self._readings, (tick + 1,), first) - 1)][1]
 
     def at(self, tick: int) -> Pose2 | None:
-        """The pose at `tick`, interpolated along a constant twist's chord; None before the oldest, after the newest."""
+        """Return the pose at `tick`, interpolated linearly; None outside the available time."""
         if tick == self._newest:
             return self.now
         first = self._first()
@@ -95,6 +95,6 @@ class OdometryHistory:
         return before.compose(Pose2(share * step.x, share * step.y, share * step.yaw))
 
     def then(self, now: Pose2, tick: int) -> Pose2:
-        """Where a robot that is at `now` was at `tick`, in whatever frame `now` is given; held, not interpolated."""
+        """Return the pose at `tick`, without interpolation, of a robot that is at `now`, in the frame of `now`."""
         held = self.held(tick)
         return now if held is self.now else now.compose(self.now.between(held))

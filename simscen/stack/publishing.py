@@ -1,4 +1,4 @@
-"""What a stack publishes, and how often: nothing twice, and beliefs and arcs no faster than anybody looks."""
+"""Publishing of plans, local plans, beliefs, and costmaps: only changes, and at limited rates."""
 
 import math
 from dataclasses import dataclass
@@ -16,80 +16,79 @@ from simscen.stack.frames import Frames, transform_poses
 from simscen.stack.protocols import Controller, CostmapView, Localizer, SupportsArc
 
 BELIEF_RATE, LOCAL_PLAN_RATE = 10.0, 5.0
-"""Hz: of beliefs without a scan, and of local plans."""
-GLOBAL_RATE, LOCAL_RATE = 0.5, 1.0
-"""Hz: of costmaps, for the eye alone; half of Nav2's, and slower where one is large."""
-CELLS_A_SECOND = 125_000
-"""Of each costmap; a large one is published so much more rarely."""
-# As nav2_costmap_2d's publisher translates costs: 1 … 252 become 1 … 98.
+"""Rates in Hz of beliefs without a scan, and of local plans."""
+GLOBAL_COSTMAP_RATE, LOCAL_COSTMAP_RATE = 0.5, 1.0
+"""Rates in Hz of costmaps, which are for display only: half of Nav2's, and lower for large costmaps."""
+MAX_CELLS_PER_SECOND = 125_000
+"""Limit for each costmap; a larger one is published less often."""
+# Translation of costs as in nav2_costmap_2d's publisher: 1 … 252 become 1 … 98.
 _PUBLISHED = np.array(
     [0, *(1 + 97 * (cost - 1) // 251 for cost in range(1, 253)), 99, 100, UNKNOWN], dtype=np.int8
 ).tobytes()
 
 
 Updates = tuple[Path | None, Path | None, tuple[CostGrid, ...]]
-"""The plan, the local plan and costmaps, where they are new."""
+"""Plan, local plan, and costmaps; each only if it has changed."""
 NO_UPDATES: Updates = (None, None, ())
 
 
 class Publisher:
-    """Picks what is new."""
+    """Selects what has changed since it was published last."""
 
     def __init__(
         self, tick_rate: int, localizer: Localizer, controller: Controller, local_frame: Literal["map", "odom"] = "odom"
     ) -> None:
-        """`local_frame` is what the local costmap is in."""
+        """Take the tick rate in Hz, the sources, and the frame of the local costmap."""
         self._localizer, self._controller, self._tick_rate = localizer, controller, tick_rate
         self._belief_period = math.ceil(tick_rate / BELIEF_RATE)
         self._local_plan_period = math.ceil(tick_rate / LOCAL_PLAN_RATE)
         self.belief_due = 0
-        """The tick from which on the belief is told without a scan."""
+        """Tick from which on the belief is published without a scan."""
         self._local_plan_due = self._local_plan_period
         self._arcs = controller if isinstance(controller, SupportsArc) else None
         self._plan: Path | None = None
-        self._wide, self._near = _Drawn("global", "map", GLOBAL_RATE), _Drawn("local", local_frame, LOCAL_RATE)
+        self._global_costmap = _CostmapPublisher("global", "map", GLOBAL_COSTMAP_RATE)
+        self._local_costmap = _CostmapPublisher("local", local_frame, LOCAL_COSTMAP_RATE)
 
     def belief(self, tick: int) -> Belief:
-        """The belief; asked with each scan, and without one at BELIEF_RATE."""
+        """Return the belief. Call it with each scan, and otherwise when `belief_due`."""
         self.belief_due = tick + self._belief_period
         return self._localizer.belief
 
-    def news(self, tick: int, frames: Frames, plan: Path | None, costmaps: Costmaps) -> Updates:
-        """What is new after a step of the controller, which follows this plan."""
+    def updates(self, tick: int, frames: Frames, plan: Path | None, costmaps: Costmaps) -> Updates:
+        """Return what is new after a controller period in which the robot follows this plan."""
         local_plan: Path | None = None
-        drawn: tuple[CostGrid, ...] = ()
+        grids: tuple[CostGrid, ...] = ()
         if plan is not None and tick >= self._local_plan_due:
-            local_plan = self._driven(tick, frames)
-        if tick >= self._wide.due or tick >= self._near.due:
-            drawn = self._drawn(tick, costmaps)
+            local_plan = self._map_local_plan(tick, frames)
+        if tick >= self._global_costmap.due or tick >= self._local_costmap.due:
+            grids = self._costmap_updates(tick, costmaps)
         if plan is None or plan is self._plan:
-            return NO_UPDATES if local_plan is None and not drawn else (None, local_plan, drawn)
+            return NO_UPDATES if local_plan is None and not grids else (None, local_plan, grids)
         self._plan = plan
-        return plan, local_plan, drawn
+        return plan, local_plan, grids
 
-    def _driven(self, tick: int, frames: Frames) -> Path | None:
-        """What the controller expects to drive, in the map frame."""
+    def _map_local_plan(self, tick: int, frames: Frames) -> Path | None:
+        """Return the controller's local plan in the map frame."""
         self._local_plan_due = tick + self._local_plan_period
         if self._arcs is not None:
-            driven = self._arcs.arc
-            return (
-                None
-                if driven is None
-                else Path(arc_poses(frames.map_from_odom.compose(driven[0]), driven[1], LOCAL_PLAN_TIMES_S))
-            )
+            arc = self._arcs.arc
+            if arc is None:
+                return None
+            return Path(arc_poses(frames.map_from_odom.compose(arc[0]), arc[1], LOCAL_PLAN_TIMES_S))
         plan = self._controller.local_plan
         return None if plan is None else Path(transform_poses(frames.map_from_odom, plan.points), plan.tick)
 
-    def _drawn(self, tick: int, costmaps: Costmaps) -> tuple[CostGrid, ...]:
-        """Both costmaps, each at its rate and when it has changed."""
-        both = (self._wide, costmaps.wide), (self._near, costmaps.near)
-        found = (one.published(tick, costmap.view, self._tick_rate) for one, costmap in both if tick >= one.due)
-        return tuple(grid for grid in found if grid is not None)
+    def _costmap_updates(self, tick: int, costmaps: Costmaps) -> tuple[CostGrid, ...]:
+        """Return the costmaps that are due and have changed."""
+        both = (self._global_costmap, costmaps.wide), (self._local_costmap, costmaps.near)
+        grids = (each.update(tick, costmap.view, self._tick_rate) for each, costmap in both if tick >= each.due)
+        return tuple(grid for grid in grids if grid is not None)
 
 
 @dataclass
-class _Drawn:
-    """What was published of a costmap, and the tick from which on it may be again."""
+class _CostmapPublisher:
+    """Revision of a costmap that was published last, and the tick from which on the next may be."""
 
     name: str
     frame: str
@@ -97,9 +96,9 @@ class _Drawn:
     due: int = 0
     revision: int = -1
 
-    def published(self, tick: int, view: CostmapView, tick_rate: int) -> CostGrid | None:
-        """The costmap now; None where nothing has changed in it."""
-        self.due = tick + math.ceil(tick_rate * max(1 / self.rate, view.costs.size / CELLS_A_SECOND))
+    def update(self, tick: int, view: CostmapView, tick_rate: int) -> CostGrid | None:
+        """Return the costmap, or None if it has not changed."""
+        self.due = tick + math.ceil(tick_rate * max(1 / self.rate, view.costs.size / MAX_CELLS_PER_SECOND))
         if view.revision == self.revision:
             return None
         self.revision = view.revision

@@ -226,7 +226,7 @@ class ReferenceStack:
             return
         if reading.sensor != TRUTH and not self._has_wheel_odometry:
             self._has_wheel_odometry = True
-            self._odometry.forget()
+            self._odometry.clear()
         pose = self._believed_pose() if self._fuses_odometry else reading.pose
         self._on_odometry_step(reading.pose, pose)
         if is_plausible(reading.twist) and self._odometry.add(reading.tick, pose):
@@ -247,7 +247,7 @@ class ReferenceStack:
         self._on_costmaps_updated(tick, frames)
         self._control(tick, frames)
         plan = self._navigator.plans.plan
-        return self._publishing.news(tick, frames, None if plan is None else plan.path, self._costmaps)
+        return self._publishing.updates(tick, frames, None if plan is None else plan.path, self._costmaps)
 
     def _update_costmaps(self, tick: int, frames: Frames) -> None:
         """Apply new zones, and update the costmaps when they are due."""

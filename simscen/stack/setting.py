@@ -1,4 +1,4 @@
-"""What a component of a stack is installed in."""
+"""Context in which a component of a stack is built: robot, map, random generator, and services of the stack."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -21,24 +21,23 @@ UNKNOWN_POSE = Estimate(None)
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """All that a component, or a whole stack, may know besides its specification. `Class(specification, setting)`.
+    """Everything that a component or a whole stack gets besides its specification: `Class(specification, setting)`.
 
-    SI units, angles in rad; the map frame is that of `map`, the base frame has x forward and y to the left.
+    Units are SI and rad. The map frame is that of `map`; the base frame has x forward and y to the left (REP 103).
 
-    surroundings:     the robot's datasheet, its map, what it must not enter, its lidars by name, ticks a second
-    name:             its random stream: "planner", "controller", "localizer", "behavior.spin", …, "stack"
-    streams:          random streams by name, derived from the run's seed; `chance` is the one it should use
-    control_period:   seconds between two calls of a controller, a goal checker or a behavior
-    resolution:       meters, the edge of a cell of the costmaps that it is shown
-    estimate:         where the robot is said to be when it is switched on; `reset` or `start` says it again
-    stop_on_failure:  whether a goal that fails ends the task (for a whole stack)
-    mode:             Nav2's action that takes the goals; what it means stands in the goals, as `via` and `wait`
-    clear_costmap:    forgets live obstacles that are not seen any more (for a behavior)
-    clear_around:     the same, as far from the robot as the local costmap reaches
-    way:              the poses that the robot came by in the last minute, the oldest first, in the odom frame (for a
-                      behavior)
-    allowed:          what the collision monitor would make of a command at a pose in the odom frame (for a behavior)
-    heard:            what stands between the localizer and all who ask it; here, nothing (for the reference stack)
+    surroundings:     robot model, map, keepout and speed zones, names of the lidars, tick rate
+    name:             name of the random stream: "planner", "controller", "localizer", "behavior.spin", …, "stack"
+    streams:          random streams by name, derived from the seed of the run; use `chance` for your own stream
+    control_period:   time in s between two calls of a controller, goal checker, or behavior
+    resolution:       cell size in m of the costmaps that the component gets
+    estimate:         initial pose estimate; `reset` or `start` provides it again
+    stop_on_failure:  whether a failed goal ends the task (for a whole stack)
+    mode:             Nav2 action that accepts the goals; `via` and `wait` of the goals express what it implies
+    clear_costmap:    clears obstacles that are no longer seen (for a behavior)
+    clear_around:     does the same within the range of the local costmap
+    trail:            returns the poses of the last minute in the odom frame, the oldest first (for a behavior)
+    limit_command:    returns a command after the collision monitor, at a pose in the odom frame (for a behavior)
+    wrap_localizer:   wraps the localizer for all other components (for the reference stack)
     """
 
     surroundings: Surroundings
@@ -51,39 +50,39 @@ class Setting:
     mode: Mode = "navigate_to_pose"
     clear_costmap: Callable[[], None] = lambda: None
     clear_around: Callable[[], None] = lambda: None
-    way: Callable[[], Sequence[Pose2]] = tuple
-    allowed: Callable[[Twist, Pose2], Twist] = lambda command, _: command
-    heard: Callable[[Localizer], Localizer] = lambda localizer: localizer
+    trail: Callable[[], Sequence[Pose2]] = tuple
+    limit_command: Callable[[Twist, Pose2], Twist] = lambda command, _: command
+    wrap_localizer: Callable[[Localizer], Localizer] = lambda localizer: localizer
 
     def named(self, name: str) -> "Setting":
-        """The same for another component, which has a random stream of its own."""
+        """Return the setting for another component with its own random stream."""
         return replace(self, name=name)
 
     @property
     def robot(self) -> RobotModel:
-        """The robot's datasheet."""
+        """The robot model."""
         return self.surroundings.robot
 
     @property
     def map(self) -> OccupancyGrid | None:
-        """The robot's map; None where it drives without one."""
+        """The map; None for mapless navigation."""
         return self.surroundings.map
 
     @property
     def clock(self) -> Clock:
-        """What makes seconds of the ticks that readings carry."""
+        """The clock that converts ticks of readings to seconds."""
         return Clock(self.surroundings.tick_rate)
 
     @cached_property
     def chance(self) -> np.random.Generator:
-        """Its own random generator. Nobody else draws from it, so that it changes nobody else's numbers."""
+        """The component's own random generator, so that its draws do not affect other components."""
         return self.streams.generator(self.name)
 
     @cached_property
     def footprint(self) -> Footprint:
-        """Says whether the robot's hull fits at poses (n, 3) on a costmap: `footprint.free(costmap, poses)`."""
+        """The footprint checker: `footprint.free(costmap, poses)` tells for poses (n, 3) whether the robot fits."""
         return _footprint(self.robot, self.resolution)
 
 
 _footprint = lru_cache(maxsize=16)(Footprint)
-"""One for all who ask for it: it takes a millisecond to make, and nobody changes it."""
+"""Shared between components, because it is immutable and takes a millisecond to build."""

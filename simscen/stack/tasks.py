@@ -1,4 +1,4 @@
-"""The list of goals: what is accepted, reached, passed, failed, canceled, and how the whole task ended."""
+"""Goal list of a navigation task, with the events and the result that an action client would see."""
 
 from simscen.core.clock import Clock
 from simscen.core.messages.goal_names import Mode
@@ -9,32 +9,32 @@ Events = tuple[Event, ...]
 
 
 class Task:
-    """Goals in order. Its methods return the events that a client of the action would see.
+    """Goals in order. Methods return the events that a client of the action would see.
 
-    Goals that are passed (`via`) and the one after them are one action: they fail, are canceled and preempted together.
+    Intermediate goals (`via`) and the goal after them are one action: they fail, are canceled, and preempted together.
     """
 
     def __init__(self, stop_on_failure: bool, *, clock: Clock | None = None, mode: Mode = "navigate_to_pose") -> None:
-        """`clock` says how many ticks the goals' `wait` takes; default: as many as the default clock's."""
+        """Create an empty task. `clock` converts the `wait` times of goals to ticks."""
         self._stop_on_failure = stop_on_failure
         self._clock, self._mode = clock or Clock(), mode
         self._waiting: list[Goal] = []
         self._accepted = 0
         self._failure: ErrorCode | int | None = None
-        self._stays: int | None = None
+        self._wait_until: int | None = None
         self.goal: Goal | None = None
-        """What is being driven to; None, too, while the robot waits where it is."""
+        """The current goal; None also while the robot waits at a goal."""
         self.since = 0
 
     def start(self, goals: tuple[Goal, ...]) -> None:
-        """A new task."""
+        """Start a task with these goals."""
         self._waiting, self.goal, self._failure, self._accepted = list(goals), None, None, 0
-        self._stays = None
+        self._wait_until = None
 
     def next(self, tick: int) -> Events:
-        """Accept the next goal if none is being driven to; end the task when there is none left."""
-        events = self.rest(tick)
-        if self.goal is None and self._stays is None and self._waiting:
+        """Accept the next goal if there is no current one; end the task if none is left."""
+        events = self.end_wait(tick)
+        if self.goal is None and self._wait_until is None and self._waiting:
             self.goal, self.since = self._waiting.pop(0), tick
             pose = self.goal.pose
             at: dict[str, Value] = {"x": float(pose.x), "y": float(pose.y), "yaw": float(pose.yaw)}
@@ -44,42 +44,45 @@ class Task:
         return events
 
     @property
-    def stays(self) -> bool:
-        """Whether the robot is to stay where it is for a while."""
-        return self._stays is not None
+    def waits(self) -> bool:
+        """Whether the robot waits at a goal."""
+        return self._wait_until is not None
 
-    def rest(self, tick: int) -> Events:
-        """Time has come to this tick: a wait may be over; the task ends with its last one."""
-        if self._stays is None or tick < self._stays:
+    def end_wait(self, tick: int) -> Events:
+        """End a wait that is over at this tick, and the task if that was its last goal."""
+        if self._wait_until is None or tick < self._wait_until:
             return ()
-        self._stays = None
+        self._wait_until = None
         return () if self._waiting else self._end(tick, TaskResult.SUCCEEDED)
 
     @property
     def ahead(self) -> tuple[Goal, ...]:
-        """What follows the current goal in the same drive."""
+        """The goals after the current one in the same action."""
         if self.goal is None or not self.goal.via:
             return ()
         last = next((k for k, goal in enumerate(self._waiting) if not goal.via), len(self._waiting) - 1)
         return tuple(self._waiting[: last + 1])
 
     def reached(self, tick: int) -> Events:
-        """The goal is reached."""
+        """Record that the current goal is reached."""
         assert self.goal is not None
         reached = self._event(tick, EventKind.GOAL_REACHED)
         if self.goal.wait > 0:
-            self._stays, self.goal = tick + self._clock.ticks(self.goal.wait), None
+            self._wait_until, self.goal = tick + self._clock.ticks(self.goal.wait), None
             return (reached,)
         return (reached, *self._close(tick, TaskResult.SUCCEEDED))
 
     def passed(self, tick: int) -> Events:
-        """The goal, which is one to pass, is behind the robot."""
+        """Record that the robot has passed the current, intermediate goal."""
         return (self._event(tick, EventKind.GOAL_PASSED), *self._close(tick, TaskResult.SUCCEEDED))
 
     def failed(self, tick: int, code: ErrorCode | int, message: str) -> Events:
-        """The goal has failed; so has the task when it stops on failures. A number is a code that has no name here."""
-        said: dict[str, Value] = {"error_code": int(code), "error_name": _name(code), "message": message}
-        dropped = self._drop(tick, EventKind.GOAL_FAILED, **said)
+        """Record that the current goal has failed, and end the task if it stops on failures.
+
+        `code` is a number for error codes of foreign stacks without a name.
+        """
+        details: dict[str, Value] = {"error_code": int(code), "error_name": _name(code), "message": message}
+        dropped = self._drop(tick, EventKind.GOAL_FAILED, **details)
         self._failure = code
         if self._stop_on_failure:
             if self._mode == "follow_waypoints":
@@ -88,26 +91,26 @@ class Task:
         return (*dropped, *self._close(tick, TaskResult.FAILED))
 
     def cancel(self, tick: int) -> Events:
-        """Drop this goal and all after it."""
-        if self.goal is None and self._stays is None:
+        """Cancel the current goal and all after it."""
+        if self.goal is None and self._wait_until is None:
             return ()
         dropped = () if self.goal is None else self._drop(tick, EventKind.GOAL_CANCELED)
-        self._waiting, self._stays = [], None
+        self._waiting, self._wait_until = [], None
         return (*dropped, *self._close(tick, TaskResult.CANCELED))
 
     def preempt(self, tick: int, goal: Goal) -> Events:
-        """Drop this goal for another one; those after it follow. It ends a wait, too."""
+        """Replace the current goal; the goals after it stay. Also ends a wait."""
         dropped = () if self.goal is None else self._drop(tick, EventKind.GOAL_CANCELED, preempted_by=goal.name)
-        self.goal, self._stays = None, None
+        self.goal, self._wait_until = None, None
         self._waiting.insert(0, goal)
         return dropped
 
-    def _drop(self, tick: int, kind: EventKind, **said: Value) -> Events:
-        """The same becomes of the goal and of what follows it in the same drive."""
+    def _drop(self, tick: int, kind: EventKind, **details: Value) -> Events:
+        """End the current goal and the other goals of the same action with one kind of event."""
         ahead = self.ahead
-        dropped = [self._event(tick, kind, **said)]
+        dropped = [self._event(tick, kind, **details)]
         for goal in ahead:
-            dropped.append(Event(tick, kind, goal.name, {"index": self._accepted, **said}))
+            dropped.append(Event(tick, kind, goal.name, {"index": self._accepted, **details}))
             self._accepted += 1
         self._waiting = self._waiting[len(ahead) :]
         return tuple(dropped)
@@ -121,16 +124,16 @@ class Task:
             result = TaskResult.FAILED
         code = self._failure or ErrorCode.NONE
         self._failure = None
-        said: dict[str, Value] = {"error_code": int(code), "error_name": _name(code)}
-        return (Event(tick, EventKind.NAVIGATION_ENDED, result.value, said),)
+        details: dict[str, Value] = {"error_code": int(code), "error_name": _name(code)}
+        return (Event(tick, EventKind.NAVIGATION_ENDED, result.value, details),)
 
     @property
     def following(self) -> Goal | None:
-        """The goal that is next."""
+        """The next goal."""
         return self._waiting[0] if self._waiting else None
 
     def _event(self, tick: int, kind: EventKind, **data: Value) -> Event:
-        """Of the goal being driven to, which is the one accepted last."""
+        """Create an event of the current goal, which is the one accepted last."""
         assert self.goal is not None
         return Event(tick, kind, self.goal.name, {"index": self._accepted - 1, **data})
 

@@ -1,4 +1,4 @@
-"""How long the robot can keep a velocity before its hull meets a lethal cell."""
+"""Time for which the robot can keep a velocity before its footprint touches a lethal cell."""
 
 import math
 
@@ -13,11 +13,11 @@ from simscen.stack.protocols import CostmapView
 
 
 def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> float:
-    """Seconds until the first collision at this velocity; `horizon` when there is none before.
+    """Return the time in s until the first collision at this velocity, at most `horizon`.
 
-    A robot that seems to be in collision already (its map or its belief is off by a few centimeters) may move as long
-    as that brings what it is in no more than half a cell further in: otherwise it could never get out. Into nothing
-    else, though: who touches a post with one side may not back into the next.
+    A robot that is in collision according to the costmap, for example because of a localization error, may move unless
+    that brings it further into the same obstacle by more than half a cell, or into another one. Otherwise, it could
+    never leave the collision.
     """
     if _clearly_free(footprint.circumscribed, costmap, pose, twist, horizon):
         return horizon
@@ -27,14 +27,14 @@ def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, t
     poses = poses_along(pose, twist, times)
     blocked = ~footprint.free(costmap, poses)
     if blocked[0]:
-        blocked = _worse(footprint, costmap, poses)
+        blocked = _is_worse(footprint, costmap, poses)
     if not blocked.any():
         return horizon
     return float(times[max(0, int(blocked.argmax()) - 1)])
 
 
-def _worse(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.NDArray[np.bool_]:
-    """Which of the poses (n, 3) are further in a lethal cell than the first one, or in another."""
+def _is_worse(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.NDArray[np.bool_]:
+    """Return which of the poses (n, 3) are further inside a lethal cell than the first pose, or inside another one."""
     reach = footprint.circumscribed + float(np.hypot(*(poses[:, :2] - poses[0, :2]).T).max()) + costmap.resolution
     gaps = footprint.gaps(lethal_near(costmap, poses[0, 0].item(), poses[0, 1].item(), reach), poses)
     further = gaps < np.minimum(gaps[0] - 0.5 * costmap.resolution, 0.0)
@@ -43,10 +43,10 @@ def _worse(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.NDAr
 
 
 def _clearly_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> bool:
-    """Whether a disc of `radius` has room all along, by steps as long as the room there is: mostly two or three.
+    """Return True if a disc of `radius` is free along the whole arc. Each step is as long as the free distance.
 
-    Half a cell's diagonal on both ends of a step is kept, as distances are known between cells. In the open this takes
-    3 µs where checking all poses takes 60.
+    Half a cell diagonal is added at both ends of a step, because distances are known between cell centers. This quick
+    check avoids the check of all poses in open space.
     """
     vx, vy, wz = twist
     speed, turns = math.hypot(vx, vy), abs(wz) >= MIN_YAW_RATE

@@ -48,7 +48,7 @@ class TrailFollower:
 
     def __init__(self, setting: Setting, speed: float) -> None:
         """`speed`: m/s at most; less where the base cannot reverse as fast."""
-        self._footprint, self._way, self._allowed = setting.footprint, setting.way, setting.allowed
+        self._footprint, self._way, self._allowed = setting.footprint, setting.trail, setting.limit_command
         self.speed = min(speed, setting.robot.max_reverse)
         """m/s; 0 for a robot without a reverse gear."""
         self._last: Pose2 | None = None

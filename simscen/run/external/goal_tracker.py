@@ -76,7 +76,7 @@ class GoalTracker:
 
     def rest(self, tick: int) -> None:
         """Advance to a tick, which can end a wait at a goal and the task."""
-        self._events += self._task.rest(tick)
+        self._events += self._task.end_wait(tick)
 
     def overdue(self, tick: int) -> bool:
         """Fail the current goal if its timeout is over; return whether it was."""
@@ -101,7 +101,7 @@ class GoalTracker:
         if self._task.goal is not None:
             raise ProtocolViolation(f"goal.accepted, but goal `{self._task.goal.name}` is under way")
         self.rest(tick)
-        if self._task.stays:
+        if self._task.waits:
             raise ProtocolViolation(f"goal.accepted `{name[:60]}`, but the robot is to stay where it is for a while")
         following = self._task.following
         if following is None or name not in ("", following.name):

@@ -49,7 +49,7 @@ IN = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0), (Twist(0.
 
 
 def behavior(robot: RobotModel, way: list[Pose2], **said: float) -> Retrace:
-    return Retrace(model.Retrace(**said), replace(setting(robot), way=lambda: way))
+    return Retrace(model.Retrace(**said), replace(setting(robot), trail=lambda: way))
 
 
 def run(behavior: Behavior, view: CostmapView, slip: float = 1.0, allowed: Allowed = lambda one, _: one) -> list[Pose2]:
@@ -135,7 +135,7 @@ def test_what_the_collision_monitor_would_not_let_it_drive_is_not_what_it_does()
     view = view_of(LONG, Flatland())
     with pytest.raises(NavigationFailure, match="too long"):
         run(behavior(LONG, way), view, allowed=monitor.allow)
-    heedful = Retrace(model.Retrace(), replace(setting(LONG), way=lambda: way, allowed=monitor.allow))
+    heedful = Retrace(model.Retrace(), replace(setting(LONG), trail=lambda: way, limit_command=monitor.allow))
     end = run(heedful, view, allowed=monitor.allow)[-1]
     assert math.hypot(end.x, end.y) > 0.29 and end.yaw > 0.3
 

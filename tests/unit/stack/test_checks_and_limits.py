@@ -217,9 +217,9 @@ def test_why_a_lidar_counts_as_silent_is_told() -> None:
     guard.start(0)
     assert guard.silence(240) == "lidar `lidar` has been silent for 1.00 s; source_timeout is 0.3 s"
     guard.on_scan(scan((2.0, 0.0), tick=120), Pose2(0, 0), 240)
-    assert guard.silence(241) == "scans of lidar `lidar` are 0.50 s old when they come; source_timeout is 0.3 s"
+    assert guard.silence(241) == "scans of lidar `lidar` are 0.50 s old when they arrive; source_timeout is 0.3 s"
     guard.on_scan(Scan("lidar", 300, np.full(9, np.nan), 0.0, 0.1, 0.05, 12.0), Pose2(0, 0), 300)
-    assert "blind for 0.75 s, as no beam of its scans answers" in guard.silence(300)
+    assert "blind for 0.75 s: its scans contain no returns" in guard.silence(300)
     assert "silent" in guard.silence(400)
 
 
@@ -407,7 +407,7 @@ def test_the_monitor_brakes_for_what_moves_wherever_the_whole_look_at_the_hull_w
     robot: RobotModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hasty, thorough = (CollisionMonitor(MonitorSpec(), robot, (), RATE) for _ in range(2))
-    monkeypatch.setattr(thorough, "_comes_near", lambda *_: True)
+    monkeypatch.setattr(thorough, "_may_meet_moving", lambda *_: True)
     chance, braked, spared = np.random.default_rng(4), 0, 0
     for _ in range(400):
         places, speeds = chance.normal(0.0, 1.2, (2, 2)), chance.normal(0.0, 0.7, (2, 2))
@@ -418,6 +418,6 @@ def test_the_monitor_brakes_for_what_moves_wherever_the_whole_look_at_the_hull_w
         allowed = thorough.allow(wanted, Pose2(0.0, 0.0))
         assert hasty.allow(wanted, Pose2(0.0, 0.0)) == allowed
         braked += allowed != wanted
-        spared += not hasty._comes_near(wanted, MonitorSpec().time_before_collision)
+        spared += not hasty._may_meet_moving(wanted, MonitorSpec().time_before_collision)
     assert braked > 10
     assert spared > 100

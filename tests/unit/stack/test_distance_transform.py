@@ -7,7 +7,7 @@ from simscen.stack.distance_transform import squared_distance_blocks, squared_di
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (64, 7), (130, 50)])
-def test_distances_by_rows_are_scipys(shape):
+def test_distances_in_blocks_match_scipy(shape):
     marked = np.random.default_rng(4).random(shape) < 0.02
     marked[0, 0] = True
     whole = np.full(shape, -1.0)
@@ -16,20 +16,20 @@ def test_distances_by_rows_are_scipys(shape):
     assert np.array_equal(whole, distance_transform_edt(~marked))
 
 
-@pytest.mark.parametrize("at_once", [1, 1000, distance_transform.BLOCK_SIZE])
+@pytest.mark.parametrize("block_size", [1, 1000, distance_transform.BLOCK_SIZE])
 @pytest.mark.parametrize(
     ("shape", "reach"),
     [((1, 1), 3), ((64, 7), 9), ((7, 64), 80), ((150, 90), 4), ((3, 200), distance_transform.MAX_REACH_CELLS)],
 )
-def test_up_to_a_reach_the_same_distances_are_told_sooner(shape, reach, at_once, monkeypatch):
-    monkeypatch.setattr(distance_transform, "AT_ONCE", at_once)
+def test_limited_distances_match_scipy_for_each_block_size(shape, reach, block_size, monkeypatch):
+    monkeypatch.setattr(distance_transform, "BLOCK_SIZE", block_size)
     marked = np.random.default_rng(5).random(shape) < 0.01
     marked[-1, -1] = True
     whole = np.rint(distance_transform_edt(~marked) ** 2)
     assert np.array_equal(squared_distances_within(marked, reach), np.where(whole <= reach**2, whole, reach**2 + 1))
 
 
-def test_where_nothing_is_marked_everything_is_beyond_the_reach():
+def test_without_marked_cells_everything_is_beyond_the_reach():
     assert (
         squared_distances_within(np.zeros((70, 5), dtype=bool), distance_transform.MAX_REACH_CELLS)
         == distance_transform.MAX_REACH_CELLS**2 + 1

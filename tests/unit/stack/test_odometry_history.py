@@ -75,12 +75,12 @@ def test_a_reading_that_is_not_a_place_is_refused(bad: float, part: int) -> None
 
 
 def test_the_way_reaches_farther_back_than_what_can_be_looked_up_and_begins_anew_with_another_odometry() -> None:
-    kept = OdometryHistory(RATE, way=60)
+    kept = OdometryHistory(RATE, trail=60)
     for tick in range(0, 1000, 10):
         kept.add(tick, Pose2(0.1 * tick, 0.0, 0.0))
-    assert 990 - 61 * RATE <= kept.way()[0].x / 0.1 <= 990 - 60 * RATE
-    assert kept.way()[-1] == kept.now
+    assert 990 - 61 * RATE <= kept.trail()[0].x / 0.1 <= 990 - 60 * RATE
+    assert kept.trail()[-1] == kept.now
     assert kept.at(990 - HISTORY_S * RATE - 1) is None
-    kept.forget()
-    assert not kept.way()
+    kept.clear()
+    assert not kept.trail()
     assert kept.add(5, Pose2(1.0, 0.0, 0.0))
