@@ -64,10 +64,10 @@ class Simulation:
         are no engine primitive. Without `has_images`, nothing is prepared for the renderer.
         """
         client = CLIENT_POOL.take()
-        engine.set_up(client, tick_rate, solver_iterations, one_by_one=len(robots) > 1)
+        engine.set_physics_parameters(client, tick_rate, solver_iterations, one_by_one=len(robots) > 1)
         terrain = Terrain(client, static, max((w.radius for r in robots.values() for w in r.body.wheels), default=0.0))
         walls = Walls(client, terrain.obstacles)
-        visual_shape = engine.AS_IT_IS if has_images else engine.speck(client)
+        visual_shape = engine.DEFAULT_VISUAL if has_images else engine.invisible_shape(client)
         render_scene = RenderScene(client, static, triangulate) if has_images else None
         actors = Actors(client, tick_rate, triangulate, visual_shape, is_complete=has_images)
         self._scene = Scene(client, tick_rate, walls, terrain, actors, render_scene)

@@ -78,14 +78,14 @@ def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
     entry = loaded.spec.own
     if entry.payload is None and entry.motor_torque == 1.0:
         return body
-    from simscen.sim.body.robot_body import add_payload, center, hull_height, is_stable, scale_motor_torque
+    from simscen.sim.body.robot_body import add_payload, center_of_mass, hull_height, is_stable, scale_motor_torque
 
     body = scale_motor_torque(body, entry.motor_torque)
     if entry.payload is not None:
         x, y, z = entry.payload.at or (0.0, 0.0, hull_height(body))
         body = add_payload(body, entry.payload.mass, (x, y, z))
         if not is_stable(body):
-            x, y, _ = center(body)
+            x, y, _ = center_of_mass(body)
             what = f"the robot falls over: with its payload its center of mass is at ({x:.2f}, {y:.2f}), off its wheels"
             raise InvalidInput([loaded.problem(("robot", "payload"), "SC406", what, "put it nearer to the middle")])
     return body

@@ -15,7 +15,7 @@ from simscen.sim.body.outline import hull_points
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.body.undercarriage import caster_gap, compliant_casters
 
-ANGLES = np.radians(np.arange(0.0, 50.0, 0.1))
+SLOPES = np.radians(np.arange(0.0, 50.0, 0.1))
 
 
 class ClimbLimits(NamedTuple):
@@ -71,7 +71,7 @@ def approach_angle(body: RobotBody) -> float:
     corners += [(c.pose.x - foremost.x, c.pose.z, c.shape.radius) for c in hanging if isinstance(c.shape, Sphere)]
     radius = foremost.radius
     free = [
-        -ahead * np.sin(ANGLES) + (up - radius) * np.cos(ANGLES) >= around - radius for ahead, up, around in corners
+        -ahead * np.sin(SLOPES) + (up - radius) * np.cos(SLOPES) >= around - radius for ahead, up, around in corners
     ]
-    scrapes = ~np.logical_and.reduce(free) if free else np.zeros(len(ANGLES), np.bool_)
-    return float(ANGLES[np.argmax(scrapes)]) if scrapes.any() else float(ANGLES[-1])
+    scrapes = ~np.logical_and.reduce(free) if free else np.zeros(len(SLOPES), np.bool_)
+    return float(SLOPES[np.argmax(scrapes)]) if scrapes.any() else float(SLOPES[-1])

@@ -13,7 +13,7 @@ from simscen.sim.urdf.body import body_from_urdf
 from simscen.sim.urdf.elements import MeshReader
 from simscen.sim.urdf.xml_source import RobotFiles
 
-LOW = 0.5
+CENTER_OF_MASS_HEIGHT_RATIO = 0.5
 """Height of the center of mass over that of the hull's volume: batteries and motors lie at the bottom."""
 
 
@@ -45,5 +45,5 @@ def _of_shapes(spec: RobotSpec, file: Path | None) -> RobotBody:
     )
     wheels = wheels_for_drive(spec.drive, spec.mass)
     even = inertia_of_solids(parts, spec.mass - sum(w.inertia.mass for w in wheels))
-    chassis = MassProperties(even.mass, even.center * (1.0, 1.0, LOW), even.tensor)
+    chassis = MassProperties(even.mass, even.center * (1.0, 1.0, CENTER_OF_MASS_HEIGHT_RATIO), even.tensor)
     return assemble(spec, parts, wheels, chassis)

@@ -10,7 +10,7 @@ from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 
-FEW = 200
+MIN_POINTS_TO_FILTER = 200
 """Points up to which it does not pay to look which of them may be corners."""
 _CIRCLE = 64
 """Corners of a circle's outline: within 0.03 % of the radius."""
@@ -85,7 +85,7 @@ def convex_hull(points: Array) -> Polygon:
 
 def _outer(points: Array) -> Array:
     """Without most of those that are no corners: they lie inside of what spans the outermost (Akl, Toussaint 1978)."""
-    if len(points) < FEW:
+    if len(points) < MIN_POINTS_TO_FILTER:
         return points
     angles = np.arange(32) * (math.pi / 16)
     outermost = (points @ np.array([np.cos(angles), np.sin(angles)])).argmax(axis=0)

@@ -100,7 +100,7 @@ def hull_height(body: RobotBody) -> float:
     return max(float(solid.pose.apply(hull_points(solid.shape))[:, 2].max()) for solid in body.hull)
 
 
-def center(body: RobotBody) -> Vector:
+def center_of_mass(body: RobotBody) -> Vector:
     """The center of mass of the whole robot in its base frame."""
     wheels = [wheel.inertia.mass * np.array((wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
     x, y, z = (np.sum([body.chassis.mass * body.chassis.center, *wheels], axis=0) / body.mass).tolist()
@@ -110,25 +110,25 @@ def center(body: RobotBody) -> Vector:
 def is_stable(body: RobotBody) -> bool:
     """Whether its center of mass is above what its wheels and casters span; a base without wheels never tips."""
     feet = [(wheel.x, wheel.y) for wheel in body.wheels] + [(c.pose.x, c.pose.y) for c in body.casters]
-    x, y, _ = center(body)
+    x, y, _ = center_of_mass(body)
     return len(feet) < 3 or body.drive.type == "mecanum" or polygon_contains(convex_hull(np.array(feet)), (x, y))
 
 
-GROUND_CLEARANCE = 0.005
+MIN_GROUND_CLEARANCE_M = 0.005
 """m that a hull must be above the ground."""
 
 
 def check_ground_clearance(spec: RobotSpec, file: Path | None) -> None:
     """Raises InvalidInput for a robot on wheels with a part of its `body` on the ground."""
     on_wheels = not isinstance(spec.drive, Omnidirectional)
-    if on_wheels and any(part.z < GROUND_CLEARANCE for part in spec.body or ()):
+    if on_wheels and any(part.z < MIN_GROUND_CLEARANCE_M for part in spec.body or ()):
         message = f"a part of the body of {spec.name!r} reaches the ground: it would drag instead of roll"
-        hint = f"give each part a `z` of at least {GROUND_CLEARANCE:g} m"
+        hint = f"give each part a `z` of at least {MIN_GROUND_CLEARANCE_M:g} m"
         raise InvalidInput([Problem(str(file or spec.name), 0, 0, "SC401", message, hint)])
 
 
 # A larger robot would make maps and footprints of the stack exhaust memory and time.
-FARTHEST = 10.0
+MAX_EXTENT_M = 10.0
 """m from the base, across and in height; the largest vehicles in ports are 15 m long."""
 
 
@@ -137,7 +137,7 @@ def check_robot_size(body: RobotBody, file: Path | None) -> None:
     across, up = radius_and_height(body.solid)
     wheels = max((math.hypot(wheel.x, wheel.y) + wheel.radius for wheel in body.wheels), default=0.0)
     farthest = max(across, up, wheels, body.circumscribed_radius)
-    if farthest > FARTHEST:
-        message = f"robot {body.name!r} reaches {farthest:.4g} m from its base, more than {FARTHEST:g} m"
+    if farthest > MAX_EXTENT_M:
+        message = f"robot {body.name!r} reaches {farthest:.4g} m from its base, more than {MAX_EXTENT_M:g} m"
         hint = "are lengths in millimeters? they are in meters here"
         raise InvalidInput([Problem(str(file or body.name), 0, 0, "SC402", message, hint)])

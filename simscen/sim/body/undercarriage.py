@@ -11,9 +11,9 @@ from simscen.model.robot import Ackermann, Differential, Drive, Mecanum, Omnidir
 from simscen.sim.body.inertia import GRAVITY, MassProperties, inertia_of_shape
 from simscen.sim.body.outline import footprint
 
-WHEEL_SHARE = 0.03
+WHEEL_MASS_SHARE = 0.03
 """A wheel's share of the mass, where nobody says: those of a TurtleBot3 and of a Jackal weigh 2 to 3 %."""
-ROTOR = {"differential": 0.25, "ackermann": 0.25, "skid_steer": 0.5}
+ROTOR_INERTIA = {"differential": 0.25, "ackermann": 0.25, "skid_steer": 0.5}
 """Rotor inertia of a wheel's motor as seen through the gear, in units of robot mass x wheel radius².
 
 The square of the gear ratio makes it far larger than that of the wheel itself. It also is what lets ten solver
@@ -21,21 +21,21 @@ iterations converge: without it a resting robot creeps at 1.1 mm/s, with it at 2
 friction nearer to opposite to the slip, as Coulomb has it; yet a rotor that is spun up turns the chassis the other
 way, and with 1.0 a Jackal somersaults at 5 m/s².
 """
-TRACTION = {"differential": 0.7, "ackermann": 0.7, "skid_steer": 1.5}
+STALL_TORQUE = {"differential": 0.7, "ackermann": 0.7, "skid_steer": 1.5}
 """Stall torque of a motor over what spins its wheel on the spot.
 
 Differential drives stall against a wall rather than spin; skid steering needs more than its grip, to start the
 rotors as well.
 """
-BALLAST = 0.1
+MASS_OFFSET_SHARE = 0.1
 """How far behind the axle the mass of a symmetric robot sits, as a fraction of the way to the caster.
 
 With the mass exactly over the axle the robot rocks between its casters and the load on the wheels is left to the
 solver: they then slip 4 % when accelerating with 1 m/s², instead of 0.1 %.
 """
-CASTER_GAP = 0.001
+CASTER_GAP_M = 0.001
 """How far the unloaded caster hangs above the ground in m."""
-YIELDS = math.tan(math.radians(8))
+UNEVEN_CASTER_GAP_RATIO = math.tan(math.radians(8))
 """How far the unloaded caster hangs on uneven ground, over its distance from the axle.
 
 Wheels between two rigid casters hang in the air at the foot of a ramp. Real bases have sprung ones, or sprung wheels;
@@ -78,7 +78,7 @@ def wheels_for_drive(drive: Drive, mass: float) -> tuple[Wheel, ...]:
             axles = {"rear": -drive.wheel_base / 2, "front": drive.wheel_base / 2}
         case Ackermann():
             axles = {"rear": 0.0, "front": drive.wheel_base}
-    inertia = wheel_inertia(WHEEL_SHARE * mass, drive.wheel_radius, drive.wheel_width)
+    inertia = wheel_inertia(WHEEL_MASS_SHARE * mass, drive.wheel_radius, drive.wheel_width)
     half = drive.wheel_separation / 2
     return tuple(
         Wheel(f"{axle}_{side}", x, y, drive.wheel_radius, drive.wheel_width, inertia, driven=not steered,
@@ -101,7 +101,9 @@ def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wh
     grip = mass * GRAVITY / max(1, sum(wheel.driven for wheel in wheels))
     return tuple(
         replace(
-            wheel, torque=TRACTION[drive.type] * grip * wheel.radius, rotor=ROTOR[drive.type] * mass * wheel.radius**2
+            wheel,
+            torque=STALL_TORQUE[drive.type] * grip * wheel.radius,
+            rotor=ROTOR_INERTIA[drive.type] * mass * wheel.radius**2,
         )
         if wheel.driven
         else wheel
@@ -134,10 +136,10 @@ def add_casters(
     front = 0.9 * (max(x for x, _ in outline) - radius)
     rear = 0.9 * (min(x for x, _ in outline) + radius)
     center = chassis.center.copy()
-    loaded = front if center[0] > BALLAST * front else rear
-    if abs(center[0]) < BALLAST * abs(loaded):
-        center[0] = BALLAST * loaded
-    gaps = {front: CASTER_GAP, rear: CASTER_GAP} | {loaded: 0.0}
+    loaded = front if center[0] > MASS_OFFSET_SHARE * front else rear
+    if abs(center[0]) < MASS_OFFSET_SHARE * abs(loaded):
+        center[0] = MASS_OFFSET_SHARE * loaded
+    gaps = {front: CASTER_GAP_M, rear: CASTER_GAP_M} | {loaded: 0.0}
     balls = tuple(Solid(Sphere(radius), Pose3(x, 0.0, radius + gap), "caster") for x, gap in gaps.items())
     return MassProperties(chassis.mass, center, chassis.tensor), balls
 
@@ -148,7 +150,7 @@ def compliant_casters(casters: Sequence[Solid]) -> tuple[Solid, ...]:
 
 
 def _raised(caster: Solid) -> Solid:
-    gap = YIELDS * math.hypot(caster.pose.x, caster.pose.y)
+    gap = UNEVEN_CASTER_GAP_RATIO * math.hypot(caster.pose.x, caster.pose.y)
     return replace(caster, pose=caster.pose._replace(z=caster.pose.z - caster_gap(caster) + gap))
 
 

@@ -23,9 +23,9 @@ class PyBulletBaseline:
         self, static: TriangleMesh | Sequence[Solid], robot: RobotBody, pose: Pose2, triangulate: engine.Triangulate
     ) -> None:
         self._client = client = pybullet.connect(pybullet.DIRECT)
-        engine.set_up(client, 240, 10)
+        engine.set_physics_parameters(client, 240, 10)
         ground = self._stand(pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
-        engine.touch(client, ground, -1, engine.GROUND, engine.EVERYTHING)
+        engine.set_collision_filter(client, ground, -1, engine.GROUND, engine.EVERYTHING)
         if isinstance(static, TriangleMesh):
             for lot in engine.tiles(static.vertices, engine.above_floor(static.vertices, static.faces)):
                 mesh = self._stand(engine.concave_shape(client, submesh(static.vertices, lot)))
@@ -37,8 +37,8 @@ class PyBulletBaseline:
         self._pose = pose
 
     def _stand(self, shape: int) -> int:
-        """A body that never moves, as `createMultiBody` makes it unless it is told otherwise; see engine.fixed."""
-        return engine.body(self._client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
+        """A body that never moves, as `createMultiBody` makes it unless it is told otherwise; see engine.create_static_body."""
+        return engine.create_rigid_body(self._client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
 
     def step(self, ticks: int) -> None:
         """Step and nothing else."""

@@ -7,7 +7,7 @@ import pybullet
 
 from simscen.sim.bullet import engine
 
-AT_ONCE = 2
+MAX_FREE_CLIENTS = 2
 """Clients that a run of one robot on even ground has."""
 
 
@@ -21,7 +21,7 @@ class ClientPool:
     def make_ahead(self) -> None:
         """Make now what a run asks for, in a process whose forks have one run each."""
         self._once = True
-        while len(self._free) < AT_ONCE:
+        while len(self._free) < MAX_FREE_CLIENTS:
             self._free.append(_grounded(_connected()))
 
     def take(self) -> int:
@@ -30,7 +30,7 @@ class ClientPool:
 
     def give_back(self, client: int) -> None:
         """Nobody uses it any more. Of what was in it nothing is left: its world and solver are made anew."""
-        if self._once or len(self._free) == AT_ONCE:
+        if self._once or len(self._free) == MAX_FREE_CLIENTS:
             pybullet.disconnect(client)
         else:
             pybullet.resetSimulation(physicsClientId=client)
@@ -49,6 +49,6 @@ def _connected() -> int:
 
 
 def _grounded(client: int) -> int:
-    ground = engine.plane(client, engine.speck(client))
-    engine.touch(client, ground, -1, engine.GROUND, engine.EVERYTHING)
+    ground = engine.create_ground_plane(client, engine.invisible_shape(client))
+    engine.set_collision_filter(client, ground, -1, engine.GROUND, engine.EVERYTHING)
     return client

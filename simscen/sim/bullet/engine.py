@@ -13,21 +13,21 @@ from simscen.sim.body.inertia import GRAVITY
 from simscen.sim.body.outline import hull_points
 from simscen.sim.bullet.hull_vertices import reduce_hull_vertices
 
-FACES_AT_ONCE = 40_000
+MAX_FACES_PER_SHAPE = 40_000
 """Bullet's shared-memory commands hold at most 131072 vertices and 524288 indices."""
-STRIP = 20.0
+STRIP_WIDTH_M = 20.0
 """m of x that lie together in one lot of faces."""
-BREAKING = 0.02
+CONTACT_BREAKING_SHARE = 0.02
 """Share of a shape's extent within which a point of contact is the one of the step before."""
-AT_REST = 1e-6
+REST_SPEED_SQUARED = 1e-6
 """(m/s)² below which a body is at rest; Bullet's own 0.05 would stop a ball that rolls at 0.2 m/s."""
-UNTIL_ASLEEP = 2.0
+SLEEP_DELAY_S = 2.0
 """Seconds at rest after which Bullet lets a body lie until it is touched (btMultiBody's SLEEP_TIMEOUT)."""
 
-TERRAIN, GROUND, HULL, WHEEL, UNMOVED = 128, 64, 32, 16, 2
+TERRAIN, GROUND, HULL, WHEEL, STATIC = 128, 64, 32, 16, 2
 """Collision groups of uneven ground, of the plane, of a robot's parts, and Bullet's own of what nothing pushes."""
 NOTHING, EVERYTHING = 0, -1
-AS_IT_IS = -1
+DEFAULT_VISUAL = -1
 """The look of a body that the renderer shows as the shape that it is; of most triangles it shows nothing."""
 
 ORIGIN = Pose3()
@@ -40,7 +40,7 @@ Frame = tuple[tuple[float, float, float], Pose3]
 Faces = npt.NDArray[np.int32]
 
 
-def set_up(client: int, tick_rate: int, solver_iterations: int, one_by_one: bool = False) -> None:
+def set_physics_parameters(client: int, tick_rate: int, solver_iterations: int, one_by_one: bool = False) -> None:
     """Set every parameter, so that no default decides a trajectory.
 
     `one_by_one`: what touches nothing in common is solved apart, so that it does not matter what else is in the world.
@@ -56,7 +56,7 @@ def set_up(client: int, tick_rate: int, solver_iterations: int, one_by_one: bool
         frictionERP=0.2,
         globalCFM=0.0,
         restitutionVelocityThreshold=0.2,
-        contactBreakingThreshold=BREAKING,
+        contactBreakingThreshold=CONTACT_BREAKING_SHARE,
         contactSlop=1e-5,
         collisionFilterMode=0,
         useSplitImpulse=0,
@@ -74,9 +74,9 @@ def set_up(client: int, tick_rate: int, solver_iterations: int, one_by_one: bool
     pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=client)
 
 
-def touch(client: int, body: int, link: int, group: int, others: int) -> None:
+def set_collision_filter(client: int, create_rigid_body: int, link: int, group: int, others: int) -> None:
     """Let a link touch only what is in the groups `others`, and of that only what lets itself be touched by `group`."""
-    pybullet.setCollisionFilterGroupMask(body, link, group, others, physicsClientId=client)
+    pybullet.setCollisionFilterGroupMask(create_rigid_body, link, group, others, physicsClientId=client)
 
 
 def static_mesh(client: int, mesh: TriangleMesh) -> list[int]:
@@ -91,10 +91,10 @@ def static_faces(client: int, vertices: Array, faces: Faces) -> list[int]:
 
 def tiles(vertices: Array, faces: Faces) -> list[Faces]:
     """Faces in as many lots as Bullet takes at once; those of a lot lie together, in strips and from end to end."""
-    if len(faces) > FACES_AT_ONCE:
+    if len(faces) > MAX_FACES_PER_SHAPE:
         middle = vertices[faces, :2].mean(axis=1)
-        faces = faces[np.lexsort((middle[:, 1], np.floor(middle[:, 0] / STRIP)))]
-    return [faces[k : k + FACES_AT_ONCE] for k in range(0, len(faces), FACES_AT_ONCE)]
+        faces = faces[np.lexsort((middle[:, 1], np.floor(middle[:, 0] / STRIP_WIDTH_M)))]
+    return [faces[k : k + MAX_FACES_PER_SHAPE] for k in range(0, len(faces), MAX_FACES_PER_SHAPE)]
 
 
 def above_floor(vertices: Array, faces: Faces) -> Faces:
@@ -104,10 +104,10 @@ def above_floor(vertices: Array, faces: Faces) -> Faces:
 
 
 def _concave(client: int, vertices: Array, faces: Faces) -> int:
-    body = fixed(client, concave_shape(client, submesh(vertices, faces)))
+    create_rigid_body = create_static_body(client, concave_shape(client, submesh(vertices, faces)))
     # Bullet would thicken the triangles by 1 mm.
-    pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
-    return body
+    pybullet.changeDynamics(create_rigid_body, -1, collisionMargin=0.0, physicsClientId=client)
+    return create_rigid_body
 
 
 def concave_shape(client: int, mesh: Mesh) -> int:
@@ -177,22 +177,22 @@ def body_shape(client: int, solids: Sequence[Solid], pushable: bool, triangulate
 
     Bullet moves convex shapes only, so what it pushes and cannot build from primitives becomes its convex hull.
     """
-    if simple(solids):
+    if are_primitives(solids):
         return compound_shape(client, solids)
-    return hull_shape(client, solids) if pushable else concave_shape(client, fused(solids, triangulate))
+    return hull_shape(client, solids) if pushable else concave_shape(client, fuse_surfaces(solids, triangulate))
 
 
-def hollow(solids: Sequence[Solid], pushable: bool) -> bool:
+def is_hollow(solids: Sequence[Solid], pushable: bool) -> bool:
     """Whether the collision shape of something that moves is a surface without an inside."""
-    return not simple(solids) and not pushable
+    return not are_primitives(solids) and not pushable
 
 
-def simple(solids: Sequence[Solid]) -> bool:
+def are_primitives(solids: Sequence[Solid]) -> bool:
     """Whether the engine knows all of them as such."""
     return all(isinstance(solid.shape, PRIMITIVES) for solid in solids)
 
 
-def fused(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
+def fuse_surfaces(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
     """The surfaces of solids as one."""
     meshes = [(triangulate(solid.shape), solid.pose) for solid in solids]
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in meshes)])
@@ -201,7 +201,9 @@ def fused(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
     return Mesh(vertices, np.concatenate(faces))
 
 
-def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float, look: int = AS_IT_IS) -> int:
+def create_rigid_body(
+    client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float, look: int = DEFAULT_VISUAL
+) -> int:
     """A rigid body of a collision shape, with principal moments and center of mass in `frame`, and how it looks.
 
     Nothing pushes one of mass 0, which sleeps while it stands: Bullet looks anew at what lies upon something awake.
@@ -218,7 +220,7 @@ def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, fricti
         physicsClientId=client,
     )  # fmt: skip
     if mass == 0:  # Bullet would look at each step for where it touches the ground, though neither moves the other
-        touch(client, number, -1, UNMOVED, ~(UNMOVED | GROUND | TERRAIN))
+        set_collision_filter(client, number, -1, STATIC, ~(STATIC | GROUND | TERRAIN))
         sleeps = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
         pybullet.changeDynamics(number, -1, activationState=sleeps, physicsClientId=client)
     if mass > 0:
@@ -228,18 +230,24 @@ def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, fricti
 
 
 def wake(client: int, number: int) -> None:
-    """Wake a body; it lies still again from UNTIL_ASLEEP after it came to rest until something with mass touches it."""
+    """Wake a body; it lies still again from SLEEP_DELAY_S after it came to rest until something with mass touches it."""
     awake = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP
-    pybullet.changeDynamics(number, -1, activationState=awake, sleepThreshold=AT_REST, physicsClientId=client)
+    pybullet.changeDynamics(
+        number, -1, activationState=awake, sleepThreshold=REST_SPEED_SQUARED, physicsClientId=client
+    )
 
 
-def lay(client: int, number: int) -> None:
-    """Let a body that is at rest sleep after the next step, as if it had been so for UNTIL_ASLEEP."""
+def put_to_sleep(client: int, number: int) -> None:
+    """Let a body that is at rest sleep after the next step, as if it had been so for SLEEP_DELAY_S."""
     asleep = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
-    pybullet.changeDynamics(number, -1, activationState=asleep, sleepThreshold=AT_REST, physicsClientId=client)
+    pybullet.changeDynamics(
+        number, -1, activationState=asleep, sleepThreshold=REST_SPEED_SQUARED, physicsClientId=client
+    )
 
 
-def fixed(client: int, shape: int, look: int = AS_IT_IS, pose: Pose3 = ORIGIN, friction: float = 1.0) -> int:
+def create_static_body(
+    client: int, shape: int, look: int = DEFAULT_VISUAL, pose: Pose3 = ORIGIN, friction: float = 1.0
+) -> int:
     """A body that never moves; it sleeps, for Bullet looks anew at what lies upon something that is awake.
 
     It is a rigid body: a multibody, as Bullet would have it, has six velocities of its own that stay zero, and each
@@ -248,7 +256,7 @@ def fixed(client: int, shape: int, look: int = AS_IT_IS, pose: Pose3 = ORIGIN, f
     number: int = pybullet.createMultiBody(
         0.0, shape, look, pose.position, pose.quaternion, useMaximalCoordinates=1, physicsClientId=client
     )
-    touch(client, number, -1, UNMOVED, ~(UNMOVED | GROUND | TERRAIN))
+    set_collision_filter(client, number, -1, STATIC, ~(STATIC | GROUND | TERRAIN))
     pybullet.changeDynamics(
         number, -1, lateralFriction=friction, restitution=0.0, activationState=pybullet.ACTIVATION_STATE_SLEEP,
         physicsClientId=client,
@@ -256,12 +264,12 @@ def fixed(client: int, shape: int, look: int = AS_IT_IS, pose: Pose3 = ORIGIN, f
     return number
 
 
-def plane(client: int, look: int = AS_IT_IS) -> int:
+def create_ground_plane(client: int, look: int = DEFAULT_VISUAL) -> int:
     """The plane z = 0."""
-    return fixed(client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client), look)
+    return create_static_body(client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client), look)
 
 
-def speck(client: int) -> int:
+def invisible_shape(client: int) -> int:
     """The look of what nobody will ever see, a triangle too small to be drawn: Bullet makes that of a shape at once.
 
     For a plane it paints 3 MB, which takes a millisecond.

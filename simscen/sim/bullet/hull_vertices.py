@@ -7,9 +7,9 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.core.geometry.shapes import Mesh
 
-MANY_CORNERS = 256
+MAX_VERTICES = 256
 """Vertices up to which a mesh is taken as it is."""
-STANDS_OUT = 0.001
+TOLERANCE_M = 0.001
 """m that a corner which is left out may stand out of the hull of those that are kept."""
 
 _known: "WeakKeyDictionary[Mesh, Array]" = WeakKeyDictionary()
@@ -20,7 +20,7 @@ def reduce_hull_vertices(mesh: Mesh) -> Array:
 
     Found once for each mesh. Of one in a plane, which has no hull in space, all are kept.
     """
-    if len(mesh.vertices) <= MANY_CORNERS:
+    if len(mesh.vertices) <= MAX_VERTICES:
         return mesh.vertices
     if mesh not in _known:
         _known[mesh] = _fewest(mesh.vertices)
@@ -32,7 +32,7 @@ def _fewest(points: Array) -> Array:
 
     try:
         # Qhull's W: a point that stands out of a facet by less is not taken for one outside.
-        hull = ConvexHull(points, qhull_options=f"Qt W{STANDS_OUT}")
+        hull = ConvexHull(points, qhull_options=f"Qt W{TOLERANCE_M}")
     except QhullError:
         return points
     corners: Array = points[np.sort(hull.vertices)]

@@ -47,7 +47,7 @@ class Actors:
         client: int,
         tick_rate: int,
         triangulate: engine.Triangulate,
-        visual_shape: int = engine.AS_IT_IS,
+        visual_shape: int = engine.DEFAULT_VISUAL,
         is_complete: bool = True,
     ) -> None:
         """Begin without actors; `visual_shape` is what the renderer shows, `is_complete` disables deferred actors."""
@@ -66,7 +66,7 @@ class Actors:
         self._poses_tick: int | None = None
         self._resting_since: int | None = None
         """Tick since when no pushable actor has moved."""
-        self._ticks_until_asleep = math.ceil(2 * engine.UNTIL_ASLEEP * tick_rate)
+        self._ticks_until_asleep = math.ceil(2 * engine.SLEEP_DELAY_S * tick_rate)
         self._no_contact_before: dict[int, int] = {}
         """For each robot's body id, the tick until which it cannot touch any actor."""
         self._broad_phase = BroadPhase(client, tick_rate, (), ())
@@ -97,8 +97,8 @@ class Actors:
         segments, speed = [SweptSegment(body.pose.x, body.pose.y, body.pose.x, body.pose.y)], 0.0
         if body.path is not None:
             segments, speed = swept_segments(body.path), top_speed(body.path, radius)
-        is_hollow = engine.hollow(body.solids, body.mass > 0 and body.path is None)
-        shell = engine.fused(body.solids, self._triangulate) if is_hollow else None
+        is_hollow = engine.is_hollow(body.solids, body.mass > 0 and body.path is None)
+        shell = engine.fuse_surfaces(body.solids, self._triangulate) if is_hollow else None
         size = math.hypot(radius, height)
         return Actor(body, body.path, tick, segments, speed, size, radius, shell, is_steered)
 
@@ -118,11 +118,13 @@ class Actors:
         if actor.is_pushable:
             frame = inertia_of_solids(body.solids, body.mass).principal()
             actor.center_from_base = frame[1].inverse()
-            actor.body_id = engine.body(client, body.mass, shape, body.pose, frame, FRICTION, visual)
+            actor.body_id = engine.create_rigid_body(client, body.mass, shape, body.pose, frame, FRICTION, visual)
         elif actor.path is None:
-            actor.body_id = engine.fixed(client, shape, visual, body.pose, FRICTION)
+            actor.body_id = engine.create_static_body(client, shape, visual, body.pose, FRICTION)
         else:
-            actor.body_id = engine.body(client, 0.0, shape, body.pose, ((0.0, 0.0, 0.0), Pose3()), FRICTION, visual)
+            actor.body_id = engine.create_rigid_body(
+                client, 0.0, shape, body.pose, ((0.0, 0.0, 0.0), Pose3()), FRICTION, visual
+            )
         if actor.path is None:
             actor.engine_pose = body.pose
         else:
@@ -231,7 +233,7 @@ class Actors:
     def put_to_sleep(self, body_ids: Collection[int]) -> None:
         """Let bodies at rest sleep after the next step; queried poses are invalid after that step."""
         for body_id in body_ids:
-            engine.lay(self._client, body_id)
+            engine.put_to_sleep(self._client, body_id)
         self._poses_tick = None
 
     def update_rest_poses(self, tick: int) -> None:

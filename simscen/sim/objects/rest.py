@@ -39,7 +39,7 @@ class RestDetector:
 
 
 def _is_at_rest(speeds: list[float]) -> bool:
-    is_slow = max(speeds) ** 2 < engine.AT_REST
+    is_slow = max(speeds) ** 2 < engine.REST_SPEED_SQUARED
     return is_slow and any(now <= before for before, now in itertools.pairwise(speeds))
 
 

@@ -31,7 +31,7 @@ class PlanarBase:
 
     ground_links: Mapping[int, float]
 
-    def __init__(self, client: int, body: RobotBody, pose: Pose2, visual_shape: int = engine.AS_IT_IS) -> None:
+    def __init__(self, client: int, body: RobotBody, pose: Pose2, visual_shape: int = engine.DEFAULT_VISUAL) -> None:
         """Place the base at `pose`; the renderer shows `visual_shape`."""
         self._client = client
         moments, base_from_center = _total_mass_properties(body).principal()
@@ -63,7 +63,7 @@ class PlanarBase:
                 physicsClientId=client,
             )  # fmt: skip
         for link in self.hull_links:
-            engine.touch(client, self.id, link, engine.HULL, ~engine.GROUND)
+            engine.set_collision_filter(client, self.id, link, engine.HULL, ~engine.GROUND)
         self._mass, self._floor_friction, self._power = body.mass, 1.0, body.power
         self._radius = body.circumscribed_radius
         self.place(pose)

@@ -43,7 +43,7 @@ class WheeledBase:
         pose: Pose2,
         terrain: Terrain | None = None,
         tick: float = 0.0,
-        visual_shape: int = engine.AS_IT_IS,
+        visual_shape: int = engine.DEFAULT_VISUAL,
     ) -> None:
         """Place the base at `pose`; a physics step lasts `tick` seconds, 0 for a robot that never drives.
 
@@ -73,7 +73,7 @@ class WheeledBase:
         xx, yy, zz = wheel.inertia.tensor.diagonal().tolist()  # the axle is the y axis
         link = joint + 1 if wheel.steered else joint
         # The sphere extends beyond the sides of a narrow wheel; against obstacles, the wheel guard in the hull is used.
-        engine.touch(self._client, self.id, link, engine.WHEEL, engine.GROUND | engine.TERRAIN)
+        engine.set_collision_filter(self._client, self.id, link, engine.WHEEL, engine.GROUND | engine.TERRAIN)
         pybullet.changeDynamics(
             self.id,
             link,
@@ -178,7 +178,7 @@ def _build(
         physicsClientId=client,
     )
     for link in hull:
-        engine.touch(client, robot, link, engine.HULL, ~engine.WHEEL)
+        engine.set_collision_filter(client, robot, link, engine.HULL, ~engine.WHEEL)
         pybullet.changeDynamics(
             robot, link, lateralFriction=0.0, restitution=0.0, linearDamping=0, angularDamping=0,
             physicsClientId=client,
@@ -215,7 +215,7 @@ def _wheel_shape(client: int, wheel: Wheel, max_roll: float) -> int:
     accumulate up to three outdated points, which double the cost of a step. A small sphere along the axle, where
     nothing touches it, makes the extent large enough; it lies within the wheel on the other side.
     """
-    pin_distance = min(ROLL_MARGIN * max_roll / engine.BREAKING, 2 * abs(wheel.y) + wheel.radius / 2)
+    pin_distance = min(ROLL_MARGIN * max_roll / engine.CONTACT_BREAKING_SHARE, 2 * abs(wheel.y) + wheel.radius / 2)
     if pin_distance <= wheel.radius:
         shape: int = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel.radius, physicsClientId=client)
         return shape

@@ -67,19 +67,21 @@ class RenderScene:
         """Move all visual bodies to the current poses of the movable objects."""
         if not self._is_built:
             self._is_built = True
-            engine.touch(self._client, engine.plane(self._client), -1, engine.NOTHING, engine.NOTHING)
+            engine.set_collision_filter(
+                self._client, engine.create_ground_plane(self._client), -1, engine.NOTHING, engine.NOTHING
+            )
             self._create_bodies(self._static.vertices, self._static.faces)
         for name in [name for name in self._visuals if name not in moving]:
             self._remove(name)
         for name, (body, pose) in moving.items():
-            if not engine.simple(body.solids):
+            if not engine.are_primitives(body.solids):
                 self._place(name, body, pose)
 
     def _place(self, name: str, body: Body, pose: Pose3) -> None:
         known = self._visuals.get(name)
         if known is None or known.solids is not body.solids:
             self._remove(name)
-            mesh = engine.fused(body.solids, self._triangulate)
+            mesh = engine.fuse_surfaces(body.solids, self._triangulate)
             known = self._visuals[name] = _VisualBody(body.solids, self._create_bodies(mesh.vertices, mesh.faces))
         for body_id in known.body_ids:
             pybullet.resetBasePositionAndOrientation(

@@ -63,11 +63,11 @@ class Terrain:
             shapes = [engine.concave_shape(self._client, submesh(static.vertices, tile)) for tile in tiles]
         friction = static.frictions[owner] if static.frictions else 1.0
         for shape in shapes:
-            body = engine.fixed(self._client, shape)
+            body = engine.create_static_body(self._client, shape)
             pybullet.changeDynamics(
                 body, -1, collisionMargin=0.0, lateralFriction=friction, physicsClientId=self._client
             )
-            engine.touch(self._client, body, -1, engine.TERRAIN, engine.EVERYTHING)
+            engine.set_collision_filter(self._client, body, -1, engine.TERRAIN, engine.EVERYTHING)
             self.names[body] = static.names[owner]
 
     def heights(self, points: Array) -> Array:

@@ -13,7 +13,7 @@ from simscen.core.geometry.shapes import Solid
 from simscen.model.robot import Mecanum, Omnidirectional, RobotSpec
 from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.outline import hull_points
-from simscen.sim.body.robot_body import GROUND_CLEARANCE, RobotBody, assemble
+from simscen.sim.body.robot_body import MIN_GROUND_CLEARANCE_M, RobotBody, assemble
 from simscen.sim.body.undercarriage import Wheel, wheel_inertia
 from simscen.sim.urdf.elements import MeshReader, MeshSource
 from simscen.sim.urdf.tree import Tree, build_tree
@@ -182,10 +182,10 @@ def _off_the_ground(tree: Tree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
     whole = np.ptp(np.concatenate(points)[:, :2], axis=0)
     kept = []
     for solid, corners in zip(hull, points, strict=True):
-        if corners[:, 2].min() >= GROUND_CLEARANCE:
+        if corners[:, 2].min() >= MIN_GROUND_CLEARANCE_M:
             kept.append(solid)
         elif (np.ptp(corners[:, :2], axis=0) > CASTER * whole).any():
-            depth = GROUND_CLEARANCE - corners[:, 2].min()
+            depth = MIN_GROUND_CLEARANCE_M - corners[:, 2].min()
             message = f"link {solid.name!r} reaches {depth:.3f} m too low: it would drag over the ground"
             hint = "its wheels' collision shapes must reach lower than everything else"
             raise InvalidInput([tree.links[solid.name].element.problem(message, hint)])

@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
 from simscen.sim.body.climb import compute_climb_limits
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.body.robot_body import add_payload, center, is_stable, scale_motor_torque
+from simscen.sim.body.robot_body import add_payload, center_of_mass, is_stable, scale_motor_torque
 from simscen.worlds.geometry.ramp_wedges import wedge
 
 TICKS, GRAVITY = 240, 9.81
@@ -61,7 +61,7 @@ def test_a_high_load_tips_a_robot_backwards_on_a_slope_steeper_than_half_its_whe
     simulate, height, tips
 ):
     body, slope = add_payload(build_robot_body(shipped("jackal")), 50.0, (0.0, 0.0, height)), math.radians(15)
-    assert (math.tan(slope) > 0.262 / 2 / center(body)[2]) == tips
+    assert (math.tan(slope) > 0.262 / 2 / center_of_mass(body)[2]) == tips
     simulation = simulate(body, [wedge((0.5, 0), (3.5, 0), 2, 3 * math.tan(slope), "ramp")], pose=Pose2(2, 0, 0))
     simulation.step(2 * TICKS)
     pose = simulation.base_pose()
@@ -79,5 +79,5 @@ def test_a_load_moves_the_center_of_mass_and_adds_its_inertia():
     body = build_robot_body(shipped("jackal"))
     loaded = add_payload(body, body.mass, (0.2, 0.0, 0.5))
     assert loaded.mass == pytest.approx(2 * body.mass)
-    assert center(loaded)[0] == pytest.approx(0.1 + center(body)[0] / 2)
+    assert center_of_mass(loaded)[0] == pytest.approx(0.1 + center_of_mass(body)[0] / 2)
     assert loaded.chassis.tensor[1, 1] > body.chassis.tensor[1, 1]
