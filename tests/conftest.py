@@ -90,7 +90,7 @@ def lay_out(folder: Path, site: Path) -> Path:
 
 def forget() -> None:
     """Let the next look for packages see what is there then."""
-    for known in (registry._scanned, registry._loaded, choice.with_installed_choices):
+    for known in (registry._installed_entries, registry._load, choice.with_installed_choices):
         known.cache_clear()
 
 

@@ -136,7 +136,7 @@ class Fault(ABC):
     """Values of the keys with which the fault has no effect; {} if it always has one."""
 
     @classmethod
-    def broken_promise(cls) -> str:
+    def definition_problem(cls) -> str:
         """Return why the class is not a valid fault specification, or ""."""
         affects: object = getattr(cls, "affects", None)
         is_valid = isinstance(affects, frozenset) and affects and affects <= set(FAULT_TARGET_KINDS)

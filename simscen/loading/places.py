@@ -54,7 +54,7 @@ def unknown_places(spec: BaseModel, tree: Node, known: Iterable[str], nothing: s
     names = tuple(known)
     for reference in place_references(spec):
         if reference.name not in names:
-            hint = suggestion(reference.name, (*names, *getattr(reference.mark, "besides", ()))) or nothing
+            hint = suggestion(reference.name, (*names, *getattr(reference.mark, "keywords", ()))) or nothing
             message = f"no place of the world is called {quoted(reference.name)}"
             yield Problem(*value_position(tree, reference.keys), code="SC030", message=message, hint=hint)
 
@@ -62,7 +62,7 @@ def unknown_places(spec: BaseModel, tree: Node, known: Iterable[str], nothing: s
 def _named(spec: BaseModel, places: Places) -> Iterator[tuple[Reference, Any]]:
     for reference in place_references(spec):
         assert isinstance(reference.mark, PlaceAllowed)
-        yield reference, reference.mark.of(places.get(reference.name, NOWHERE).at(reference.name))
+        yield reference, reference.mark.value_at(places.get(reference.name, NOWHERE).at(reference.name))
 
 
 def _put(holder: Any, keys: tuple[Key, ...], value: Any) -> Any:

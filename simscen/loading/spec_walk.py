@@ -59,7 +59,9 @@ def _in_value(
     elif isinstance(value, dict):
         for key, item in value.items():
             yield from _in_value(item, mark, (*keys, key), concerns)
-    elif isinstance(value, str) and mark is not None and not (isinstance(mark, PlaceAllowed) and value in mark.besides):
+    elif (
+        isinstance(value, str) and mark is not None and not (isinstance(mark, PlaceAllowed) and value in mark.keywords)
+    ):
         yield Reference(keys, mark, value)
 
 

@@ -204,9 +204,9 @@ class SensorSpec(Component):
     """How long a reading takes from the moment it shows to the stack: exposure, sweep, driver, bus."""
 
     @classmethod
-    def broken_promise(cls) -> str:
+    def definition_problem(cls) -> str:
         """Why it is no specification of a sensor; "" for one that is."""
-        return super().broken_promise() or ("" if getattr(cls, "says", None) in READING_KINDS else _UNSAID)
+        return super().definition_problem() or ("" if getattr(cls, "says", None) in READING_KINDS else _UNSAID)
 
 
 _UNSAID = f"its `says` is none of {', '.join(READING_KINDS)}"

@@ -62,21 +62,21 @@ WorldOrFile = Annotated[
 
 
 class InitialEstimate(PoseSpec):
-    """What the localizer is told: a pose and how sure that is."""
+    """Initial pose estimate of the localizer with standard deviations."""
 
     std: Annotated[tuple[NonNegativeLength, NonNegativeLength, NonNegativeAngle], Field(strict=False)] = (
         0.5,
         0.5,
         0.2618,
     )
-    """Standard deviations of x, y (m) and yaw (rad); Nav2's default covariance."""
+    """Standard deviations of x, y (m), and yaw (rad); the default is Nav2's covariance."""
 
 
 class EstimateOrPlace(PlaceAllowed):
-    """Marks an estimate in place of which the name of a place may be written."""
+    """Annotation of an initial estimate that can also be given as the name of a place."""
 
-    def of(self, pose: PoseSpec) -> InitialEstimate:
-        """Its pose, as sure as an estimate is that does not say."""
+    def value_at(self, pose: PoseSpec) -> InitialEstimate:
+        """Return an estimate at the pose of the place with the default standard deviations."""
         return InitialEstimate(x=pose.x, y=pose.y, yaw=pose.yaw)
 
 
@@ -85,7 +85,7 @@ Unknown = Literal["unknown"]
 if TYPE_CHECKING:
     EstimateOrUnknown = InitialEstimate | Unknown
 else:
-    EstimateOrUnknown = Annotated[InitialEstimate, EstimateOrPlace(besides=get_args(Unknown))]
+    EstimateOrUnknown = Annotated[InitialEstimate, EstimateOrPlace(keywords=get_args(Unknown))]
 
 
 class Payload(Spec):

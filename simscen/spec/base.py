@@ -1,4 +1,4 @@
-"""The base of everything a user writes in YAML."""
+"""Base classes of the specifications that users write in YAML."""
 
 import ast
 import inspect
@@ -23,7 +23,7 @@ from pydantic_core import CoreSchema, PydanticCustomError
 
 
 class Spec(BaseModel):
-    """Strict, frozen, finite, and closed: an unknown key is an error."""
+    """Base of all specifications: strict, frozen, finite, and closed (an unknown key is an error)."""
 
     model_config = ConfigDict(
         strict=True,
@@ -31,12 +31,12 @@ class Spec(BaseModel):
         frozen=True,
         allow_inf_nan=False,
         populate_by_name=True,
-        defer_build=True,  # a light command validates nothing; building every schema costs it 50 ms
+        defer_build=True,  # building all validators takes 50 ms, and light commands need none of them
     )
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """The schema with the docstring of each field as its description."""
+        """Return the schema with the docstring of each field as its description."""
         schema = handler.resolve_ref_schema(handler(core))
         docs = field_docs(cls)
         for name, field in cls.model_fields.items():
@@ -46,48 +46,48 @@ class Spec(BaseModel):
 
 
 def _no_boolean(value: Any) -> Any:
-    if isinstance(value, bool):  # `True == 1`, so that a Literal would take it
+    if isinstance(value, bool):  # `True == 1`, so a Literal accepts it
         raise PydanticCustomError("literal_error", "expected 1", {"expected": "1"})
     return value
 
 
 LanguageVersion = Annotated[Literal[1], BeforeValidator(_no_boolean)]
-"""The version of the language that a file is written for."""
+"""Version of the language that a file is written for."""
 
 T = TypeVar("T")
 
 
 class Value(RootModel[T], Generic[T]):
-    """A bare value instead of a mapping, e.g. `time: 10 s`, as strict as a mapping is."""
+    """Specification that is a bare value instead of a mapping, e.g. `time: 10 s`."""
 
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class Ranged(Spec):
-    """A specification in which no `min_…` is greater than its `max_…`."""
+    """Specification in which no `min_…` may be greater than its `max_…`."""
 
     @model_validator(mode="after")
-    def _in_order(self) -> "Ranged":
+    def _check_order(self) -> "Ranged":
         for low in type(self).model_fields:
             high = low.replace("min", "max")
             if high == low or high not in type(self).model_fields:
                 continue
-            least, most = getattr(self, low), getattr(self, high)
-            if least > most:
-                raise ValueError(f"`{low}` {least:g} is greater than `{high}` {most:g}")
+            minimum, maximum = getattr(self, low), getattr(self, high)
+            if minimum > maximum:
+                raise ValueError(f"`{low}` {minimum:g} is greater than `{high}` {maximum:g}")
         return self
 
 
 def by_default() -> Any:
-    """The default of a field that holds a mapping: `{}`, validated when it is needed.
+    """Return the default of a field that holds a mapping: `{}`, validated when it is used.
 
-    An instance as the default would have its own validator built at import, for every command: 10 ms in all.
+    An instance as default would build its validator at import, which costs every command 10 ms.
     """
     return Field(default_factory=dict, validate_default=True)
 
 
 def type_discriminator(default: str) -> Callable[[Any], str | None]:
-    """Tells the members of a union apart by their `type`, which may be left out for the default one."""
+    """Return a discriminator that selects a member of a union by its `type`; a missing `type` means `default`."""
 
     def tag(value: Any) -> str | None:
         if isinstance(value, dict):
@@ -98,24 +98,25 @@ def type_discriminator(default: str) -> Callable[[Any], str | None]:
 
 
 def field_docs(model: type) -> dict[str, str]:
-    """Field name → docstring, those of base classes included."""
+    """Return the docstrings of the fields of a model and its base classes, by field name."""
     docs: dict[str, str] = {}
     for base in reversed(model.__mro__):
         if base.__module__.partition(".")[0] not in ("builtins", "pydantic", "abc", "typing"):
-            docs.update(_of_module(base.__module__).get(base.__name__, {}))
+            docs.update(_docs_of_module(base.__module__).get(base.__name__, {}))
     return docs
 
 
 @cache
-def _of_module(module: str) -> dict[str, dict[str, str]]:
+def _docs_of_module(module: str) -> dict[str, dict[str, str]]:
+    """Return the field docstrings of all classes of a module; empty if its source is not installed."""
     try:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
-    except OSError:  # a package that was installed without its source
+    except OSError:
         return {}
-    return {node.name: _of_class(node) for node in tree.body if isinstance(node, ast.ClassDef)}
+    return {node.name: _docs_of_class(node) for node in tree.body if isinstance(node, ast.ClassDef)}
 
 
-def _of_class(node: ast.ClassDef) -> dict[str, str]:
+def _docs_of_class(node: ast.ClassDef) -> dict[str, str]:
     docs = {}
     for statement, following in zip(node.body, node.body[1:], strict=False):
         if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
@@ -125,31 +126,31 @@ def _of_class(node: ast.ClassDef) -> dict[str, str]:
     return docs
 
 
-# MERGED: Specifications of what is built when a run is assembled: parts of a stack, whole stacks, sensors.
 class Component(Spec):
-    """What a file says of a component; its class is imported when a run is assembled, and no sooner.
+    """Specification of an object that is built for a run: a part of a stack, a whole stack, or a sensor.
 
-    So a file is validated without the engine or the library that the component needs.
+    The class of the object is imported when the run is assembled, so files are validated without the libraries that it
+    needs.
     """
 
     component: ClassVar[str]
     """`package.module:Class`, called as `Class(specification, setting)`."""
 
     @classmethod
-    def broken_promise(cls) -> str:
-        """Why it is no specification of a component; "" for one that is."""
-        named = isinstance(getattr(cls, "component", None), str) and re.fullmatch(r"[\w.]+:\w+", cls.component)
-        return "" if named else "it does not say what its `component` is, as package.module:Class"
+    def definition_problem(cls) -> str:
+        """Return why this class is not a valid specification of a component, or ""."""
+        valid = isinstance(getattr(cls, "component", None), str) and re.fullmatch(r"[\w.]+:\w+", cls.component)
+        return "" if valid else "it has no attribute `component` of the form package.module:Class"
 
     @classmethod
     def implementation(cls) -> Any:
-        """The class that `component` names. Raises ImportError or AttributeError where there is none."""
+        """Import and return the class that `component` names. Raises ImportError or AttributeError."""
         module, _, name = cls.component.partition(":")
         return getattr(import_module(module), name)
 
 
 class Typed(Component):
-    """A component that a file chooses by its `type`: the name of its entry point."""
+    """Component that files select by `type`, which is the name of its entry point."""
 
     type: str = ""
-    """Which one it is."""
+    """Name of the component."""

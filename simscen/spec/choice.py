@@ -1,6 +1,6 @@
-"""One key out of several: those that are shipped, and those that installed packages add.
+"""Mappings with exactly one key out of several: shipped keys, and keys added by installed packages.
 
-What packages add is looked for when a file uses a key that is not shipped, or somebody asks for everything.
+Installed packages are searched only if a file uses a key that simscen does not ship, or if all keys are requested.
 """
 
 import contextlib
@@ -16,59 +16,58 @@ from simscen.spec.lazy_spec import LazySpec
 
 
 class Choice(Spec):
-    """A mapping with exactly one key out of several, e.g. `spawn: {…}`, plus some modifiers.
+    """Mapping with exactly one key out of several, e.g. `spawn: {…}`, plus optional modifiers.
 
-    A subclass lists one optional field for each choice. Fields named in `modifiers` may stand beside the choice. An
-    editor or a validator can then name the exact mistake, where a tagged union could only say that nothing matched.
+    A subclass has one optional field for each choice; the fields in `modifiers` can be combined with any choice. Unlike
+    for a tagged union, editors and validators can report the exact mistake.
 
-    Where `group` names one of the registry, installed packages add choices: a mapping with such a key becomes an
-    instance of the `widened` class, which has a field for each of them. A file that uses only what is shipped never
-    looks for them.
+    If `group` is a group of the registry, installed packages can add choices. A mapping with an added key becomes an
+    instance of an extended class (`with_installed_choices`) that has a field for each of them.
     """
 
     modifiers: ClassVar[frozenset[str]] = frozenset()
     group: ClassVar[str] = ""
     narrow: ClassVar[type["Choice"] | None] = None
-    """Of a widened class: the one that it widens."""
+    """Original class of an extended class."""
 
     @classmethod
     def choices(cls) -> dict[str, str]:
-        """The keys to choose from, as they are written in YAML, and the fields that hold them."""
+        """Return the field names of the choices by their keys in YAML."""
         return {f.alias or name: name for name, f in cls.model_fields.items() if name not in cls.modifiers}
 
     @classmethod
     @cache
     def known_keys(cls) -> frozenset[str]:
-        """Every key that may be written there, modifiers included."""
+        """Return all valid keys, including modifiers."""
         return frozenset(field.alias or name for name, field in cls.model_fields.items())
 
     @classmethod
     def addresses(cls) -> dict[str, str]:
-        """The keys to choose from and where their specifications are, "module:Class"; not those without one."""
-        marks = {key: _address(cls.model_fields[name]) for key, name in cls.choices().items()}
-        return {key: address for key, address in marks.items() if address}
+        """Return the addresses "module:Class" of the specifications by key, for the keys that have one."""
+        addresses = {key: _address(cls.model_fields[name]) for key, name in cls.choices().items()}
+        return {key: address for key, address in addresses.items() if address}
 
     @model_validator(mode="wrap")
     @classmethod
-    def _or_installed(cls, value: Any, handler: ModelWrapValidatorHandler["Choice"]) -> "Choice":
+    def _use_installed(cls, value: Any, handler: ModelWrapValidatorHandler["Choice"]) -> "Choice":
         if cls.group and cls.narrow is None and isinstance(value, dict) and not cls.known_keys().issuperset(value):
-            wider = with_installed_choices(cls)
-            if not wider.known_keys().isdisjoint(value.keys() - cls.known_keys()):
-                return wider.model_validate(value, by_alias=True, by_name=False)
-        if isinstance(value, dict) and (named := cls._python_names().intersection(value)):
-            # Inside of a wrapped model older pydantics forget that names of fields are no keys.
-            errors = [InitErrorDetails(type="extra_forbidden", loc=(key,), input=value[key]) for key in sorted(named)]
+            extended = with_installed_choices(cls)
+            if not extended.known_keys().isdisjoint(value.keys() - cls.known_keys()):
+                return extended.model_validate(value, by_alias=True, by_name=False)
+        if isinstance(value, dict) and (invalid := cls._python_names().intersection(value)):
+            # Older pydantic versions accept field names as keys inside a wrapped model.
+            errors = [InitErrorDetails(type="extra_forbidden", loc=(key,), input=value[key]) for key in sorted(invalid)]
             raise ValidationError.from_exception_data(cls.__name__, errors)
         return handler(value)
 
     @classmethod
     @cache
     def _python_names(cls) -> frozenset[str]:
-        """Names of fields that are written otherwise, e.g. `for_`."""
+        """Return the names of fields whose key differs, e.g. `for_`."""
         return frozenset(name for name, field in cls.model_fields.items() if field.alias not in (None, name))
 
     @model_validator(mode="after")
-    def _exactly_one(self) -> "Choice":
+    def _check_one_choice(self) -> "Choice":
         given = self._given()
         if not given:
             raise ValueError(f"expected one of: {', '.join(self.choices())}")
@@ -81,19 +80,19 @@ class Choice(Spec):
 
     @property
     def kind(self) -> str:
-        """The key that was given."""
+        """Key of the choice."""
         return self._given()[0]
 
     @property
     def chosen(self) -> BaseModel:
-        """The specification under that key."""
+        """Specification of the choice."""
         spec = getattr(self, self.choices()[self.kind])
         assert isinstance(spec, BaseModel)
         return spec
 
     @property
     def added_by(self) -> str:
-        """Whose it is, as a message ends: " (criterion `dwell` of yardwork 1.2)"; "" where simscen ships it."""
+        """Suffix for messages with the package of the choice: " (criterion `dwell` of yardwork 1.2)"; "" if shipped."""
         if self.narrow is None:
             return ""
         from simscen.spec.registry import find
@@ -109,7 +108,7 @@ class Choice(Spec):
 
 @cache
 def with_installed_choices(choice: type[Choice]) -> type[Choice]:
-    """The choice with a field for each name that installed packages add to its group; itself where there is none."""
+    """Return a subclass with a field for each key that installed packages add, or the class itself if there is none."""
     from pydantic import create_model
 
     from simscen.spec.extensible_union import PluginSpec
@@ -127,15 +126,15 @@ def with_installed_choices(choice: type[Choice]) -> type[Choice]:
     }
     if not fields:
         return choice
-    wider = create_model(
+    extended = create_model(
         choice.__name__, __base__=choice, __module__=choice.__module__, __doc__=choice.__doc__, **fields
     )
-    wider.narrow = choice
-    return wider
+    extended.narrow = choice
+    return extended
 
 
 def installed_choices(choice: type[Choice]) -> dict[str, type[BaseModel]]:
-    """The specifications that installed packages add to a choice, by key, without those that cannot be used."""
+    """Return the usable specifications that installed packages add to a choice, by key."""
     from simscen.spec.registry import BrokenPlugin, installed
 
     found = {}
@@ -147,16 +146,16 @@ def installed_choices(choice: type[Choice]) -> dict[str, type[BaseModel]]:
 
 
 def blank(narrow: type[Choice]) -> Choice:
-    """What a widened choice is unpickled into: its class is made anew by each process."""
-    wider = with_installed_choices(narrow)
-    return wider.__new__(wider)
+    """Return an empty instance of an extended class for unpickling; each process creates the class again."""
+    extended = with_installed_choices(narrow)
+    return extended.__new__(extended)
 
 
 def _address(field: FieldInfo) -> str:
-    """Where the specification under a key is; "" where there is none: a list, or the choice itself."""
-    mark = next((mark for mark in field.metadata if isinstance(mark, LazySpec)), None)
-    if mark is not None:
-        return f"{mark.module}:{mark.name}"
+    """Return the address of the specification of a field; "" for a list or for the choice itself."""
+    lazy = next((item for item in field.metadata if isinstance(item, LazySpec)), None)
+    if lazy is not None:
+        return f"{lazy.module}:{lazy.name}"
     kinds = [kind for kind in get_args(field.annotation) if isinstance(kind, type) and issubclass(kind, Spec)]
     kinds = [kind for kind in kinds if not issubclass(kind, Choice)]
     return f"{kinds[0].__module__}:{kinds[0].__name__}" if kinds else ""

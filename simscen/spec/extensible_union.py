@@ -1,4 +1,4 @@
-"""Mappings that are told apart by their `type`: what simscen ships, or what an installed package adds."""
+"""Unions discriminated by `type` whose members are shipped with simscen or added by installed packages."""
 
 import math
 from collections.abc import Iterator
@@ -14,16 +14,15 @@ from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped
 
 GROUP_KEY, NAMES_ALLOWED_KEY, MAPPINGS_ALLOWED_KEY = "simscen group", "simscen names", "simscen mappings"
-"""Under these keys the metadata of a schema says to which group packages add, and whether names and mappings may stand
-there."""
+"""Keys of schema metadata: the group that packages can extend, and whether names and mappings are valid values."""
 
 
 @dataclass(frozen=True)
 class ExtensibleUnion:
-    """Marks a field that holds a specification of a group; `own` is the type that holds for what is shipped.
+    """Annotation of a field with a specification of a group; `own` is the union of the shipped types.
 
-    A mapping whose `type` is not shipped is validated by the specification that an installed package adds by that name;
-    so is a bare name, where a name is enough (`named`).
+    A mapping with another `type` is validated by the specification that an installed package adds under that name. With
+    `named`, the bare name is also valid.
     """
 
     group: str
@@ -32,14 +31,14 @@ class ExtensibleUnion:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         inner = handler.generate_schema(self.own)
-        told = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: self.named, MAPPINGS_ALLOWED_KEY: True}
-        return core_schema.no_info_wrap_validator_function(self._validate, inner, metadata=told)
+        metadata = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: self.named, MAPPINGS_ALLOWED_KEY: True}
+        return core_schema.no_info_wrap_validator_function(self._validate, inner, metadata=metadata)
 
     def _validate(self, value: Any, own: core_schema.ValidatorFunctionWrapHandler) -> Any:
         if isinstance(value, Typed) and not type(value).__module__.startswith("simscen."):
             return value
         if self.named and isinstance(value, str) and value not in _names(self.group):
-            return specification(_found(self.group, value), {})
+            return specification(_find_or_raise(self.group, value), {})
         name = value.get("type") if isinstance(value, dict) else None
         if not isinstance(name, str) or name in _names(self.group):
             return own(value)
@@ -52,31 +51,31 @@ class ExtensibleUnion:
 
 @dataclass(frozen=True)
 class TypeName:
-    """Marks a text that is the name of a shipped type, as the field says, or of one that an installed package adds."""
+    """Annotation of a string that is the name of a shipped type or of a type that an installed package adds."""
 
     group: str
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        told = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: True, MAPPINGS_ALLOWED_KEY: False}
-        return core_schema.no_info_wrap_validator_function(self._validate, handler(source), metadata=told)
+        metadata = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: True, MAPPINGS_ALLOWED_KEY: False}
+        return core_schema.no_info_wrap_validator_function(self._validate, handler(source), metadata=metadata)
 
     def _validate(self, value: Any, own: core_schema.ValidatorFunctionWrapHandler) -> Any:
         if isinstance(value, str) and value not in _names(self.group):
-            return _found(self.group, value).name
+            return _find_or_raise(self.group, value).name
         return own(value)
 
 
 BehaviorName = Annotated[RecoveryBehavior, TypeName("behavior")]
-"""The name of a recovery behavior, as events of the log have it."""
+"""Name of a recovery behavior, as in the events of the log."""
 
 
 def specification(entry: Entry, value: dict[str, Any]) -> BaseModel:
-    """The specification of an installed package with these values, which may lack its `type`."""
+    """Return the specification of an installed package with these values; `type` can be omitted."""
     return validate_plugin_spec(entry, {**value, "type": entry.name})
 
 
 def installed_specs(group: str) -> Iterator[tuple[str, type[BaseModel]]]:
-    """The specifications that installed packages add to a group, by name; broken ones are left out."""
+    """Yield names and specifications that installed packages add to a group, without broken ones."""
     for entry in installed(group):
         if entry.flaw or entry.name in _names(group):
             continue
@@ -90,29 +89,29 @@ def _names(group: str) -> frozenset[str]:
     return frozenset(entry.name for entry in shipped(group))
 
 
-def _found(group: str, name: str) -> Entry:
+def _find_or_raise(group: str, name: str) -> Entry:
     if (entry := find(group, name)) is None:
         raise _unknown(group, name)
     return entry
 
 
 def _unknown(group: str, name: str) -> PydanticCustomError:
-    every = [*(entry.name for entry in shipped(group)), *(entry.name for entry in installed(group))]
-    return PydanticCustomError("unknown_type", "no such type", {"value": name, "names": ", ".join(every)})
+    names = [*(entry.name for entry in shipped(group)), *(entry.name for entry in installed(group))]
+    return PydanticCustomError("unknown_type", "no such type", {"value": name, "names": ", ".join(names)})
 
 
-_ASKED = ("horizon", "clearance_range")
-"""What a criterion says of itself, in seconds and meters."""
+_CHECKED_PROPERTIES = ("horizon", "clearance_range")
+"""Properties of criteria that are used before a run, in s and m."""
 
 
 @dataclass(frozen=True)
 class PluginSpec(LazySpec):
-    """Marks a type that stands for the specification of a name that an installed package adds."""
+    """Annotation that stands for a specification that an installed package adds."""
 
     entry: Entry
 
     def load(self) -> type[BaseModel]:
-        """The specification; its package is imported now. Raises BrokenPlugin."""
+        """Import the package and return the specification. Raises BrokenPlugin."""
         return self.entry.load()
 
     def _validate(self, value: Any) -> BaseModel:
@@ -120,15 +119,15 @@ class PluginSpec(LazySpec):
 
 
 def validate_plugin_spec(entry: Entry, value: Any) -> BaseModel:
-    """The specification of an entry with these values; whatever its package does wrong is a problem of the file."""
+    """Return the specification of an entry with these values; any error of its package becomes a validation error."""
     try:
-        return _kept(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
+        return _checked(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
     except BrokenPlugin as broken:
         raise _plugin_error(broken) from broken
-    except (ValueError, AssertionError):  # what pydantic takes for a mistake in the file, ValidationError included
+    except (ValueError, AssertionError):  # pydantic reports these as mistakes in the file
         raise
-    except Exception as error:  # the boundary to code of others, which can raise anything
-        why = f"it breaks down over what is written here: {type(error).__name__}: {error}"
+    except Exception as error:  # code of other packages can raise anything
+        why = f"its validation raises {type(error).__name__}: {error}"
         raise _plugin_error(BrokenPlugin(entry, why)) from error
 
 
@@ -136,10 +135,10 @@ def _plugin_error(broken: BrokenPlugin) -> PydanticCustomError:
     return PydanticCustomError("plugin", "{problem}", {"problem": str(broken), "hint": broken.hint})
 
 
-def _kept(entry: Entry, spec: BaseModel) -> BaseModel:
-    """The specification. Raises BrokenPlugin where what simscen asks of it before any run is no number."""
-    for name in _ASKED:
+def _checked(entry: Entry, spec: BaseModel) -> BaseModel:
+    """Return the specification. Raises BrokenPlugin if a property that is used before a run is not a valid number."""
+    for name in _CHECKED_PROPERTIES:
         number = getattr(spec, name) if hasattr(type(spec), name) else 0.0
         if isinstance(number, bool) or not isinstance(number, int | float) or not (0 <= number < math.inf):
-            raise BrokenPlugin(entry, f"its `{name}` is {number!r}, no finite number from 0 on")
+            raise BrokenPlugin(entry, f"its `{name}` is {number!r} instead of a finite number of at least 0")
     return spec

@@ -1,7 +1,6 @@
 """Specifications that are imported, and whose validators are built, when a file first uses them.
 
-A scenario uses three of sixteen criteria and perhaps one fault. To import and build all of the language was half of
-the start of every command.
+A scenario uses few of the types of the language; importing all of them takes half of the start of a command.
 """
 
 from dataclasses import dataclass
@@ -17,13 +16,13 @@ from pydantic_core import CoreSchema, core_schema
 
 @dataclass(frozen=True)
 class LazySpec:
-    """Marks a type that stands for the specification `name` of `module`."""
+    """Annotation that stands for the specification class `name` of `module`."""
 
     module: str
     name: str
 
     def load(self) -> type[BaseModel]:
-        """The specification; its module is imported now."""
+        """Import the module and return the specification."""
         model: type[BaseModel] = getattr(import_module(self.module), self.name)
         return model
 
@@ -34,15 +33,15 @@ class LazySpec:
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         model = self.load()
         model.model_rebuild()
-        # Below a nullable the handler makes a reference of a model; of a model itself it would make a copy.
+        # For a nullable schema the handler makes a reference to the model, for a model itself a copy.
         made = handler(core_schema.nullable_schema(model.__pydantic_core_schema__))
         return made if schema["type"] == "nullable" else made["anyOf"][0]
 
     def _validate(self, value: Any) -> BaseModel:
-        """Pydantic takes the problems of the model for problems of the field, each at its place."""
+        """Validate a value; pydantic reports errors of the model as errors of the field, with their positions."""
         return self.load().model_validate(value, by_alias=True, by_name=False)
 
 
 def annotation_of(field: FieldInfo) -> Any:
-    """What a field holds: its annotation, or the specification that is loaded on demand."""
+    """Return the type of a field: its annotation, or the specification of its LazySpec, which is loaded."""
     return next((mark.load() for mark in field.metadata if isinstance(mark, LazySpec)), field.annotation)

@@ -1,4 +1,4 @@
-"""How something moves by a script, as a user writes it: through waypoints at a speed, or along timed keyframes."""
+"""Specifications of objects with a simple shape and of scripted motions along waypoints or timed keyframes."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from simscen.spec.places import PlaceOrPoint, Ring
 from simscen.spec.quantities import Angle, Duration, Length, NonNegativeLength, PositiveLength, PositiveSpeed
 
 CORNER_TURN_S = 0.25
-"""Seconds before and after a corner in which something that drives through it turns, or a quarter of a shorter way."""
+"""Time of turning before and after a corner, or a quarter of the time along a shorter leg."""
 SMOOTH_DURATION_FACTOR = 1.5
-"""How much longer a way takes that is eased from rest to rest, at the same top speed."""
+"""Duration of an eased leg from rest to rest, relative to a leg at constant speed with the same top speed."""
 LOOP_TOLERANCE = 1e-6
-"""Meters and radians within which the last keyframe of a loop is its first."""
+"""Largest difference in m and rad between the first and the last keyframe of a loop."""
 
 Keyframe = Annotated[tuple[Duration, Length, Length, Angle], Field(strict=False)]
 
 
-def _rising(keyframes: list[tuple[float, float, float, float]]) -> list[tuple[float, float, float, float]]:
+def _check_times(keyframes: list[tuple[float, float, float, float]]) -> list[tuple[float, float, float, float]]:
     for before, after in itertools.pairwise(keyframes):
         if after[0] <= before[0]:
             raise ValueError(f"the times of keyframes must rise, but {after[0]:g} s comes after {before[0]:g} s")
@@ -35,62 +35,64 @@ class Motion(Spec):
     """A scripted motion."""
 
     through: Annotated[list[PlaceOrPoint], Field(min_length=1, max_length=1000)] | None = None
-    """Waypoints, [x, y] in the world frame or places by name, after where it is: it drives along straight lines and
-    faces where it drives.
-    """
+    """Waypoints after the current position: [x, y] in the world frame, or names of places. The object moves along
+    straight lines and faces its direction of motion."""
     speed: PositiveSpeed | None = None
-    """Along the lines through waypoints; its greatest one where it is eased."""
-    keyframes: Annotated[list[Keyframe], Field(min_length=1, max_length=1000), AfterValidator(_rising)] | None = None
-    """Instead of waypoints where it is when: [t, x, y, yaw] in the world frame, t from the beginning of the motion.
-    A first one at 0 sets it there at once; to a later one it comes from where it is. Turns go the shorter way."""
+    """Speed between waypoints; with `ease: smooth`, the top speed."""
+    keyframes: Annotated[list[Keyframe], Field(min_length=1, max_length=1000), AfterValidator(_check_times)] | None = (
+        None
+    )
+    """Timed poses instead of waypoints: [t, x, y, yaw] in the world frame, with t from the start of the motion. A
+    keyframe at time 0 places the object there; otherwise it moves from its current pose to the first keyframe. Turns
+    take the shorter direction."""
     repeat: Literal["once", "loop", "back_and_forth"] = "once"
-    """At the end: stay, start over, or turn around. A loop through waypoints leads back to where it began; one of
-    keyframes has to end at its first keyframe."""
+    """What happens at the end: stop, start over, or reverse. A loop through waypoints returns to its start; a loop of
+    keyframes must end at its first keyframe."""
     ease: Literal["linear", "smooth", "spline"] = "linear"
-    """`linear`: at constant speed from one waypoint or keyframe to the next. `smooth`: from rest to rest between any
-    two, 3u² - 2u³ of the way after a share u of the time, at most 1.5 times as fast as evenly. `spline`: through
-    keyframes without a stop, a cubic Hermite curve with the velocities of Catmull and Rom for uneven times,
-    (next - previous) / (their times' difference), at rest at both ends but in a loop."""
+    """Velocity profile. `linear`: constant speed between waypoints or keyframes. `smooth`: a stop at each of them, with
+    the fraction 3u² - 2u³ of the leg covered after the fraction u of its time (peak speed 1.5 times the mean).
+    `spline`: through keyframes without stopping, along a cubic Hermite curve with Catmull-Rom velocities for uneven
+    times, (next - previous) / (difference of their times); at rest at both ends, except in a loop."""
     phase: Duration = 0.0
-    """How far into its keyframes it begins, so that several things share them and keep apart."""
+    """Time into the keyframes at which the motion starts, so that several objects can share keyframes."""
 
     @model_validator(mode="after")
-    def _one_way(self) -> Motion:
+    def _check_kind(self) -> Motion:
         if (self.through is None) == (self.keyframes is None):
             raise ValueError("expected through and speed, or keyframes")
         if (self.through is None) != (self.speed is None):
             raise ValueError("expected speed along waypoints" if self.through else "keyframes have times, and no speed")
         if self.through is not None and self.ease == "spline":
-            raise ValueError("`ease: spline` needs keyframes: where it is when, not only a speed")
+            raise ValueError("`ease: spline` needs keyframes instead of waypoints and speed")
         if self.through is not None and self.phase:
-            raise ValueError("phase is for keyframes")
+            raise ValueError("`phase` needs keyframes instead of waypoints and speed")
         return self
 
     @model_validator(mode="after")
-    def _repeatable(self) -> Motion:
+    def _check_repeat(self) -> Motion:
         if self.keyframes is None:
             return self
         first, last = self.keyframes[0], self.keyframes[-1]
         if self.repeat != "once" and (first[0] > 0 or len(self.keyframes) == 1):
             raise ValueError(f"`repeat: {self.repeat}` needs two keyframes or more, the first of them at 0 s")
-        apart = max(math.dist(first[1:3], last[1:3]), abs(wrap(last[3] - first[3])))
-        if self.repeat == "loop" and apart > LOOP_TOLERANCE:
-            raise ValueError("a loop jumps unless its last keyframe is where its first one is: repeat that at the end")
-        lasts = last[0] * (2 if self.repeat == "back_and_forth" else 1)
-        if self.phase and self.phase >= lasts:
-            raise ValueError(f"phase {self.phase:g} s is not within the {lasts:g} s that the keyframes take")
+        difference = max(math.dist(first[1:3], last[1:3]), abs(wrap(last[3] - first[3])))
+        if self.repeat == "loop" and difference > LOOP_TOLERANCE:
+            raise ValueError("the last keyframe of a loop must have the same pose as the first keyframe")
+        duration = last[0] * (2 if self.repeat == "back_and_forth" else 1)
+        if self.phase and self.phase >= duration:
+            raise ValueError(f"phase {self.phase:g} s is not within the {duration:g} s that the keyframes take")
         return self
 
-    def path(self, here: Pose2, start: float = 0.0) -> MotionPath:
-        """The path of something that is `here` now, set off `start` seconds from now."""
+    def path(self, current: Pose2, start: float = 0.0) -> MotionPath:
+        """Return the path of an object at the pose `current` that starts moving `start` seconds from now."""
         if self.keyframes is not None:
-            return _timed(here, self.keyframes, self.repeat, start, self.ease, self.phase)
+            return _path_through_keyframes(current, self.keyframes, self.repeat, start, self.ease, self.phase)
         assert self.through is not None and self.speed is not None
-        return route(here, self.through, self.speed, self.repeat, self.ease, start)
+        return path_through_waypoints(current, self.through, self.speed, self.repeat, self.ease, start)
 
 
-def _timed(
-    here: Pose2,
+def _path_through_keyframes(
+    current: Pose2,
     keyframes: list[tuple[float, float, float, float]],
     repeat: str,
     start: float,
@@ -99,30 +101,30 @@ def _timed(
 ) -> MotionPath:
     times, poses = [t for t, *_ in keyframes], [Pose2(x, y, yaw) for _, x, y, yaw in keyframes]
     if times[0] > 0:
-        times, poses = [0.0, *times], [here, *poses]
+        times, poses = [0.0, *times], [current, *poses]
     if repeat == "loop":
         poses[-1] = poses[0]
     return MotionPath(tuple(times), tuple(poses), repeat, start, ease, phase)
 
 
-def route(
-    here: Pose2, through: list[list[float]], speed: float, repeat: str, ease: str = "linear", start: float = 0.0
+def path_through_waypoints(
+    current: Pose2, through: list[list[float]], speed: float, repeat: str, ease: str = "linear", start: float = 0.0
 ) -> MotionPath:
-    """Times and poses along straight lines at `speed`, or at no more than it when eased; `loop` closes the circle."""
-    corners = [(here.x, here.y)]
-    for x, y in [*through, *([[here.x, here.y]] if repeat == "loop" else [])]:
+    """Return the path along straight lines from `current` through waypoints; `speed` in m/s is the top speed."""
+    corners = [(current.x, current.y)]
+    for x, y in [*through, *([[current.x, current.y]] if repeat == "loop" else [])]:
         if (x, y) != corners[-1]:
             corners.append((x, y))
     if len(corners) == 1:
-        return MotionPath((0.0,), (here,), repeat, start)
+        return MotionPath((0.0,), (current,), repeat, start)
     legs = [_Leg(Pose2(*a, math.atan2(b[1] - a[1], b[0] - a[0])), math.hypot(b[0] - a[0], b[1] - a[1]), b)
             for a, b in itertools.pairwise(corners)]  # fmt: skip
-    stops = _eased(legs, speed, repeat) if ease == "smooth" else _even(legs, speed, repeat)
+    stops = _with_stops(legs, speed, repeat) if ease == "smooth" else _at_constant_speed(legs, speed, repeat)
     return MotionPath(tuple(time for time, _ in stops), tuple(pose for _, pose in stops), repeat, start, ease)
 
 
 class _Leg(NamedTuple):
-    """A straight way: from where, heading along it, how far in meters, and where to."""
+    """Straight leg of a path: pose at its beginning with the heading along it, length in m, and end point."""
 
     begin: Pose2
     length: float
@@ -132,75 +134,74 @@ class _Leg(NamedTuple):
     def end(self) -> Pose2:
         return Pose2(*self.to, self.begin.yaw)
 
-    def along(self, meters: float) -> Pose2:
-        return self.begin.compose(Pose2(meters, 0.0))
+    def at(self, distance: float) -> Pose2:
+        return self.begin.compose(Pose2(distance, 0.0))
 
 
-def _even(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
-    """At a constant speed; around each corner the heading turns evenly, half of the turn on either side."""
+def _at_constant_speed(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
+    """Return times and poses at constant speed; half of each turn is made before the corner and half after it."""
     stops, time = [(0.0, legs[0].begin)], 0.0
     for leg, following in itertools.zip_longest(legs, legs[1:]):
-        lasts = leg.length / speed
-        turned = min(CORNER_TURN_S, lasts / 4)
+        duration = leg.length / speed
+        turn_time = min(CORNER_TURN_S, duration / 4)
         if stops[-1][1].yaw != leg.begin.yaw:
-            stops.append((time + turned, leg.along(turned * speed)))
-        ahead = following or (legs[0] if repeat == "loop" else leg)
-        turn = wrap(ahead.begin.yaw - leg.begin.yaw)
+            stops.append((time + turn_time, leg.at(turn_time * speed)))
+        next_leg = following or (legs[0] if repeat == "loop" else leg)
+        turn = wrap(next_leg.begin.yaw - leg.begin.yaw)
         if turn:
-            stops.append((time + lasts - turned, leg.along(leg.length - turned * speed)))
-        time += lasts
+            stops.append((time + duration - turn_time, leg.at(leg.length - turn_time * speed)))
+        time += duration
         stops.append((time, leg.end._replace(yaw=wrap(leg.begin.yaw + turn / 2))))
     if repeat == "loop" and stops[-1][1].yaw != stops[0][1].yaw:
         first = stops[0]
-        turned = min(CORNER_TURN_S, legs[0].length / speed / 4)
+        turn_time = min(CORNER_TURN_S, legs[0].length / speed / 4)
         stops[0] = (0.0, first[1]._replace(yaw=stops[-1][1].yaw))
-        stops.insert(1, (turned, legs[0].along(turned * speed)))
+        stops.insert(1, (turn_time, legs[0].at(turn_time * speed)))
     if repeat == "loop":
         stops[-1] = (time, stops[0][1])
     return stops
 
 
-def _eased(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
-    """From rest to rest along each way; in each corner it turns in place."""
+def _with_stops(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
+    """Return times and poses with a stop at the end of each leg and a turn in place at each corner."""
     stops, time = [(0.0, legs[0].begin)], 0.0
     for leg, following in itertools.zip_longest(legs, legs[1:]):
         time += SMOOTH_DURATION_FACTOR * leg.length / speed
         stops.append((time, leg.end))
-        ahead = following or (legs[0] if repeat == "loop" else leg)
-        if wrap(ahead.begin.yaw - leg.begin.yaw):
+        next_leg = following or (legs[0] if repeat == "loop" else leg)
+        if wrap(next_leg.begin.yaw - leg.begin.yaw):
             time += 2 * CORNER_TURN_S
-            stops.append((time, leg.end._replace(yaw=ahead.begin.yaw)))
+            stops.append((time, leg.end._replace(yaw=next_leg.begin.yaw)))
     return stops
 
 
-# MERGED: Things that stand or move in a world, as a user writes them.
 class Shaped(Spec):
-    """Something with one simple shape that stands on the ground, or `z` above it."""
+    """Object with one simple shape that stands on the ground or at the height `z`."""
 
     box: Annotated[list[PositiveLength], Field(min_length=3, max_length=3)] | None = None
-    """A box: length along x, width along y, height."""
+    """Box: length along x, width along y, height."""
     cylinder: Annotated[list[PositiveLength], Field(min_length=2, max_length=2)] | None = None
-    """An upright cylinder: radius, height."""
+    """Upright cylinder: radius, height."""
     polygon: Ring | None = None
-    """An upright prism over these corners, `height` tall."""
+    """Upright prism over a polygon with these corners."""
     height: PositiveLength = 1.0
     """Height of the prism over `polygon`."""
     z: NonNegativeLength = 0.0
-    """How far its underside is above the ground."""
+    """Height of the underside above the ground."""
 
     @model_validator(mode="after")
-    def _one_shape(self) -> Shaped:
+    def _check_shape(self) -> Shaped:
         if sum(shape is not None for shape in (self.box, self.cylinder, self.polygon)) != 1:
             raise ValueError("expected exactly one of: box, cylinder, polygon")
         return self
 
     @property
     def tall(self) -> float:
-        """Its own height in meters."""
+        """Height of the object in meters."""
         return self.box[2] if self.box is not None else self.cylinder[1] if self.cylinder is not None else self.height
 
     def solid(self, name: str) -> Solid:
-        """The shape in the object's own frame, which is on the ground below it."""
+        """Return the shape in the frame of the object, whose origin is on the ground below it."""
         shape: Shape
         if self.box is not None:
             shape, middle = Box((self.box[0], self.box[1], self.box[2])), self.box[2] / 2

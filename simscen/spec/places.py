@@ -1,4 +1,8 @@
-"""Points and poses as a user writes them."""
+"""Names, points, poses, and references to named things in specifications.
+
+A field of type `PlaceOrPose` or `PlaceOrPoint` also accepts the name of a place. The loader replaces the name by the
+pose of the place (`loading/places.py`), so code that uses a specification only sees poses and points.
+"""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
@@ -12,8 +16,8 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Length
 
 
-def _no_path(name: str) -> str:
-    """Refuse `../x` and `/x`, but not `1 m/s`: files could be named after it."""
+def _reject_path(name: str) -> str:
+    """Return the name; raise an error for `../x` and `/x`, but not for `1 m/s`, because files are named after it."""
     if name[0] in "/\\" or not {".", ".."}.isdisjoint(name.replace("\\", "/").split("/")):
         raise PydanticCustomError("path_name", "must not be a path")
     return name
@@ -22,25 +26,25 @@ def _no_path(name: str) -> str:
 Name = Annotated[
     str,
     StringConstraints(min_length=1, max_length=120, pattern=r"^[^\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]*$"),
-    AfterValidator(_no_path),
+    AfterValidator(_reject_path),
 ]
-# The length stands apart from the pattern: a Unicode `\w` repeated 119 times takes 25 ms to compile, at every start.
 NAMESPACE = r"^[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$"
 RobotName = Annotated[str, StringConstraints(max_length=40, pattern=NAMESPACE)]
-"""What one of several robots is called, which is its namespace in ROS, too."""
+"""Name of one of several robots, which is also its ROS namespace."""
+# The maximum length is not part of the pattern: compiling `\w{0,119}` for Unicode takes 25 ms at every start.
 PlaceName = Annotated[str, StringConstraints(max_length=120, pattern=r"^[A-Za-z_][\w .-]*$")]
 Point = Annotated[list[Length], Field(min_length=2, max_length=2)]
 
 
-def _without_flaw(ring: list[Point]) -> list[Point]:
-    wrong = polygon_defect([(x, y) for x, y in ring])
-    if wrong:
-        raise ValueError(f"the polygon {wrong}")
+def _check_polygon(ring: list[Point]) -> list[Point]:
+    defect = polygon_defect([(x, y) for x, y in ring])
+    if defect:
+        raise ValueError(f"the polygon {defect}")
     return ring
 
 
-Ring = Annotated[list[Point], Field(min_length=3, max_length=200), AfterValidator(_without_flaw)]
-"""The corners of one area, in order, either way round."""
+Ring = Annotated[list[Point], Field(min_length=3, max_length=200), AfterValidator(_check_polygon)]
+"""Corners of a polygon in order, clockwise or counterclockwise."""
 
 
 class PoseSpec(Spec):
@@ -51,38 +55,36 @@ class PoseSpec(Spec):
     y: Length
     """Meters along the y axis."""
     yaw: Angle = 0.0
-    """The heading, anticlockwise from the x axis."""
+    """Heading, counterclockwise from the x axis."""
     _place: str = PrivateAttr(default="")
 
     @property
     def place(self) -> str:
-        """The place of the world whose pose it is; "" where the pose itself is written."""
+        """Name of the place that this pose was written as; "" if the file contains the pose itself."""
         return self._place
 
     def at(self, place: str) -> "PoseSpec":
-        """The same pose, as that of a place."""
+        """Return a copy of the pose with the name of the place that it comes from."""
         named = self.model_copy()
         named._place = place
         return named
 
     @property
     def pose(self) -> Pose2:
-        """As plain data."""
+        """The pose as plain data."""
         return Pose2(self.x, self.y, self.yaw)
 
 
-# MERGED: Names that must exist elsewhere: a specification says what they name, the loader looks whether it is there.
 Target = Literal["place", "region", "object", "movable", "mover", "door", "goal", "event", "happening", "mask"]
 
 
 @dataclass(frozen=True)
 class ReferenceTo:
-    """Marks a text as the name of something.
+    """Annotation of a string that must be the name of an existing thing; the loader checks that it exists.
 
-    A `mask` is the file of a filter mask; where a criterion names one, it is among the masks of its Case.
-    An `object` is anything that can be touched, a `movable` one that has a pose of its own, and a `mover` one of
-    these or another robot; a `happening` is an event
-    or a fault of the scenario.
+    `object`: anything that can be touched. `movable`: an object with its own pose. `mover`: a movable or another robot.
+    `happening`: an event or a fault of the scenario. `mask`: the file of a filter mask; those of criteria are in the
+    masks of their Case.
     """
 
     to: Target
@@ -99,61 +101,58 @@ HappeningName = Annotated[Name, ReferenceTo("happening")]
 MaskFile = Annotated[str, Field(min_length=1, max_length=4096), ReferenceTo("mask")]
 
 
-# MERGED: Places of the world by name, wherever a pose or a point of it is meant.
-# MERGED:
-# MERGED: A field says so by its type, `PlaceOrPose` or `PlaceOrPoint`, and needs to do no more: when a scenario has been loaded,
-# MERGED: the pose of the place stands there (`loading/places.py`), so that code only ever meets poses and points.
-DESCRIPTION = "A place of the world, by name."
+DESCRIPTION = "Name of a place in the world."
 
 
-def _text_or_not(value: Any) -> str:
+def _name_or_value(value: Any) -> str:
     return "text" if isinstance(value, str) else "written out"
 
 
 @dataclass(frozen=True)
 class PlaceAllowed(ReferenceTo):
-    """Marks a pose in the world frame, in place of which the name of a place may be written.
+    """Annotation of a pose in the world frame that can also be given as the name of a place.
 
-    `besides` are words that mean something else there.
+    `keywords` are texts with another meaning in this field.
     """
 
     to: Target = "place"
-    besides: tuple[str, ...] = ()
+    keywords: tuple[str, ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        shown = Field(description=DESCRIPTION, examples=list(self.besides) or None)
-        name = handler.generate_schema(Annotated[PlaceName, shown])
-        return core_schema.tagged_union_schema({"text": name, "written out": handler(source)}, _text_or_not)
+        field = Field(description=DESCRIPTION, examples=list(self.keywords) or None)
+        name = handler.generate_schema(Annotated[PlaceName, field])
+        return core_schema.tagged_union_schema({"text": name, "written out": handler(source)}, _name_or_value)
 
-    def of(self, pose: PoseSpec) -> Any:
-        """What stands there instead of the name of a place with this pose."""
+    def value_at(self, pose: PoseSpec) -> Any:
+        """Return the value of the field that replaces the name of a place with this pose."""
         return pose
 
 
 class PlaceAllowedForPoint(PlaceAllowed):
-    """Marks a point [x, y] in the world frame, in place of which the name of a place may be written."""
+    """Annotation of a point [x, y] in the world frame that can also be given as the name of a place."""
 
-    def of(self, pose: PoseSpec) -> Any:
-        """Its position."""
+    def value_at(self, pose: PoseSpec) -> Any:
+        """Return the position of the place."""
         return [pose.x, pose.y]
 
 
 @dataclass(frozen=True)
 class PlaceShorthand:
-    """Marks a mapping in place of which a place alone may be written: the value of its key `key`."""
+    """Annotation of a mapping that can also be given as the name of a place, the value of its key `key`."""
 
     key: str
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        name, whole = handler.generate_schema(Annotated[PlaceName, Field(description=DESCRIPTION)]), handler(source)
-        alone = core_schema.chain_schema([name, core_schema.no_info_plain_validator_function(self._as_mapping), whole])
-        return core_schema.tagged_union_schema({"text": alone, "written out": whole}, _text_or_not)
+        name, mapping = handler.generate_schema(Annotated[PlaceName, Field(description=DESCRIPTION)]), handler(source)
+        convert = core_schema.no_info_plain_validator_function(self._as_mapping)
+        shorthand = core_schema.chain_schema([name, convert, mapping])
+        return core_schema.tagged_union_schema({"text": shorthand, "written out": mapping}, _name_or_value)
 
     def _as_mapping(self, place: str) -> dict[str, str]:
         return {self.key: place}
 
 
 PlaceOrPose = Annotated[PoseSpec, PlaceAllowed()]
-"""A pose in the world frame, or a place of the world by name."""
+"""A pose in the world frame, or the name of a place in the world."""
 PlaceOrPoint = Annotated[Point, PlaceAllowedForPoint()]
-"""A point [x, y] in the world frame, or a place of the world by name."""
+"""A point [x, y] in the world frame, or the name of a place in the world."""

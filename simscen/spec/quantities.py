@@ -1,4 +1,4 @@
-"""Numbers with units. A bare number is SI; a string carries a unit that is checked for its dimension."""
+"""Numbers with units. A bare number is in SI units; a string has a unit, whose dimension is checked."""
 
 import math
 import re
@@ -37,7 +37,7 @@ UNITS: dict[str, dict[str, float]] = {
 
 @dataclass(frozen=True)
 class Quantity:
-    """Marks a float as a physical quantity of a dimension in UNITS."""
+    """Annotation of a float that is a physical quantity with a dimension of UNITS."""
 
     dimension: str
 
@@ -46,29 +46,29 @@ class Quantity:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         number = dict(handler(schema))
-        units = "|".join(unit.replace("^", r"\^") for unit in UNITS[self.dimension])  # a pattern for JavaScript, too
+        units = "|".join(unit.replace("^", r"\^") for unit in UNITS[self.dimension])  # must also be valid in JavaScript
         pattern = rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$"
-        # Bounds apply to numbers only and the pattern to text only, so both fit into one schema.
-        told = f"expected {self._a_dimension}, e.g. {self.example}; units: {', '.join(UNITS[self.dimension])}"
-        both = {**number, "type": [number["type"], "string"], "pattern": pattern, "description": self.described}
-        return {**both, "patternErrorMessage": told}
+        # Bounds apply only to numbers and the pattern only to text, so both fit into one schema.
+        message = f"expected {self._with_article}, e.g. {self.example}; units: {', '.join(UNITS[self.dimension])}"
+        schema = {**number, "type": [number["type"], "string"], "pattern": pattern, "description": self.described}
+        return {**schema, "patternErrorMessage": message}
 
     @property
     def example(self) -> str:
-        """A value as a user would write it."""
+        """Example of a value in a file."""
         return f"1.5 {next(iter(UNITS[self.dimension]))}"
 
     @property
     def described(self) -> str:
-        """What an editor shows."""
+        """Description for editors."""
         return f"{self.dimension}, e.g. {self.example}"
 
     @property
-    def _a_dimension(self) -> str:
+    def _with_article(self) -> str:
         return f"an {self.dimension}" if self.dimension[0] in "aeiou" else f"a {self.dimension}"
 
     def parse(self, value: Any) -> Any:
-        """Turn "90 deg" into radians; leave anything but text to pydantic."""
+        """Convert text such as "90 deg" to SI units; return other values unchanged."""
         if not isinstance(value, str):
             return value
         units = UNITS[self.dimension]
@@ -77,11 +77,11 @@ class Quantity:
             return float(match[1]) * units[match[2]]
         if match and any(match[2] in others for others in UNITS.values()):
             other = next(name for name, others in UNITS.items() if match[2] in others)
-            problem = f"`{match[2]}` is a unit of {other}, but this is {self._a_dimension}"
+            problem = f"`{match[2]}` is a unit of {other}, but this is {self._with_article}"
         elif match:
-            problem = f"unknown unit `{match[2]}` for {self._a_dimension}"
+            problem = f"unknown unit `{match[2]}` for {self._with_article}"
         else:
-            problem = f"expected {self._a_dimension}, got the text `{value}`"
+            problem = f"expected {self._with_article}, got the text `{value}`"
         raise PydanticCustomError(
             "quantity", "{problem}; units: {units}", {"problem": problem, "units": ", ".join(units)}
         )
@@ -89,21 +89,22 @@ class Quantity:
 
 @dataclass(frozen=True)
 class AnyQuantity:
-    """Marks a float as a quantity whose dimension something beside it says, and whose unit is parsed there."""
+    """Annotation of a float whose dimension depends on another field, which also parses the unit."""
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         units = "|".join(re.escape(unit) for unit in dict.fromkeys(unit for units in UNITS.values() for unit in units))
-        units = units.replace("\\ ", " ").replace("\\%", "%")  # JavaScript knows no escapes but those it needs
-        told = "expected a number, with a unit such as in 1.5 m or in SI"
-        text = {"pattern": rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$", "patternErrorMessage": told}
+        units = units.replace("\\ ", " ").replace("\\%", "%")  # JavaScript rejects unnecessary escapes
+        message = "expected a number with a unit, such as 1.5 m, or a bare number in SI units"
+        pattern = rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$"
+        text = {"pattern": pattern, "patternErrorMessage": message}
         return {**handler(schema), "type": ["number", "string"], **text}
 
 
 class WholeQuantity(Quantity):
-    """Marks an integer as a physical quantity: so many whole units of SI."""
+    """Annotation of an integer that is a physical quantity in whole SI units."""
 
     def parse(self, value: Any) -> Any:
-        """Turn "240 Hz" into 240; what is no whole number stays a float, which pydantic refuses."""
+        """Convert text such as "240 Hz" to 240; a fraction stays a float, which pydantic rejects."""
         number = super().parse(value)
         return int(number) if isinstance(value, str) and number.is_integer() else number
 
@@ -135,20 +136,20 @@ Force = Annotated[float, Field(ge=-1e5, le=1e5), Quantity("force")]
 Impulse = Annotated[float, Field(ge=-1e5, le=1e5), Quantity("impulse")]
 Ratio = Annotated[float, Field(ge=0), Quantity("ratio")]
 Friction = Annotated[float, Field(ge=0, le=2), Quantity("ratio")]
-"""Of a surface against the rubber of a wheel: 1 on dry concrete, 0.3 on a wet floor, 0.1 on oil or ice."""
+"""Friction coefficient of a surface and a rubber wheel: 1 on dry concrete, 0.3 on a wet floor, 0.1 on oil or ice."""
 Probability = Annotated[float, Field(ge=0, le=1), Quantity("ratio")]
 
 
 class Amount(NamedTuple):
-    """A number and the unit behind it; "" = a bare number."""
+    """A number and its unit; "" for a bare number."""
 
     number: float
     unit: str = ""
 
 
 @dataclass(frozen=True)
-class _OfAnyDimension:
-    """Marks a number whose dimension is that of the place where it goes."""
+class _ParsedAmount:
+    """Annotation of an Amount, whose dimension is checked where it is used."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(_parse_amount)
@@ -157,13 +158,13 @@ class _OfAnyDimension:
         return {"type": ["number", "string"], "description": "a number, with its unit if it has one"}
 
 
-AnyAmount = Annotated[Amount, _OfAnyDimension()]
+AnyAmount = Annotated[Amount, _ParsedAmount()]
 
 
 def to_common_unit(amounts: tuple[Amount, ...]) -> tuple[tuple[float, ...], str]:
-    """The numbers in one unit, and that unit: their own where it is the same, else SI.
+    """Return the numbers in a common unit, and that unit: their own if it is the same for all, otherwise SI ("").
 
-    Raises ValueError where they have no dimension in common.
+    Raises ValueError if their dimensions differ.
     """
     units = {amount.unit for amount in amounts}
     if len(units) == 1:
@@ -171,8 +172,8 @@ def to_common_unit(amounts: tuple[Amount, ...]) -> tuple[tuple[float, ...], str]
     for known in UNITS.values():
         if units <= {"", *known}:
             return tuple(amount.number * known.get(amount.unit, 1.0) for amount in amounts), ""
-    told = " and ".join(f"`{unit}`" for unit in sorted(units - {""}))
-    raise ValueError(f"{told} are no units of one dimension")
+    names = " and ".join(f"`{unit}`" for unit in sorted(units - {""}))
+    raise ValueError(f"{names} are units of different dimensions")
 
 
 def _parse_amount(value: Any) -> Amount:
@@ -183,7 +184,6 @@ def _parse_amount(value: Any) -> Amount:
     match = NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
     if match and any(match[2] in known for known in UNITS.values()) and math.isfinite(float(match[1])):
         return Amount(float(match[1]), match[2])
-    told = f"the text `{value}`" if isinstance(value, str) else "something else"
-    raise PydanticCustomError(
-        "amount", "{problem}", {"problem": f"expected a number with or without a unit, got {told}"}
-    )
+    found = f"the text `{value}`" if isinstance(value, str) else "something else"
+    problem = f"expected a number with or without a unit, got {found}"
+    raise PydanticCustomError("amount", "{problem}", {"problem": problem})

@@ -1,13 +1,12 @@
-"""What there is to choose from by name: what simscen ships, then what installed packages add to it.
+"""Registry of the types that files can use by name: shipped types, and types that installed packages add.
 
-A package adds a type by an entry point of a group `simscen.<kind>` whose value names a specification:
+A package adds a type by an entry point in a group `simscen.<kind>` whose value is the address of a specification:
 
     [project.entry-points."simscen.criterion"]
     headway = "my_package.headway:Headway"
 
-Shipped types are entries, too, written in the list of their room; both are found and loaded by what stands here. To
-look for what is installed costs 30 ms (importlib.metadata), so it is done once, and only when a file uses a name that
-is not shipped or somebody asks for everything. Nothing of a package is imported before a file uses what it adds.
+Searching the installed packages takes 30 ms (importlib.metadata), so it is done once, and only if a file uses a name
+that simscen does not ship, or if all names are requested. A package is imported when a file uses one of its types.
 """
 
 from __future__ import annotations
@@ -37,13 +36,13 @@ _VALUE = re.compile(r"(?P<module>[\w.]+):(?P<name>\w+)")
 
 @dataclass(frozen=True)
 class Group:
-    """One kind of thing that packages may add to.
+    """Kind of types that packages can add.
 
-    `promise` is the class that every specification of the group must be a subclass of. `shipped` is where its list
-    stands: a Choice, or a mapping of names to "module:Class". `reserved` are names that mean something else there.
+    `base` is the address of the base class of all specifications of the group. `shipped` is the address of the list of
+    shipped types: a Choice, or a mapping of names to "module:Class". `reserved` names have another meaning in files.
     """
 
-    promise: str
+    base: str
     shipped: str = ""
     reserved: tuple[str, ...] = ()
 
@@ -70,15 +69,15 @@ GROUPS: dict[str, Group] = {
     "sensor": Group("simscen.model.robot:SensorSpec", "simscen.model.robot:Sensor"),
     "metric": Group("simscen.criteria.plugin_metric:Measure", "simscen.judge.metrics.catalog:ADDRESSES", ("metrics",)),
 }
-"""Kind → what is known of its group `simscen.<kind>`, in the order of the language."""
+"""Groups `simscen.<kind>` of entry points by kind."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A name in a group and the specification that it stands for, `value` = "package.module:Class".
+    """Type of a group: its name and the address of its specification, `value` = "package.module:Class".
 
-    `distribution` and `version` are those of the package that adds it; "" for what is shipped. `flaw` says why it
-    cannot be used, as far as that is known without importing it.
+    `distribution` and `version` are those of the package that adds it, or "" for a shipped type. `flaw` is the reason
+    why it cannot be used, as far as known without importing it.
     """
 
     group: str
@@ -88,27 +87,27 @@ class Entry:
     version: str = ""
     flaw: str = ""
     folder: str = ""
-    """Where its package is installed: a folder of the search path."""
+    """Folder of the search path in which its package is installed."""
 
     @property
     def shipped(self) -> bool:
-        """Whether it comes with simscen."""
+        """Whether simscen ships this type."""
         return not self.distribution
 
     @property
     def origin(self) -> str:
-        """Who adds it, for a message: "headway 1.2", with no version where its package has none."""
+        """Package and version for messages, e.g. "headway 1.2"."""
         return f"{self.distribution} {self.version}".strip() or "simscen"
 
     def load(self) -> type[BaseModel]:
-        """Its specification; the module is imported now. Raises BrokenPlugin."""
+        """Import the module and return the specification. Raises BrokenPlugin."""
         if self.flaw:
             raise BrokenPlugin(self, self.flaw)
-        return _loaded(self)
+        return _load(self)
 
 
 class BrokenPlugin(Exception):
-    """What an installed package adds cannot be used: `entry`, `why`, and a `hint` how to find out more."""
+    """A type of an installed package cannot be used; `why` is the reason and `hint` how to find out more."""
 
     def __init__(self, entry: Entry, why: str, hint: str = "") -> None:
         self.entry, self.why = entry, why
@@ -117,47 +116,49 @@ class BrokenPlugin(Exception):
 
 
 def shipped(group: str) -> tuple[Entry, ...]:
-    """What simscen itself offers, in the order of its list."""
-    where = GROUPS[group].shipped
-    if not where:
+    """Return the shipped types of a group in the order of its list."""
+    address = GROUPS[group].shipped
+    if not address:
         return ()
-    listed = _resolved(where)
-    values: dict[str, str] = listed if isinstance(listed, dict) else listed.addresses()
+    types = _resolve(address)
+    values: dict[str, str] = types if isinstance(types, dict) else types.addresses()
     return tuple(Entry(group, name, value) for name, value in values.items())
 
 
 def installed(group: str) -> tuple[Entry, ...]:
-    """What installed packages add, by name; those with a flaw, too, so that a file that uses one is told of it."""
-    return tuple(entry for entry in _scanned() if entry.group == group)
+    """Return the types that installed packages add to a group, sorted by name, including unusable ones."""
+    return tuple(entry for entry in _installed_entries() if entry.group == group)
 
 
 def entries(group: str) -> tuple[Entry, ...]:
-    """All of a group: what is shipped in the order of its list, then what is installed under other names."""
+    """Return all types of a group: the shipped ones, then the installed ones with other names."""
     own = shipped(group)
     names = {entry.name for entry in own}
     return (*own, *(entry for entry in installed(group) if entry.name not in names))
 
 
 def find(group: str, name: str) -> Entry | None:
-    """What a name of a group stands for. Packages are looked through only when nothing shipped is called so."""
+    """Return the type with this name, or None. Packages are searched only if no shipped type has the name."""
     own = next((entry for entry in shipped(group) if entry.name == name), None)
     return own or next((entry for entry in installed(group) if entry.name == name), None)
 
 
 def unknown_groups() -> tuple[Entry, ...]:
-    """Entry points in groups `simscen.…` that there are not, each with its flaw: a slip of the pen in a package."""
-    return tuple(entry for entry in _scanned() if entry.group not in GROUPS)
+    """Return the entry points of packages in groups `simscen.…` that do not exist, probably by a typing mistake."""
+    return tuple(entry for entry in _installed_entries() if entry.group not in GROUPS)
 
 
 def origin_of(spec: type) -> tuple[Entry, ...]:
-    """The entries of installed packages that stand for a specification; () for what is shipped."""
+    """Return the entries of installed packages with this specification; () for a shipped one."""
     package = spec.__module__.partition(".")[0]
     if package == "simscen":
         return ()
-    near = [
-        entry for entry in _scanned() if not entry.flaw and entry.value.partition(".")[0].partition(":")[0] == package
+    same_package = [
+        entry
+        for entry in _installed_entries()
+        if not entry.flaw and entry.value.partition(".")[0].partition(":")[0] == package
     ]
-    return tuple(entry for entry in near if _is(entry, spec))
+    return tuple(entry for entry in same_package if _is(entry, spec))
 
 
 def _is(entry: Entry, spec: type) -> bool:
@@ -168,39 +169,39 @@ def _is(entry: Entry, spec: type) -> bool:
 
 
 @cache
-def _scanned() -> tuple[Entry, ...]:
-    """Every entry point of a group of ours, group by group, by name, then by distribution."""
-    found = sorted(set(_read()), key=lambda e: (e.group, e.name, e.distribution, e.version, e.value))
+def _installed_entries() -> tuple[Entry, ...]:
+    """Return all entry points in groups of simscen, sorted by group, name, and package."""
+    found = sorted(set(_read_entries()), key=lambda e: (e.group, e.name, e.distribution, e.version, e.value))
     return tuple(replace(entry, flaw=entry.flaw or _flaw(entry, found)) for entry in found)
 
 
-def _read() -> Iterator[Entry]:
-    """The entry points of ours of every package that can be imported; of two packages of a name those of the first."""
+def _read_entries() -> Iterator[Entry]:
+    """Yield the entry points of all importable packages; of packages with the same name, only those of the first."""
     from importlib.metadata import distributions
 
     seen: set[str] = set()
     for package in distributions(path=search_path()):
-        if not _is_about_us(package):  # to read what else there is of it, its name too, would cost ten times as much
+        if not _mentions_simscen(package):  # reading its name and the rest would take ten times longer
             continue
         name, version = package.metadata["Name"], package.metadata["Version"] or ""
         key = re.sub("[-_.]+", "-", name or "").lower()
         if key and key in seen:
             continue
         seen.add(key)
-        whose = (name or "an unnamed package", version)  # an installation that broke off has no METADATA
+        owner = (name or "an unnamed package", version)  # an incomplete installation has no METADATA
         folder = str(package.locate_file(""))
         try:
             points = [(point.group, point.name, point.value) for point in package.entry_points]
-        except (ValueError, TypeError, LookupError) as error:  # what importlib.metadata raises on what is none
-            yield Entry("", "", "entry_points.txt", *whose, f"its entry_points.txt is damaged: {error}", folder)
+        except (ValueError, TypeError, LookupError) as error:  # raised by importlib.metadata for damaged files
+            yield Entry("", "", "entry_points.txt", *owner, f"its entry_points.txt is damaged: {error}", folder)
             continue
         for group, point, value in points:
             if group.startswith(PREFIX):
-                yield Entry(group.removeprefix(PREFIX), point, value, *whose, folder=folder)
+                yield Entry(group.removeprefix(PREFIX), point, value, *owner, folder=folder)
 
 
-def _is_about_us(package: Distribution) -> bool:
-    """Whether it may have entry points for simscen; damage to others is no concern of ours."""
+def _mentions_simscen(package: Distribution) -> bool:
+    """Return whether a package can have entry points for simscen, even if its file is not valid UTF-8."""
     try:
         return PREFIX in (package.read_text("entry_points.txt") or "")
     except UnicodeDecodeError as error:
@@ -208,29 +209,30 @@ def _is_about_us(package: Distribution) -> bool:
 
 
 def search_path() -> list[str]:
-    """Where Python looks for modules, without the folders that it adds by itself for where and how it was called.
+    """Return the search path of modules without the folders that Python adds by itself.
 
-    These are the working directory and that of the program: a folder of scenarios with a dist-info would be code.
+    These are the working directory and the folder of the program. A dist-info folder beside scenarios must not be able
+    to run code.
     """
     program = getattr(sys.modules.get("__main__"), "__file__", None)
-    implied = {"", str(Path.cwd()), *([str(Path(program).absolute().parent)] if program else [])}
-    said = os.environ.get("PYTHONPATH", "").split(os.pathsep)
-    wanted = {str(Path(folder).absolute()) for folder in said if folder}
-    return [folder for folder in sys.path if folder not in implied - wanted]
+    implicit = {"", str(Path.cwd()), *([str(Path(program).absolute().parent)] if program else [])}
+    python_path = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    explicit = {str(Path(folder).absolute()) for folder in python_path if folder}
+    return [folder for folder in sys.path if folder not in implicit - explicit]
 
 
-def _flaw(entry: Entry, everything: list[Entry]) -> str:
-    """What is wrong with it before anything is imported."""
+def _flaw(entry: Entry, all_entries: list[Entry]) -> str:
+    """Return what is wrong with an entry as far as known without importing it, or ""."""
     group = GROUPS.get(entry.group)
     if group is None:
         return f"there is no group `{PREFIX}{entry.group}`"
     if not _NAME.fullmatch(entry.name):
-        return "a name is a small letter, then small letters, digits and `_`"
+        return "its name must start with a lowercase letter and consist of lowercase letters, digits, and `_`"
     if entry.name in group.reserved:
-        return f"`{entry.name}` means something else there"
+        return f"the name `{entry.name}` is reserved"
     if any(own.name == entry.name for own in shipped(entry.group)):
-        return "simscen itself has one of that name, which is the one that files mean"
-    others = [other for other in everything if (other.group, other.name) == (entry.group, entry.name)]
+        return "simscen ships a type with the same name, which takes precedence"
+    others = [other for other in all_entries if (other.group, other.name) == (entry.group, entry.name)]
     if len(others) > 1:
         return "added by " + " and by ".join(f"{other.origin} ({other.value})" for other in others)
     if not _VALUE.fullmatch(entry.value):
@@ -239,39 +241,39 @@ def _flaw(entry: Entry, everything: list[Entry]) -> str:
 
 
 @cache
-def _loaded(entry: Entry) -> type[BaseModel]:
+def _load(entry: Entry) -> type[BaseModel]:
     module, _, name = entry.value.partition(":")
     try:
-        # What a module prints while it is imported must not get into output that programs read.
+        # Output of a module during import must not get into output that programs read.
         with contextlib.redirect_stdout(sys.stderr):
             model = getattr(import_module(module), name, None)
-        if (why := _unfit(entry, model)) is None:
+        if (why := _defect(entry, model)) is None:
             model.model_rebuild()  # type: ignore[union-attr]
-    except (Exception, SystemExit) as error:  # the boundary to code of others, which can raise anything
-        told = f"{type(error).__name__}: {error}".splitlines()[0]
-        hint = f"`{sys.executable} -c 'import {module}'` shows where"
-        raise BrokenPlugin(entry, f"`{entry.value}` cannot be loaded: {told}", hint) from error
+    except (Exception, SystemExit) as error:  # code of other packages can raise anything
+        cause = f"{type(error).__name__}: {error}".splitlines()[0]
+        hint = f"`{sys.executable} -c 'import {module}'` shows the traceback"
+        raise BrokenPlugin(entry, f"`{entry.value}` cannot be loaded: {cause}", hint) from error
     if why is not None:
         raise BrokenPlugin(entry, why)
     return model  # type: ignore[return-value]
 
 
-def _unfit(entry: Entry, model: Any) -> str | None:
-    """Why it is no specification of its group."""
+def _defect(entry: Entry, model: Any) -> str | None:
+    """Return why an imported object is not a valid specification of its group, or None."""
     if model is None:
-        return f"`{entry.value}` is not there"
-    if not isinstance(model, type) or not issubclass(model, tuple(map(_resolved, _SPECIFICATIONS))):
-        return f"`{entry.value}` is no specification: neither a simscen.spec.base.Spec nor a Value"
-    promise = _resolved(GROUPS[entry.group].promise)
-    if not issubclass(model, promise):
-        return f"`{entry.value}` is no simscen.plugin.{promise.__name__}"
+        return f"`{entry.value}` does not exist"
+    if not isinstance(model, type) or not issubclass(model, tuple(map(_resolve, _SPECIFICATIONS))):
+        return f"`{entry.value}` is not a subclass of simscen.plugin.Spec or simscen.plugin.Value"
+    base = _resolve(GROUPS[entry.group].base)
+    if not issubclass(model, base):
+        return f"`{entry.value}` is not a subclass of simscen.plugin.{base.__name__}"
     if inspect.isabstract(model):
         missing = ", ".join(sorted(getattr(model, "__abstractmethods__", ())))
-        return f"`{entry.value}` does not say what it does: {missing} is missing"
-    broken = model.broken_promise() if hasattr(model, "broken_promise") else ""
-    return f"`{entry.value}`: {broken}" if broken else None
+        return f"`{entry.value}` does not implement {missing}"
+    problem = model.definition_problem() if hasattr(model, "definition_problem") else ""
+    return f"`{entry.value}`: {problem}" if problem else None
 
 
-def _resolved(address: str) -> Any:
+def _resolve(address: str) -> Any:
     module, _, name = address.partition(":")
     return getattr(import_module(module), name)

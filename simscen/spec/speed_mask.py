@@ -1,4 +1,4 @@
-"""A mask of speed limits, as stacks are given one and criteria judge by one."""
+"""Filter mask of speed limits, for stacks and criteria."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ if TYPE_CHECKING:
 
 
 class SpeedMask(Spec):
-    """A filter mask of speed limits (nav2_costmap_2d's SpeedFilter and its CostmapFilterInfo).
+    """Filter mask of speed limits, as for nav2_costmap_2d's SpeedFilter and its CostmapFilterInfo.
 
-    What a cell of the mask says is `base + multiplier · value`, its value being 0 … 100 as map_server reads the mask
-    (`mode: scale` keeps the grays). Cells of value 0 and unknown ones limit nothing, nor does a limit of 0 or less.
+    The limit of a cell is `base + multiplier · value` with a value of 0 … 100 as map_server reads the mask (`mode:
+    scale` keeps shades of gray). Cells with value 0, unknown cells, and limits of 0 or less have no effect.
     """
 
     file: MaskFile
-    """Map yaml of the mask, relative to this file; its resolution and origin may differ from the map's."""
+    """Map YAML file of the mask, relative to this file. Its resolution and origin may differ from those of the map."""
     type: Literal["percent", "absolute"] = "percent"
-    """Percent of the controller's full speed (CostmapFilterInfo type 1), or m/s (type 2)."""
+    """Unit of the limits: percent of the controller's full speed (CostmapFilterInfo type 1), or m/s (type 2)."""
     base: Annotated[float, Field(ge=-1000, le=1000)] = 0.0
-    """CostmapFilterInfo's base: percent or m/s."""
+    """Limit at value 0 (base of CostmapFilterInfo): percent or m/s."""
     multiplier: Annotated[float, Field(ge=-1000, le=1000)] = 1.0
-    """CostmapFilterInfo's multiplier: percent or m/s for each unit of a cell's value."""
+    """Increase of the limit per unit of value (multiplier of CostmapFilterInfo): percent or m/s."""
 
     def over(self, grid: OccupancyGrid) -> SpeedLimits:
-        """The limits that it makes of the cells in its file."""
+        """Return the speed limits for the cells of the mask."""
         from simscen.core.environment.costmap_filters import SpeedLimits
 
         return SpeedLimits(grid, self.type == "percent", self.base, self.multiplier)

@@ -74,11 +74,6 @@ def _found(times: np.ndarray, distance: np.ndarray) -> float | None:
     return max(0.0, float(times[begin + near[0]])) if len(near) else None
 
 
-# MERGED: Whether a localizer is as sure as it may be: normalized estimation error squared, averaged over runs.
-# MERGED:
-# MERGED: The average is over runs at fixed times, not over time: errors of one run are correlated, and the bounds of the
-# MERGED: chi-square distribution hold for independent samples only. (Bar-Shalom, Li, Kirubarajan 2001, section 5.4.) Runs that
-# MERGED: share a building are not independent either: what stands elsewhere than the map shows it errs in all of them.
 FEWEST = 3
 """Buildings from which on they say how much they differ."""
 

@@ -212,7 +212,7 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
     if get_origin(kind) is Annotated:
         return kind_of(get_args(kind)[0], (*get_args(kind)[1:], *metadata))
     if place := next((mark for mark in metadata if isinstance(mark, PlaceAllowed | PlaceShorthand)), None):
-        words = [f"`{word}`" for word in getattr(place, "besides", ())]
+        words = [f"`{word}`" for word in getattr(place, "keywords", ())]
         return " or ".join([*words, "place", kind_of(kind, tuple(mark for mark in metadata if mark is not place))])
     if get_origin(kind) in (Union, UnionType):
         return " or ".join(dict.fromkeys(kind_of(member) for member in get_args(kind) if member is not NoneType))

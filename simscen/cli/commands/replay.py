@@ -8,8 +8,19 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.commands.judge import TimeStamps, wanted_of
 from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.log_options import (
+    RootOption,
+    SameFrameOption,
+    ScenarioOption,
+    TickRateOption,
+    TimeOption,
+    TimeStamps,
+    TopicOption,
+    TruthOption,
+    WorldPathOption,
+    foreign_log_options,
+)
 from simscen.cli.session.judging import LogJudge
 from simscen.cli.session.logs import LOGS, logs_of
 from simscen.cli.session.output_files import save
@@ -31,25 +42,14 @@ def command(
         typer.Option(help="Output file; default: replay.html beside run.mcap, NAME.replay.html beside other logs."),
     ] = None,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
-    scenario: Annotated[Path | None, typer.Option(help="Use the criteria of this file, as in `simscen judge`.")] = None,
-    truth: Annotated[str | None, typer.Option(help="Ground truth in a foreign log, as in `simscen judge`.")] = None,
-    topic: Annotated[
-        list[str] | None, typer.Option(help="NAME=TOPIC in a foreign log, as in `simscen judge`; repeatable.")
-    ] = None,
-    time: Annotated[
-        TimeStamps, typer.Option(help="Time stamps in a foreign log, as in `simscen judge`.")
-    ] = TimeStamps.HEADER,
-    tick_rate: Annotated[int, typer.Option(min=1, max=10_000, help="Ticks per second for foreign logs.")] = 1000,
-    same_frame: Annotated[
-        bool,
-        typer.Option("--same-frame", help="Treat the frame of the truth as the map frame although its name differs."),
-    ] = False,
-    root: Annotated[
-        Path | None, typer.Option(help="Root folder; the scenario may only refer to files below it.")
-    ] = None,
-    world_path: Annotated[
-        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
-    ] = None,
+    scenario: ScenarioOption = None,
+    truth: TruthOption = None,
+    topic: TopicOption = None,
+    time: TimeOption = TimeStamps.HEADER,
+    tick_rate: TickRateOption = 1000,
+    same_frame: SameFrameOption = False,
+    root: RootOption = None,
+    world_path: WorldPathOption = None,
 ) -> None:
     """Write a page that plays a recorded run, or two runs side by side.
 
@@ -63,7 +63,7 @@ def command(
     if len(files) > 1 and (against is not None or out is not None):
         option = "--against" if against is not None else "--out"
         raise UsageError(f"{option} takes one run, but {len(files)} were found")
-    judging = LogJudge(wanted_of(truth, topic or [], time, tick_rate, same_frame), scenario, root, world_path or [])
+    judging = LogJudge(foreign_log_options(truth, topic, time, tick_rate, same_frame), scenario, root, world_path or [])
     others = [] if against is None else logs_of([against])
     if len(others) > 1:
         raise UsageError(f"--against takes one run, but {escaped(str(against))} contains {len(others)}")

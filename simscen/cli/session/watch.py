@@ -15,7 +15,6 @@ from typing import Any, TextIO
 
 from simscen.cli.diagnostics import print_text
 from simscen.cli.session.run_session import SessionRequest, execute_session
-from simscen.cli.session.selection import Selection
 from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.records.session_events import RunFinished, SessionEvent
 from simscen.loading.files.discovery import default_root, discover
@@ -166,13 +165,9 @@ def watch_session(asked: SessionRequest) -> int:
         files = _next(watching, seen)
         if files is None:
             break
-        again = replace(asked, paths=files, root=home, last_failed=False, wanted=_unsharded(asked.wanted))
+        again = replace(asked, paths=files, root=home, last_failed=False)
         code, seen = _run_in_child(again, watching)
     return code
-
-
-def _unsharded(wanted: Selection) -> Selection:
-    return replace(wanted, shard=(1, 1))
 
 
 def _run_in_child(asked: SessionRequest, watching: WatchState) -> tuple[int, FileStamps]:

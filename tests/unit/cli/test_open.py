@@ -44,8 +44,8 @@ def test_the_page_opens_at_once_follows_the_runs_and_becomes_the_report(
             super().__call__(event)
             seen.append((tmp_path / "out/report.html").read_text(encoding="utf-8"))
 
-    monkeypatch.setattr(output_files, "LEAST_PAUSE", 0.0)
-    monkeypatch.setattr(output_files, "SHARE", 0)
+    monkeypatch.setattr(output_files, "MIN_UPDATE_INTERVAL_S", 0.0)
+    monkeypatch.setattr(output_files, "UPDATE_INTERVAL_FACTOR", 0)
     monkeypatch.setattr("simscen.cli.session.run_session.LivePage", Watched)
     ended = simscen("run", "a.scenario.yaml", "--repeat", "2", "--out", "out", "--open", "-j", "1")
     assert (ended.code, ended.err) == (0, "")

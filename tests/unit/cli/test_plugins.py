@@ -58,9 +58,9 @@ def test_as_json(simscen, yardwork) -> None:
     ("kind", "name", "value", "why"),
     [
         ("criterion", "hello", "nowhere:Hello", "ModuleNotFoundError: No module named 'nowhere'"),
-        ("criterion", "speed", "hello:Hello", "simscen itself has one of that name"),
+        ("criterion", "speed", "hello:Hello", "simscen ships a type with the same name"),
         ("criteria", "hello", "hello:Hello", "there is no group `simscen.criteria`"),
-        ("metric", "success", "hello:Hello", "simscen itself has one of that name"),
+        ("metric", "success", "hello:Hello", "simscen ships a type with the same name"),
     ],
 )
 def test_one_that_is_broken_says_why_and_the_exit_code_tells(simscen, packages, kind, name, value, why) -> None:

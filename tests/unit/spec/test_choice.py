@@ -77,4 +77,4 @@ def test_a_check_of_its_own_that_breaks_down_is_told_where_it_is_written(package
         choice.model_validate(words, by_alias=True, by_name=False)
     (error,) = told.value.errors()
     assert error["loc"] == (("calm",) if kind == "criterion" else ("planner",))
-    assert "it breaks down over what is written here: KeyError: 'nothing'" in error["msg"]
+    assert "its validation raises KeyError: 'nothing'" in error["msg"]

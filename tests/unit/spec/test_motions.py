@@ -80,10 +80,10 @@ SLIPS = {
     "keyframes have times, and no speed": {"keyframes": TWO, "speed": 1.0},
     "times of keyframes must rise": {"keyframes": [[0, 1, 1, 0], [2, 2, 1, 0], [2, 2, 2, 0]]},
     "needs keyframes": {"through": [[1, 1]], "speed": 1.0, "ease": "spline"},
-    "phase is for keyframes": {"through": [[1, 1]], "speed": 1.0, "phase": 1.0},
+    "`phase` needs keyframes": {"through": [[1, 1]], "speed": 1.0, "phase": 1.0},
     "the first of them at 0 s": {"keyframes": [[1, 1, 1, 0], [2, 2, 1, 0]], "repeat": "back_and_forth"},
     "two keyframes or more": {"keyframes": [[0, 1, 1, 0]], "repeat": "loop"},
-    "a loop jumps": {"keyframes": TWO, "repeat": "loop"},
+    "the last keyframe of a loop must have the same pose": {"keyframes": TWO, "repeat": "loop"},
     "phase 2 s is not within the 2 s": {"keyframes": TWO, "phase": 2.0},
     "phase 4 s is not within the 4 s": {"keyframes": TWO, "phase": 4.0, "repeat": "back_and_forth"},
 }

@@ -42,16 +42,16 @@ def test_everything_shipped_keeps_the_promise_of_its_group(group: str) -> None:
     ("group", "name", "value", "why"),
     [
         ("criterion", "calm", "nowhere:Calm", "ModuleNotFoundError: No module named 'nowhere'"),
-        ("criterion", "calm", "calm:Clam", "`calm:Clam` is not there"),
-        ("criterion", "calm", "calm:Lax", "neither a simscen.spec.base.Spec nor a Value"),
-        ("criterion", "calm", "calm:Stranger", "is no simscen.plugin.Criterion"),
-        ("criterion", "calm", "calm:Vague", "judge is missing"),
+        ("criterion", "calm", "calm:Clam", "`calm:Clam` does not exist"),
+        ("criterion", "calm", "calm:Lax", "not a subclass of simscen.plugin.Spec or simscen.plugin.Value"),
+        ("criterion", "calm", "calm:Stranger", "is not a subclass of simscen.plugin.Criterion"),
+        ("criterion", "calm", "calm:Vague", "does not implement judge"),
         ("criterion", "calm", "calm", "not of the form package.module:Class"),
-        ("criterion", "Calm", "calm:Calm", "a name is a small letter"),
-        ("criterion", "severity", "calm:Calm", "`severity` means something else there"),
-        ("criterion", "speed", "calm:Calm", "simscen itself has one of that name"),
-        ("trigger", "all", "calm:Calm", "`all` means something else there"),
-        ("fault", "calm", "calm:Calm", "is no simscen.plugin.Fault"),
+        ("criterion", "Calm", "calm:Calm", "its name must start with a lowercase letter"),
+        ("criterion", "severity", "calm:Calm", "`severity` is reserved"),
+        ("criterion", "speed", "calm:Calm", "simscen ships a type with the same name"),
+        ("trigger", "all", "calm:Calm", "`all` is reserved"),
+        ("fault", "calm", "calm:Calm", "is not a subclass of simscen.plugin.Fault"),
     ],
 )
 def test_what_cannot_be_used_says_why_and_whose_it_is(packages, group, name, value, why, calm_module) -> None:
@@ -136,4 +136,4 @@ def test_an_installation_that_broke_off_has_no_name_and_is_usable(packages, calm
 
 @pytest.mark.parametrize("kind", GROUPS)
 def test_what_a_specification_must_be_is_to_be_had_where_authors_of_plugins_import(kind) -> None:
-    assert GROUPS[kind].promise.rpartition(":")[2] in simscen.plugin.__all__
+    assert GROUPS[kind].base.rpartition(":")[2] in simscen.plugin.__all__

@@ -10,8 +10,8 @@ ANNA = [0, "object.spawned", "anna", {"person": True, "size": [0.25, 1.7]}]
 
 def test_a_robot_that_drives_up_to_somebody_is_in_each_zone_for_the_time_that_its_way_takes():
     """At 1 m/s from a gap of 4.55 m to one of 0.05 m, then it stands: 0.95 s social are 2.4 m, and so on."""
-    trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0], [4.5, 4.5, 0], [10, 4.5, 0]], "objects": {"anna": [[0, 5, 0]]},
-                    "events": [ANNA]})  # fmt: skip
+    waypoints = [[0, 0, 0], [4.5, 4.5, 0], [10, 4.5, 0]]
+    trace = synthetic_trace({"seconds": 10, "truth": waypoints, "objects": {"anna": [[0, 5, 0]]}, "events": [ANNA]})
     found = person_metrics(trace, synthetic_case({"inscribed_radius": 0.2}))
     assert found["min_person_distance"] == pytest.approx(0.05, abs=1e-6)
     assert found["intrusion_social"] == pytest.approx(0.24, abs=0.004)

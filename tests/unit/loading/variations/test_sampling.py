@@ -77,7 +77,7 @@ def test_a_value_has_the_unit_of_its_range_and_is_in_si_where_there_are_several(
     ("draw", "told"),
     [
         ({"uniform": [2, 1]}, "the range is empty: 2 is greater than 1"),
-        ({"uniform": ["1 m", "2 s"]}, "`m` and `s` are no units of one dimension"),
+        ({"uniform": ["1 m", "2 s"]}, "`m` and `s` are units of different dimensions"),
         ({"log_uniform": [0, 1]}, "must be greater than 0"),
         ({"integer": [2, 1]}, "the range is empty"),
         ({"normal": {"mean": 0, "std": 0}}, "`std` must be greater than 0"),

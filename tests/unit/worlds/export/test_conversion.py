@@ -13,7 +13,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, Mesh, MotionPath, Solid, Sphere
 from simscen.model.world import WorldSpec
-from simscen.spec.moving_objects import route
+from simscen.spec.moving_objects import path_through_waypoints
 from simscen.worlds.export.conversion import convert
 from simscen.worlds.export.cut_polygons import rings_of
 from simscen.worlds.geometry.cross_section import outlines
@@ -108,7 +108,7 @@ def test_a_mesh_that_is_open_is_left_out_and_told():
 
 def test_bodies_keep_mass_and_motion():
     start = Pose2(1.0, 1.0, 0.0)
-    path = route(start, [[4.0, 1.0], [4.0, 3.0]], 0.8, "back_and_forth")
+    path = path_through_waypoints(start, [[4.0, 1.0], [4.0, 3.0]], 0.8, "back_and_forth")
     box = (Solid(Box((0.6, 0.4, 1.0)), Pose3(z=0.5)),)
     bodies = (Body("cart", box, Pose3.planar(start), 0.0, path), Body("bin", box, Pose3(x=3.0), 4.0))
     world, changes = converted(bodies=bodies)

@@ -1,0 +1,74 @@
+"""Options that `simscen judge` and `simscen replay` share: criteria for a log, and how to read foreign logs."""
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli.diagnostics import escaped
+from simscen.core.errors import UsageError
+from simscen.record.foreign.options import TOPICS, Clock, ForeignLogOptions
+
+
+class TimeStamps(str, Enum):
+    """Which time stamp of a message is used."""
+
+    HEADER = "header"
+    LOG = "log"
+
+
+ScenarioOption = Annotated[Path | None, typer.Option(help="Use the criteria of this file; it needs only `pass:`.")]
+TruthOption = Annotated[
+    str | None,
+    typer.Option(help="Ground truth in a foreign log: a topic, or two frames such as map:base_link."),
+]
+TopicOption = Annotated[
+    list[str] | None,
+    typer.Option(help="NAME=TOPIC: other name of a standard topic, e.g. odom=/my/odom; repeatable."),
+]
+TimeOption = Annotated[
+    TimeStamps, typer.Option(help="Time stamps to use in a foreign log: of the message headers, or of logging.")
+]
+TickRateOption = Annotated[int, typer.Option(min=1, max=10_000, help="Ticks per second for foreign logs.")]
+SameFrameOption = Annotated[
+    bool,
+    typer.Option("--same-frame", help="Treat the frame of the truth as the map frame although its name differs."),
+]
+RootOption = Annotated[Path | None, typer.Option(help="Root folder; the scenario may only refer to files below it.")]
+WorldPathOption = Annotated[
+    list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
+]
+
+
+def foreign_log_options(
+    truth: str | None, topics: list[str] | None, time: TimeStamps, tick_rate: int, same_frame: bool
+) -> ForeignLogOptions:
+    """Return how to read a foreign log according to the command-line options. Raises UsageError."""
+    clock: Clock = "log" if time is TimeStamps.LOG else "header"
+    options = ForeignLogOptions(truth, _parse_topics(topics or []), tick_rate, clock, same_frame)
+    _check_truth(options)
+    return options
+
+
+def _check_truth(options: ForeignLogOptions) -> None:
+    """Raise UsageError if --truth is malformed or names the belief of the robot."""
+    if options.truth is None:
+        return
+    if not options.truth.startswith("/") and not (options.frames and all(options.frames)):
+        expected = "expected a /topic, or two frames such as map:base_link"
+        raise UsageError(f"cannot read --truth: {expected}, got {escaped(options.truth) or 'nothing'}")
+    if options.truth == options.topic("amcl_pose"):
+        raise UsageError(f"--truth {escaped(options.truth)} is the belief of the robot; name an independent source")
+
+
+def _parse_topics(arguments: list[str]) -> dict[str, str]:
+    """Return the topics by standard name. Raises UsageError."""
+    topics = {}
+    for argument in arguments:
+        name, equals, topic = argument.partition("=")
+        if not equals or name not in TOPICS or not topic.startswith("/"):
+            known = ", ".join(TOPICS)
+            raise UsageError(f"cannot read --topic {escaped(argument)}: expected NAME=/TOPIC with one of {known}")
+        topics[name] = topic
+    return topics
