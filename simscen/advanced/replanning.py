@@ -148,14 +148,14 @@ class AdvancedPlanManager(PlanManager):
     def _call_planner(self, view: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         for clearance in CAUTIOUS_CLEARANCES_M if self._is_cautious else ():
             with contextlib.suppress(NavigationFailure):
-                path = self.planner.plan(view.with_less_room(clearance), start, goal, seed)
+                path = self.planner.plan(view.with_grown_obstacles(clearance), start, goal, seed)
                 return self._with_preferred_clearance(path, view, start, goal, seed)
         return self.planner.plan(view, start, goal, seed)
 
     def _with_preferred_clearance(self, path: Path, view: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """Return a path with the preferred clearance if it is not much longer, otherwise `path`."""
         with contextlib.suppress(NavigationFailure):
-            other = self.planner.plan(view.with_less_room(PREFERRED_CLEARANCE_M), start, goal, seed)
+            other = self.planner.plan(view.with_grown_obstacles(PREFERRED_CLEARANCE_M), start, goal, seed)
             if other.length() <= MAX_DETOUR_RATIO * path.length():
                 return other
         return path

@@ -1,4 +1,4 @@
-"""Whether the robot's hull fits where it is, on a costmap: the one check that planners and controllers share."""
+"""Collision checks of the robot's footprint on a costmap, shared by planners and controllers."""
 
 import math
 
@@ -14,7 +14,7 @@ Reals = npt.NDArray[np.floating]
 
 
 def distances(costmap: CostmapView, points: Reals) -> npt.NDArray[np.float32]:
-    """Distance in meters (…,) to the nearest lethal cell at points (…, 2); 0 off the costmap."""
+    """Return the distance in m (…,) from points (…, 2) to the nearest lethal cell; 0 outside the costmap."""
     height, width = costmap.distance.shape
     across = (points[..., 0] - costmap.origin[0]) * (1.0 / costmap.resolution)
     up = (points[..., 1] - costmap.origin[1]) * (1.0 / costmap.resolution)
@@ -26,7 +26,7 @@ def distances(costmap: CostmapView, points: Reals) -> npt.NDArray[np.float32]:
 
 
 def distance_at(costmap: CostmapView, x: float, y: float) -> float:
-    """The same for one point: a tenth of the time."""
+    """Return the same for one point, in a tenth of the time."""
     left, low = costmap.origin
     distance, resolution = costmap.distance, costmap.resolution
     row, column = math.floor((y - low) / resolution), math.floor((x - left) / resolution)
@@ -35,7 +35,7 @@ def distance_at(costmap: CostmapView, x: float, y: float) -> float:
 
 
 def lethal_near(costmap: CostmapView, x: float, y: float, meters: float) -> Array:
-    """The middles (n, 2) of the lethal cells in a square of so many meters to each side of a point."""
+    """Return the centers (n, 2) of the lethal cells in a square around a point, `meters` to each side."""
     left, low = costmap.origin
     first = [max(0, math.floor((at - meters - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
     last = [max(0, math.ceil((at + meters - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
@@ -45,15 +45,15 @@ def lethal_near(costmap: CostmapView, x: float, y: float, meters: float) -> Arra
 
 
 class Footprint:
-    """Checks many poses at once.
+    """Collision checker for many poses at once.
 
-    A round robot collides where a lethal cell's center is within its radius. Any other collides where one is within
-    the inscribed radius or anywhere under the hull; far from everything (circumscribed radius) it never does. `reach`
-    is how far turning in place moves the hull: 0 when it is round; `circumscribed` is the radius around all of it,
-    `inscribed` that of the largest circle within.
+    A round robot is in collision if the center of a lethal cell is within its radius. Another robot is in collision if
+    one is within the inscribed radius or inside the footprint polygon. Attributes in m: `inscribed` and `circumscribed`
+    radius, and `reach`, the largest distance that a point of the footprint moves per radian of rotation (0 if round).
     """
 
     def __init__(self, robot: RobotModel, resolution: float) -> None:
+        """Prepare checks of this robot on costmaps with this cell size in m."""
         self.inscribed = robot.inscribed_radius
         self._round = robot.radius is not None
         self.reach = 0.0 if self._round else robot.circumscribed_radius
@@ -65,7 +65,7 @@ class Footprint:
         self._corners, self.discs = corners, CoveringDiscs(robot)
 
     def gaps(self, points: Array, poses: Array) -> Array:
-        """How far (n, k) the hull's edge at poses (n, 3) is from points (k, 2); negative where they are inside."""
+        """Return distances (n, k) from the footprint's edge at poses (n, 3) to points (k, 2); negative inside."""
         cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
         x, y = points[None, :, 0] - poses[:, 0, None], points[None, :, 1] - poses[:, 1, None]
         if self._round:
@@ -75,7 +75,7 @@ class Footprint:
         return np.asarray(away.reshape(x.shape))
 
     def free(self, costmap: CostmapView, poses: Array) -> Mask:
-        """Which of the poses (n, 3) hit nothing."""
+        """Return which of the poses (n, 3) are free of collisions."""
         distance = distances(costmap, poses[:, :2])
         free: Mask = np.asarray(distance > np.float32(self.inscribed))
         if self._round:
@@ -86,10 +86,10 @@ class Footprint:
         return free
 
     def clearance(self, costmap: CostmapView, poses: Array) -> Array:
-        """About how far (n,) the hull's edge is from the nearest lethal cell in meters; negative in collision.
+        """Return the approximate distance (n,) in m from the footprint's edge to the nearest lethal cell.
 
-        Then it is how far the deepest of the lethal cells under the hull is from its edge: whether a turn leads out of
-        a collision or further into it shows in nothing else.
+        In collision, it is the negative depth of the deepest lethal cell inside the footprint, so that it tells whether
+        a motion leads out of a collision or further into it.
         """
         middle = distances(costmap, poses[:, :2]).astype(np.float64) - self.inscribed
         if self._round:
@@ -102,10 +102,11 @@ class Footprint:
         return np.asarray(np.minimum(edge, middle))
 
     def gap(self, moving: MovingObstacles, poses: Array, times: Array, sigmas: float = 0.0) -> Array:
-        """Meters (…,) from the hull at poses (…, 3) to what moves, where it will be `times` seconds from now.
+        """Return distances (…,) in m from the footprint at poses (…, 3) to moving obstacles, negative in collision.
 
-        `times` broadcast with them. Negative where they will meet; of a hull that is not round less than it is, by
-        some centimeters. Things are so many standard deviations of their places wider.
+        The obstacles are at their positions predicted for `times` (s, broadcast with the poses), inflated by `sigmas`
+        standard deviations. For a footprint that is not round, the result is a lower bound, a few centimeters too
+        small.
         """
         x, y, yaw = poses[..., 0], poses[..., 1], poses[..., 2]
         return np.asarray(self.discs.gap(moving, x, y, yaw, times, sigmas), dtype=np.float64)
@@ -121,15 +122,15 @@ class Footprint:
 
 
 class CoveringDiscs:
-    """A row of equal discs along the base's x axis that covers the hull: `offsets` (k,) and their `radius`.
+    """Row of equal discs along the x axis of the base that covers the footprint: `offsets` (k,) and `radius` in m.
 
-    `reach` is how far from the base they reach; `centered` is whether it is one about the base, however that is turned.
-
-    A check by discs is a few look-ups a pose, and errs to the safe side by a centimeter or two: for the controllers
-    that compare thousands of trajectories.
+    `reach` is the largest distance of their edges from the base; `centered` is True for a single disc at the base.
+    Checks with discs need a few lookups per pose and err on the safe side by a centimeter or two. Controllers use them
+    to compare thousands of trajectories.
     """
 
     def __init__(self, robot: RobotModel) -> None:
+        """Cover the footprint of a robot."""
         if robot.radius is not None:
             self.offsets, self.radius, self.reach, self.centered = np.zeros(1), robot.radius, robot.radius, True
             return
@@ -144,7 +145,7 @@ class CoveringDiscs:
         self.centered = self.offsets.tolist() == [0.0]
 
     def clearance(self, costmap: CostmapView, x: Reals, y: Reals, yaw: Reals) -> npt.NDArray[np.float32]:
-        """Distance (…,) from the discs to the nearest lethal cell at poses (…,); negative in collision."""
+        """Return distances (…,) in m from the discs at poses (…,) to the nearest lethal cell; negative in collision."""
         if self.centered:
             return np.asarray(distances(costmap, np.stack((x, y), axis=-1)) - np.float32(self.radius))
         cosine, sine = np.cos(yaw), np.sin(yaw)
@@ -156,7 +157,7 @@ class CoveringDiscs:
         return np.asarray(least - np.float32(self.radius))
 
     def gap(self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
-        """Meters (…,) from the discs at poses (…,) to what moves, where it will be at `times`; see Moving.gap."""
+        """Return distances (…,) in m from the discs at poses (…,) to moving obstacles; see MovingObstacles.gap."""
         least, *others = [moving.gap(*at, times, sigmas) for at in self._placed(x, y, yaw)]
         for other in others:
             np.minimum(least, other, out=least)
@@ -166,7 +167,7 @@ class CoveringDiscs:
     def nearness(
         self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, kept_off: float
     ) -> tuple[Reals, Mask]:
-        """How near the discs at poses (…,) come to what moves, and which touch it; see Moving.nearness."""
+        """Return the nearness (…,) of the discs to moving obstacles and whether they touch; see MovingObstacles."""
         places = self._placed(x, y, yaw)
         (nearest, touched), *others = [moving.nearness(*at, times, self.radius, kept_off) for at in places]
         for near, touch in others:
@@ -175,7 +176,7 @@ class CoveringDiscs:
         return nearest, touched
 
     def _placed(self, x: Reals, y: Reals, yaw: Reals) -> list[tuple[Reals, Reals]]:
-        """The discs' middles."""
+        """Return the x and y of each disc's center."""
         if self.centered:
             return [(x, y)]
         cosine, sine = np.cos(yaw), np.sin(yaw)
@@ -183,7 +184,7 @@ class CoveringDiscs:
 
 
 def _inner_points(corners: Array, resolution: float, inscribed: float) -> Array:
-    """Points inside the hull, so dense that no cell is missed, outside the inscribed circle that is checked anyway."""
+    """Return points inside the footprint, dense enough to hit each cell, outside the inscribed circle."""
     spacing = resolution / math.sqrt(2.0)
     low, high = corners.min(axis=0), corners.max(axis=0)
     axes = [np.arange(a + spacing, b, spacing) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
@@ -193,7 +194,7 @@ def _inner_points(corners: Array, resolution: float, inscribed: float) -> Array:
 
 
 def _inside(corners: Array, points: Array) -> Mask:
-    """Which of the points (n, 2) lie in the polygon."""
+    """Return which of the points (n, 2) are inside the polygon."""
     inside: Mask = np.zeros(len(points), dtype=bool)
     for (ax, ay), (bx, by) in zip(corners.tolist(), np.roll(corners, -1, axis=0).tolist(), strict=True):
         if ay != by:
@@ -203,7 +204,7 @@ def _inside(corners: Array, points: Array) -> Mask:
 
 
 def _depths(corners: Array, points: Array) -> Array:
-    """How far (n,) points (n, 2) are from the nearest edge."""
+    """Return distances (n,) from points (n, 2) to the nearest edge."""
     depths: Array = np.full(len(points), np.inf)
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         along = np.clip((points - a) @ (b - a) / float((b - a) @ (b - a)), 0.0, 1.0)
@@ -212,7 +213,7 @@ def _depths(corners: Array, points: Array) -> Array:
 
 
 def _edge_points(corners: Array, resolution: float) -> Array:
-    """Points along the hull's edge, at most one cell apart."""
+    """Return points along the footprint's edge, at most one cell apart."""
     points = []
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         count = max(1, math.ceil(float(np.hypot(*(b - a))) / resolution))

@@ -1,4 +1,4 @@
-"""What moves: where it is, how fast and how sure that is, at a moment."""
+"""Moving obstacles: position, velocity, and their uncertainty at one time."""
 
 import cmath
 import math
@@ -11,21 +11,21 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 
 MAX_UNCERTAINTY_M = 0.8
-"""Meters by which what is not known of a place widens it at most."""
+"""Largest inflation of an obstacle for its uncertainty."""
 MAX_STEP_S, MIN_STEP_S = 0.5, 0.05
-"""Seconds that are passed over at once at most, unless all keep clear of each other by WIDEST as well, and at least, to
-be worth it."""
+"""Longest and shortest time step of `surely_off`. Steps are longer where the distance exceeds MAX_UNCERTAINTY_M."""
 CONTACT_DISTANCE_M = 0.03
-"""Meters: whoever comes nearer is taken to touch."""
+"""Closer obstacles count as touching."""
 
 Mask = npt.NDArray[np.bool_]
 Reals = npt.NDArray[np.floating]
 
 
 class MovingObstacle(NamedTuple):
-    """An upright cylinder that moves: its middle (m) and its velocity (m/s) as x + iy, and its radius in m.
+    """A moving upright cylinder: center (m) and velocity (m/s) as x + iy, and radius in m.
 
-    How sure these are is alike along all axes: variance of the place, covariance of both, variance of the velocity.
+    The uncertainty is isotropic: variance of the position, covariance of position and velocity, variance of the
+    velocity.
     """
 
     place: complex
@@ -36,18 +36,18 @@ class MovingObstacle(NamedTuple):
     velocity_variance: float
 
     def deviation(self, seconds: float, acceleration: float) -> float:
-        """Standard deviation in m of where it will be, along any axis, if its velocity may change so fast in m/s²."""
+        """Return the standard deviation in m of the position after `seconds`, with this `acceleration` in m/s²."""
         *_, variance, covariance, wanders = self
         turned = 0.5 * acceleration * seconds * seconds
         return math.sqrt(variance + seconds * (2.0 * covariance + wanders * seconds) + turned * turned)
 
     def missed_by(self, here: complex, speed: float, seconds: float) -> float:
-        """Meters at least that its surface stays off whoever leaves `here` at `speed` for so long, whichever way."""
+        """Return a lower bound of the distance in m to anything that leaves `here` at `speed` in any direction."""
         off, velocity = self.place - here, self.velocity
         own = abs(velocity)
         if speed >= own:
             when = seconds
-        else:  # the nearer to `here`, the nearer; and the later, the farther may who left have come
+        else:  # the minimum lies between the closest approach to `here` and the end of the time
             along, aside = (off.conjugate() * velocity).real / own, abs((off.conjugate() * velocity).imag) / own
             when = (aside * speed / math.sqrt(own * own - speed * speed) - along) / own
             when = min(max(0.0, when), seconds)
@@ -55,9 +55,9 @@ class MovingObstacle(NamedTuple):
 
 
 class MovingObstacles:
-    """Things that move, as upright cylinders, in one frame and at one moment.
+    """Moving obstacles in one frame and at one time.
 
-    `acceleration` in m/s² is how fast velocities may change: what is not known of them grows with it.
+    `acceleration` in m/s² is the assumed change of velocity; the uncertainty of predictions grows with it.
     """
 
     __slots__ = ("acceleration", "things")
@@ -65,9 +65,9 @@ class MovingObstacles:
     def __init__(
         self, centers: Array, velocities: Array, radii: Array, covariances: Array, acceleration: float
     ) -> None:
-        """Of `centers` (n, 2) in m, `velocities` (n, 2) in m/s, `radii` (n,) in m.
+        """Create obstacles from `centers` (n, 2) in m, `velocities` (n, 2) in m/s, and `radii` (n,) in m.
 
-        `covariances` (n, 4, 4) are of x, y, vx, vy in that order; of the two axes, what is known less holds for both.
+        `covariances` (n, 4, 4) are of x, y, vx, vy in that order; the larger value of the two axes is used for both.
         """
         spreads = np.maximum(covariances[:, (0, 0, 2), (0, 2, 2)], covariances[:, (1, 1, 3), (1, 3, 3)])
         rows = zip(centers.tolist(), velocities.tolist(), radii.tolist(), spreads.tolist(), strict=True)
@@ -78,7 +78,7 @@ class MovingObstacles:
 
     @classmethod
     def of(cls, things: Iterable[MovingObstacle], acceleration: float) -> "MovingObstacles":
-        """These things."""
+        """Create a set of these obstacles."""
         moving = object.__new__(cls)
         moving.things, moving.acceleration = tuple(things), acceleration
         return moving
@@ -88,34 +88,35 @@ class MovingObstacles:
 
     @property
     def centers(self) -> Array:
-        """Their middles (n, 2) in m."""
+        """Centers (n, 2) in m."""
         return np.array([(each.place.real, each.place.imag) for each in self.things]).reshape(-1, 2)
 
     @property
     def velocities(self) -> Array:
-        """The same (n, 2) in m/s."""
+        """Velocities (n, 2) in m/s."""
         return np.array([(each.velocity.real, each.velocity.imag) for each in self.things]).reshape(-1, 2)
 
     @property
     def radii(self) -> Array:
-        """Their radii (n,) in m."""
+        """Radii (n,) in m."""
         return np.array([each.radius for each in self.things])
 
     @property
     def covariances(self) -> Array:
-        """How sure that is: (n, 4, 4) of x, y, vx, vy in that order."""
+        """Covariances (n, 4, 4) of x, y, vx, vy in that order."""
         spreads = [((place, both), (both, velocity)) for *_, place, both, velocity in self.things]
         return np.kron(np.array(spreads).reshape(-1, 2, 2), np.eye(2))
 
     def at(self, times: Array) -> Array:
-        """Where their middles will be (times, n, 2) after `times` (m,) seconds, at constant velocity."""
+        """Return the centers (m, n, 2) after `times` (m,) in s, at constant velocity."""
         moved: Array = self.centers + self.velocities * times[:, None, None]
         return moved
 
     def gap(self, x: Reals, y: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
-        """Meters (…,) from points (…,) to the surface of what will be nearest at `times`, which broadcast with them.
+        """Return distances (…,) in m from points (…,) to the surface of the nearest obstacle at `times`.
 
-        Things are so many standard deviations wider, up to WIDEST; inf where nothing moves.
+        `times` broadcast with the points. Obstacles are inflated by `sigmas` standard deviations, at most by
+        MAX_UNCERTAINTY_M. Without obstacles, the distance is inf.
         """
         least = np.full(np.broadcast_shapes(x.shape, times.shape), np.inf, x.dtype)
         for thing, gap in self._gaps(x, y, times):
@@ -124,10 +125,10 @@ class MovingObstacles:
         return least
 
     def nearness(self, x: Reals, y: Reals, times: Reals, radius: float, kept_off: float) -> tuple[Reals, Mask]:
-        """How near discs at points (…,) are to what will be nearest at `times`, and which of them touch it then.
+        """Return the nearness (…,) of discs at points (…,) to the nearest obstacle at `times`, and whether they touch.
 
-        0 and less from so far off as is to be kept (meters, and a standard deviation of the place, up to WIDEST), 1
-        where they touch.
+        The nearness is 1 at contact and 0 at the distance `kept_off` (m) plus one standard deviation of the position,
+        at most MAX_UNCERTAINTY_M; farther away it is negative.
         """
         shape = np.broadcast_shapes(x.shape, times.shape)
         nearest, touched = np.full(shape, -np.inf, x.dtype), np.zeros(shape, np.bool_)
@@ -141,8 +142,9 @@ class MovingObstacles:
     def surely_off(
         self, place: Callable[[float], complex], speed: float, reach: float, kept_off: float, seconds: float
     ) -> bool:
-        """Whether a disc of radius `reach` at `place(t)`, no faster than `speed`, has a `nearness` of 0 at most for so
-        many seconds; False where that is not told at once.
+        """Return True if a disc of radius `reach` at `place(t)`, not faster than `speed`, has a nearness of at most 0.
+
+        This is a quick check for the given time in s; False means that it could not decide.
         """
         for thing in self.things:
             closing, time = max(speed + abs(thing.velocity), 1e-3), 0.0
@@ -158,13 +160,13 @@ class MovingObstacles:
         return True
 
     def _deviation(self, thing: MovingObstacle, times: Reals) -> Reals:
-        """Standard deviation (…,) in m of where one will be, along any axis."""
+        """Return the standard deviation (…,) in m of an obstacle's predicted position along any axis."""
         turned = (0.5 * self.acceleration * times**2) ** 2
         *_, variance, covariance, wanders = thing
         return np.asarray(np.sqrt(variance + 2.0 * covariance * times + wanders * times**2 + turned))
 
     def _gaps(self, x: Reals, y: Reals, times: Reals) -> Iterator[tuple[MovingObstacle, Reals]]:
-        """Of each thing, the meters (…,) to its surface."""
+        """Yield each obstacle with the distances (…,) in m to its surface."""
         for thing in self.things:
             place, velocity, radius, *_ = thing
             dx, dy = x - (place.real + velocity.real * times), y - (place.imag + velocity.imag * times)
@@ -176,13 +178,13 @@ class MovingObstacles:
             yield thing, dx
 
     def near(self, x: float, y: float, reach: float, speed: float, seconds: float) -> "MovingObstacles":
-        """Those whose surface may come within `reach` meters of who leaves a point at `speed`, in so many seconds."""
+        """Return the obstacles that can come within `reach` m of a robot that leaves a point at `speed`."""
         here = complex(x, y)
         close = [each for each in self.things if each.missed_by(here, speed, seconds) < reach]
         return self if len(close) == len(self.things) else MovingObstacles.of(close, self.acceleration)
 
     def seen_from(self, frame: Pose2) -> "MovingObstacles":
-        """The same in another frame, which is at `frame` in this one."""
+        """Return the obstacles expressed in another frame, whose pose in this frame is `frame`."""
         origin, turn = complex(frame.x, frame.y), cmath.rect(1.0, -frame.yaw)
         return MovingObstacles.of(
             [MovingObstacle((place - origin) * turn, goes * turn, *rest) for place, goes, *rest in self.things],
@@ -190,7 +192,7 @@ class MovingObstacles:
         )
 
     def after(self, seconds: float) -> "MovingObstacles":
-        """The same so many seconds later."""
+        """Return the obstacles as predicted after `seconds`."""
         later = [
             MovingObstacle(
                 place + goes * seconds,
@@ -206,7 +208,7 @@ class MovingObstacles:
 
 
 def no_moving_obstacles(acceleration: float = 0.0) -> MovingObstacles:
-    """Nothing moves."""
+    """Return an empty set of obstacles."""
     return MovingObstacles.of((), acceleration)
 
 

@@ -1,4 +1,4 @@
-"""Drives to a goal, past poses on the way: the replanning and recovery of Nav2's trees as a state machine.
+"""Navigation to one goal: replanning and recovery of Nav2's default behavior trees as a state machine.
 
 Without errors, one step is: check the goal, check the plan, ask the controller. When planning fails, the global
 costmap is cleared and planning is tried again; when control fails, the local one is cleared (the contextual recoveries
@@ -55,9 +55,9 @@ class Step(NamedTuple):
 
 
 class Navigator:
-    """One goal at a time; `step` is called at the controller's rate.
+    """Drives the robot to one goal at a time; call `step` at the controller's rate.
 
-    Goals, plans and what is made of them are in the map frame; what drives the robot lives in the odom frame.
+    Goals and plans are in the map frame; controller and recovery behaviors work in the odom frame.
     """
 
     def __init__(
@@ -82,10 +82,10 @@ class Navigator:
         self._clock = 0.0
         self.goal: Goal | None = None
         self.via: tuple[Goal, ...] = ()
-        """What is to be passed before the goal, in this order."""
-        self._forget()
+        """Intermediate goals to pass before the goal, in this order."""
+        self._reset()
 
-    def _forget(self) -> None:
+    def _reset(self) -> None:
         self.plans.reset(self._clock)
         self._behavior: Behavior | None = None
         self._behavior_since = 0.0
@@ -93,9 +93,9 @@ class Navigator:
         self._trouble_since: float | None = None
 
     def pursue(self, goal: Goal) -> None:
-        """Drive to this goal from the next step on."""
+        """Set the goal for the following steps."""
         self.goal = goal
-        self._forget()
+        self._reset()
         self._recovery.reset()
         self._clearing.reset()
         self._goal_checker.reset()
@@ -104,12 +104,12 @@ class Navigator:
     def stop(self) -> None:
         """Drop the goal."""
         self.goal, self.via = None, ()
-        self._forget()
+        self._reset()
 
     def step(self, tick: int, frames: Frames, twist: Twist, held: bool = False, periods: int = 1) -> Step:
-        """What to do now, so many periods after the last step.
+        """Run one step, `periods` controller periods after the previous one.
 
-        `held`: the collision monitor has kept the robot from driving for a while.
+        `held`: the collision monitor has stopped the robot for its hold timeout.
         """
         goal = self.goal
         if goal is None:
@@ -130,23 +130,23 @@ class Navigator:
         return Step(command, events=events)
 
     def _follow(self, goal: Goal, frames: Frames, twist: Twist, held: bool) -> Twist:
-        """The controller's command on the plan in force; the robot stands while the first plan is worked out."""
+        """Return the controller's command on the current plan; a stop while the first plan is being computed."""
         plan = self.plans.plan
         if plan is None:
             return STOP
         self._replanned = False
-        following = self.via[0] if self.via else goal  # a tour may end where it begins: only its last drive ends it
+        following = self.via[0] if self.via else goal  # the final goal may be close while intermediate goals remain
         local = self._path.update(plan, following, frames)
         command = self._controller.command(frames.odometry, twist, self._costmaps.near.view, local)
         if held:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")
         if self._progress.stuck(frames.pose, self._clock):
             self._progress.reset()
-            raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the robot does not get on")
+            raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the robot made no progress")
         return command
 
     def _failed(self, tick: int, goal: Goal, frames: Frames, failure: NavigationFailure) -> Step:
-        """Bear it a moment, clear and try again, recover, or give up: in this order."""
+        """Handle a failure: tolerate it for a while, then clear a costmap and retry, then recover, then give up."""
         planning, events = 200 <= failure.code < 300, tuple[Event, ...]()
         if planning:
             events = (Event(tick, EventKind.PLAN_FAILED, "", _described(failure)),)
@@ -157,7 +157,7 @@ class Navigator:
             if failure.code != ErrorCode.FAILED_TO_MAKE_PROGRESS:
                 if self._tolerable():
                     return Step()
-                failure = self._impatient(failure)
+                failure = self._patience_exceeded(failure)
             self.plans.report_control_failure()
             retry, self._controlled_again = not self._controlled_again, True
         if retry:
@@ -169,7 +169,7 @@ class Navigator:
                 self._costmaps.clear_local()
             self.plans.drop("recovery")
             return Step(events=events)
-        if self._hopeless(goal, failure):
+        if self._is_unreachable(goal, failure):
             return Step(failure=failure, events=events)
         self.plans.drop("recovery")
         self._replanned, self._controlled_again, self._trouble_since = False, False, None
@@ -178,8 +178,8 @@ class Navigator:
             return Step(failure=failure, events=events)
         self._behavior_since = self._clock
         self._behavior.start(frames.odometry)
-        begun = Event(tick, EventKind.RECOVERY_STARTED, self._behavior.name, _described(failure))
-        return Step(events=(*events, begun))
+        started = Event(tick, EventKind.RECOVERY_STARTED, self._behavior.name, _described(failure))
+        return Step(events=(*events, started))
 
     def _tolerable(self) -> bool:
         if self._trouble_since is None:
@@ -187,18 +187,20 @@ class Navigator:
         patience = self._failure_tolerance
         return patience < 0.0 or self._clock - self._trouble_since < patience
 
-    def _impatient(self, failure: NavigationFailure) -> NavigationFailure:
-        """What nav2's controller server makes of a controller that has failed for too long."""
+    def _patience_exceeded(self, failure: NavigationFailure) -> NavigationFailure:
+        """Return the failure that nav2_controller reports when a controller has failed for too long."""
         if self._failure_tolerance <= 0.0 or failure.code != ErrorCode.NO_VALID_CONTROL:
             return failure
         return NavigationFailure(ErrorCode.PATIENCE_EXCEEDED, f"for {self._failure_tolerance:g} s: {failure}")
 
-    def _hopeless(self, goal: Goal, failure: NavigationFailure) -> bool:
+    def _is_unreachable(self, goal: Goal, failure: NavigationFailure) -> bool:
+        """Return whether a goal lies inside a mapped obstacle, so that no recovery helps."""
         return failure.code == ErrorCode.GOAL_OCCUPIED and not all(
             self._costmaps.wide.fits_static(each.pose, each.xy_tolerance) for each in (*self.via, goal)
         )
 
     def _recover(self, tick: int, frames: Frames, behavior: Behavior) -> Step:
+        """Run the current recovery behavior."""
         ended: dict[str, Value] = {"outcome": "succeeded"}
         try:
             command = behavior.step(frames.odometry, self._costmaps.near.view, self._clock - self._behavior_since)

@@ -1,10 +1,10 @@
-"""The roles of a navigation stack and what each promises. Anybody's own component can take a place.
+"""Protocols of a navigation stack and its components. You can implement each of them in a package of your own.
 
-Promises are written as *given … then …* and tested in tests/contracts on every implementation. Three hold for all:
+Contracts are written as *given … then …*; tests/contracts checks them for every implementation. These apply to all:
 
-- *Given* the same calls with the same generators *then* bit-identical answers: no clock, no global chance.
-- *Given* data in a call *then* it is neither changed nor kept to be changed later.
-- *Given* a failure *then* a NavigationFailure with one of Nav2's codes, never another exception.
+- *Given* the same calls and random generators *then* the results are bit-identical: no clock, no global generator.
+- *Given* data in a call *then* the component neither changes it nor keeps it to change it later.
+- *Given* a failure *then* it raises NavigationFailure with one of Nav2's error codes, and no other exception.
 """
 
 from dataclasses import dataclass, field, replace
@@ -26,19 +26,20 @@ from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
 
 
 class NavigationFailure(Exception):
-    """A component cannot do what it was asked; `code` says why in Nav2's terms."""
+    """A component failed; `code` is one of Nav2's error codes."""
 
     def __init__(self, code: ErrorCode, message: str) -> None:
+        """Take the error code and a message for logs and reports."""
         self.code = code
         super().__init__(message)
 
 
 @dataclass(frozen=True)
 class RobotModel:
-    """What a stack knows of its own robot: a datasheet, in SI units.
+    """Description of the robot for its stack, in SI units.
 
-    `footprint` are the corners of the hull in the base frame, anticlockwise (a regular polygon for a round robot,
-    then `radius` is set). Speeds are limits of the base. `turning_radius` is 0 for a base that turns in place.
+    `footprint` contains the corners in the base frame, counterclockwise; a round robot has a regular polygon and a
+    `radius`. Speeds and accelerations are limits of the base. `turning_radius` is 0 for a base that turns in place.
     """
 
     footprint: Polygon
@@ -55,7 +56,7 @@ class RobotModel:
 
     @property
     def inscribed_radius(self) -> float:
-        """The largest circle around the base's origin inside the footprint."""
+        """Radius in m of the largest circle around the origin of the base inside the footprint."""
         corners = np.array(self.footprint)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
@@ -64,77 +65,77 @@ class RobotModel:
 
     @property
     def circumscribed_radius(self) -> float:
-        """The smallest circle around the base's origin that holds the footprint."""
+        """Radius in m of the smallest circle around the origin of the base that contains the footprint."""
         return self.radius if self.radius is not None else float(np.hypot(*np.array(self.footprint).T).max())
 
 
 class Localizer(Protocol):
-    """Knows where the robot is on the map.
+    """Estimates the pose of the robot on the map.
 
-    *Given* no motion and perfect readings *then* the belief does not wander off.
-    *Given* a sensor that is blind, lying or full of nan *then* the belief stays finite and its covariance symmetric
-    and positive semidefinite.
+    *Given* no motion and perfect readings *then* the belief does not drift.
+    *Given* blind, wrong, or NaN readings *then* the belief stays finite and its covariance symmetric and positive
+    semidefinite.
     """
 
     def reset(self, estimate: Estimate) -> None:
-        """Start over at an estimate; the next odometry is the new reference."""
+        """Restart at an initial pose estimate. The next odometry reading is the new reference."""
         ...
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Take a step of dead reckoning; several may come one after the other before anybody asks for the belief."""
+        """Process an odometry reading. Several can arrive before `belief` is read."""
         ...
 
     def on_scan(self, scan: Scan) -> None:
-        """Correct with a lidar scan; may do nothing until the robot has moved enough."""
+        """Process a lidar scan. A localizer may ignore it until the robot has moved enough."""
         ...
 
     def on_imu(self, imu: Imu) -> None:
-        """Take a turn rate."""
+        """Process an IMU reading."""
         ...
 
     @property
     def belief(self) -> Belief:
-        """The estimate now: the last correction carried on by odometry."""
+        """The current estimate: the last correction, extrapolated by odometry."""
         ...
 
 
 class SupportsPose(Protocol):
-    """What a localizer that ships can do besides: say where the robot is, and not how sure that is.
+    """Optional extension of a localizer: the pose without covariance and particles, which costs less.
 
-    That is asked at each step of the controller, and half as often published.
+    The controller needs the pose at each step; the complete belief is published less often.
     """
 
     @property
     def pose(self) -> Pose2:
-        """That of the belief, to the last digit."""
+        """The pose of the belief, bit-identical."""
         ...
 
 
 def supports_pose(localizer: object) -> TypeGuard[SupportsPose]:
-    """Whether a localizer does. Its class is asked: it would itself work the pose out, of particles anywhere in ms."""
+    """Return whether a localizer has `pose`. Looks at the class, because reading the property may compute the pose."""
     return hasattr(type(localizer), "pose")
 
 
 LETHAL = 254
-"""nav2_costmap_2d's cost of an obstacle."""
+"""Cost of an obstacle in nav2_costmap_2d."""
 
 
 @fast_dataclass(eq=False)
 class CostmapView:
-    """A costmap at a moment: the global one in the map frame, which planners see, or the local one in the odom frame.
+    """A costmap at one time: the global one in the map frame for planners, or the local one in the odom frame.
 
-    Poses, paths and goals that come with it are in its frame.
+    Poses, paths, and goals in the same call are in its frame.
 
-    `costs` (height, width) uint8 with nav2_costmap_2d's values (0 free, 253 inscribed, 254 lethal, 255 unknown);
-    row 0 is the lowest y, `origin` is the corner of cell (0, 0), without rotation. `distance` (height, width) float32
-    is the distance in meters from each cell's center to the nearest lethal cell's center; a costmap may cap it, at no
-    less than the inflation radius and half a meter beyond the hull. `revision` grows with each
-    change; `inflation_radius` is how far in meters an obstacle's costs reach. The arrays may be windows on a costmap
-    that goes on living: they hold until its next update.
+    `costs` (height, width) uint8 has nav2_costmap_2d's values (0 free, 253 inscribed, 254 lethal, 255 unknown). Row 0
+    has the lowest y; `origin` is the corner of cell (0, 0) without rotation. `distance` (height, width) float32 is the
+    distance in m from the center of each cell to the center of the nearest lethal cell. It may be capped, but not below
+    the inflation radius and half a meter beyond the footprint. `revision` increases with each change.
+    `inflation_radius` in m is the range of an obstacle's costs. The arrays may be views of a live costmap and are valid
+    until its next update.
 
-    `moving` is what motion prediction says of things that move, now and in this frame; `Footprint.gap` says how near a
-    robot will come to them. Empty where nothing moves and where nobody predicts. Nothing of them is in the costs, but
-    for the view that a planner is shown: there, cells are dearer at which a robot would meet them.
+    `moving` contains the moving obstacles that motion prediction has found, now and in this frame; `Footprint.gap`
+    returns the distance to them. It is empty without prediction. They do not affect the costs, except in the view for a
+    planner, where cells at which the robot would meet them cost more.
     """
 
     costs: npt.NDArray[np.uint8]
@@ -145,8 +146,8 @@ class CostmapView:
     inflation_radius: float = 0.55
     moving: MovingObstacles = NO_MOVING_OBSTACLES
 
-    def with_less_room(self, meters: float) -> "CostmapView":
-        """The same place with every obstacle so much larger all round."""
+    def with_grown_obstacles(self, meters: float) -> "CostmapView":
+        """Return a copy with every obstacle larger by `meters` in all directions."""
         costs = np.where(self.distance <= meters, np.uint8(LETHAL), self.costs)
         return replace(self, costs=costs, distance=np.maximum(self.distance - np.float32(meters), np.float32(0)))
 
@@ -154,125 +155,122 @@ class CostmapView:
 class Planner(Protocol):
     """Finds a path on a costmap.
 
-    *Given* a start or a goal off the map or in an obstacle *then* fails at once with its code.
-    *Given* no way *then* fails with NO_VALID_PATH after a bounded number of iterations.
-    *Given* success *then* the path begins at `start`, ends within `tolerance` of `goal`, and no point of it puts the
-    footprint on a lethal cell.
+    *Given* a start or goal outside the map or in an obstacle *then* it fails at once with the corresponding code.
+    *Given* that no path exists *then* it fails with NO_VALID_PATH after a bounded number of iterations.
+    *Given* success *then* the path starts at `start`, ends within `tolerance` of `goal`, and the footprint is on no
+    lethal cell at any of its points.
     """
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """A path of poses in the map frame, at most 0.1 m apart."""
+        """Return a path of poses in the map frame, at most 0.1 m apart."""
         ...
 
 
 class Controller(Protocol):
-    """Follows a path. All that it is told is in the odom frame, in which the local costmap is: there nothing jumps.
+    """Follows a path. All inputs are in the odom frame like the local costmap, because that frame is continuous.
 
-    *Given* limits *then* no command exceeds them. *Given* an obstacle on the arc it is about to drive *then* fails
-    with NO_VALID_CONTROL rather than drive into it.
+    *Given* limits *then* no command exceeds them. *Given* an obstacle on the arc that it would drive *then* it fails
+    with NO_VALID_CONTROL.
     """
 
     def set_path(self, path: Path) -> None:
         """Follow this path from now on.
 
-        It is a new one, or the rest of the one it follows, where the localizer has found that to be in the odom frame.
+        It is a new path, or the rest of the current path after the transform between map and odom frame has changed.
         """
         ...
 
     @property
     def full_speed(self) -> float:
-        """What it drives at in m/s where nothing limits it."""
+        """Speed in m/s without any limit."""
         ...
 
     def set_speed_limit(self, limit: float | None) -> None:
-        """Drive no faster than this in m/s from now on; None lifts the limit (a speed zone was left)."""
+        """Set the speed limit in m/s; None removes it."""
         ...
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """The velocity to drive now, given where the robot is and how it moves. Called at a fixed rate."""
+        """Return the velocity command for the current pose and velocity. Called at a fixed rate."""
         ...
 
     @property
     def local_plan(self) -> Path | None:
-        """The arc it expects to drive, for the log."""
+        """The expected trajectory, for the log."""
         ...
 
 
 @runtime_checkable
 class SupportsArc(Protocol):
-    """What a controller that ships can do besides: say of which arc its local plan is the beginning.
-
-    Nobody need place it point by point in another frame then.
-    """
+    """Optional extension of a controller whose local plan is an arc, so that it need not be transformed by points."""
 
     @property
     def arc(self) -> tuple[Pose2, Twist] | None:
-        """The pose and the velocity of its last command; None before there was any."""
+        """Pose and velocity of the last command; None before the first."""
         ...
 
 
 class Behavior(Protocol):
-    """A recovery behavior such as spin: asked again and again until it is done. Its poses are in the odom frame."""
+    """A recovery behavior such as spin, called until it is done. Poses are in the odom frame."""
 
     name: str
 
     def start(self, pose: Pose2) -> None:
-        """Begin from this pose."""
+        """Start the behavior at this pose."""
         ...
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """The velocity to drive now, `seconds` after the start; None when done.
+        """Return the velocity command, `seconds` after the start, or None when the behavior is done.
 
-        Raises NavigationFailure when it would hit something or takes too long.
+        Raises NavigationFailure if there is an obstacle or if it takes too long.
         """
         ...
 
 
 class GoalChecker(Protocol):
-    """Says whether a goal is reached.
+    """Decides whether a goal is reached.
 
-    *Given* a robot that stands on the goal *then* it says so within two seconds. *Given* one that is outside the goal's
-    tolerances *then* it never does.
+    *Given* a robot that stands at the goal *then* it returns True within two seconds. *Given* a robot outside the
+    goal's tolerances *then* it never does.
     """
 
     def reset(self) -> None:
-        """A new goal: nothing of the last one counts."""
+        """Prepare for a new goal."""
         ...
 
     def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
-        """Whether the robot, believed at `pose` in the map and moving at `twist`, has reached the goal."""
+        """Return whether the goal is reached, given the estimated pose in the map frame and the velocity."""
         ...
 
 
 class SupportsZones(Protocol):
-    """What a stack can do besides, whose costmap filters can be switched while it drives."""
+    """Optional extension of a stack whose costmap filters can change during a run."""
 
     def set_zones(self, tick: int, zones: Zones) -> None:
-        """Told at `tick`, before its `decide`: these hold from the next update of its costmap on, and no others."""
+        """Replace all zones from the next costmap update on. Called before `decide` of the same tick."""
         ...
 
 
 class Stack(Protocol):
-    """A whole navigation stack: readings in, one command out, each beat.
+    """A complete navigation stack: takes readings and returns one command per beat.
 
-    *Given* no goal *then* it commands zero. *Given* a task that has ended *then* it commands zero from that beat on.
-    (But for stepping aside, and coming back, where something that moves would run into it. After a cancel it stays.)
+    *Given* no goal or an ended task *then* it commands zero. (A stack may still avoid a moving obstacle that would hit
+    the robot, and return afterward, but not after a cancel.)
     """
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Localize at the estimate, then drive to the goals in order."""
+        """Initialize the localizer with the estimate and drive to the goals in order."""
         ...
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Told at `tick`, before its `decide`: drive to this goal first, as a new action goal would make it."""
+        """Drive to this goal first, like a new action goal. Called before `decide` of the same tick."""
         ...
 
     def cancel(self, tick: int) -> None:
-        """Told at `tick`, before its `decide`: cancel the current goal and all after it."""
+        """Cancel the current goal and all after it. Called before `decide` of the same tick."""
         ...
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """Take the readings of this beat and say what to drive."""
+        """Process the readings of this beat and return the command."""
         ...
 
     @property
@@ -282,16 +280,16 @@ class Stack(Protocol):
 
     @property
     def goal(self) -> Goal | None:
-        """The goal being driven to; None when the task has ended."""
+        """The current goal; None when the task has ended."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What a stack is installed with: its robot, its map (None = mapless) and the ticks a second.
+    """Configuration of a stack by its scenario: robot, map (None for mapless navigation), and tick rate in Hz.
 
-    `keepout` are polygons it must not enter, `speed_zones` polygons with a speed limit in m/s; `masks` say
-    the same of cells.
+    `keepout` contains polygons that the robot must not enter, `speed_zones` polygons with a speed limit in m/s; `masks`
+    express the same by cells.
     """
 
     robot: RobotModel

@@ -37,7 +37,7 @@ class PyBulletBaseline:
         self._pose = pose
 
     def _stand(self, shape: int) -> int:
-        """A body that never moves, as `createMultiBody` makes it unless it is told otherwise; see engine.create_static_body."""
+        """Create a static body with PyBullet's defaults; `engine.create_static_body` makes a faster one."""
         return engine.create_rigid_body(self._client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
 
     def step(self, ticks: int) -> None:

@@ -230,7 +230,7 @@ def create_rigid_body(
 
 
 def wake(client: int, number: int) -> None:
-    """Wake a body; it lies still again from SLEEP_DELAY_S after it came to rest until something with mass touches it."""
+    """Wake a body. It sleeps again SLEEP_DELAY_S after it comes to rest, until something with mass touches it."""
     awake = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP
     pybullet.changeDynamics(
         number, -1, activationState=awake, sleepThreshold=REST_SPEED_SQUARED, physicsClientId=client
@@ -238,7 +238,7 @@ def wake(client: int, number: int) -> None:
 
 
 def put_to_sleep(client: int, number: int) -> None:
-    """Let a body that is at rest sleep after the next step, as if it had been so for SLEEP_DELAY_S."""
+    """Put a body that is at rest to sleep after the next step, without waiting for SLEEP_DELAY_S."""
     asleep = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
     pybullet.changeDynamics(
         number, -1, activationState=asleep, sleepThreshold=REST_SPEED_SQUARED, physicsClientId=client

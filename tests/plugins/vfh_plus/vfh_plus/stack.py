@@ -132,7 +132,7 @@ class VfhPlusStack:
         if not self._on_its_way(tick, goal, obstacles):
             return self._fail(tick, ErrorCode.NO_VALID_PATH, "there is no way on the map")
         if self._stuck(tick, goal):
-            return self._fail(tick, ErrorCode.FAILED_TO_MAKE_PROGRESS, "the robot does not get on")
+            return self._fail(tick, ErrorCode.FAILED_TO_MAKE_PROGRESS, "the robot made no progress")
         return self._steer(goal, obstacles)
 
     def _turn(self, tick: int, goal: Goal) -> Twist:
