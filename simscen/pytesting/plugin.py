@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from simscen.pytesting import OUT_OPTION
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
     from simscen.pytesting.runner import Simscen
 
-OUT_OPTION = "simscen_out"
-"""Name of the setting for the output folder: in the configuration, and in the input of xdist workers."""
 SUFFIXES = (".scenario.yaml", ".scenario.yml")
 
 

@@ -13,7 +13,7 @@ from simscen.core.records.case import Run
 from simscen.core.records.session_events import RunFinished
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
-from simscen.pytesting.plugin import OUT_OPTION
+from simscen.pytesting import OUT_OPTION
 from simscen.run.process.isolation import plugin_path_arguments
 from simscen.run.process.jobs import Job, ReplayMode
 from simscen.run.process.supervisor import OnDemandRunner
