@@ -171,7 +171,7 @@ def _one(
     limits = spec.stack.speed_mask
     speed_mask = _mask(limits.file if limits else None, tree, ("stack", "speed_mask", "file"), assets)
     judged = load_judged_masks(spec, tree, assets)
-    robot = assets.robot(spec.own.model, value_position(tree, ("robot", "model")))
+    robot = assets.robot(spec.only_robot.model, value_position(tree, ("robot", "model")))
     if world is None or robot is None or assets.problems:
         return library.with_source(sorted(assets.problems))
     fence, shown, places = library.fence, library.fence.shown(file), places_of(world)

@@ -1,4 +1,4 @@
-"""What says that a goal is reached, and that the robot does not get on (nav2_controller's checkers)."""
+"""Specifications of goal checkers and the progress checker (nav2_controller)."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -16,7 +16,7 @@ from simscen.spec.quantities import (
 
 
 class GoalCheckerSpec(GoalTolerances, Typed):
-    """What says whether a goal is reached; the tolerances are those of goals that name none."""
+    """Base class of goal checker specifications. Goals without tolerances have those of the goal checker."""
 
 
 class SimpleGoalChecker(GoalCheckerSpec):
@@ -25,23 +25,24 @@ class SimpleGoalChecker(GoalCheckerSpec):
     component: ClassVar[str] = "simscen.stack.checkers:SimpleGoalChecker"
     type: Literal["simple"] = "simple"
     stateful: bool = True
-    """Once the position was reached only the heading counts."""
+    """Whether only the heading counts once the position has been reached."""
     well_inside: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
-    """While it moves, the robot has arrived within this share of the tolerances; at rest, anywhere inside. Nav2: 1."""
+    """Fraction of the tolerances within which a moving robot has reached the goal; a robot at rest may be anywhere
+    within them. Nav2: 1."""
 
 
 GoalChecker = Annotated[GoalCheckerSpec, ExtensibleUnion("goal_checker", SimpleGoalChecker)]
 
 
 class ProgressChecker(Spec):
-    """nav2_controller::SimpleProgressChecker, or PoseProgressChecker when an angle is given."""
+    """nav2_controller::SimpleProgressChecker, or PoseProgressChecker if an angle is given."""
 
     required_movement_radius: PositiveLength = 0.5
-    """How far it must move within the time allowed."""
+    """Distance that the robot must move within the time allowance."""
     required_movement_angle: PositiveAngle | None = None
-    """Or how far it must turn, where that counts as progress."""
+    """Angle that counts as progress, too, if the robot turns by it within the time allowance."""
     movement_time_allowance: PositiveDuration = 10.0
-    """In how long; then driving fails with FAILED_TO_MAKE_PROGRESS."""
+    """Time without progress after which driving fails with FAILED_TO_MAKE_PROGRESS."""
 
 
 GOAL_CHECKERS = {"simple": "simscen.model.checkers:SimpleGoalChecker"}

@@ -1,4 +1,4 @@
-"""The parameters of the controllers, with Nav2's names, meanings and defaults; what differs says so."""
+"""Specifications of the controllers, with Nav2's names, meanings, and defaults unless noted otherwise."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -37,146 +37,147 @@ class RegulatedPurePursuit(Ranged, ControllerSpec):
     component: ClassVar[str] = "simscen.stack.controllers.regulated_pure_pursuit:RegulatedPurePursuit"
     type: Literal["regulated_pure_pursuit"] = "regulated_pure_pursuit"
     desired_linear_vel: PositiveSpeed | None = None
-    """Default: 0.5 m/s, or what the robot can do if that is less."""
+    """Maximum speed; default: 0.5 m/s, or that of the robot if it is lower."""
     lookahead_dist: PositiveLength = 0.6
-    """To the point of the plan that is followed, where its distance is not scaled by speed."""
+    """Distance to the plan point to follow if it does not scale with speed."""
     min_lookahead_dist: PositiveLength = 0.3
-    """The least, where it is scaled by speed."""
+    """Minimum lookahead distance if it scales with speed."""
     max_lookahead_dist: PositiveLength = 0.9
-    """The greatest, where it is scaled by speed."""
+    """Maximum lookahead distance if it scales with speed."""
     lookahead_time: PositiveDuration = 1.5
-    """The lookahead distance is the way driven in this time."""
+    """Time for which the current speed is multiplied to get the lookahead distance."""
     use_velocity_scaled_lookahead_dist: bool = True
-    """Whether the lookahead distance is scaled by speed."""
+    """Whether the lookahead distance scales with speed."""
     use_fixed_curvature_lookahead: bool = False
-    """Whether the curvature is taken from a point of its own, `curvature_lookahead_dist` ahead."""
+    """Whether to compute the curvature from a separate point, `curvature_lookahead_dist` ahead."""
     curvature_lookahead_dist: PositiveLength = 0.6
-    """How far ahead that point is."""
+    """Distance to the point that defines the curvature."""
     interpolate_curvature_after_goal: bool = False
-    """Whether that point may lie beyond the plan's end, so that the robot comes in straight."""
+    """Whether that point may be beyond the end of the plan, so that the robot approaches it straight."""
     rotate_to_heading_angular_vel: PositiveAngularSpeed = 1.8
-    """Turn rate when it turns in place."""
+    """Turn rate when turning in place."""
     rotate_to_heading_min_angle: PositiveAngle = 0.785
-    """It turns in place when the plan leads off by more than this."""
+    """Angle to the plan beyond which the robot turns in place."""
     use_rotate_to_heading: bool = True
-    """Whether it turns in place at all: towards the plan, and at the goal to its heading."""
+    """Whether to turn in place: towards the plan, and at the goal to its heading."""
     min_approach_linear_velocity: PositiveSpeed = 0.05
-    """The least speed on the last stretch to the goal."""
+    """Minimum speed when approaching the goal."""
     approach_velocity_scaling_dist: PositiveLength = 0.6
-    """How far from the plan's end it begins to slow down."""
+    """Distance from the end of the plan at which the robot begins to slow down."""
     use_collision_detection: bool = True
-    """Whether it stops when what it commands would lead into an obstacle."""
+    """Whether to stop if the command would lead to a collision."""
     max_allowed_time_to_collision_up_to_carrot: PositiveDuration = 1.0
-    """How far ahead it looks for collisions, no further than the point that it follows."""
+    """Time for which commands are checked for collisions, at most up to the point that is followed."""
     use_regulated_linear_velocity_scaling: bool = True
-    """Whether it slows down in narrow curves."""
+    """Whether to slow down in tight curves."""
     regulated_linear_scaling_min_radius: PositiveLength = 0.9
-    """Narrower curves are driven slower."""
+    """Radius below which curves are driven more slowly."""
     regulated_linear_scaling_min_speed: PositiveSpeed = 0.25
-    """The least speed that curves and costs slow it down to."""
+    """Minimum speed in curves and near obstacles."""
     use_cost_regulated_linear_velocity_scaling: bool = True
-    """Whether it slows down near obstacles."""
+    """Whether to slow down near obstacles."""
     cost_scaling_dist: PositiveLength = 0.6
-    """How near an obstacle must be to slow it down."""
+    """Distance from an obstacle below which the robot slows down."""
     cost_scaling_gain: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
-    """How much: speed times this share of the distance over `cost_scaling_dist`."""
+    """Factor of the reduced speed: speed · this value · distance / `cost_scaling_dist`."""
     slow_down_ahead: bool = True
-    """Whether it slows down before bends and obstacles, so that its brakes suffice, and in gaps by the room beside its
-    hull. Nav2 does neither: it looks at where the robot is."""
+    """Whether to slow down ahead of curves and obstacles early enough for the brakes, and in narrow gaps according to
+    the clearance. Nav2 considers only the current position."""
     max_angular_accel: PositiveAngularAcceleration = 3.2
-    """Of its turn rate, when it turns in place."""
+    """Maximum angular acceleration when turning in place."""
     allow_reversing: bool = False
-    """Whether it drives backward to a carrot behind it."""
+    """Whether to drive backward to a point behind the robot."""
 
     @model_validator(mode="after")
-    def _has_a_point_to_interpolate(self) -> "RegulatedPurePursuit":
+    def _check_interpolation(self) -> "RegulatedPurePursuit":
         if self.interpolate_curvature_after_goal and not self.use_fixed_curvature_lookahead:
-            raise ValueError("`interpolate_curvature_after_goal` is for `use_fixed_curvature_lookahead: true`")
+            raise ValueError("`interpolate_curvature_after_goal` needs `use_fixed_curvature_lookahead: true`")
         return self
 
     @property
-    def looks_ahead(self) -> float:
-        """The time to collision that it keeps."""
+    def lookahead_s(self) -> float:
+        """Time to collision that the controller keeps, in seconds."""
         return self.max_allowed_time_to_collision_up_to_carrot
 
 
 class DynamicWindow(ControllerSpec):
-    """A dynamic-window controller with DWB's critics (Fox et al. 1997; nav2_dwb_controller)."""
+    """Dynamic-window controller with DWB's critics (Fox et al. 1997; nav2_dwb_controller)."""
 
     component: ClassVar[str] = "simscen.stack.controllers.dwb.controller:DynamicWindowController"
     type: Literal["dwb"]
     max_vel_x: PositiveSpeed | None = None
-    """Greatest speed forward; default: 0.5 m/s, or what the robot can do if that is less."""
+    """Maximum forward speed; default: 0.5 m/s, or that of the robot if it is lower."""
     min_vel_x: Annotated[Speed, Field(ge=-10, le=0)] = 0.0
-    """Greatest speed backward, negative."""
+    """Maximum backward speed, negative."""
     max_vel_y: NonNegativeSpeed | None = None
-    """Greatest speed sideways, to the left; default: as `max_vel_x`, where the base can do it, else 0."""
+    """Maximum speed to the left; default: `max_vel_x` if the base can move sideways, otherwise 0."""
     min_vel_y: Annotated[Speed, Field(ge=-100, le=0)] | None = None
-    """Greatest speed sideways, to the right, negative; default: as far to the left."""
+    """Maximum speed to the right, negative; default: like that to the left."""
     max_vel_theta: PositiveAngularSpeed = 1.0
-    """Greatest turn rate."""
+    """Maximum turn rate."""
     min_speed_xy: NonNegativeSpeed = 0.0
-    """What moves slower than this must turn by at least `min_speed_theta`."""
+    """Minimum speed of trajectories that turn slower than `min_speed_theta`."""
     max_speed_xy: PositiveSpeed | None = None
-    """Greatest speed in any direction; default: `max_vel_x`."""
+    """Maximum speed in any direction; default: `max_vel_x`."""
     min_speed_theta: NonNegativeAngularSpeed = 0.0
-    """What turns slower than this must move by at least `min_speed_xy`."""
+    """Minimum turn rate of trajectories that move slower than `min_speed_xy`."""
     acc_lim_x: PositiveAcceleration | None = None
-    """Default: the robot's own limit; so are those below."""
+    """Maximum forward acceleration; default: the limit of the robot."""
     acc_lim_y: SidewaysAcceleration | None = None
-    """Sideways; 0 for a base that cannot."""
+    """Maximum sideways acceleration; 0 if the base cannot move sideways. Default: the limit of the robot."""
     acc_lim_theta: PositiveAngularAcceleration | None = None
-    """Of its turn rate."""
+    """Maximum angular acceleration; default: the limit of the robot."""
     decel_lim_x: Deceleration | None = None
-    """Towards lower speeds, negative."""
+    """Maximum deceleration, negative; default: the limit of the robot."""
     decel_lim_y: SidewaysDeceleration | None = None
-    """Sideways, to the right, negative; 0 for a base that cannot."""
+    """Maximum deceleration of sideways motion, negative; 0 if the base cannot move sideways. Default: the limit of the
+    robot."""
     decel_lim_theta: AngularDeceleration | None = None
-    """Of its turn rate, to the right, negative."""
+    """Maximum angular deceleration, negative; default: the limit of the robot."""
     vx_samples: Annotated[int, Field(ge=0, le=200)] = 20
-    """Speeds forward that are tried; two at least, as in Nav2."""
+    """Number of forward speeds to try; at least two, as in Nav2."""
     vy_samples: Annotated[int, Field(ge=0, le=200)] = 5
-    """Speeds sideways that are tried, where the base can do any; two at least, as in Nav2."""
+    """Number of sideways speeds to try if the base can move sideways; at least two, as in Nav2."""
     vtheta_samples: Annotated[int, Field(ge=0, le=200)] = 20
-    """Turn rates that are tried; two at least, as in Nav2."""
+    """Number of turn rates to try; at least two, as in Nav2."""
     sim_time: PositiveDuration = 1.7
-    """How far ahead each is followed."""
+    """Duration of each simulated trajectory."""
     linear_granularity: Annotated[Length, Field(ge=0.01, le=10)] = 0.05
-    """At most so far between two poses of a trajectory."""
+    """Maximum distance between two poses of a trajectory."""
     angular_granularity: Annotated[Angle, Field(ge=0.005, le=10)] = 0.025
-    """And at most such a turn."""
+    """Maximum angle between two poses of a trajectory."""
     trans_stopped_velocity: NonNegativeSpeed = 0.25
-    """At the goal it turns to its heading from this speed down."""
+    """Speed at the goal below which the robot begins to turn to the goal's heading."""
     prune_distance: PositiveLength = 1.5
-    """How much of the plan ahead it looks at, at least (Nav2: 2 m, of which its costmap shows 1.5 m)."""
+    """Minimum length of the plan ahead that is considered (Nav2: 2 m, of which its costmap shows 1.5 m)."""
     base_obstacle_scale: Weight = 0.02
     """Weight of the costs at the end of a trajectory."""
     path_align_scale: Weight = 32.0
-    """Weight of how far its front is from the plan."""
+    """Weight of the distance between the front of the robot and the plan."""
     path_dist_scale: Weight = 32.0
-    """Weight of how far it is from the plan."""
+    """Weight of the distance between the robot and the plan."""
     goal_align_scale: Weight = 24.0
-    """Weight of how far its front is from the plan's end."""
+    """Weight of the distance between the front of the robot and the end of the plan."""
     goal_dist_scale: Weight = 24.0
-    """Weight of how far it is from the plan's end."""
+    """Weight of the distance between the robot and the end of the plan."""
     rotate_to_goal_scale: Weight = 32.0
-    """Weight of how far it is off the goal's heading, at the goal; 0: it does not stop there to turn."""
+    """Weight of the heading error at the goal; 0: the robot does not stop at the goal to turn."""
     slowing_factor: Weight = 5.0
-    """Weight of its speed, while it comes to rest at the goal before it turns."""
+    """Weight of the speed while the robot stops at the goal before it turns."""
     twirling_scale: Weight = 0.0
-    """Weight of how fast it turns: keeps an omnidirectional base from spinning as it goes."""
+    """Weight of the turn rate, which keeps an omnidirectional base from spinning while it drives."""
     forward_point_distance: NonNegativeLength = 0.1
-    """How far ahead of its middle its front is."""
+    """Distance from the center of the robot to its front, for the two alignment weights."""
     oscillation_reset_dist: NonNegativeLength = 0.05
-    """What went to and fro may go back again once it has come this far."""
+    """Distance after which an oscillating motion may change its direction again."""
     oscillation_reset_angle: Annotated[Angle, Field(ge=0)] = 0.2
-    """Or has turned this far."""
+    """Angle after which an oscillating motion may change its direction again."""
     x_only_threshold: NonNegativeSpeed = 0.05
-    """Turning to and fro counts only below this speed."""
+    """Speed below which oscillating turns count, too."""
 
     @property
-    def looks_ahead(self) -> float:
-        """As far as its trajectories."""
+    def lookahead_s(self) -> float:
+        """Duration of a trajectory in seconds."""
         return self.sim_time
 
 

@@ -1,4 +1,4 @@
-"""The parameters of the two costmaps (nav2_costmap_2d)."""
+"""Specifications of the two costmaps (nav2_costmap_2d)."""
 
 from typing import Annotated, Literal
 
@@ -14,92 +14,93 @@ from simscen.spec.quantities import (
 
 
 class DenoiseLayer(Spec):
-    """nav2_costmap_2d's denoise layer: obstacles of very few cells are noise, and left out."""
+    """Denoise layer of nav2_costmap_2d: removes obstacles of only a few cells."""
 
     enabled: bool = False
-    """Whether it is there at all."""
+    """Whether to use the layer."""
     minimal_group_size: Annotated[int, Field(ge=1, le=1000)] = 2
-    """Groups of fewer cells are left out."""
+    """Minimum number of cells of an obstacle; smaller groups are removed."""
     group_connectivity_type: Literal[4, 8] = 8
-    """Whether cells that touch at a corner are of one group: 8, or 4 where only edges join."""
+    """Connectivity of the cells of a group: 8 includes cells that touch at a corner, 4 does not."""
 
 
 class Costmap(Ranged):
-    """The global costmap (nav2_costmap_2d: static, obstacle and inflation layers), in the map frame, for plans."""
+    """Global costmap in the map frame, for planning (nav2_costmap_2d: static, obstacle, and inflation layers)."""
 
     resolution: PositiveLength = 0.05
-    """Edge of the largest cell: those of a coarser map are split, those of a finer one stay as they are."""
+    """Maximum edge length of a cell: cells of a coarser map are split, those of a finer map are kept."""
     inflation_radius: NonNegativeLength = 0.70
-    """How far around obstacles cells cost something."""
+    """Distance from obstacles within which cells have a cost."""
     cost_scaling_factor: Annotated[float, Field(gt=0, le=100)] = 3.0
-    """How fast cost falls with the distance to an obstacle, for each meter."""
+    """Exponential decay of the cost with the distance from an obstacle, per meter."""
     update_frequency: Frequency = 5.0
-    """How often what the lidars see is taken in."""
+    """Rate of the updates with sensor data."""
     obstacle_max_range: PositiveLength = 2.5
-    """What is seen further off is not marked."""
+    """Maximum distance at which obstacles are marked."""
     obstacle_min_range: NonNegativeLength = 0.0
-    """What is seen nearer is not marked."""
+    """Minimum distance at which obstacles are marked."""
     raytrace_max_range: PositiveLength = 3.0
-    """Beams clear cells up to this distance."""
+    """Maximum distance up to which beams clear cells."""
     raytrace_min_range: NonNegativeLength = 0.0
-    """Beams clear cells from this distance on."""
+    """Minimum distance from which beams clear cells."""
     min_obstacle_height: NonNegativeLength = 0.05
-    """Of what a camera sees, lower things are the ground. Lidars see at their own height, whatever this says."""
+    """Minimum height of obstacles in camera data; lower points are ground. Lidar data is not filtered."""
     max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] = 0.2
-    """What a camera sees to rise from the robot's feet on no steeper than this is the ground; 0: heights are above the
-    plane on which the robot stands, and a ramp is an obstacle, as in Nav2."""
+    """Maximum slope, seen from the robot's base, of camera points that are ground. 0: heights are measured from the
+    plane below the robot, so that a ramp is an obstacle, as in Nav2."""
     max_obstacle_height: NonNegativeLength = 2.0
-    """Of what a camera sees, higher things are not in the way."""
+    """Maximum height of obstacles in camera data; higher points are ignored."""
     inf_is_valid: bool = True
-    """Whether beams that meet nothing clear what they pass through. Nav2's default is that they say nothing."""
+    """Whether beams without a hit clear the cells that they pass. In Nav2, they are ignored by default."""
     denoise_layer: DenoiseLayer = by_default()
-    """What is done about single cells."""
+    """Removal of small obstacles."""
     track_unknown_space: bool = True
-    """Whether what the map does not know, and no beam has passed through, is unknown; else it is free."""
+    """Whether cells that neither the map nor a beam shows are unknown; otherwise they are free."""
     rolling_size: PositiveLength = 24.0
-    """Edge of the rolling window when driving without a map."""
+    """Edge length of the rolling window if the robot has no map."""
 
 
 class LocalCostmap(Spec):
-    """The local costmap, which rolls with the robot in the odom frame, for controllers and behaviors.
+    """Local costmap in the odom frame, which rolls with the robot, for controllers and recovery behaviors.
 
-    It shows what the sensors see and keepout zones, and no map. What is not said here is as in `costmap`.
+    It contains sensor data and keepout zones, but not the map. Parameters without a value have that of `costmap`.
     """
 
     width: PositiveLength | None = None
-    """Along x of the odom frame; default: what the controller looks ahead at full speed, at least 3 m."""
+    """Size along x of the odom frame; default: the distance that the controller looks ahead at full speed, at least 3
+    m."""
     height: PositiveLength | None = None
-    """Along y of the odom frame; default: as for the width."""
+    """Size along y of the odom frame; default: like the width."""
     resolution: PositiveLength | None = None
-    """Edge of a cell."""
+    """Edge length of a cell."""
     inflation_radius: NonNegativeLength | None = None
-    """How far around obstacles cells cost something."""
+    """Distance from obstacles within which cells have a cost."""
     cost_scaling_factor: Annotated[float, Field(gt=0, le=100)] | None = None
-    """How fast cost falls with the distance to an obstacle, for each meter."""
+    """Exponential decay of the cost with the distance from an obstacle, per meter."""
     update_frequency: Frequency | None = None
-    """How often what the sensors see is taken in."""
+    """Rate of the updates with sensor data."""
     obstacle_max_range: PositiveLength | None = None
-    """What is seen further off is not marked."""
+    """Maximum distance at which obstacles are marked."""
     obstacle_min_range: NonNegativeLength | None = None
-    """What is seen nearer is not marked."""
+    """Minimum distance at which obstacles are marked."""
     raytrace_max_range: PositiveLength | None = None
-    """Beams clear cells up to this distance."""
+    """Maximum distance up to which beams clear cells."""
     raytrace_min_range: NonNegativeLength | None = None
-    """Beams clear cells from this distance on."""
+    """Minimum distance from which beams clear cells."""
     min_obstacle_height: NonNegativeLength | None = None
-    """Of what a camera sees, lower things are the ground."""
+    """Minimum height of obstacles in camera data; lower points are ground."""
     max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] | None = None
-    """What a camera sees to rise no steeper than this is the ground."""
+    """Maximum slope, seen from the robot's base, of camera points that are ground."""
     max_obstacle_height: NonNegativeLength | None = None
-    """Of what a camera sees, higher things are not in the way."""
+    """Maximum height of obstacles in camera data; higher points are ignored."""
     inf_is_valid: bool | None = None
-    """Whether beams that meet nothing clear what they pass through."""
+    """Whether beams without a hit clear the cells that they pass."""
     denoise_layer: DenoiseLayer | None = None
-    """What is done about single cells."""
+    """Removal of small obstacles."""
     track_unknown_space: bool = False
-    """Whether what no beam has passed through is unknown; else it is free."""
+    """Whether cells that no beam has passed are unknown; otherwise they are free."""
 
     def completed(self, shared: Costmap) -> Costmap:
-        """The costmap with what it does not say itself from `shared`."""
+        """Return the complete parameters; those without a value are taken from `shared`."""
         own = {name: value for name in sorted(Costmap.model_fields) if (value := getattr(self, name, None)) is not None}
         return shared.model_copy(update=own)

@@ -1,21 +1,21 @@
-"""What must hold, without all of the scenario around it."""
+"""Specification of criteria without a scenario, for logs that already exist."""
 
 from simscen.core.records.verdict import ExpectedFailure
 from simscen.model.scenario import RobotEntry, ScenarioSpec, WorldOrFile
 from simscen.spec.base import LanguageVersion
 
 
-def expectation_of(spec: ScenarioSpec) -> ExpectedFailure | None:
-    """That a run is known to fail, wherever that is written."""
+def expected_failure(spec: ScenarioSpec) -> ExpectedFailure | None:
+    """Return the known failure that a scenario declares, or None."""
     return None if spec.expected is None else ExpectedFailure(spec.expected.fail, tuple(spec.expected.criteria))
 
 
 class CriteriaSpec(ScenarioSpec):
-    """A scenario of which only `pass` need be there: enough to judge a log that exists already."""
+    """Scenario in which only `pass` is required: enough to evaluate an existing log."""
 
     simscen: LanguageVersion = 1
-    """Version of this language."""
+    """Version of the scenario language."""
     world: WorldOrFile | None = None  # type: ignore[assignment]
-    """Whose places and regions are meant; only a log that is not simscen's own needs it."""
+    """World with the places and regions of the criteria; needed only for foreign logs."""
     robot: RobotEntry | None = None
-    """Whose footprint it is; only a log that is not simscen's own needs it."""
+    """Robot with the footprint for the criteria; needed only for foreign logs."""

@@ -1,4 +1,4 @@
-"""Events and faults as a scenario lists them: something happens when a trigger fires."""
+"""Specification of the events and faults of a scenario."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -26,59 +26,60 @@ Actions = Annotated[
 
 
 class StepEntry(Spec):
-    """A step of a story: it is waited for only once the step before it has happened.
+    """Step of a sequence, which becomes active when the previous step has happened.
 
-    What it waits for counts from there: `time` and `for` are seconds since then, `travelled` is the way since then, and
-    of goals, replans, recoveries, collisions and events only those since then count.
+    Its trigger counts from that moment: `time` and `for` are seconds since then, `travelled` is the distance since
+    then, and only later goals, replans, recoveries, collisions, and events count.
     """
 
     name: Name | None = None
-    """What reports and other triggers call it; default: that of its event with `then 1`, `then 2`, …"""
+    """Name in reports and other triggers; default: the name of the event with `then 1`, `then 2`, …"""
     when: Trigger | None = None
-    """What it waits for; default: it happens at once."""
+    """Trigger; default: the step happens immediately."""
     do: Actions | None = None
-    """One action, or several in order; default: the next step waits from here."""
+    """Action, or list of actions in order; default: none, the next step waits from here."""
     required: bool | None = None
-    """Whether the run fails when this never happened; default: as the step before it."""
+    """Whether the run fails if this step never happens; default: as for the previous step."""
 
     @model_validator(mode="after")
-    def _waits_or_does(self) -> "StepEntry":
+    def _check_not_empty(self) -> "StepEntry":
         if self.when is None and self.do is None:
             raise ValueError("expected when, do, or both")
         if self.when is not None and self.when.times > 1:
-            raise ValueError("a step of a story happens once: `times` has no place in it")
+            raise ValueError("a step of a sequence happens only once: `times` is not valid here")
         return self
 
 
 class EventEntry(Spec):
-    """Something that happens in the world: `do` it `when` the trigger fires, `then` go on with the story."""
+    """Change in the world: its actions (`do`) happen when its trigger (`when`) fires, then the steps of its sequence
+    (`then`)."""
 
     name: Name | None = None
-    """What reports and other triggers call it; default: event-1, event-2, …"""
+    """Name in reports and other triggers; default: event-1, event-2, …"""
     when: Trigger
-    """What it waits for."""
+    """Trigger of the event."""
     do: Actions | None = None
-    """One action, or several in order; may be left out before `then`."""
+    """Action, or list of actions in order; optional if there is `then`."""
     then: Annotated[list[StepEntry], Field(max_length=50)] = []
-    """What happens after it, step by step: each is waited for only once the one before it has happened."""
+    """Sequence of further steps; each becomes active when the previous one has happened."""
     required: bool = True
-    """Whether the run fails when this never happened: its trigger never fired, an action of it changed nothing, or
-    its `probability` was not drawn. `false` where it may stay away."""
+    """Whether the run fails if this event never happens: its trigger does not fire, one of its actions has no effect,
+    or its `probability` is not drawn."""
 
     @model_validator(mode="after")
-    def _something_happens(self) -> "EventEntry":
+    def _check_not_empty(self) -> "EventEntry":
         if self.do is None and not self.then:
             raise ValueError("expected do, or then")
         if self.then and self.when.times > 1:
-            raise ValueError("a story is told once: `times` and `then` exclude each other")
+            raise ValueError("a sequence runs only once: `times` and `then` exclude each other")
         return self
 
 
 @dataclass(frozen=True)
-class Step:
-    """An event, or a step of its story, as the run takes it: `after` is the number of the step that it waits for.
+class SequenceStep:
+    """Event, or step of its sequence, as a run processes it.
 
-    `keys` are where it stands in the scenario.
+    `keys` are its path in the scenario; `after` is the index of the step that must happen before it.
     """
 
     name: str
@@ -89,53 +90,54 @@ class Step:
 
     @property
     def when(self) -> Trigger | None:
-        """What it waits for; None: nothing but the step before it."""
+        """Trigger; None if the step follows the previous one immediately."""
         return self.entry.when
 
     @property
     def actions(self) -> list[AnyAction]:
-        """What to do, in order."""
-        return [action for _, action in self.placed()]
+        """Actions in order."""
+        return [action for _, action in self.located_actions()]
 
-    def placed(self) -> Iterator[tuple[tuple[str | int, ...], AnyAction]]:
-        """The actions in order, each with where it stands."""
+    def located_actions(self) -> Iterator[tuple[tuple[str | int, ...], AnyAction]]:
+        """Yield the actions in order, each with its path in the scenario."""
         if isinstance(self.entry.do, list):
             yield from (((*self.keys, "do", number), action) for number, action in enumerate(self.entry.do))
         elif self.entry.do is not None:
             yield (*self.keys, "do"), self.entry.do
 
 
-def steps_of(events: Sequence[EventEntry]) -> list[Step]:
-    """Each event, and after it the steps of its story."""
-    steps: list[Step] = []
+def steps_of(events: Sequence[EventEntry]) -> list[SequenceStep]:
+    """Return each event, followed by the steps of its sequence."""
+    steps: list[SequenceStep] = []
     for index, event in enumerate(events):
         name = event.name or f"event-{index + 1}"
-        steps.append(Step(name, ("events", index), event, event.required))
+        steps.append(SequenceStep(name, ("events", index), event, event.required))
         for number, entry in enumerate(event.then):
             required = steps[-1].required if entry.required is None else entry.required
             called = entry.name or f"{name} then {number + 1}"
-            steps.append(Step(called, ("events", index, "then", number), entry, required, len(steps) - 1))
+            steps.append(SequenceStep(called, ("events", index, "then", number), entry, required, len(steps) - 1))
     return steps
 
 
 class FaultEntry(AnyFault):
-    """Something that goes wrong with a sensor, the base, the localizer or the map."""
+    """Fault of a sensor, the base, the localizer, or the map."""
 
     modifiers: ClassVar[frozenset[str]] = frozenset({"sensor", "when", "for_", "name", "required"})
 
     sensor: Name
-    """What it affects: a sensor, by its name in the robot's `sensors`; `cmd_vel`, `wheels`, `localizer` or `map`."""
+    """Target of the fault: a sensor by its name in the robot's `sensors`, or `cmd_vel`, `wheels`, `localizer`, or
+    `map`."""
     name: Name | None = None
-    """What reports and criteria call it; default: `<sensor>.<fault>`, e.g. `lidar.off`."""
+    """Name in reports and criteria; default: `<sensor>.<fault>`, e.g. `lidar.off`."""
     when: Trigger | None = None
-    """When it begins; default: at the start."""
+    """Trigger that starts the fault; default: the start of the run."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
-    """How long it lasts; default: to the end."""
+    """Duration; default: until the end of the run."""
     required: bool = True
-    """Whether the run fails when this never happened: its trigger never fired, its `probability` was not drawn, or it
-    was over before it changed a message or a command. `false` where it may stay away."""
+    """Whether the run fails if this fault has no effect: its trigger does not fire, its `probability` is not drawn, or
+    it ends before it changes a message or a command."""
 
     @property
     def label(self) -> str:
-        """Its name in events and criteria."""
+        """Name in events and criteria."""
         return self.name or f"{self.sensor}.{self.kind}"

@@ -1,14 +1,14 @@
-"""A failure that a scenario expects of a goal."""
+"""Specification of the failure of a goal that a scenario expects."""
 
 from simscen.criteria.goal_outcomes import Code
 from simscen.spec.base import Spec
 
 
 class ExpectedError(Spec):
-    """The robot is to fail at this goal with this code.
+    """Error code with which a goal is expected to fail.
 
     Example: `expect: {error_code: GOAL_OCCUPIED}`
     """
 
     error_code: Code
-    """One of Nav2's, by name or number."""
+    """Error code of Nav2, by name or number."""

@@ -1,4 +1,4 @@
-"""What stands between the controller and the base, and what it knows of things that move."""
+"""Specifications of the velocity smoother, the collision monitor, and motion prediction."""
 
 from typing import Annotated
 
@@ -18,55 +18,56 @@ from simscen.spec.quantities import (
 
 
 class VelocitySmoother(Spec):
-    """nav2_velocity_smoother: limits accelerations of what is sent to the base."""
+    """nav2_velocity_smoother: limits the acceleration of the commands to the base."""
 
     enabled: bool = True
-    """Whether it is there at all."""
+    """Whether to use the velocity smoother."""
     max_accel: PositiveAcceleration | None = None
-    """Default: the robot's own limit."""
+    """Maximum acceleration; default: the limit of the robot."""
     max_angular_accel: PositiveAngularAcceleration | None = None
-    """Default: the robot's own limit."""
+    """Maximum angular acceleration; default: the limit of the robot."""
     max_decel: PositiveAcceleration | None = None
-    """Default: the robot's own limit."""
+    """Maximum deceleration; default: the limit of the robot."""
     max_velocity: PositiveSpeed | None = None
-    """Of each component of its velocity; default: what the controller commands."""
+    """Maximum of each velocity component; default: unlimited."""
     max_angular_velocity: PositiveAngularSpeed | None = None
-    """Of its turn rate; default: what the controller commands."""
+    """Maximum turn rate; default: unlimited."""
     counter_turn_slip: bool = False
-    """Whether the turn is taken off the command that wheels of which one side slips more add to it, as the gyroscope
-    shows; with the localizers `ekf` and `slip_ekf` only. Nav2 does not."""
+    """Whether to correct commands for the turn caused by wheels that slip on one side, as measured by the gyroscope;
+    only with the localizers `ekf` and `slip_ekf`. Nav2 has no such correction."""
 
 
 class CollisionMonitor(Spec):
-    """nav2_collision_monitor: the last word before the base."""
+    """nav2_collision_monitor: stops or slows the robot before a collision."""
 
     enabled: bool = True
-    """Whether it is there at all."""
+    """Whether to use the collision monitor."""
     source_timeout: PositiveDuration = 0.3
-    """A lidar that is silent this long stops the robot (Nav2's default is 1 s)."""
+    """Time without lidar data after which the robot stops (Nav2's default is 1 s)."""
     time_before_collision: PositiveDuration = 0.5
-    """APPROACH: slow down so that a collision is at least this far off."""
+    """APPROACH: minimum time before a collision; the robot slows down to keep it."""
     stop_margin: NonNegativeLength = 0.02
-    """STOP: nothing may be nearer to the footprint than this, in the direction of travel. Nav2 has no such margin."""
+    """STOP: minimum distance between the footprint and obstacles in the direction of travel. Nav2 has no such margin.
+    """
     min_points: Annotated[int, Field(ge=1, le=1000)] = 1
-    """How many points of a scan there must be in the way. Nav2's default is 4: a chair's leg may be fewer."""
+    """Minimum number of scan points of an obstacle. Nav2's default is 4, but the leg of a chair may have fewer."""
     hold_timeout: Duration = 1.0
-    """How long it may hold the robot until that counts as a failure, for the controller may not see what it sees; 0:
-    never, as in Nav2, where the progress checker says so in the end."""
+    """Time that the monitor may hold the robot before navigation fails, since the controller may not see the obstacle.
+    0: unlimited, as in Nav2, where the progress checker fails eventually."""
 
 
 class Prediction(Ranged):
-    """Motion prediction: what moves is tracked from the lidars' scans and met where it will be."""
+    """Motion prediction: tracks moving objects in the lidar scans and plans for their future positions."""
 
     enabled: bool = False
-    """Whether it is there at all."""
+    """Whether to predict motion."""
     max_range: PositiveLength = 12.0
-    """Nothing further off is tracked."""
+    """Maximum distance of tracked objects."""
     max_radius: PositiveLength = 1.0
-    """Larger things are taken for walls."""
+    """Maximum radius of tracked objects; larger ones are static."""
     min_speed: PositiveSpeed = 0.25
-    """What is slower stands."""
+    """Minimum speed; slower objects are static."""
     acceleration: PositiveAcceleration = 1.5
-    """Standard deviation of how fast a tracked thing changes its velocity."""
+    """Standard deviation of the acceleration of a tracked object."""
     margin: NonNegativeLength = 0.15
-    """Hits so near to the cylinder of a moving thing are its own, and not marked in costmaps."""
+    """Distance from a tracked object within which scan points belong to it and are not marked in costmaps."""

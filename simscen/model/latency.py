@@ -1,4 +1,4 @@
-"""What computing and sensing take."""
+"""Specifications of computing times and sensor delays."""
 
 from typing import Annotated
 
@@ -10,29 +10,29 @@ from simscen.spec.quantities import Duration
 
 
 class Latency(Spec):
-    """Computing time of the parts of a stack; each is a whole number of physics ticks, the nearest one.
+    """Computing times of the parts of a stack, rounded to physics ticks.
 
-    A part works on what there is when it begins, and what it makes of that is there so much later. Parts run beside
-    each other, as Nav2's servers do; one that is still busy is not asked again.
+    A part uses the data at the start of its computation; its result is available after this time. Parts run in
+    parallel, as Nav2's servers do; a part that is still busy is not started again.
     """
 
     localizer: Duration = 0.0
-    """From a scan to the correction that it leads to; odometry carries the pose on meanwhile."""
+    """Time from a scan to the pose correction; odometry updates the pose in the meantime."""
     costmap: Duration = 0.0
-    """From the readings to the costmaps that show them."""
+    """Time from sensor data to the updated costmaps."""
     planner: Duration = 0.0
-    """From the question to the plan; the controller goes on with the one it has."""
+    """Time from a request to the plan; the controller follows the previous plan in the meantime."""
     controller: Duration = 0.0
-    """From pose and costmap to the command."""
+    """Time from pose and costmap to the command."""
     collision_monitor: Duration = 0.0
-    """From the command to the one that is sent."""
+    """Time from the command of the controller to the command that is sent to the base."""
 
 
 class RobotLatency(Latency):
-    """What computing takes on the robot's usual computer, and how late its sensors' readings usually come.
+    """Computing times on the robot's usual computer, and usual delays of its sensors.
 
-    It counts where a scenario says `stack: {latency: robot}`.
+    Used by scenarios with `stack: {latency: robot}`.
     """
 
     sensors: Annotated[dict[Name, Duration], Field(max_length=100)] = {}
-    """By name; in place of what the sensor itself says."""
+    """Delays by sensor name, instead of the `latency` of the sensor."""

@@ -1,4 +1,5 @@
-"""The parameters of MPPI and of its critics: nav2_mppi_controller's names, and the defaults of Nav2's own file."""
+"""Specification of the MPPI controller, with the parameters of nav2_mppi_controller and the defaults of Nav2's own
+file."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -42,244 +43,248 @@ CriticName = Literal[
 
 
 class MppiCritic(Spec):
-    """What every critic has: cost = (`cost_weight` × what it measures) to the power of `cost_power`."""
+    """Base class of critics: cost = (`cost_weight` · measured value) to the power of `cost_power`."""
 
     enabled: bool = True
-    """Whether it is asked."""
+    """Whether to use the critic."""
     cost_power: Power = 1
-    """How much worse twice as bad is."""
+    """Exponent of the cost."""
 
 
 class MppiConstraintCritic(MppiCritic):
-    """Against velocities that the base must not or cannot drive."""
+    """Penalizes velocities beyond the limits of the base."""
 
     cost_weight: Weight = 4.0
-    """Of m/s too many, over the seconds."""
+    """Weight of the excess speed in m/s, integrated over time."""
 
 
 class MppiCostCritic(MppiCritic):
-    """Against obstacles, by the costs of the costmap."""
+    """Penalizes proximity to obstacles by the costs of the costmap."""
 
     cost_weight: Weight = 3.81
-    """Of the mean cost, 254 being 1."""
+    """Weight of the mean cost; a cost of 254 counts as 1."""
     critical_cost: Weight = 300.0
-    """Cost of a pose from `near_collision_cost` on."""
+    """Cost of a pose whose cell cost is at least `near_collision_cost`."""
     near_collision_cost: Annotated[int, Field(ge=1, le=255)] = 253
-    """A pose of this cost is all but a collision."""
+    """Cell cost from which a pose is critical."""
     collision_cost: Weight = 1_000_000.0
-    """Cost of a trajectory that hits something."""
+    """Cost of a trajectory that collides."""
     consider_footprint: bool | None = None
-    """Whether the whole hull must be free, or its inscribed circle; default: the hull (Nav2: the circle)."""
+    """Whether to check the whole footprint instead of its inscribed circle; default: true (Nav2: false)."""
     near_goal_distance: NonNegativeLength = 1.0
-    """So near to the plan's end only critical costs count."""
+    """Distance from the end of the plan within which only critical costs count."""
     trajectory_point_step: Every = 2
-    """Every which pose is looked at."""
+    """Step between the poses of a trajectory that are checked."""
 
 
 class MppiObstaclesCritic(MppiCritic):
-    """Against obstacles, by distances; takes the place of CostCritic."""
+    """Penalizes proximity to obstacles by distance; alternative to CostCritic."""
 
     repulsion_weight: Weight = 1.5
-    """Of nearness within the inflation radius."""
+    """Weight of proximity within the inflation radius."""
     critical_weight: Weight = 20.0
-    """Of nearness within `collision_margin_distance`."""
+    """Weight of proximity within `collision_margin_distance`."""
     collision_cost: Weight = 100_000.0
-    """Cost of a trajectory that hits something."""
+    """Cost of a trajectory that collides."""
     collision_margin_distance: NonNegativeLength = 0.10
-    """Nearer than this is all but a collision."""
+    """Distance from an obstacle within which a pose is critical."""
     consider_footprint: bool | None = None
-    """Whether the whole hull must be free, or its inscribed circle; default: the hull (Nav2: the circle)."""
+    """Whether to check the whole footprint instead of its inscribed circle; default: true (Nav2: false)."""
     near_goal_distance: NonNegativeLength = 0.5
-    """So near to the plan's end only critical nearness counts."""
+    """Distance from the end of the plan within which only critical proximity counts."""
 
 
 class MppiGoalCritic(MppiCritic):
-    """Towards the plan's end, once that is near."""
+    """Penalizes the distance from the goal, near the goal."""
 
     cost_weight: Weight = 5.0
-    """Of the mean distance in meters."""
+    """Weight of the mean distance in meters."""
     threshold_to_consider: NonNegativeLength = 1.4
-    """How near."""
+    """Distance from the goal within which the critic is active."""
 
 
 class MppiGoalAngleCritic(MppiCritic):
-    """Towards the goal's heading, once that is near."""
+    """Penalizes the difference from the goal's heading, near the goal."""
 
     cost_weight: Weight = 3.0
-    """Of the mean angle in rad."""
+    """Weight of the mean angle in rad."""
     threshold_to_consider: NonNegativeLength = 0.5
-    """How near."""
+    """Distance from the goal within which the critic is active."""
     symmetric_yaw_tolerance: bool = False
-    """Whether the opposite heading is as good."""
+    """Whether the opposite heading is equally good."""
 
 
 class MppiPathAlignCritic(MppiCritic):
-    """Along the plan: where a trajectory is after so many meters, against where the plan is."""
+    """Penalizes the distance between a trajectory and the plan after the same traveled distance."""
 
     cost_weight: Weight = 14.0
-    """Of the mean distance in meters."""
+    """Weight of the mean distance in meters."""
     max_path_occupancy_ratio: Annotated[float, Field(ge=0, le=1), Quantity("ratio")] = 0.05
-    """Is silent where more of the plan than this is blocked."""
+    """Fraction of the plan that may be blocked; the critic is inactive if more is."""
     trajectory_point_step: Every = 4
-    """Every which pose is looked at."""
+    """Step between the poses of a trajectory that are checked."""
     threshold_to_consider: NonNegativeLength = 0.5
-    """Is silent nearer to the plan's end than this."""
+    """Distance from the end of the plan within which the critic is inactive."""
     offset_from_furthest: Points = 20
-    """Is silent until a trajectory gets to so many points of the plan, 5 cm apart: a robot must turn first."""
+    """Number of plan points, 5 cm apart, that a trajectory must reach for the critic to be active; a robot must turn
+    first."""
     use_path_orientations: bool = False
     """Whether headings count, too."""
 
 
 class MppiPathFollowCritic(MppiCritic):
-    """Onward: the end of a trajectory, against a point of the plan beyond the furthest that any reaches."""
+    """Penalizes the distance from the end of a trajectory to a plan point beyond the furthest point that any trajectory
+    reaches."""
 
     cost_weight: Weight = 5.0
-    """Of the distance in meters."""
+    """Weight of the distance in meters."""
     offset_from_furthest: Points = 5
-    """How many points of the plan beyond, 5 cm apart; points that are blocked are passed over."""
+    """Number of plan points, 5 cm apart, beyond the furthest point reached; blocked points are skipped."""
     threshold_to_consider: NonNegativeLength = 1.4
-    """Is silent nearer to the plan's end than this."""
+    """Distance from the end of the plan within which the critic is inactive."""
 
 
 class MppiPathAngleCritic(MppiCritic):
-    """Looking onward: the heading at the end of a trajectory, where the robot looks another way than the plan leads."""
+    """Penalizes a heading at the end of a trajectory that differs from the direction of the plan."""
 
     cost_weight: Weight = 2.0
-    """Of the angle in rad."""
+    """Weight of the angle in rad."""
     offset_from_furthest: Points = 4
-    """To a point of the plan so many points beyond the furthest that any trajectory reaches."""
+    """Number of plan points beyond the furthest point that any trajectory reaches, to the point that defines the
+    direction."""
     threshold_to_consider: NonNegativeLength = 0.5
-    """Is silent nearer to the plan's end than this."""
+    """Distance from the end of the plan within which the critic is inactive."""
     max_angle_to_furthest: NonNegativeAngle = 1.0
-    """Is silent where the robot looks there but for this angle."""
+    """Angle to that point within which the critic is inactive."""
     mode: Annotated[int, Field(ge=0, le=2)] = 0
-    """0: forward is preferred; 1: forward and backward are alike; 2: as the poses of the plan look."""
+    """0: forward driving is preferred; 1: forward and backward driving are equal; 2: as the orientations of the plan.
+    """
 
 
 class MppiPreferForwardCritic(MppiCritic):
-    """Against driving backward."""
+    """Penalizes backward driving."""
 
     cost_weight: Weight = 5.0
-    """Of the meters driven backward."""
+    """Weight of the distance in meters driven backward."""
     threshold_to_consider: NonNegativeLength = 0.5
-    """Is silent nearer to the plan's end than this."""
+    """Distance from the end of the plan within which the critic is inactive."""
 
 
 class MppiTwirlingCritic(MppiCritic):
-    """Against turning: keeps an omnidirectional base from spinning as it goes."""
+    """Penalizes turning, so that an omnidirectional base does not spin while it drives."""
 
     cost_weight: Weight = 10.0
-    """Of the mean turn rate in rad/s."""
+    """Weight of the mean turn rate in rad/s."""
 
 
 class MppiVelocityDeadbandCritic(MppiCritic):
-    """Against velocities that are too low to move a base with friction."""
+    """Penalizes velocities that are too low to move a base with friction."""
 
     cost_weight: Weight = 35.0
-    """Of m/s and rad/s too few, over the seconds."""
+    """Weight of the missing m/s and rad/s, integrated over time."""
     deadband_velocities: Annotated[
         tuple[NonNegativeSpeed, NonNegativeSpeed, NonNegativeAngularSpeed], Field(strict=False)
     ] = (0.0, 0.0, 0.0)
-    """Ahead, sideways and turning: below these the base does not move."""
+    """Velocities forward, sideways, and turning below which the base does not move."""
 
 
 class MppiTrajectoryValidator(Spec):
-    """The last look at the trajectory that comes out (mppi::DefaultOptimalTrajectoryValidator)."""
+    """Final check of the selected trajectory (mppi::DefaultOptimalTrajectoryValidator)."""
 
     collision_lookahead_time: Duration = 2.0
-    """For how long it must be free."""
+    """Time for which the trajectory must be free of collisions."""
     consider_footprint: bool | None = None
-    """Whether the whole hull must be free, or its inscribed circle; default: the hull (Nav2: the circle)."""
+    """Whether to check the whole footprint instead of its inscribed circle; default: true (Nav2: false)."""
 
 
 class Mppi(ControllerSpec):
-    """Model predictive path integral control (Williams et al. 2017; nav2_mppi_controller)."""
+    """Model predictive path integral controller (Williams et al. 2017; nav2_mppi_controller)."""
 
     component: ClassVar[str] = "simscen.stack.controllers.mppi.controller:MppiController"
     type: Literal["mppi"]
     motion_model: Literal["DiffDrive", "Omni", "Ackermann"] | None = None
-    """Default: as the robot's drive."""
+    """Motion model; default: that of the robot's drive."""
     min_turning_r: PositiveLength | None = None
-    """Of the Ackermann model; default: the robot's own turning radius (Nav2: 0.2 m)."""
+    """Minimum turning radius of the Ackermann model; default: that of the robot (Nav2: 0.2 m)."""
     time_steps: Annotated[int, Field(ge=5, le=200)] = 56
-    """Steps that each sample looks ahead."""
+    """Number of time steps per sample."""
     model_dt: Annotated[PositiveDuration, Field(le=1)] = 0.05
-    """How long a step is."""
+    """Duration of a time step."""
     batch_size: Annotated[int, Field(ge=50, le=10_000)] = 1000
-    """Samples for each command."""
+    """Number of samples per command."""
     iteration_count: Annotated[int, Field(ge=1, le=20)] = 1
-    """How often a command is improved."""
+    """Number of optimization iterations per command."""
     vx_max: PositiveSpeed | None = None
-    """Greatest speed forward; default: 0.5 m/s, or what the robot can do if that is less."""
+    """Maximum forward speed; default: 0.5 m/s, or that of the robot if it is lower."""
     vx_min: Annotated[Speed, Field(ge=-10, le=0)] = -0.35
-    """Greatest speed backward, negative."""
+    """Maximum backward speed, negative."""
     vy_max: NonNegativeSpeed | None = None
-    """Greatest speed sideways of the Omni model; default: 0.5 m/s, or what the robot can do if that is less."""
+    """Maximum sideways speed of the Omni model; default: 0.5 m/s, or that of the robot if it is lower."""
     wz_max: PositiveAngularSpeed = 1.9
-    """Greatest turn rate."""
+    """Maximum turn rate."""
     ax_max: PositiveAcceleration | None = None
-    """Default: the robot's own limit; so are those below."""
+    """Maximum forward acceleration; default: the limit of the robot."""
     ax_min: Deceleration | None = None
-    """Braking, negative."""
+    """Maximum deceleration, negative; default: the limit of the robot."""
     ay_max: PositiveAcceleration | None = None
-    """Sideways."""
+    """Maximum sideways acceleration; default: the limit of the robot."""
     ay_min: Deceleration | None = None
-    """Braking sideways, negative."""
+    """Maximum sideways deceleration, negative; default: the limit of the robot."""
     az_max: PositiveAngularAcceleration | None = None
-    """Of the turn rate."""
+    """Maximum angular acceleration; default: the limit of the robot."""
     model_delay_vx: Annotated[Duration, Field(le=2)] = 0.0
-    """How late the base answers, from the command on: what was sent and is under way is part of every sample."""
+    """Delay of the base after a forward command; commands under way are part of each sample."""
     model_delay_vy: Annotated[Duration, Field(le=2)] = 0.0
-    """Sideways."""
+    """Delay of the base after a sideways command."""
     model_delay_wz: Annotated[Duration, Field(le=2)] = 0.0
-    """Of its turn rate."""
+    """Delay of the base after a turn command."""
     vx_std: PositiveSpeed | None = None
-    """Standard deviation of the sampled speeds; default: half of `vx_max` (Nav2: 0.2 m/s)."""
+    """Standard deviation of the sampled forward speeds; default: half of `vx_max` (Nav2: 0.2 m/s)."""
     vy_std: PositiveSpeed | None = None
-    """Standard deviation of the sampled speeds sideways; default: half of `vy_max`."""
+    """Standard deviation of the sampled sideways speeds; default: half of `vy_max`."""
     wz_std: PositiveAngularSpeed = 0.4
     """Standard deviation of the sampled turn rates."""
     temperature: Annotated[float, Field(gt=0, le=100)] = 0.3
-    """How evenly samples are weighted: the lower, the more the best one counts."""
+    """Temperature of the weighting: lower values prefer the best samples more strongly."""
     gamma: Annotated[float, Field(ge=0, le=10)] = 0.015
-    """Weight of the energy of a command, against the costs of a sample."""
+    """Weight of the control effort relative to the cost of a sample."""
     regenerate_noises: bool = False
-    """Whether samples are drawn anew for each command."""
+    """Whether to draw new samples for each command."""
     retry_attempt_limit: Annotated[int, Field(ge=0, le=20)] = 1
-    """How often it begins anew within a command, when all it has found hits something."""
+    """Number of restarts per command if all trajectories collide."""
     open_loop: bool = False
-    """Whether it takes its last command for the velocity that the robot has."""
+    """Whether to use the last command instead of the measured velocity."""
     sgf_order: Annotated[int, Field(ge=1, le=2)] = 2
-    """Of the Savitzky-Golay filter that smooths commands: 2 keeps their bends, 1 is a mean of nine."""
+    """Order of the Savitzky-Golay filter that smooths commands: 2 preserves bends, 1 is the mean of nine commands."""
     critics: Annotated[list[CriticName], Field(min_length=1, max_length=11)] | None = None
-    """Which are asked; default: as in Nav2 all but ObstaclesCritic and VelocityDeadbandCritic, and TwirlingCritic
+    """Critics to use; default: as in Nav2, all except ObstaclesCritic and VelocityDeadbandCritic, and TwirlingCritic
     only with the Omni model."""
     ConstraintCritic: MppiConstraintCritic = by_default()
-    """Keeps to the limits."""
+    """Parameters of the critic of velocity limits."""
     CostCritic: MppiCostCritic = by_default()
-    """Keeps off obstacles."""
+    """Parameters of the critic of obstacle costs."""
     ObstaclesCritic: MppiObstaclesCritic = by_default()
-    """Keeps off obstacles by distance, where it is among `critics`."""
+    """Parameters of the critic of obstacle distances; used only if listed in `critics`."""
     GoalCritic: MppiGoalCritic = by_default()
-    """Gets to the goal."""
+    """Parameters of the critic of the goal distance."""
     GoalAngleCritic: MppiGoalAngleCritic = by_default()
-    """Gets to its heading."""
+    """Parameters of the critic of the goal heading."""
     PathAlignCritic: MppiPathAlignCritic = by_default()
-    """Keeps to the plan."""
+    """Parameters of the critic of alignment with the plan."""
     PathFollowCritic: MppiPathFollowCritic = by_default()
-    """Gets on."""
+    """Parameters of the critic of progress along the plan."""
     PathAngleCritic: MppiPathAngleCritic = by_default()
-    """Looks where the plan leads."""
+    """Parameters of the critic of the direction of the plan."""
     PreferForwardCritic: MppiPreferForwardCritic = by_default()
-    """Prefers driving forward."""
+    """Parameters of the critic of backward driving."""
     TwirlingCritic: MppiTwirlingCritic = by_default()
-    """Does not spin, where it is among `critics`."""
+    """Parameters of the critic of turning; used only if listed in `critics`."""
     VelocityDeadbandCritic: MppiVelocityDeadbandCritic = by_default()
-    """Does not creep, where it is among `critics`."""
+    """Parameters of the critic of velocities below the deadband; used only if listed in `critics`."""
     TrajectoryValidator: MppiTrajectoryValidator = by_default()
-    """Has the last word."""
+    """Parameters of the final check of the trajectory."""
 
     @property
-    def looks_ahead(self) -> float:
-        """As far as its samples."""
+    def lookahead_s(self) -> float:
+        """Duration of a sample in seconds."""
         return self.time_steps * self.model_dt

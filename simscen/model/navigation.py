@@ -1,4 +1,4 @@
-"""How a robot is sent to its goals, with the names of Nav2's actions, and what a scenario expects of each."""
+"""Specification of how goals are sent to a robot, with the names of Nav2's actions, and of their expected outcomes."""
 
 from typing import Annotated, Any, Literal
 
@@ -11,21 +11,21 @@ from simscen.spec.quantities import Duration, PositiveLength
 
 
 class Navigation(Spec):
-    """Which action takes the goals, and how often they are driven to.
+    """Navigation action for the goals, and number of loops.
 
     Example: `navigation: {mode: follow_waypoints, loops: 3}`
     """
 
     mode: Mode = "navigate_to_pose"
-    """`navigate_to_pose`: one goal after the other, each reached at a stop. `navigate_through_poses`: one drive through
-    all of them, on one plan, with a stop at the last alone. `follow_waypoints`: as navigate_to_pose, by the waypoint
-    follower: it knows the whole list, and what fails it is STOP_ON_MISSED_WAYPOINT."""
+    """Navigation action. `navigate_to_pose`: one goal after the other, with a stop at each. `navigate_through_poses`:
+    all goals on one plan, with a stop only at the last. `follow_waypoints`: like navigate_to_pose, but through the
+    waypoint follower, which receives the whole list and fails with STOP_ON_MISSED_WAYPOINT."""
     loops: Annotated[int, Field(ge=1, le=1000)] = 1
-    """How often the list of goals is driven. From the second time on a goal is called `shelf#2`, `shelf#3`, …; its bare
-    name means it in every loop."""
+    """Number of times that the list of goals is driven. In later loops the goals are named `shelf#2`, `shelf#3`, …; the
+    plain name refers to the goal in every loop."""
     radius: PositiveLength = 0.7
-    """How near the robot has to come to a pose that it drives through (m): the radius of Nav2's RemovePassedGoals. A
-    goal's own `xy_tolerance` takes its place."""
+    """Distance (m) within which a pose of navigate_through_poses counts as passed: the radius of Nav2's
+    RemovePassedGoals. A goal's own `xy_tolerance` takes precedence."""
 
 
 def _text_or_mapping(value: Any) -> str:
@@ -39,8 +39,8 @@ Expectation = Annotated[
 ]
 
 
-def failure_of(expected: "Expectation") -> str:
-    """How the robot is to fail: "failed", or the name of a code; "" where it is to arrive."""
+def expected_failure_name(expected: "Expectation") -> str:
+    """Return the expected failure: "failed", or the name of an error code, or "" if the goal should succeed."""
     code = getattr(expected, "error_code", None)
     if code is not None:
         return str(code.name)
@@ -48,10 +48,10 @@ def failure_of(expected: "Expectation") -> str:
 
 
 class OnReached(Spec):
-    """What the robot does where it has arrived, before it goes on.
+    """What the robot does at a goal before it continues.
 
     Example: `on_reached: {wait: 5 s}`
     """
 
     wait: Duration = 0.0
-    """Simulated seconds to stay (Nav2's WaitAtWaypoint)."""
+    """Simulated time to wait at the goal (Nav2's WaitAtWaypoint)."""

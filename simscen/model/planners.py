@@ -1,4 +1,4 @@
-"""The parameters of planners: OMPL's, Nav2's grid planners, and the planner of the advanced stack."""
+"""Specifications of the planners: OMPL's planners, Nav2's grid planners, and the planner of the advanced stack."""
 
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
@@ -16,68 +16,72 @@ Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 class PlannerSpec(Typed):
-    """The planner of the global path, and when it plans anew."""
+    """Base class of planner specifications."""
 
     tolerance: NonNegativeLength = 0.5
-    """How far from an unreachable goal the plan may end."""
+    """Maximum distance between the end of the plan and an unreachable goal."""
     replanning: Literal["on_invalid", "rate"] = "on_invalid"
     """Replan only if the path becomes invalid, or at a rate; Nav2 has a behavior tree for each. The advanced stack also
     replans `on_invalid` if a clearly better path appears, and if moving obstacles will be in the way."""
     replanning_rate: Frequency | None = None
-    """Rate of new plans, or of checks of the current one; default: 1 Hz, through poses 0.333 Hz, as in Nav2's trees."""
+    """Rate of new plans, or of checks of the current plan; default: 1 Hz, with navigate_through_poses 0.333 Hz, as in
+    Nav2's behavior trees."""
     cautious: bool = False
-    """Whether paths with more clearance are preferred once a plan could not be followed; the advanced stack does."""
+    """Whether to prefer paths with more clearance after the robot failed to follow a plan, as the advanced stack does.
+    """
 
 
 StateSpace = Literal["auto", "holonomic", "se2", "dubins", "reeds_shepp"]
 
 
 class OmplParameters(PlannerSpec):
-    """The parameters of all planners that search with OMPL."""
+    """Parameters of all planners that search with OMPL."""
 
     allow_unknown: bool = True
-    """Whether plans may lead over what is not known, as dear as what is barely free."""
+    """Whether plans may lead through unknown cells, at the cost of cells that are only just free."""
     cost_travel_multiplier: Annotated[float, Field(ge=0, le=100)] = 2.0
-    """A meter of way costs 1 + this times its cost / 252 (nav2_smac_planner's name and meaning; its default is 1)."""
+    """Cost factor: one meter costs 1 + this value · cell cost / 252 (the parameter of nav2_smac_planner; its default is
+    1)."""
     max_iterations: Iterations = 50_000
-    """Iterations after which a search fails. There is no limit in seconds, so that results repeat."""
+    """Number of iterations after which a search fails. There is no time limit, so that results are reproducible."""
     state_space: StateSpace = "auto"
-    """auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, otherwise holonomic."""
+    """State space of the search. auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, otherwise
+    holonomic."""
 
 
 class OmplPlanner(OmplParameters):
-    """A planner of OMPL on the costmap."""
+    """OMPL planner on the costmap."""
 
     component: ClassVar[str] = "simscen.stack.planners.build:ompl_planner"
     type: Literal["bit_star", "rrt_connect", "rrt_star", "informed_rrt_star", "aorrtc", "kpiece"] = "bit_star"
     improving_iterations: Iterations = 500
-    """Iterations of planners that improve their path; `bit_star` processes two batches of 200 samples instead."""
+    """Number of iterations of planners that improve their path; `bit_star` uses two batches of 200 samples instead."""
     simplify: bool = True
-    """Whether OMPL shortens the path and moves it to where it costs less."""
+    """Whether OMPL shortens the path and moves it to cells of lower cost."""
 
 
 class Navfn(PlannerSpec):
-    """nav2_navfn_planner: the cheapest way over the cells of the costmap, by Dijkstra."""
+    """nav2_navfn_planner: path of lowest cost over the cells of the costmap (Dijkstra)."""
 
     component: ClassVar[str] = "simscen.stack.planners.grid_planner:navfn"
     type: Literal["navfn"]
     allow_unknown: bool = True
-    """Whether plans may lead over what is not known, as dear as what is barely free."""
+    """Whether plans may lead through unknown cells, at the cost of cells that are only just free."""
 
 
 class Smac2d(PlannerSpec):
-    """nav2_smac_planner::SmacPlanner2D: the cheapest way from cell to neighboring cell."""
+    """nav2_smac_planner::SmacPlanner2D: path of lowest cost from cell to neighboring cell (A*)."""
 
     component: ClassVar[str] = "simscen.stack.planners.grid_planner:smac_2d"
     type: Literal["smac_2d"]
     tolerance: NonNegativeLength = 0.125
-    """How far from an unreachable goal the plan may end."""
+    """Maximum distance between the end of the plan and an unreachable goal."""
     allow_unknown: bool = True
-    """Whether plans may lead over what is not known, as dear as what is barely free."""
+    """Whether plans may lead through unknown cells, at the cost of cells that are only just free."""
     cost_travel_multiplier: Annotated[float, Field(ge=0, le=100)] = 1.0
-    """A meter of way costs 1 + this times its cost / 252."""
+    """Cost factor: one meter costs 1 + this value · cell cost / 252."""
     smooth_path: bool = True
-    """Whether the corners of the cells are taken out of the path."""
+    """Whether to smooth the path, which removes the corners of the cells."""
 
 
 def _planner(value: Any) -> str | None:

@@ -11,31 +11,31 @@ from typing import Any, Literal
 Profile = Literal["reference", "advanced", "nav2", "simscen"]
 Values = Mapping[str, Any]
 
-BY_TYPE = ("localizer", "planner", "controller", "goal_checker")
-"""The sections whose `type` says which parameters there are; below, the first type is the one that is left out."""
-_SEEN: Values = {
+SECTIONS_BY_TYPE = ("localizer", "planner", "controller", "goal_checker")
+"""Sections whose parameters depend on `type`. In the profiles, the first type is the default."""
+_COSTMAP: Values = {
     "obstacle_max_range": 2.5, "obstacle_min_range": 0.0, "raytrace_max_range": 3.0, "raytrace_min_range": 0.0,
     "max_obstacle_height": 2.0, "min_obstacle_height": 0.0, "max_ground_slope": 0.0,
     "inf_is_valid": False,
     "inflation_radius": 0.70, "cost_scaling_factor": 3.0, "resolution": 0.05,
 }  # fmt: skip
-_PLANNING: Values = {"tolerance": 0.5, "allow_unknown": True, "replanning": "rate", "cautious": False}
-_CIRCLE: Values = {"consider_footprint": False}
+_PLANNER: Values = {"tolerance": 0.5, "allow_unknown": True, "replanning": "rate", "cautious": False}
+_USE_CIRCLE: Values = {"consider_footprint": False}
 NAV2: Values = {
     "controller_frequency": 20.0,
     "failure_tolerance": 0.3,
     "localizer": {"amcl": {}},
-    "costmap": {**_SEEN, "update_frequency": 1.0, "track_unknown_space": True},
-    "local_costmap": {**_SEEN, "update_frequency": 5.0, "width": 3.0, "height": 3.0, "track_unknown_space": False},
-    "planner": {"navfn": _PLANNING, "smac_2d": {**_PLANNING, "tolerance": 0.125}},
+    "costmap": {**_COSTMAP, "update_frequency": 1.0, "track_unknown_space": True},
+    "local_costmap": {**_COSTMAP, "update_frequency": 5.0, "width": 3.0, "height": 3.0, "track_unknown_space": False},
+    "planner": {"navfn": _PLANNER, "smac_2d": {**_PLANNER, "tolerance": 0.125}},
     "controller": {
         "mppi": {
             "batch_size": 2000, "time_steps": 56, "model_dt": 0.05, "iteration_count": 1, "vx_max": 0.5,
             "vx_min": -0.35, "vy_max": 0.5, "wz_max": 1.9, "vx_std": 0.2, "vy_std": 0.2, "wz_std": 0.4,
             "ax_max": 3.0, "ax_min": -3.0,
             "ay_max": 3.0, "ay_min": -3.0, "az_max": 3.5, "temperature": 0.3, "gamma": 0.015,
-            "regenerate_noises": True, "open_loop": False, "CostCritic": _CIRCLE, "ObstaclesCritic": _CIRCLE,
-            "TrajectoryValidator": _CIRCLE,
+            "regenerate_noises": True, "open_loop": False, "CostCritic": _USE_CIRCLE, "ObstaclesCritic": _USE_CIRCLE,
+            "TrajectoryValidator": _USE_CIRCLE,
         },
         "regulated_pure_pursuit": {
             "desired_linear_vel": 0.5, "use_velocity_scaled_lookahead_dist": False, "slow_down_ahead": False,
@@ -86,31 +86,32 @@ ADVANCED: Values = {
 PROFILES: Mapping[str, Values] = {"reference": {}, "advanced": ADVANCED, "nav2": NAV2, "simscen": ADVANCED}
 
 
-def with_profile(said: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the parameters of a stack with those of the profile that it names."""
-    chosen = PROFILES.get(str(said.get("profile", "reference")), {})
-    return {**said, **{section: _with(section, values, said.get(section)) for section, values in chosen.items()}}
+def apply_profile(parameters: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the parameters of a stack, with missing ones from the profile that it names."""
+    profile = PROFILES.get(str(parameters.get("profile", "reference")), {})
+    sections = {name: _complete_section(name, values, parameters.get(name)) for name, values in profile.items()}
+    return {**parameters, **sections}
 
 
-def _with(section: str, values: Any, said: Any) -> Any:
-    """What the profile and the scenario make of a section; a specification that is already made stays as it is."""
-    if said is None:
-        if section not in BY_TYPE:
-            return values
-        kind = next(iter(values))
-        return {"type": kind, **values[kind]}
-    if not isinstance(said, Mapping) or not isinstance(values, Mapping):
-        return said
-    if section not in BY_TYPE:
-        return over(values, said)
-    kind = str(said.get("type", next(iter(values))))
-    return over({"type": kind, **values.get(kind, {})}, said)
+def _complete_section(name: str, defaults: Any, section: Any) -> Any:
+    """Return a section with missing parameters from the profile; a validated specification is returned unchanged."""
+    if section is None:
+        if name not in SECTIONS_BY_TYPE:
+            return defaults
+        kind = next(iter(defaults))
+        return {"type": kind, **defaults[kind]}
+    if not isinstance(section, Mapping) or not isinstance(defaults, Mapping):
+        return section
+    if name not in SECTIONS_BY_TYPE:
+        return merge_parameters(defaults, section)
+    kind = str(section.get("type", next(iter(defaults))))
+    return merge_parameters({"type": kind, **defaults.get(kind, {})}, section)
 
 
-def over(values: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
-    """What is said over what holds otherwise; mappings on both sides are merged."""
-    both = {
-        key: over(values[key], value) if isinstance(values.get(key), Mapping) and isinstance(value, Mapping) else value
-        for key, value in said.items()
-    }
-    return {**values, **both}
+def merge_parameters(defaults: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `defaults` updated by `parameters`; nested mappings are merged."""
+    merged = dict(defaults)
+    for key, value in parameters.items():
+        nested = isinstance(defaults.get(key), Mapping) and isinstance(value, Mapping)
+        merged[key] = merge_parameters(defaults[key], value) if nested else value
+    return merged

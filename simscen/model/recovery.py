@@ -1,4 +1,4 @@
-"""What is done when planning or control has failed: the recovery branch of Nav2's default tree, and its behaviors."""
+"""Specifications of recovery behaviors, which run after planning or control failed (Nav2's default behavior tree)."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -25,37 +25,37 @@ PlannerCode = Literal[
     "PLANNER_TIMEOUT",
     "NO_VALID_PATH",
 ]
-"""Codes with which a planner fails."""
+"""Error codes of planners."""
 
 
 class BehaviorSpec(Typed):
-    """What a robot does when planning or control has failed."""
+    """Base class of recovery behavior specifications."""
 
     turns_in_place: ClassVar[bool] = False
-    """Whether only a base that turns in place can do it; others leave it out."""
+    """Whether the behavior needs a base that can turn in place; other robots skip it."""
 
 
 class Spin(BehaviorSpec):
-    """Turn in place, to see what is around (nav2_behaviors::Spin)."""
+    """Turn in place to see the surroundings (nav2_behaviors::Spin)."""
 
     component: ClassVar[str] = "simscen.stack.behaviors.motions:Spin"
     turns_in_place: ClassVar[bool] = True
     type: Literal["spin"] = "spin"
     spin_dist: Angle = 1.57
-    """How far it turns."""
+    """Angle of the turn."""
     max_rotational_vel: PositiveAngularSpeed = 1.0
-    """Greatest turn rate of a spin."""
+    """Maximum turn rate."""
     simulate_ahead_time: PositiveDuration = 2.0
-    """How far ahead it looks for collisions."""
+    """Time for which the motion is checked for collisions."""
 
 
 class Wait(BehaviorSpec):
-    """Stand still: what is in the way may go by itself (nav2_behaviors::Wait)."""
+    """Wait, since the obstacle may move away (nav2_behaviors::Wait)."""
 
     component: ClassVar[str] = "simscen.stack.behaviors.motions:Wait"
     type: Literal["wait"] = "wait"
     wait_duration: Duration = 5.0
-    """How long it waits."""
+    """Duration of the wait."""
 
 
 class BackUp(BehaviorSpec):
@@ -64,38 +64,38 @@ class BackUp(BehaviorSpec):
     component: ClassVar[str] = "simscen.stack.behaviors.motions:BackUp"
     type: Literal["backup"] = "backup"
     backup_dist: NonNegativeLength = 0.30
-    """How far it backs up."""
+    """Distance to back up."""
     backup_speed: PositiveSpeed = 0.15
-    """How fast it backs up."""
+    """Speed."""
     simulate_ahead_time: PositiveDuration = 2.0
-    """How far ahead it looks for collisions."""
+    """Time for which the motion is checked for collisions."""
     backup_partial: bool = False
-    """Whether it backs up as far as there is room, if that is less. Nav2 does not."""
+    """Whether to back up a shorter distance if there is not enough room. Nav2 fails instead."""
 
 
 class Retrace(BehaviorSpec):
-    """Drive back the way it came, turns included, until there is room to turn. Nav2 has nothing like it.
+    """Drive back along the robot's own path until there is room to turn. Nav2 has no such behavior.
 
-    Backs up straight where nobody knows that way.
+    The robot backs up straight if its path is not known.
     """
 
     component: ClassVar[str] = "simscen.advanced.recovery.retrace:Retrace"
     type: Literal["retrace"] = "retrace"
     backup_dist: NonNegativeLength = 0.30
-    """How far it drives back at least."""
+    """Minimum distance to drive back."""
     retrace_dist: NonNegativeLength = 1.0
-    """How far at most: beyond `backup_dist` only until it has room to turn in place."""
+    """Maximum distance; beyond `backup_dist` only until there is room to turn in place."""
     backup_speed: PositiveSpeed = 0.15
-    """How fast it drives back."""
+    """Speed."""
 
 
 class ClearCostmap(BehaviorSpec):
-    """Forget live obstacles that are not seen any more."""
+    """Remove obstacles that are no longer seen from the costmap."""
 
     component: ClassVar[str] = "simscen.stack.behaviors.motions:ClearCostmap"
     type: Literal["clear_costmap"] = "clear_costmap"
     clear_entirely: bool = True
-    """Whether all of the global costmap is cleared, as in Nav2, or as much as the local one covers."""
+    """Whether to clear all of the global costmap, as Nav2 does, or only the area of the local costmap."""
 
 
 _Behaviors = Annotated[
@@ -118,54 +118,54 @@ Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", _NamedOrWho
 
 
 class Recovery(Spec):
-    """Behaviors of Nav2's default tree, taken in turn when planning or control fails."""
+    """Recovery behaviors, which run in turn after planning or control failed (Nav2's default behavior tree)."""
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
-    """How often a goal is tried again before it fails."""
+    """Number of retries before the goal fails."""
     retries_since_progress: bool = False
-    """Whether that is counted anew, and the first behavior is next, once the robot is a meter nearer to its goal than
-    at any recovery before. Nav2 counts for the whole goal."""
+    """Whether to restart the count, and the list of behaviors, once the robot is one meter nearer to its goal than at
+    any earlier recovery. Nav2 counts all retries of a goal."""
     planner_codes: Annotated[list[PlannerCode], Field(max_length=20)] = [
         "PLANNER_UNKNOWN",
         "PLANNER_TIMEOUT",
         "NO_VALID_PATH",
     ]
-    """Planner failures after which recovery is tried (WouldAPlannerRecoveryHelp); after others the goal fails at once.
-    The advanced stack adds START_OUTSIDE_MAP, START_OCCUPIED and GOAL_OCCUPIED."""
+    """Planner errors that start recovery (WouldAPlannerRecoveryHelp); after others the goal fails immediately. The
+    advanced stack adds START_OUTSIDE_MAP, START_OCCUPIED, and GOAL_OCCUPIED."""
     behaviors: Annotated[list[Behavior], Field(max_length=20)] = [
         "clear_costmap",
         "spin",
         "wait",
         "backup",
     ]
-    """What is done in turn, by name or with parameters of its own."""
+    """Behaviors in the order of their use, by name or with parameters."""
     clear_entirely: bool = True
-    """Whether all of the global costmap is cleared each time, as in Nav2. With false only as much as the local costmap
-    covers, and more and more rarely when planning fails: a dead end that is forgotten is driven into again."""
+    """Whether `clear_costmap` clears all of the global costmap, as in Nav2. Otherwise it clears the area of the local
+    costmap, and ever more rarely after planner errors, so that the robot does not return to a known dead end."""
     spin_dist: Angle = 1.57
-    """How far it turns."""
+    """Angle of `spin`."""
     wait_duration: Duration = 5.0
-    """How long it waits."""
+    """Duration of `wait`."""
     backup_dist: NonNegativeLength = 0.30
-    """How far it backs up."""
+    """Distance of `backup`, and minimum distance of `retrace`."""
     backup_speed: PositiveSpeed = 0.15
-    """How fast it backs up."""
+    """Speed of `backup` and `retrace`."""
     backup_partial: bool = False
-    """Whether it backs up as far as there is room, if that is less. Nav2 does not."""
+    """Whether `backup` drives a shorter distance if there is not enough room. Nav2 fails instead."""
     retrace_dist: NonNegativeLength = 1.0
-    """How far it drives back the way it came: beyond `backup_dist` only until it has room to turn in place."""
+    """Maximum distance of `retrace`; beyond `backup_dist` only until there is room to turn in place."""
     simulate_ahead_time: PositiveDuration = 2.0
-    """How far ahead it looks for collisions."""
+    """Time for which the motions of `spin` and `backup` are checked for collisions."""
     max_rotational_vel: PositiveAngularSpeed = 1.0
-    """Greatest turn rate of a spin."""
+    """Maximum turn rate of `spin`."""
 
     @property
     def names(self) -> list[str]:
-        """What the behaviors are called, in turn."""
+        """Names of the behaviors in order."""
         return [entry if isinstance(entry, str) else entry.type for entry in self.behaviors]
 
     def chosen(self) -> list[BehaviorSpec]:
-        """The behaviors in turn; each takes what it does not say itself from the parameters of the same name here."""
+        """Return the behaviors in order, with parameters that they do not set from those of the same name here."""
         return [self._completed(entry) for entry in self.behaviors]
 
     def _completed(self, entry: str | BehaviorSpec) -> BehaviorSpec:

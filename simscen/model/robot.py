@@ -1,4 +1,4 @@
-"""A robot as a user writes it (`*.robot.yaml`)."""
+"""Specification of robots (`*.robot.yaml`)."""
 
 import math
 from typing import Annotated, ClassVar, Literal
@@ -42,15 +42,15 @@ class Differential(Spec):
     """Two driven wheels and casters."""
 
     type: Literal["differential"]
-    """Which drive it is."""
+    """Type of the drive."""
     wheel_radius: PositiveLength
-    """Of a driven wheel."""
+    """Radius of a driven wheel."""
     wheel_separation: PositiveLength
-    """Between the middles of the two wheels."""
+    """Distance between the centers of the two wheels."""
     wheel_width: PositiveLength = 0.03
-    """Of a wheel, along its axle."""
+    """Width of a wheel along its axle."""
     left: JointNames | None = None
-    """Wheel joints of the URDF; default: found by position."""
+    """Wheel joints of the URDF on the left; default: found by position."""
     right: JointNames | None = None
     """Wheel joints of the URDF on the right; default: found by position."""
 
@@ -59,38 +59,39 @@ class SkidSteer(Spec):
     """Fixed wheels on both sides that skid in turns."""
 
     type: Literal["skid_steer"]
-    """Which drive it is."""
+    """Type of the drive."""
     wheel_radius: PositiveLength
-    """Of a driven wheel."""
+    """Radius of a driven wheel."""
     wheel_separation: PositiveLength
-    """Between the middles of the wheels on the left and on the right."""
+    """Distance between the centers of the left and the right wheels."""
     wheel_base: PositiveLength = 0.3
-    """Between the front and the rear axle."""
+    """Distance between the front and the rear axle."""
     wheel_width: PositiveLength = 0.05
-    """Of a wheel, along its axle."""
+    """Width of a wheel along its axle."""
     left: JointNames | None = None
     """Wheel joints of the URDF on the left; default: found by position."""
     right: JointNames | None = None
     """Wheel joints of the URDF on the right; default: found by position."""
     turning_scale: Annotated[float, Field(gt=0, le=10), Quantity("ratio")] = 1.0
-    """Effective over geometric wheel separation; skidding makes it larger than 1 (Clearpath's jackal: 1.5)."""
+    """Effective wheel separation divided by the geometric one; skidding makes it larger than 1 (Clearpath's jackal:
+    1.5)."""
 
 
 class Ackermann(Spec):
-    """A car: rear wheels drive, front wheels steer."""
+    """Car-like drive: rear wheels drive, front wheels steer."""
 
     type: Literal["ackermann"]
-    """Which drive it is."""
+    """Type of the drive."""
     wheel_radius: PositiveLength
-    """Of a driven wheel."""
+    """Radius of a driven wheel."""
     wheel_separation: PositiveLength
-    """Between the middles of the wheels on the left and on the right."""
+    """Distance between the centers of the left and the right wheels."""
     wheel_base: PositiveLength
-    """Between the front and the rear axle."""
+    """Distance between the front and the rear axle."""
     wheel_width: PositiveLength = 0.04
-    """Of a wheel, along its axle."""
+    """Width of a wheel along its axle."""
     max_steering: PositiveAngle
-    """Of the virtual middle wheel."""
+    """Maximum steering angle of the virtual wheel in the middle."""
     left: JointNames | None = None
     """Wheel joints of the URDF on the left; default: found by position."""
     right: JointNames | None = None
@@ -100,207 +101,207 @@ class Ackermann(Spec):
 
 
 class Omnidirectional(Spec):
-    """Moves in any direction (omni wheels, idealised as a planar drive); its odometry sees every motion."""
+    """Drive in any direction (omni wheels, idealized as a planar drive) with odometry of every motion."""
 
     type: Literal["omnidirectional"]
-    """Which drive it is."""
+    """Type of the drive."""
 
 
 class Mecanum(Spec):
-    """Four mecanum wheels: moves in any direction, with odometry from the wheels' encoders."""
+    """Drive in any direction with four mecanum wheels and odometry from their encoders."""
 
     type: Literal["mecanum"]
-    """Which drive it is."""
+    """Type of the drive."""
     wheel_radius: PositiveLength
-    """Of a driven wheel."""
+    """Radius of a driven wheel."""
     wheel_separation: PositiveLength
-    """Between the middles of the wheels on the left and on the right (track width)."""
+    """Distance between the centers of the left and the right wheels (track width)."""
     wheel_base: PositiveLength
-    """Between the front and the rear axle."""
+    """Distance between the front and the rear axle."""
     wheel_width: PositiveLength = 0.05
-    """Of a wheel, along its axle."""
+    """Width of a wheel along its axle."""
     roller_angle: Annotated[Angle, Field(ge=0.1, le=1.4)] = 0.7853981633974483
-    """Between a roller's axis and the wheel's axle."""
+    """Angle between the axis of a roller and the axle of the wheel."""
     left: JointNames | None = None
-    """Wheel joints of the URDF; default: found by position."""
+    """Wheel joints of the URDF on the left; default: found by position."""
     right: JointNames | None = None
     """Wheel joints of the URDF on the right; default: found by position."""
 
     @property
     def wheels(self) -> MecanumWheels:
-        """Their kinematics."""
+        """Kinematics of the wheels."""
         slant = 1 / math.tan(self.roller_angle)
         return MecanumWheels(self.wheel_radius, self.wheel_separation / 2, self.wheel_base / 2, slant)
 
 
 Holonomic = Omnidirectional | Mecanum
-"""Drives that can go sideways."""
+"""Drives that can move sideways."""
 Drive = Annotated[Differential | SkidSteer | Ackermann | Omnidirectional | Mecanum, Field(discriminator="type")]
 
 
 class Limits(Spec):
-    """What the base can do; commands beyond are clipped, as the firmware of a real base does."""
+    """Limits of the base; commands beyond them are clipped, as by the firmware of a real base."""
 
     linear: PositiveSpeed
-    """Forward speed."""
+    """Maximum forward speed."""
     reverse: PositiveSpeed | None = None
-    """Backward speed; default: as forward."""
+    """Maximum backward speed; default: that of forward motion."""
     lateral: PositiveSpeed | None = None
-    """Sideways speed of an omnidirectional or mecanum base; default: as forward."""
+    """Maximum sideways speed of an omnidirectional or mecanum base; default: that of forward motion."""
     angular: PositiveAngularSpeed
-    """Turn rate, either way."""
+    """Maximum turn rate in both directions."""
     linear_acceleration: PositiveAcceleration
-    """When it speeds up."""
+    """Maximum acceleration."""
     linear_deceleration: PositiveAcceleration | None = None
-    """Default: as acceleration."""
+    """Maximum deceleration; default: the maximum acceleration."""
     angular_acceleration: PositiveAngularAcceleration
-    """Of its turn rate, up and down."""
+    """Maximum angular acceleration and deceleration."""
     command_timeout: PositiveDuration = 0.5
-    """The base stops when no command came for so long; ros2_control's `cmd_vel_timeout` and its default. Commands stay
-    away only where a fault on `cmd_vel` keeps them back."""
+    """Time without a command after which the base stops (ros2_control's `cmd_vel_timeout` and its default). Commands
+    stop only if a fault on `cmd_vel` blocks them."""
 
 
 class Mount(Spec):
-    """Where a sensor sits in the robot's base frame (on the ground under the middle of the axle)."""
+    """Pose of a sensor in the base frame of the robot, which is on the ground below the center of the axle."""
 
     x: Length = 0.0
-    """Ahead of the base frame's origin."""
+    """Distance in front of the origin of the base frame."""
     y: Length = 0.0
-    """To the left of it."""
+    """Distance to the left of the origin of the base frame."""
     z: NonNegativeLength = 0.2
-    """Above the ground."""
+    """Height above the ground."""
     yaw: Angle = 0.0
-    """Where it looks, anticlockwise from straight ahead."""
+    """Viewing direction, counterclockwise from straight ahead."""
 
     @property
     def pose(self) -> Pose3:
-        """The sensor's frame in the base frame."""
+        """Pose of the sensor frame in the base frame."""
         return Pose3.from_rpy(self.x, self.y, self.z, 0.0, 0.0, self.yaw)
 
 
 class CameraMount(Mount):
-    """Where a camera sits, and how far it looks down."""
+    """Pose of a camera in the base frame of the robot, with its pitch."""
 
     pitch: Annotated[Angle, Field(ge=-1.6, le=1.6)] = 0.0
-    """How far it looks down; negative: up."""
+    """Downward angle of the viewing direction; negative: upward."""
 
     @property
     def pose(self) -> Pose3:
-        """The sensor's frame in the base frame: turned, then tilted, as in URDF."""
+        """Pose of the sensor frame in the base frame; yaw is applied before pitch, as in URDF."""
         return Pose3.from_rpy(self.x, self.y, self.z, 0.0, self.pitch, self.yaw)
 
 
 class SensorSpec(Component):
-    """A sensor: what it says, and how often. Its component is called with a simscen.sensors.sensor.SensorSetting."""
+    """Base class of sensor specifications. The component is called with a simscen.sensors.sensor.SensorSetting."""
 
-    says: ClassVar[str]
-    """The kind of its readings: Scan, Odometry, Imu, Bump or Image of simscen.core.messages.sensor_data."""
+    reading_type: ClassVar[str]
+    """Type of the readings: Scan, Odometry, Imu, Bump, or Image of simscen.core.messages.sensor_data."""
     localizes: ClassVar[bool] = False
-    """Whether a localizer matches its scans with the map; all scans show a costmap what is around."""
+    """Whether the localizer matches the scans with the map; costmaps use all scans."""
 
     rate: Frequency = 10.0
-    """How often it says something."""
+    """Rate of the readings."""
     latency: Duration = 0.0
-    """How long a reading takes from the moment it shows to the stack: exposure, sweep, driver, bus."""
+    """Delay from the moment that a reading shows until the stack receives it: exposure, sweep, driver, and bus."""
 
     @classmethod
     def definition_problem(cls) -> str:
-        """Why it is no specification of a sensor; "" for one that is."""
-        return super().definition_problem() or ("" if getattr(cls, "says", None) in READING_KINDS else _UNSAID)
-
-
-_UNSAID = f"its `says` is none of {', '.join(READING_KINDS)}"
+        """Return why this class is not a valid specification of a sensor, or ""."""
+        if problem := super().definition_problem():
+            return problem
+        is_known = getattr(cls, "reading_type", None) in READING_KINDS
+        return "" if is_known else f"its `reading_type` is not one of {', '.join(READING_KINDS)}"
 
 
 class Lidar(Ranged, SensorSpec):
-    """A planar lidar."""
+    """Planar lidar."""
 
     component: ClassVar[str] = "simscen.sensors.lidar:LidarSensor"
-    says: ClassVar[str] = "Scan"
+    reading_type: ClassVar[str] = "Scan"
     localizes: ClassVar[bool] = True
 
     rate: Frequency = 10.0
-    """How often it says something."""
+    """Rate of the scans."""
     beams: Annotated[int, Field(ge=1, le=4096)] = 360
-    """How many beams a scan has, spread evenly over its field of view."""
+    """Number of beams per scan, evenly spread over the field of view."""
     field_of_view: PositiveAngle = 6.283185307179586
-    """Centered on straight ahead."""
+    """Field of view, centered on straight ahead."""
     min_range: NonNegativeLength = 0.12
-    """What is nearer gives no answer."""
+    """Minimum range; nearer objects give no reading."""
     max_range: PositiveLength = 12.0
-    """What is further gives no answer."""
+    """Maximum range; farther objects give no reading."""
     noise: NonNegativeLength = 0.01
     """Standard deviation of a range."""
     resolution: PositiveLength = 0.001
-    """Ranges are whole multiples of this."""
+    """Quantization step of the ranges."""
     mount: Mount = by_default()
-    """Where it sits on the robot."""
+    """Pose on the robot."""
 
 
 class WheelOdometry(SensorSpec):
-    """Dead reckoning from the wheels' encoders, with the error model of Thrun, Probabilistic Robotics, table 5.6."""
+    """Dead reckoning from wheel encoders, with the error model of Thrun, Probabilistic Robotics, table 5.6."""
 
     component: ClassVar[str] = "simscen.sensors.odometry:WheelOdometrySensor"
-    says: ClassVar[str] = "Odometry"
+    reading_type: ClassVar[str] = "Odometry"
 
     rate: Frequency = 40.0
-    """How often it says something."""
+    """Rate of the readings."""
     translation_noise: NonNegativeLength = 0.01
-    """Standard deviation of the distance error after one meter driven; errors grow with the square root."""
+    """Standard deviation of the distance after one meter; the error grows with the square root of the distance."""
     rotation_noise: Annotated[NonNegativeAngle, Field(le=1)] = 0.01
-    """Standard deviation of the heading error after turning one radian."""
+    """Standard deviation of the heading after a turn of one radian."""
     drift_noise: Annotated[NonNegativeAngle, Field(le=1)] = 0.005
-    """Standard deviation of the heading error after driving one meter straight."""
+    """Standard deviation of the heading after one meter straight ahead."""
 
 
 class InertialUnit(SensorSpec):
     """Gyroscope and accelerometer."""
 
     component: ClassVar[str] = "simscen.sensors.imu:ImuSensor"
-    says: ClassVar[str] = "Imu"
+    reading_type: ClassVar[str] = "Imu"
 
     rate: Frequency = 60.0
-    """How often it says something."""
+    """Rate of the readings."""
     gyro_noise: Annotated[NonNegativeAngularSpeed, Field(le=10)] = 0.002
     """Standard deviation of the turn rate."""
     gyro_bias: Annotated[NonNegativeAngularSpeed, Field(le=1)] = 0.0005
-    """Standard deviation of the constant bias of a run."""
+    """Standard deviation of the gyroscope bias, which is constant in a run."""
     accelerometer_noise: Annotated[NonNegativeAcceleration, Field(le=100)] = 0.02
     """Standard deviation of the acceleration."""
 
 
 class Bumper(SensorSpec):
-    """Pressed while the base touches something."""
+    """Contact sensor of the base: pressed while the base touches an object."""
 
     component: ClassVar[str] = "simscen.sensors.camera_and_bumper:BumperSensor"
-    says: ClassVar[str] = "Bump"
+    reading_type: ClassVar[str] = "Bump"
 
     rate: Frequency = 40.0
-    """How often it says something."""
+    """Rate of the readings."""
 
 
 class Camera(SensorSpec):
-    """A color and depth camera."""
+    """Color and depth camera."""
 
     component: ClassVar[str] = "simscen.sensors.camera_and_bumper:CameraSensor"
-    says: ClassVar[str] = "Image"
+    reading_type: ClassVar[str] = "Image"
 
     rate: Frequency = 5.0
-    """How often it says something."""
+    """Rate of the images."""
     width: Annotated[int, Field(ge=8, le=640)] = 64
-    """Of its image, in pixels."""
+    """Width of the image in pixels."""
     height: Annotated[int, Field(ge=8, le=480)] = 48
-    """Of its image, in pixels."""
+    """Height of the image in pixels."""
     field_of_view: PositiveAngle = 1.2
-    """Horizontal."""
+    """Horizontal field of view."""
     max_range: PositiveLength = 10.0
-    """What is further has no depth."""
+    """Maximum range of the depth image."""
     mount: CameraMount = by_default()
-    """Where it sits on the robot, and how far it looks down."""
+    """Pose on the robot, with pitch."""
 
 
 class Sensor(Choice):
-    """One sensor."""
+    """Sensor of a robot."""
 
     group: ClassVar[str] = "sensor"
 
@@ -311,79 +312,79 @@ class Sensor(Choice):
     camera: Camera | None = None
 
     @property
-    def says(self) -> str:
-        """The kind of its readings."""
+    def reading_type(self) -> str:
+        """Type of the readings."""
         assert isinstance(self.chosen, SensorSpec)
-        return self.chosen.says
+        return self.chosen.reading_type
 
     @property
     def localizes(self) -> bool:
-        """Whether a localizer matches its scans with the map."""
+        """Whether the localizer matches the scans with the map."""
         assert isinstance(self.chosen, SensorSpec)
         return self.chosen.localizes
 
     @property
-    def takes_pictures(self) -> bool:
-        """Whether it may: one of an installed package may look at one whatever it then says."""
-        return self.narrow is not None or self.says == "Image"
+    def may_render(self) -> bool:
+        """Whether the sensor may use the renderer; sensors of installed packages may do so whatever they report."""
+        return self.narrow is not None or self.reading_type == "Image"
 
 
 class Part(Shaped):
-    """A piece of the robot's body; `pose` in the base frame."""
+    """Part of the body of the robot."""
 
     pose: PoseSpec = PoseSpec(x=0.0, y=0.0)
-    """Where it is in the robot's base frame."""
+    """Pose in the base frame of the robot."""
 
 
 class RobotSpec(Spec):
-    """A robot: shape, drive, limits, sensors. Its base frame is on the ground under the middle of its axle."""
+    """Robot: shape, drive, limits, and sensors. Its base frame is on the ground below the center of its axle."""
 
     simscen: LanguageVersion
-    """Version of this language."""
+    """Version of the scenario language."""
     name: Name
-    """What reports call it."""
+    """Name in reports."""
     description: Annotated[str, Field(max_length=10_000)] = ""
-    """For people."""
+    """Description for people."""
     urdf: FilePath | None = None
-    """A URDF (or xacro) file, relative to this one, instead of `body`."""
+    """URDF or xacro file, relative to this file, instead of `body`."""
     packages: Annotated[dict[Name, FilePath], Field(max_length=100)] = {}
-    """ROS packages by name: the folder, relative to this file, that `package://` and `$(find)` in the URDF mean."""
+    """Folders of ROS packages by name, relative to this file, for `package://` and `$(find)` in the URDF."""
     arguments: Annotated[dict[Name, Argument], Field(max_length=200)] = {}
-    """What the xacro file's `<xacro:arg>` get in place of their defaults."""
+    """Values of the `<xacro:arg>` elements of the xacro file, instead of their defaults."""
     body: Annotated[list[Part], Field(min_length=1, max_length=50)] | None = None
-    """Simple shapes that make up the hull; wheels are added by the drive."""
+    """Simple shapes of the hull; the drive adds the wheels."""
     mass: PositiveMass | None = None
-    """Of the whole robot; needed with `body`."""
+    """Mass of the whole robot; required with `body`."""
     radius: PositiveLength | None = None
-    """Of the footprint, for a round robot."""
+    """Radius of the footprint of a round robot."""
     footprint: Ring | None = None
-    """Corners of the footprint in the base frame, for any other; default: from the shapes."""
+    """Corners of the footprint in the base frame for any other robot; default: computed from the shapes."""
     drive: Drive
-    """What its wheels are, and how they drive it."""
+    """Wheels and their kinematics."""
     limits: Limits
-    """What its base can do."""
+    """Speed and acceleration limits of the base."""
     sensors: dict[Name, Sensor]
-    """By instance name: what faults refer to."""
+    """Sensors by name; faults refer to these names."""
     latency: RobotLatency = by_default()
-    """What computing and sensing take on it, for scenarios that ask for it."""
+    """Computing times and sensor delays on this robot, for scenarios that use them."""
 
     @property
     def top_speed(self) -> float:
-        """Highest speed over ground in m/s, in the direction in which it drives fastest."""
+        """Maximum ground speed in m/s in the fastest direction."""
         ahead = max(self.limits.linear, self.limits.reverse or self.limits.linear)
         sideways = (self.limits.lateral or self.limits.linear) if isinstance(self.drive, Holonomic) else 0.0
         return float((ahead**2 + sideways**2) ** 0.5)
 
     @model_validator(mode="after")
-    def _consistent(self) -> "RobotSpec":
+    def _check_consistency(self) -> "RobotSpec":
         if strange := sorted(self.latency.sensors.keys() - self.sensors.keys()):
-            raise ValueError(f"`latency` names `{strange[0]}`, which is none of its sensors")
+            raise ValueError(f"`latency` names `{strange[0]}`, which is not a sensor of the robot")
         if (self.urdf is None) == (self.body is None):
             raise ValueError("expected exactly one of: body, urdf")
         if self.urdf is None and (self.packages or self.arguments):
-            raise ValueError("`packages` and `arguments` are for a `urdf`")
+            raise ValueError("`packages` and `arguments` are only valid with `urdf`")
         if self.body is not None and self.mass is None:
-            raise ValueError("`mass` is missing; a robot with a `body` needs one")
+            raise ValueError("`mass` is missing; a robot with a `body` needs it")
         if self.radius is not None and self.footprint is not None:
             raise ValueError("only one of radius, footprint may be given")
         return self

@@ -1,4 +1,4 @@
-"""A scenario as a user writes it (`*.scenario.yaml`)."""
+"""Specification of scenarios (`*.scenario.yaml`)."""
 
 from itertools import count
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
@@ -39,7 +39,7 @@ from simscen.spec.quantities import (
 
 if TYPE_CHECKING:
     from simscen.criteria.plugin_metric import AnyMeasure
-    from simscen.model.disturbances import EventEntry, FaultEntry, Step
+    from simscen.model.disturbances import EventEntry, FaultEntry, SequenceStep
     from simscen.model.variations import Variations
     from simscen.triggers.registry import Trigger
 else:
@@ -89,208 +89,208 @@ else:
 
 
 class Payload(Spec):
-    """Something on the robot that neither its stack nor its datasheet knows of: mass and where that is."""
+    """Load on the robot that is unknown to its stack and not included in its robot file."""
 
     mass: PositiveMass
-    """In kg."""
+    """Mass in kg."""
     at: Annotated[list[Length], Field(min_length=3, max_length=3)] | None = None
-    """[x, y, z] of its center of mass in the base frame; default: on top of the hull, above the base's origin."""
+    """Center of mass [x, y, z] in the base frame; default: on top of the hull, above the origin of the base frame."""
 
 
 class RobotEntry(Spec):
-    """The robot, where it truly starts, and where it thinks it starts."""
+    """The robot, its true start pose, and the initial pose estimate of its localizer."""
 
     model: FilePath = "turtlebot"
-    """A shipped robot (turtlebot, amr, …) or a `*.robot.yaml` or `.urdf` file."""
+    """Robot that simscen ships (turtlebot, amr, …), or a `*.robot.yaml` or `.urdf` file."""
     pose: PlaceOrPose
-    """Where it truly stands: a pose or a place of the world."""
+    """True start pose: a pose, or the name of a place of the world."""
     initial_estimate: EstimateOrUnknown | None = None
-    """A pose, or a place of the world; default: the true pose, with Nav2's default covariance; `unknown`: anywhere on
-    the map."""
+    """Pose, or name of a place of the world, that the localizer starts with; `unknown`: anywhere on the map. Default:
+    the true pose with Nav2's default covariance."""
     payload: Payload | None = None
-    """What it carries: motors are those of the empty robot."""
+    """Load that the robot carries; its motors stay those of the empty robot."""
     motor_torque: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
-    """Share of their torque that its motors still have: worn, hot, or run from a weak battery."""
+    """Fraction of the nominal motor torque that is available, e.g. because of wear, heat, or a weak battery."""
 
 
 class GoalEntry(Spec):
-    """A pose to drive to."""
+    """Pose to which the robot navigates."""
 
     name: Name | None = None
-    """What reports call it; default: the place's name, or goal-1, goal-2, …"""
+    """Name in reports; default: the name of the place, or goal-1, goal-2, …"""
     pose: PlaceOrPose
-    """In the map frame: a pose or a place of the world."""
+    """Pose in the map frame, or name of a place of the world."""
     timeout: PositiveDuration | None = None
-    """Simulated time this goal may take; then it fails with NAVIGATE_TIMEOUT."""
+    """Simulated time after which this goal fails with NAVIGATE_TIMEOUT."""
     xy_tolerance: PositiveLength | None = None
-    """Default: the stack's goal checker."""
+    """Distance from the goal within which the goal counts as reached; default: that of the stack's goal checker."""
     yaw_tolerance: PositiveAngle | None = None
-    """Default: the stack's goal checker."""
+    """Heading error within which the goal counts as reached; default: that of the stack's goal checker."""
     expect: Expectation = "succeeded"
-    """What is to come of it: `succeeded`, `failed`, or the code of a failure, e.g. `{error_code: GOAL_OCCUPIED}`. A
-    failure that is expected is a pass, and a success that is not expected is none."""
+    """Expected outcome: `succeeded`, `failed`, or the code of a failure, e.g. `{error_code: GOAL_OCCUPIED}`. The goal
+    passes if and only if this is its outcome."""
     on_reached: OnReached = by_default()
-    """What the robot does there before it goes on."""
+    """What the robot does at the goal before it continues."""
 
 
 MAX_GOALS = 1000
-"""Goals that a robot is sent to in one run, loops counted."""
+"""Maximum number of goals per robot and run, including loops."""
 
 
-class OneOfSeveral(RobotEntry):
-    """One of several robots: where it starts, and what is its own.
+class MultiRobotEntry(RobotEntry):
+    """One of several robots, with its own start, goals, faults, and criteria.
 
-    What is not said here holds as the scenario says it for all: `map`, `stack` (merged with what is said here) and
-    `on_goal_failure`.
+    A robot without its own `map` or `on_goal_failure` uses those of the scenario. Its `stack` is merged with the stack
+    of the scenario.
 
     Example: `robots: {left: {pose: {x: 1, y: 1}, goals: [{pose: dock}]}, right: {pose: {x: 4, y: 1}}}`
     """
 
     map: FilePath | None = None
-    """The map this robot gets; `none` = no map, odometry only."""
+    """Map for this robot; `none`: no map, odometry only."""
     stack: AnyStack | None = None
-    """What its stack has otherwise than that of all."""
+    """Parameters of this robot's stack that differ from the stack of the scenario."""
     goals: Annotated[list[Annotated[GoalEntry, PlaceShorthand("pose")]], Field(max_length=MAX_GOALS)] = []
-    """In this order; a robot without goals stands where it is."""
+    """Goals in this order; a robot without goals does not move."""
     navigation: Navigation | None = None
-    """Which action takes its goals, and how often."""
+    """Navigation action for the goals, and number of loops."""
     on_goal_failure: Literal["stop", "continue"] | None = None
-    """After a goal that failed: end, or drive to the next one."""
+    """Whether this robot stops or drives to the next goal after a failed goal."""
     faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
-    """Of its sensors and wheels; their triggers are about this robot, where they do not say another."""
+    """Faults of this robot's sensors and wheels; their triggers refer to this robot unless they name another one."""
     pass_: Annotated[list[AnyCriterion], Field(max_length=200, alias="pass")] = []
-    """What must hold for this robot, besides what must for all."""
+    """Criteria for this robot, in addition to those for all robots."""
 
 
 MAX_ROBOTS = 20
 
 
-def _in_words(reason: str) -> str:
+def _check_reason(reason: str) -> str:
     if not reason.strip():
-        raise ValueError("a reason has words")
+        raise ValueError("the reason is empty")
     return reason
 
 
-Reason = Annotated[str, Field(max_length=500), AfterValidator(_in_words)]
+Reason = Annotated[str, Field(max_length=500), AfterValidator(_check_reason)]
 
 
 class ExpectedFailure(Spec):
-    """A failure that is known: the run is no failure as long as it fails, and one as soon as it does not.
+    """Failure that is known: the run counts as expected while it fails, and as a failure as soon as it passes.
 
     Example: `expected: {fail: "the planner hugs corners, NAV-123", criteria: [clearance]}`
     """
 
     fail: Reason
-    """Why, for people: a ticket, and what is wrong."""
+    """Reason for people, e.g. a ticket and the problem."""
     criteria: Annotated[list[Annotated[Name, ReferenceTo("verdict")]], Field(max_length=200)] = []
-    """Ids of the criteria, or names of the events and faults that do not happen, that must fail, and alone may;
-    default: one or more criteria, whichever."""
+    """Ids of criteria, and names of events and faults that do not happen: all of these must fail, and nothing else may.
+    Default: any criteria may fail, at least one."""
 
     @model_validator(mode="before")
     @classmethod
-    def _with_reason(cls, value: Any) -> Any:
+    def _require_reason(cls, value: Any) -> Any:
         if isinstance(value, str):
-            raise ValueError("say why it is known to fail: `{fail: REASON}`")
+            raise ValueError("give the reason for the known failure as `{fail: REASON}`")
         return value
 
 
 MIN_TRUTH_RATE_HZ = 20.0
-"""At lower rates, short violations fall between two samples, and `smoothness` (SPARC) has no value."""
+"""Lowest rate at which short violations are not missed between two samples and `smoothness` (SPARC) has a value."""
 
 
 class Physics(Spec):
-    """How the world is stepped."""
+    """Parameters of the physics simulation."""
 
     tick_rate: Annotated[int, Field(ge=60, le=2000), WholeQuantity("frequency")] = 240
-    """Physics steps for each simulated second."""
+    """Physics steps per simulated second."""
     solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 10
-    """Iterations of the contact solver for each physics step."""
+    """Iterations of the contact solver per physics step."""
     truth_rate: Annotated[float, Field(ge=MIN_TRUTH_RATE_HZ, le=1000), Quantity("frequency")] = 40.0
-    """How often the truth is recorded and judged. Criteria need at least 20 Hz."""
+    """Rate at which the ground truth is recorded and evaluated. Criteria need at least 20 Hz."""
 
 
-def _once(measures: list[AnyMeasure]) -> list[AnyMeasure]:
+def _check_unique(measures: list[AnyMeasure]) -> list[AnyMeasure]:
     kinds = [measure.kind for measure in measures]
     twice = [kind for index, kind in enumerate(kinds) if kind in kinds[:index]]
     if twice:
-        raise ValueError(f"`{twice[0]}` is there twice: a run reports one number of a name")
+        raise ValueError(f"`{twice[0]}` is given twice")
     return measures
 
 
 class ScenarioSpec(Spec):
-    """One navigation test: a world, a robot, goals, disturbances, and what must hold."""
+    """Navigation test: a world, a robot, goals, disturbances, and pass criteria."""
 
     simscen: LanguageVersion
-    """Version of this language."""
+    """Version of the scenario language."""
     name: Name | None = None
-    """For people; default: the file's name."""
+    """Name in reports; default: the name of the file."""
     description: Annotated[str, Field(max_length=10_000)] = ""
-    """What is tested and why."""
+    """What the scenario tests, and why."""
     tags: Annotated[list[PlaceName], Field(max_length=50)] = []
-    """For `--tag`."""
+    """Tags that `--tag` selects scenarios by."""
     seed: Annotated[int, Field(ge=1, le=LARGEST_SEED)] = 1
-    """The root of all chance in a run."""
+    """Seed of all random numbers of a run."""
     world: WorldOrFile
-    """A `*.world.yaml`, a ROS map `.yaml`, a Gazebo `.sdf`/`.world`, or the world itself."""
+    """World: a `*.world.yaml` file, a ROS map `.yaml`, a Gazebo `.sdf` or `.world` file, or an inline world."""
     map: FilePath | None = None
-    """The map the robot gets, if it is not that of the world; `none` = no map, odometry only."""
+    """Map for the robot; `none`: no map, odometry only. Default: the map of the world."""
     robot: RobotEntry | None = None
-    """The robot under test; where there are several, `robots`."""
-    robots: Annotated[dict[RobotName, OneOfSeveral], Field(min_length=2, max_length=MAX_ROBOTS)] | None = None
-    """Several robots by name, instead of `robot`: each with its own goals, faults and criteria."""
+    """Robot under test; use `robots` for several."""
+    robots: Annotated[dict[RobotName, MultiRobotEntry], Field(min_length=2, max_length=MAX_ROBOTS)] | None = None
+    """Several robots by name, instead of `robot`, each with its own goals, faults, and criteria."""
     stack: AnyStack = by_default()
-    """The stack under test: simscen's own, or `{external: NAME}`, a process."""
+    """Navigation stack under test: the one of simscen, or an external process with `{external: NAME}`."""
     goals: Annotated[list[Annotated[GoalEntry, PlaceShorthand("pose")]], Field(max_length=MAX_GOALS)] = []
-    """In this order; places of the world alone will do: `[kitchen, office]`."""
+    """Goals in this order; names of places are also valid: `[kitchen, office]`."""
     navigation: Navigation = by_default()
-    """Which action takes the goals, and how often."""
+    """Navigation action for the goals, and number of loops."""
     on_goal_failure: Literal["stop", "continue"] = "stop"
-    """After a goal that failed: end, or drive to the next one (FollowWaypoints' stop_on_failure)."""
+    """Whether the robot stops or drives to the next goal after a failed goal (stop_on_failure of FollowWaypoints)."""
     time_limit: Annotated[PositiveDuration, Field(le=8000)] = 300.0
-    """Simulated time after which the run ends, whatever happens."""
+    """Simulated time after which the run ends in any case."""
     linger: Annotated[Duration, Field(le=3600)] = 0.5
-    """Simulated time that the run goes on after the last goal, to see that the robot stays where it is."""
+    """Simulated time for which the run continues after the last goal, to check that the robot stays there."""
     events: Annotated[list[EventEntry], Field(max_length=500)] = []
-    """What happens in the world, and when."""
+    """Changes to the world, and when they happen."""
     faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
-    """What goes wrong with sensors, wheels and commands, and when."""
+    """Faults of sensors, wheels, and commands, and when they happen."""
     physics: Physics = by_default()
-    """How the world is stepped."""
+    """Parameters of the physics simulation."""
     pass_: Annotated[list[AnyCriterion], Field(max_length=200, alias="pass")] = []
-    """All of these must hold; of several robots, for each of them."""
-    metrics: Annotated[list[AnyMeasure], Field(max_length=100), AfterValidator(_once)] = []
-    """What is measured besides what every run reports; each is a type that an installed package adds."""
+    """Criteria that must all hold; with several robots, for each of them."""
+    metrics: Annotated[list[AnyMeasure], Field(max_length=100), AfterValidator(_check_unique)] = []
+    """Additional metrics of types that installed packages add."""
     expected: ExpectedFailure | None = None
-    """Say that it is known to fail, and why. A run that breaks off is an error all the same."""
+    """Declaration, with a reason, that the run is known to fail. A run that is aborted is still an error."""
     skip: Reason | None = None
-    """Do not run it, and say why. The file must be valid all the same."""
+    """Reason for not running this scenario. The file must still be valid."""
     variations: Variations | None = None
-    """Values by their paths, each combination a run of its own; default: the file as it is."""
+    """Values by path; each combination is a separate run. Default: the file as it is."""
 
     @property
-    def own(self) -> RobotEntry:
-        """The only robot."""
+    def only_robot(self) -> RobotEntry:
+        """The only robot of the scenario."""
         assert self.robot is not None
         return self.robot
 
     @property
-    def steps(self) -> "list[Step]":
-        """The events, each with the steps of its story after it: everything that is to happen to the world."""
+    def steps(self) -> "list[SequenceStep]":
+        """All events and, after each event, the steps of its sequence."""
         from simscen.model.disturbances import steps_of
 
         return steps_of(self.events)
 
     @property
     def triggers(self) -> "list[Trigger]":
-        """What events and faults wait for, in their order."""
+        """Triggers of all events and faults in order."""
         waiting = [*(step.when for step in self.steps), *(fault.when for fault in self.faults)]
         return [trigger for trigger in waiting if trigger is not None]
 
     @property
     def goal_names(self) -> list[str]:
-        """What the goals are called, in order: as written, or after their place, or goal-1, goal-2, …
+        """Names of the goals in order: as given, or the name of the place, or goal-1, goal-2, …
 
-        A place that is driven to again is `kitchen-2` then.
+        A repeated place gets a suffix: `kitchen-2`.
         """
         taken, names = {goal.name for goal in self.goals}, list[str]()
         for number, goal in enumerate(self.goals, start=1):
@@ -301,13 +301,13 @@ class ScenarioSpec(Spec):
         return names
 
 
-def estimate_of(entry: RobotEntry, truth: Pose2) -> Estimate:
-    """What the localizer is told, given where the robot truly is."""
+def initial_estimate(entry: RobotEntry, truth: Pose2) -> Estimate:
+    """Return the initial estimate of the localizer for a robot that starts at the pose `truth`."""
     match entry.initial_estimate:
         case None:
             return Estimate(truth)
         case "unknown":
             return Estimate(None)
-        case InitialEstimate() as told:
-            return Estimate(Pose2(told.x, told.y, told.yaw), told.std)
+        case InitialEstimate() as estimate:
+            return Estimate(Pose2(estimate.x, estimate.y, estimate.yaw), estimate.std)
     raise AssertionError(entry.initial_estimate)

@@ -1,4 +1,4 @@
-"""The navigation stack's parameters, with Nav2's names and defaults."""
+"""Specification of the navigation stack, with Nav2's parameter names and defaults."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
@@ -12,7 +12,7 @@ from simscen.model.guards import CollisionMonitor, Prediction, VelocitySmoother
 from simscen.model.latency import Latency
 from simscen.model.localizers import GroundTruth, Localizer
 from simscen.model.planners import Planner
-from simscen.model.profiles import PROFILES, Profile, with_profile
+from simscen.model.profiles import PROFILES, Profile, apply_profile
 from simscen.model.recovery import Recovery
 from simscen.model.stack_base import StackBase
 from simscen.spec.base import Typed, by_default
@@ -20,7 +20,7 @@ from simscen.spec.quantities import (
     Quantity,
 )
 
-Patience = Annotated[float, Field(ge=-1, le=86400), Quantity("duration")]
+FailureTolerance = Annotated[float, Field(ge=-1, le=86400), Quantity("duration")]
 
 
 ParameterFile = Annotated[str, Field(min_length=1, max_length=4096)]
@@ -37,56 +37,55 @@ ADVANCED_BUILDER = "simscen.advanced.build:AdvancedStackBuilder"
 
 
 class InProcessStack(StackBase, Typed):
-    """A whole stack that lives in the process of its run: simscen's own, or one that an installed package adds."""
+    """Stack in the process of the run: the one of simscen, or one of an installed package."""
 
 
 class StackSpec(InProcessStack):
-    """The navigation stack under test: Nav2 in miniature."""
+    """Navigation stack of simscen, modeled on Nav2."""
 
     component: ClassVar[str] = "simscen.stack.build:configured_stack"
     type: Literal["reference"] = "reference"
     profile: Profile = "reference"
-    """Default values of the other parameters. `nav2`: those of nav2_bringup. `advanced`: those that choose the
-    components that Nav2 does not have, such as motion prediction and scan matching. `simscen` is the deprecated name
-    of `advanced`."""
+    """Set of default values for the other parameters. `nav2`: those of nav2_bringup. `advanced`: components that Nav2
+    does not have, such as motion prediction and scan matching. `simscen` is the deprecated name of `advanced`."""
     nav2_params: ParameterFile | None = None
-    """A parameter file of Nav2, such as nav2_params.yaml: what it says of parameters that are here, too."""
+    """Parameter file of Nav2, such as nav2_params.yaml; its values apply to all parameters that exist here."""
     localizer: Localizer = by_default()
-    """What knows where the robot is."""
+    """Localizer, which estimates the pose of the robot."""
     costmap: Costmap = by_default()
-    """What the robot knows of the ground, for plans; the local costmap takes from it what it does not say itself."""
+    """Global costmap for planning; parameters that the local costmap does not set have the values given here."""
     local_costmap: LocalCostmap = by_default()
-    """What the robot sees around it, for driving."""
+    """Local costmap for control and recovery behaviors."""
     planner: Planner = by_default()
-    """What finds a way."""
+    """Planner of the global path."""
     controller: Controller = by_default()
-    """What follows a path."""
-    failure_tolerance: Patience = 0.3
-    """How long the controller may find no valid command until that is PATIENCE_EXCEEDED; at 0 it is NO_VALID_CONTROL at
-    once, with -1 it never fails."""
+    """Controller that follows the path."""
+    failure_tolerance: FailureTolerance = 0.3
+    """Time without a valid command after which the controller fails with PATIENCE_EXCEEDED; 0: it fails immediately
+    with NO_VALID_CONTROL; -1: it never fails."""
     goal_checker: GoalChecker = by_default()
-    """What says whether a goal is reached."""
+    """Checker that decides whether a goal is reached."""
     progress_checker: ProgressChecker = by_default()
-    """What says that the robot does not get on."""
+    """Checker that detects that the robot makes no progress."""
     recovery: Recovery = by_default()
-    """What is done when planning or control has failed."""
+    """Recovery behaviors after planning or control failed."""
     velocity_smoother: VelocitySmoother = by_default()
-    """What limits the accelerations of commands."""
+    """Limits of the acceleration of commands."""
     collision_monitor: CollisionMonitor = by_default()
-    """What stops the robot, whatever it is told."""
+    """Monitor that stops or slows the robot before a collision."""
     latency: _LatencyOrRobots = by_default()
-    """What computing takes: durations, or `robot` for what the robot's file says, of its sensors, too."""
+    """Computing times of the stack, or `robot` for those of the robot file, which include the delays of its sensors."""
     prediction: Prediction = by_default()
-    """What knows of things that move, and keeps out of their way."""
+    """Prediction of moving obstacles."""
 
     @model_validator(mode="before")
     @classmethod
     def _by_profile(cls, said: Any) -> Any:
-        return with_profile(said) if isinstance(said, Mapping) and said.get("profile") in PROFILES else said
+        return apply_profile(said) if isinstance(said, Mapping) and said.get("profile") in PROFILES else said
 
     @property
     def builder(self) -> str:
-        """The builder of the stack as `module:class`: that of the advanced stack if any parameter asks for it."""
+        """Class that builds the stack as `module:Class`: that of the advanced stack if any parameter needs it."""
         is_advanced = (
             self.prediction.enabled
             or self.planner.cautious
@@ -96,8 +95,8 @@ class StackSpec(InProcessStack):
         return ADVANCED_BUILDER if is_advanced else REFERENCE_BUILDER
 
     @property
-    def told_truth(self) -> bool:
-        """Whether its localizer is told where the robot truly is."""
+    def gets_ground_truth(self) -> bool:
+        """Whether the localizer receives the true pose."""
         return isinstance(self.localizer, GroundTruth)
 
 

@@ -1,4 +1,4 @@
-"""What the engine and the criteria read of any stack, whoever wrote it."""
+"""Base class of all stack specifications: the parameters that the simulation and the criteria use."""
 
 from typing import Annotated
 
@@ -11,54 +11,54 @@ from simscen.spec.speed_mask import SpeedMask
 
 
 class GoalTolerances(Spec):
-    """How near is near enough for goals that do not say: the stack is told, and criteria judge by it."""
+    """Tolerances of goals that do not have their own, for the stack and for criteria."""
 
     xy_goal_tolerance: PositiveLength = 0.25
-    """How far from the goal the robot may be."""
+    """Distance from the goal within which the goal counts as reached."""
     yaw_goal_tolerance: PositiveAngle = 0.25
-    """How far from the goal's heading its own may be."""
+    """Heading error within which the goal counts as reached."""
 
 
 class SpeedZone(Spec):
-    """A part of the world with a speed limit (nav2_costmap_2d's SpeedFilter)."""
+    """Region with a speed limit (nav2_costmap_2d's SpeedFilter)."""
 
     region: RegionName
-    """A region of the world, by name."""
+    """Name of a region of the world."""
     speed_limit: PositiveSpeed
-    """While the robot believes itself inside."""
+    """Speed limit while the robot's estimated position is in the region."""
 
 
 class StackBase(Spec):
-    """What every stack is given, and what the engine asks of it."""
+    """Parameters of every stack."""
 
     controller_frequency: Frequency = 20.0
-    """How often it is asked for a command."""
+    """Rate at which the stack computes commands."""
     goal_checker: GoalTolerances = by_default()
-    """Its tolerances are those of goals that name none of their own."""
+    """Tolerances of goals that do not have their own."""
     keepout: Annotated[list[RegionName], Field(max_length=100)] = []
     """Regions of the world that the robot must not enter (nav2_costmap_2d's KeepoutFilter)."""
     speed_zones: Annotated[list[SpeedZone], Field(max_length=100)] = []
     """Regions of the world with a speed limit."""
     keepout_mask: MaskFile | None = None
-    """Map yaml of a filter mask: its occupied cells are lethal to the costmap (nav2_costmap_2d's KeepoutFilter)."""
+    """Map YAML file of a filter mask whose occupied cells are lethal in the costmap (nav2_costmap_2d's KeepoutFilter).
+    """
     speed_mask: SpeedMask | None = None
-    """A filter mask of speed limits."""
+    """Filter mask of speed limits."""
 
     @property
-    def told_truth(self) -> bool:
-        """Whether it is also told where it truly is."""
+    def gets_ground_truth(self) -> bool:
+        """Whether the stack receives the true pose."""
         return False
 
 
-# MERGED: What the parameters of all controllers have in common.
 Weight = Annotated[float, Field(ge=0, le=1e7)]
-"""Of a critic, against other critics."""
+"""Weight of a critic relative to other critics."""
 
 
 class ControllerSpec(Typed):
-    """What follows a path."""
+    """Base class of controller specifications."""
 
     @property
-    def looks_ahead(self) -> float:
-        """Seconds for which it follows what it may command: the local costmap reaches so far."""
+    def lookahead_s(self) -> float:
+        """Time horizon of the commands in seconds; the local costmap is large enough for it."""
         return 2.0

@@ -1,4 +1,4 @@
-"""The stacks that a scenario may name: simscen's own, or a process that speaks the stack protocol."""
+"""Specifications of stacks: the stack of a scenario, stack files (`--stack NAME=FILE`), and the user configuration."""
 
 from typing import Annotated, Any
 
@@ -13,33 +13,33 @@ from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration
 
 _TAG = "an external stack"
-"""No key of a stack: problems are told by keys and tags in one path."""
+"""Tag of external stacks in validation errors; not a valid key, so that it can be told from the keys of a stack."""
 StackName = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$")]
 
 
 class ExternalStackSpec(StackBase):
-    """A stack in a process of its own, in any language, in lockstep with the simulation.
+    """Stack in a separate process, in any language, in lockstep with the simulation.
 
-    A scenario only names it. What the name runs is told on the command line (`--stack mine='COMMAND'`) or in the
-    user's own configuration, never in a scenario: a scenario stays data. Each of several robots has a process of
-    its own.
+    A scenario contains only the name. The command that starts the process is given on the command line (`--stack
+    mine='COMMAND'`) or in the user configuration, so that scenarios contain no code. With several robots, each has its
+    own process.
 
     Example: `stack: {external: mine, controller_frequency: 10 Hz}`
     """
 
     external: StackName
-    """What the command line and the user's configuration call it: letters, digits, `_`, `.` and `-`."""
+    """Name of the stack on the command line and in the user configuration: letters, digits, `_`, `.`, and `-`."""
     ground_truth: bool = False
-    """Also tell it where it truly is, to tell faults of localization from faults of navigation."""
+    """Whether to send the true pose to the stack, to separate faults of localization from faults of navigation."""
 
     @property
-    def told_truth(self) -> bool:
-        """Whether it is also told where it truly is."""
+    def gets_ground_truth(self) -> bool:
+        """Whether the stack receives the true pose."""
         return self.ground_truth
 
 
 def _kind(value: Any) -> str:
-    """Which stack a mapping means: an `external` one, or one by its `type`, which is left out for simscen's own."""
+    """Return the tag of the specification of a stack: external, or its `type`."""
     if isinstance(value, dict):
         return _TAG if "external" in value and "type" not in value else str(value.get("type", "reference"))
     return _TAG if isinstance(value, ExternalStackSpec) else str(getattr(value, "type", "reference"))
@@ -53,63 +53,66 @@ AnyStack = Annotated[InProcessStack | ExternalStackSpec, ExtensibleUnion("stack"
 
 # MERGED: The parameters of a stack, without a scenario around them.
 class StackFileSpec(Spec):
-    """A stack that `--stack NAME=FILE` runs scenarios with: a `stack:` section as a scenario has it.
+    """Stack for `--stack NAME=FILE`, with the same `stack` section as a scenario.
 
-    It is the whole stack: what it does not say is at its default, whatever the scenarios say. Only what is asked of any
-    stack is the scenario's, in its own `stack:` section: keepout regions, speed zones, filter masks, and tolerances of
-    goals where it gives them.
+    Parameters that it does not set have their default values, whatever the scenarios say. Only parameters that every
+    stack has come from the scenario: keepout regions, speed zones, filter masks, and goal tolerances if the scenario
+    sets them.
     """
 
     simscen: LanguageVersion
-    """Version of this language."""
+    """Version of the scenario language."""
     name: Name | None = None
-    """For people."""
+    """Name for people."""
     description: Annotated[str, Field(max_length=10_000)] = ""
-    """What is special about it."""
+    """Description for people."""
     stack: AnyStack
-    """The stack's parameters, as in a scenario."""
+    """Parameters of the stack, as in a scenario."""
 
 
 # MERGED: What a user says once for all sessions on their machine.
-def _words(text: str) -> str:
+def _check_command(text: str) -> str:
     split_command(text)
     return text
 
 
-def _rooted(folder: str) -> str:
+def _check_absolute(folder: str) -> str:
     if not folder.startswith(("/", "~")):
-        raise ValueError("expected an absolute folder, or one below `~`: this file is for all sessions, wherever")
+        raise ValueError(
+            "expected an absolute folder or one below `~`, since this file applies to all working directories"
+        )
     return folder
 
 
-CommandLine = Annotated[str, StringConstraints(min_length=1, max_length=4096), AfterValidator(_words)]
-Folder = Annotated[str, StringConstraints(min_length=1, max_length=4096), AfterValidator(_rooted)]
+CommandLine = Annotated[str, StringConstraints(min_length=1, max_length=4096), AfterValidator(_check_command)]
+Folder = Annotated[str, StringConstraints(min_length=1, max_length=4096), AfterValidator(_check_absolute)]
 Variable = Annotated[str, StringConstraints(max_length=200, pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 Content = Annotated[str, StringConstraints(max_length=32_768, pattern=r"^[^\x00]*$")]
 
 
 class StackCommandSpec(Spec):
-    """What the name of an external stack runs.
+    """Command that starts an external stack.
 
     Example: `stacks: {mine: {command: python3 -m my_nav --port auto, cwd: ~/my_nav}}`
     """
 
     command: CommandLine
-    """The program and its arguments as in a shell, but with nothing replaced: quotes count, `$HOME` and `*` do not."""
+    """Program and its arguments. Quotes work as in a shell; variables such as `$HOME` and patterns such as `*` do not.
+    """
     env: dict[Variable, Content] = {}
-    """Variables that it gets besides those, or in place of those, that simscen was called with."""
+    """Environment variables to add or replace."""
     cwd: Folder | None = None
-    """The folder it starts in, absolute or below `~`; default: where simscen is called."""
+    """Working directory, absolute or below `~`; default: the directory in which simscen runs."""
     start_limit: Annotated[PositiveDuration, Field(le=3600)] = START_TIMEOUT_S
-    """Wall time until it has said what it wants to hear."""
+    """Maximum wall-clock time until the stack is ready."""
     answer_limit: Annotated[PositiveDuration, Field(le=3600)] = ANSWER_TIMEOUT_S
-    """Wall time for each answer after that."""
+    """Maximum wall-clock time of each later answer."""
 
 
 class UserConfigSpec(Spec):
-    """The user's own configuration, `$XDG_CONFIG_HOME/simscen/config.yaml` (`~/.config/simscen/config.yaml`)."""
+    """Configuration of the user, `$XDG_CONFIG_HOME/simscen/config.yaml` (`~/.config/simscen/config.yaml`)."""
 
     simscen: LanguageVersion = 1
-    """Version of this language."""
+    """Version of the scenario language."""
     stacks: Annotated[dict[StackName, StackCommandSpec], Field(max_length=100)] = {}
-    """What the names of external stacks run, unless `--stack` says so on the command line."""
+    """Commands of external stacks by name; `--stack` on the command line takes precedence."""

@@ -1,4 +1,4 @@
-"""One scenario said once and run for many values: `variations:`."""
+"""Specification of variations: one scenario with many values (`variations:`)."""
 
 from typing import Annotated, Any, Literal
 
@@ -8,61 +8,61 @@ from simscen.spec.base import Spec, Value
 from simscen.spec.choice import Choice
 from simscen.spec.quantities import AnyAmount
 
-MOST = 1000
-"""Variations of one scenario."""
+MAX_VARIATIONS = 1000
+"""Maximum number of variations of a scenario."""
 
 ValuePath = Annotated[str, StringConstraints(min_length=1, max_length=500)]
-"""Where a value of the scenario stands: `robot.pose.x`, `goals[0].pose`, `goals.shelf.pose`."""
-Values = Annotated[list[Any], Field(min_length=1, max_length=MOST)]
+"""Path of a value in the scenario: `robot.pose.x`, `goals[0].pose`, `goals.shelf.pose`."""
+Values = Annotated[list[Any], Field(min_length=1, max_length=MAX_VARIATIONS)]
 Interval = Annotated[tuple[AnyAmount, AnyAmount], Field(strict=False)]
 
 
 class Normal(Spec):
-    """Values around a mean, as tolerances and noise are spread.
+    """Normal distribution, optionally truncated.
 
     Example: `normal: {mean: 0.5 m/s, std: 5 cm/s, min: 0.3 m/s}`
     """
 
     mean: AnyAmount
-    """The middle."""
+    """Mean."""
     std: AnyAmount
-    """The standard deviation."""
+    """Standard deviation."""
     min: AnyAmount | None = None
-    """Nothing below this is drawn; the shape above stays as it is."""
+    """Smallest value; truncation does not change the shape of the distribution above it."""
     max: AnyAmount | None = None
-    """Nothing above this is drawn."""
+    """Largest value."""
 
 
 class Uniform(Value[Interval]):
-    """Any value between two, each as likely as the other.
+    """Uniform distribution between two values.
 
     Example: `uniform: [0.5 m, 1.5 m]`
     """
 
 
 class LogUniform(Value[Interval]):
-    """Any value between two, each order of magnitude as likely as the other.
+    """Log-uniform distribution between two values: each order of magnitude is equally likely.
 
     Example: `log_uniform: [1 mm, 1 m]`
     """
 
 
 class Integer(Value[Annotated[tuple[int, int], Field(strict=False)]]):
-    """A whole number from the first to the last, both included.
+    """Uniform distribution of whole numbers, including both limits.
 
     Example: `integer: [1, 6]`
     """
 
 
 class OneOf(Value[Values]):
-    """One of these, each as likely as the other.
+    """Random choice of one of several values with equal probability.
 
     Example: `choice: [turtlebot, amr]`
     """
 
 
 class Draw(Choice):
-    """How a value is drawn."""
+    """Distribution of a random value."""
 
     uniform: Uniform | None = None
     log_uniform: LogUniform | None = None
@@ -72,39 +72,40 @@ class Draw(Choice):
 
 
 class Sampled(Spec):
-    """Values that are drawn, the same ones every time.
+    """Reproducible random values.
 
-    The k-th value of a path depends on the seed, the path and k alone: more of them, or another path, change none that
-    were there. Numbers are rounded to six digits.
+    The k-th value of a path depends only on the seed, the path, and k: a larger count or more paths do not change
+    existing values. Numbers are rounded to six digits.
     """
 
-    count: Annotated[int, Field(ge=1, le=MOST)]
-    """How many variations."""
+    count: Annotated[int, Field(ge=1, le=MAX_VARIATIONS)]
+    """Number of variations."""
     seed: Annotated[int, Field(ge=1, le=2**32 - 1)] = 1
-    """Of these draws alone; the runs keep the scenario's."""
+    """Seed of these values; the runs keep the seed of the scenario."""
     method: Literal["random", "latin_hypercube"] = "random"
-    """`latin_hypercube` spreads each path's values evenly over its range; another `count` then changes all of them."""
+    """`latin_hypercube` spreads the values of each path evenly over its range; another `count` then changes all of
+    them."""
     values: Annotated[dict[ValuePath, Draw], Field(min_length=1, max_length=50)]
-    """How the value of each path is drawn."""
+    """Distribution of the value of each path."""
 
 
 class VariationBlock(Spec):
-    """Values to run a scenario with, by their paths.
+    """Values of a scenario by path.
 
-    Several of these kinds side by side are combined, each of one with each of the others.
+    If several of the fields are given, each variation of one field is combined with each variation of the others.
     """
 
     grid: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
-    """Every combination of the values of each path."""
+    """All combinations of the values of each path."""
     pairs: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
-    """The first values of all paths together, then the second ones, and so on: lists of the same length."""
-    list_: Annotated[list[dict[str, Any]] | None, Field(min_length=1, max_length=MOST, alias="list")] = None
-    """Each variation as a mapping from paths to values, with a `name` if you like."""
+    """The first values of all paths together, then the second ones, and so on; all lists must have the same length."""
+    list_: Annotated[list[dict[str, Any]] | None, Field(min_length=1, max_length=MAX_VARIATIONS, alias="list")] = None
+    """Each variation as a mapping of paths to values, with an optional `name`."""
     sampled: Sampled | None = None
-    """Values that are drawn from ranges."""
+    """Random values."""
 
     @model_validator(mode="after")
-    def _something(self) -> "VariationBlock":
+    def _check_not_empty(self) -> "VariationBlock":
         if self.grid is None and self.pairs is None and self.list_ is None and self.sampled is None:
             raise ValueError("expected one of: grid, pairs, list, sampled")
         return self
@@ -119,18 +120,18 @@ class Variations(
         ]
     ]
 ):
-    """Values to run the scenario with, each a run of its own; a list of such blocks is run one after the other.
+    """Values by path; each combination is a separate run. A list of blocks runs one block after the other.
 
-    `[]` is none, whatever a file that is extended has.
+    `[]` removes the variations that a file inherits.
     """
 
     @property
     def blocks(self) -> list[VariationBlock]:
-        """One after the other."""
+        """Blocks in order."""
         return self.root if isinstance(self.root, list) else [self.root]
 
 
-class VariedSpec(Spec):
-    """What a scenario says of its variations, apart from all else."""
+class VariationsSection(Spec):
+    """The `variations` of a scenario without its other keys."""
 
     variations: Variations

@@ -1,4 +1,4 @@
-"""A world as a user writes it (`*.world.yaml`)."""
+"""Specification of worlds (`*.world.yaml`)."""
 
 from typing import Annotated, Literal
 
@@ -11,132 +11,132 @@ from simscen.spec.quantities import Duration, Friction, Mass, PositiveLength
 
 
 class Wall(Spec):
-    """A wall along a polyline."""
+    """Wall along a polyline."""
 
     name: Name = "wall"
-    """What a collision with it is reported as; default: wall_1, wall_2, …"""
+    """Name in collision reports; default: wall_1, wall_2, …"""
     points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=10_000)]
-    """Corners, [x, y] or places by name, of its center line; repeat the first one at the end to close it."""
+    """Corners of the center line as [x, y] or names of places; repeat the first one at the end to close the wall."""
     thickness: PositiveLength = 0.1
-    """Across the center line."""
+    """Thickness across the center line."""
     height: PositiveLength = 1.0
-    """From the ground."""
+    """Height above the ground."""
 
     def called(self, number: int) -> str:
-        """Its name, or `wall_3` for the third wall of a world."""
+        """Return the name, or `wall_3` for the third wall of a world."""
         return self.name if "name" in self.model_fields_set else f"wall_{number}"
 
 
-class Thing(Shaped):
-    """Something that is in the world."""
+class WorldObject(Shaped):
+    """Object in the world."""
 
     name: Name
-    """What a collision with it is reported as."""
+    """Name in collision reports."""
     pose: PlaceOrPose
-    """Where it stands: a pose, or a place by name."""
+    """Pose, or name of a place."""
 
 
-class Obstacle(Thing):
-    """Something that stands in the world and never moves; what is low enough is driven over."""
+class Obstacle(WorldObject):
+    """Object that never moves; robots drive over it if it is low enough."""
 
     friction: Friction = 1.0
-    """Of its surface, where wheels get onto it: a sill, a step, a platform."""
+    """Friction of the surface for wheels on top of it, e.g. on a sill, step, or platform."""
 
 
 class Ramp(Spec):
-    """A wedge that rises from the ground: how steep it is follows from its length and height."""
+    """Wedge that rises from the ground; its slope follows from its length and height."""
 
     name: Name
-    """What a collision with it is reported as."""
+    """Name in collision reports."""
     start: PlaceOrPoint
-    """The middle [x, y] of its foot, where it begins to rise."""
+    """Center [x, y] of the lower edge, where the wedge begins to rise."""
     end: PlaceOrPoint
-    """The middle [x, y] of its upper edge, where it ends upright."""
+    """Center [x, y] of the upper edge, where the wedge ends with a vertical face."""
     width: PositiveLength
-    """Across the way up."""
+    """Width across the direction of the slope."""
     height: PositiveLength
-    """Of its upper edge, above the ground."""
+    """Height of the upper edge above the ground."""
     friction: Friction = 1.0
-    """Of its surface."""
+    """Friction of the surface."""
 
 
 class Travel(Motion):
     """Motion through waypoints at a speed, or along timed keyframes."""
 
     start: Duration = 0.0
-    """When it begins."""
+    """Time at which the motion starts."""
 
 
-class Movable(Thing):
-    """Something that can move: pushed by the robot if it has a mass, or by itself along waypoints."""
+class Movable(WorldObject):
+    """Object that can move: pushed by the robot if it has a mass, or on its own along waypoints."""
 
     mass: Mass = 0.0
-    """In kg; 0 = the robot cannot push it."""
+    """Mass in kg; 0: the robot cannot push the object."""
     move: Travel | None = None
-    """How it moves by itself, whatever its pose where keyframes begin elsewhere."""
+    """Motion of the object. Keyframes may start at another pose than `pose`."""
 
 
 class Door(Spec):
-    """A door: a panel in a doorway that a scenario can open and close. It swings about its hinge, or slides."""
+    """Door that a scenario can open and close: a panel that swings about its hinge, or slides."""
 
     name: Name
-    """What `open` and `close` call it."""
+    """Name for the actions `open` and `close`."""
     points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=2)]
-    """The two door posts, [x, y] or places by name; the hinge is at the first, past which a sliding door goes."""
+    """The two door posts as [x, y] or names of places. A door swings about the first post, and slides past it."""
     motion: Literal["swing", "slide"] = "swing"
-    """`swing`: by 90° anticlockwise about the hinge. `slide`: along its own line, as into a pocket of the wall."""
+    """`swing`: by 90° counterclockwise about the hinge. `slide`: along its own line, as into a pocket of the wall."""
     travel: PositiveLength | None = None
-    """How far it slides; default: as far as it is wide."""
+    """Distance that a sliding door moves; default: its width."""
     closed: bool = False
-    """Whether it is closed at the start."""
+    """Whether the door is closed at the start."""
     thickness: PositiveLength = 0.05
-    """Of the panel."""
+    """Thickness of the panel."""
     height: PositiveLength = 1.0
-    """Of the panel."""
+    """Height of the panel."""
 
     @model_validator(mode="after")
-    def _travel_slides(self) -> "Door":
+    def _check_travel(self) -> "Door":
         if self.travel is not None and self.motion == "swing":
-            raise ValueError("travel is for a door that slides: `motion: slide`")
+            raise ValueError("`travel` is only valid for a sliding door (`motion: slide`)")
         return self
 
 
 class WorldSpec(Spec):
-    """Walls, obstacles, things that move, named places and regions. Meters, in the map frame."""
+    """World: walls, obstacles, movable objects, and named places and regions, in meters in the map frame."""
 
     simscen: LanguageVersion
-    """Version of this language."""
+    """Version of the scenario language."""
     name: Name | None = None
-    """Default: the file's name."""
+    """Name of the world; default: the name of the file."""
     description: Annotated[str, Field(max_length=10_000)] = ""
-    """For people."""
+    """Description for people."""
     map: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
-    """A ROS map (yaml) whose occupied cells become walls `map_height` tall."""
+    """ROS map (yaml) whose occupied cells become walls with the height `map_height`."""
     map_height: PositiveLength = 1.0
     """Height of the walls made from `map`."""
     sdf: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
-    """A Gazebo world to add things to."""
+    """Gazebo world to which the objects are added."""
     walls: Annotated[list[Wall], Field(max_length=2000)] = []
     """Walls along polylines."""
     obstacles: Annotated[list[Obstacle], Field(max_length=10_000)] = []
-    """What stands and never moves."""
+    """Objects that never move."""
     objects: Annotated[list[Movable], Field(max_length=200)] = []
-    """What can move, be pushed, or be moved by a scenario."""
+    """Objects that can move, be pushed, or be moved by a scenario."""
     ramps: Annotated[list[Ramp], Field(max_length=200)] = []
-    """What wheels climb: slopes, sills and steps."""
+    """Slopes, sills, and steps that wheels can climb."""
     doors: Annotated[list[Door], Field(max_length=200)] = []
-    """What a scenario can open and close."""
+    """Doors that a scenario can open and close."""
     places: dict[PlaceName, PoseSpec] = {}
     """Named poses for goals and starts."""
     regions: dict[PlaceName, Ring] = {}
-    """Named areas: polygons over their corners, which may not cross themselves."""
+    """Named areas: polygons given by their corners, without self-intersections."""
     friction: dict[PlaceName, Friction] = {}
-    """How slippery the floor is in which region: 1 is dry concrete, 0.3 a wet floor, 0.1 oil or ice."""
+    """Friction coefficient of the floor by region: 1 is dry concrete, 0.3 a wet floor, 0.1 oil or ice."""
 
     @model_validator(mode="after")
-    def _names_differ(self) -> "WorldSpec":
+    def _check_names(self) -> "WorldSpec":
         names = [*(thing.name for thing in self.objects), *(door.name for door in self.doors)]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise ValueError(f"two objects are called `{twice[0]}`")
+            raise ValueError(f"several objects have the name `{twice[0]}`")
         return self

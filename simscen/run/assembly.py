@@ -53,9 +53,7 @@ def assemble(prepared: PreparedScenario, seed: int, printed: Path | None = None)
         tick_rate=clock.rate,
         solver_iterations=spec.physics.solver_iterations,
         clearance_range=prepared.case.clearance_range,
-        has_images=any(
-            sensor.takes_pictures for part in prepared.each.values() for sensor in part.robot.sensors.values()
-        ),
+        has_images=any(sensor.may_render for part in prepared.each.values() for sensor in part.robot.sensors.values()),
     )
     for region, friction in world.friction.items():
         simulation.add_friction_patch(region, Patch(world.regions[region], friction))
@@ -114,7 +112,7 @@ def _agent(
     sensors: tuple[Sensor, ...] = build_sensors(prepared.robot, clock, streams, robot, rays)
     truth_period = clock.period(spec.physics.truth_rate)
     control_period = clock.period(prepared.stack.controller_frequency)
-    if prepared.stack.told_truth:
+    if prepared.stack.gets_ground_truth:
         # Last, because the log takes the first odometry for the robot's own.
         sensors = (*sensors, TruthSensor(robot, control_period))
     senses = SensorSuite(sensors, sensor_latencies(prepared, clock))

@@ -40,8 +40,8 @@ def robot_model(body: RobotBody) -> RobotModel:
 
 def sensor_kinds(prepared: PreparedScenario) -> dict[str, str]:
     """Return the type of readings of each sensor by name, in the order in which they are read."""
-    told = {TRUTH: Odometry.__name__} if prepared.stack.told_truth else {}
-    return {name: sensor.says for name, sensor in prepared.robot.sensors.items()} | told
+    told = {TRUTH: Odometry.__name__} if prepared.stack.gets_ground_truth else {}
+    return {name: sensor.reading_type for name, sensor in prepared.robot.sensors.items()} | told
 
 
 def sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:

@@ -56,7 +56,7 @@ class PluginSensor:
     def __init__(self, kind: str, spec: SensorSpec, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
         self._kind, self._spec = kind, spec
-        self._reading_type: type = getattr(sensor_data, spec.says)
+        self._reading_type: type = getattr(sensor_data, spec.reading_type)
         self._sensor: Any = self._call(lambda: spec.implementation()(spec, setting))
         if not callable(getattr(self._sensor, "read", None)):
             self._fail(f"{type(self._sensor).__name__} has no method `read`")
@@ -65,7 +65,7 @@ class PluginSensor:
         """Return a reading; raises RunError if it is invalid."""
         reading: Reading = self._call(lambda: self._sensor.read(tick))
         if type(reading) is not self._reading_type:
-            self._fail(f"returned {type(reading).__name__}, but its specification declares {self._spec.says}")
+            self._fail(f"returned {type(reading).__name__}, but its specification declares {self._spec.reading_type}")
         if (reading.sensor, reading.tick) != (self.name, tick):
             self._fail(f"returned a reading of `{reading.sensor}` at tick {reading.tick}, but it is tick {tick}")
         for field in fields(reading):

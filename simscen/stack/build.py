@@ -100,7 +100,7 @@ class StackBuilder:
         costmaps = Costmaps(
             spec,
             self.surroundings,
-            controller.full_speed * spec.controller.looks_ahead,
+            controller.full_speed * spec.controller.lookahead_s,
             self.latency["costmap"],
         )
         monitor = CollisionMonitor(spec.collision_monitor, robot, self.surroundings.lidars, self.surroundings.tick_rate)

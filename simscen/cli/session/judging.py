@@ -19,7 +19,7 @@ from simscen.judge.run_result import combine_robots, judge_run
 from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
 from simscen.loading.resolved import criteria_of_text
-from simscen.model.criteria_file import expectation_of
+from simscen.model.criteria_file import expected_failure
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import is_simscen_log
 from simscen.record.foreign.read import ForeignLog, read_foreign_log
@@ -90,7 +90,7 @@ class LogJudge:
         runs = {name: self._of_one(log, one, name) for name, one in read.robots.items()}
         traces = {name: one.trace for name, one in read.robots.items()}
         said = criteria_of_text(read.about.scenario, str(log), read.about.facts)
-        expected = expectation_of(said if self._criteria is None else self._criteria.spec)
+        expected = expected_failure(said if self._criteria is None else self._criteria.spec)
         result = combine_robots({name: run.result for name, run in runs.items()}, traces, expected)
         return replace(next(iter(runs.values())), result=result)
 
@@ -100,7 +100,7 @@ class LogJudge:
         key = about.key
         if self._criteria is None:
             spec = criteria_of_text(about.scenario, str(log), about.facts, robot)
-            expected = expectation_of(spec)
+            expected = expected_failure(spec)
             result = judge_run(key, str(log), spec.pass_, read.trace, case, (), read.coverage, spec.metrics, expected)
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         with _scenario_errors(self._criteria):
@@ -159,7 +159,7 @@ class LogJudge:
     ) -> RunFinished:
         """Judged by the file of criteria."""
         file, spec = str(self._scenario), criteria.spec
-        expected = expectation_of(spec)
+        expected = expected_failure(spec)
         result = judge_run(key, file, spec.pass_, trace, case, criteria.lines, coverage, spec.metrics, expected)
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)
 

@@ -14,7 +14,7 @@ def stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[Finding]:
     """Find pedestrians that are stopped for a while: they have no script that could continue."""
     pedestrians = pedestrian_names(loaded)
     for step in loaded.spec.steps:
-        for keys, action in step.placed():
+        for keys, action in step.located_actions():
             stop: Any = action.chosen
             if action.kind == "stop" and stop.for_ is not None and stop.name in pedestrians:
                 message = f"`{step.name}` can never happen: pedestrian `{stop.name}` does not walk on after a stop"
@@ -26,7 +26,7 @@ def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
     return [
         (step.name, (*keys, action.kind), action.chosen)
         for step in loaded.spec.steps
-        for keys, action in step.placed()
+        for keys, action in step.located_actions()
         if action.kind in ("keepout", "speed_zone") and loaded.concerns(action.robot)
     ]
 
@@ -71,7 +71,7 @@ def pushes_without_effect(loaded: LoadedScenario) -> Iterator[Finding]:
     things = [*(world.objects if world else []), *spawned]
     doors = [door.name for door in world.doors] if world else []
     for step in loaded.spec.steps:
-        for keys, action in step.placed():
+        for keys, action in step.located_actions():
             if action.kind != "push":
                 continue
             push: Any = action.chosen
@@ -90,7 +90,7 @@ def pushes_without_effect(loaded: LoadedScenario) -> Iterator[Finding]:
 @MEANING.check("SC055", severity="warning")
 def doors_already_there(loaded: LoadedScenario) -> Iterator[Finding]:
     """Find doors that are opened or closed although they already are."""
-    done = [placed for step in loaded.spec.steps for placed in step.placed()]
+    done = [placed for step in loaded.spec.steps for placed in step.located_actions()]
     if loaded.world.spec is None or any(action.may() for _, action in done):
         return
     kinds = {(action.kind, getattr(action.chosen, "name", "")) for _, action in done}

@@ -7,7 +7,7 @@ from simscen.loading.checks.events import no_recovery
 from simscen.loading.checks.registry import MEANING, Finding, Keys
 from simscen.loading.known_names import goal_names
 from simscen.loading.loaded import LoadedScenario
-from simscen.model.navigation import failure_of
+from simscen.model.navigation import expected_failure_name
 
 GOAL_CRITERIA = frozenset({"goals_reached", "time_to_goal", "no_false_success", "stuck", "result", "error_code"})
 """Criteria that have nothing to judge if the robot gets no goal."""
@@ -68,7 +68,7 @@ _IMPOSSIBLE = {"result": _result, "recoveries": _recoveries}
 @MEANING.check("SC051")
 def contradicting_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
     """Find pairs of criteria that ask for different results."""
-    failing = any(failure_of(goal.expect) for goal in loaded.spec.goals)
+    failing = any(expected_failure_name(goal.expect) for goal in loaded.spec.goals)
     wanted: dict[str, tuple[str, Keys]] = {}
     for index, entry in enumerate(loaded.spec.pass_):
         if entry.severity != "fail":
@@ -94,7 +94,7 @@ def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[Finding]:
     if spec.on_goal_failure == "continue" or new_goals:
         return
     for index, goal in enumerate(spec.goals):
-        if failure_of(goal.expect) and (spec.navigation.loops > 1 or index + 1 < len(spec.goals)):
+        if expected_failure_name(goal.expect) and (spec.navigation.loops > 1 or index + 1 < len(spec.goals)):
             following = spec.goal_names[(index + 1) % len(spec.goals)]
             message = f"the robot never gets goal `{following}`: it stops after this goal, which is expected to fail"
             yield Finding(("goals", index, "expect"), message, "set `on_goal_failure: continue`")

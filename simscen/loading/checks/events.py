@@ -10,7 +10,7 @@ from simscen.core.messages.goal_names import matches_goal_name
 from simscen.loading.checks.registry import MEANING, Finding, Keys
 from simscen.loading.known_names import own_goal_names
 from simscen.loading.loaded import LoadedScenario
-from simscen.model.disturbances import Step
+from simscen.model.disturbances import SequenceStep
 from simscen.model.stack import StackSpec
 from simscen.triggers.registry import AnyCondition, Trigger
 
@@ -99,7 +99,7 @@ class PossibleRun:
     alive: frozenset[str]
 
     @cached_property
-    def steps(self) -> list[Step]:
+    def steps(self) -> list[SequenceStep]:
         """Return the events and the steps of their stories."""
         return self.loaded.spec.steps
 
@@ -112,11 +112,11 @@ class PossibleRun:
         for index, fault in enumerate(self.loaded.spec.faults):
             yield ("faults", index, "when"), fault.when, fault.label, fault.required
 
-    def is_reached(self, step: Step) -> bool:
+    def is_reached(self, step: SequenceStep) -> bool:
         """Return whether the step before it in its story can happen."""
         return step.after is None or self.steps[step.after].name in self.alive
 
-    def before(self, step: Step) -> frozenset[str]:
+    def before(self, step: SequenceStep) -> frozenset[str]:
         """Return the names of the steps before it in its story."""
         if step.after is None:
             return frozenset()
@@ -216,7 +216,7 @@ class PossibleRun:
 
     def _localization_error(self, error: Any) -> str | None:
         stack = self.loaded.spec.stack
-        gets_truth = isinstance(stack, StackSpec) and stack.told_truth
+        gets_truth = isinstance(stack, StackSpec) and stack.gets_ground_truth
         too_large = getattr(error, "root", error) >= MAX_TRUTH_ERROR_M
         return "the localizer gets the true pose" if gets_truth and too_large else None
 

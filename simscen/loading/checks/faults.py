@@ -35,7 +35,7 @@ def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance
         for name, kind in KIND_BY_INSTANCE.items()
     }
     sensors = {
-        name: Instance(sensor.says, getattr(sensor.chosen, "rate", 0.0), sensor.chosen)
+        name: Instance(sensor.reading_type, getattr(sensor.chosen, "rate", 0.0), sensor.chosen)
         for name, sensor in robot.sensors.items()
     }
     return {**sensors, **{name: other for name, other in others.items() if name not in sensors}}

@@ -59,7 +59,7 @@ def unknown_lidars(scope: NameScope) -> Iterator[Finding]:
     loaded = scope.loaded
     if loaded.robot.spec is None:
         return
-    lidars = [name for name, sensor in loaded.robot.spec.sensors.items() if sensor.says == "Scan"]
+    lidars = [name for name, sensor in loaded.robot.spec.sensors.items() if sensor.reading_type == "Scan"]
     for keys, part in walk(loaded.spec, concerns=loaded.concerns):
         named = getattr(part.scan_age, "sensor", None) if isinstance(part, AnyCondition) else None
         if named is not None and named not in lidars:
@@ -96,7 +96,7 @@ def duplicate_names_of_actions(scope: NameScope) -> Iterator[Finding]:
     loaded = scope.loaded
     happenings = [*event_names(loaded), *(fault.label for fault in loaded.spec.faults)]
     goals = own_goal_names(loaded)
-    for keys, action in (placed for step in loaded.spec.steps for placed in step.placed()):
+    for keys, action in (placed for step in loaded.spec.steps for placed in step.located_actions()):
         name = getattr(action.chosen, "name", "")
         if action.kind == "mark" and name in happenings:
             message = f"an event or a fault is also called {quoted(name)}; criteria could not tell them apart"
@@ -124,7 +124,7 @@ def duplicate_pedestrians(scope: NameScope) -> Iterator[Finding]:
     loaded = scope.loaded
     taken = dict.fromkeys(world_object_names(loaded, scope.world), "an object of the world")
     for step in loaded.spec.steps:
-        for keys, action in step.placed():
+        for keys, action in step.located_actions():
             if action.kind not in ("spawn", "pedestrian", "crowd"):
                 continue
             names = getattr(action.chosen, "names", None) or [getattr(action.chosen, "name", "")]

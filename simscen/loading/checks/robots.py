@@ -38,7 +38,7 @@ def missing_robots(scenario: WrittenScenario) -> Iterator[Finding]:
     hint = f"add {' or '.join(f'`robot: {name}`' for name in sorted(spec.robots))}"
     for step in spec.steps:
         unnamed = [] if step.when is None else list(_tests_without_robot(step.when, (*step.keys, "when"), faults))
-        for keys, action in step.placed():
+        for keys, action in step.located_actions():
             assert isinstance(action.chosen, Action)
             if action.robot is None and action.chosen.is_robot_specific:
                 unnamed.append((keys, action.kind))

@@ -6,7 +6,7 @@ from simscen.core.clock import Clock
 from simscen.loading.checks.registry import NAMES, Finding, Keys, NameScope
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import MappingNode, existing_keys
-from simscen.model.navigation import failure_of
+from simscen.model.navigation import expected_failure_name
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import MAX_GOALS
 
@@ -55,7 +55,7 @@ def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[Finding]:
     for index, goal in enumerate(spec.goals[:-1]):
         for key, used, why in (
             ("on_reached", goal.on_reached.wait, "does not stop"),
-            ("expect", failure_of(goal.expect), "reports no result"),
+            ("expect", expected_failure_name(goal.expect), "reports no result"),
         ):
             if used and key in goal.model_fields_set:
                 message = f"only the last goal of navigate_through_poses can have `{key}`: elsewhere the robot {why}"

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from simscen.loading.checks.registry import WORLD_FILE, Finding, Keys
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
-from simscen.model.world import Thing, WorldSpec
+from simscen.model.world import WorldObject, WorldSpec
 
 
 def _spec(world: LoadedWorld) -> WorldSpec:
@@ -57,7 +57,7 @@ def no_extent(world: LoadedWorld) -> Iterator[Finding]:
 def duplicate_shapes(world: LoadedWorld) -> Iterator[Finding]:
     """Find the same shape at the same pose under another name."""
     spec = _spec(world)
-    things: list[tuple[Keys, Thing]] = [(("obstacles", k), thing) for k, thing in enumerate(spec.obstacles)]
+    things: list[tuple[Keys, WorldObject]] = [(("obstacles", k), thing) for k, thing in enumerate(spec.obstacles)]
     things += [(("objects", k), thing) for k, thing in enumerate(spec.objects)]
     seen: list[tuple[object, str]] = []
     for keys, thing in things:

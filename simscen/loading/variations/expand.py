@@ -63,10 +63,10 @@ def expand_variations(tree: MappingNode) -> list[Variation] | list[Problem]:
     entry = tree.entries.get(VARIATIONS)
     if entry is None:
         return [Variation("", tree)]
-    from simscen.model.variations import MOST, VariedSpec
+    from simscen.model.variations import MAX_VARIATIONS, VariationsSection
 
     own = MappingNode(tree.place, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
-    said = check(VariedSpec, MappingNode(tree.place, {VARIATIONS: entry}))
+    said = check(VariationsSection, MappingNode(tree.place, {VARIATIONS: entry}))
     if isinstance(said, list):
         return said
     expansion = _Expansion(own)
@@ -75,8 +75,8 @@ def expand_variations(tree: MappingNode) -> list[Variation] | list[Problem]:
     axes = [expansion.axes(block, node) for block, node in zip(blocks, nodes, strict=True)]
     if expansion.problems:
         return expansion.problems
-    if (number := sum(math.prod(map(len, block)) for block in axes)) > MOST:
-        message = f"the scenario has {number} variations; the limit is {MOST}"
+    if (number := sum(math.prod(map(len, block)) for block in axes)) > MAX_VARIATIONS:
+        message = f"the scenario has {number} variations; the limit is {MAX_VARIATIONS}"
         return [Problem(*entry.value.place, "SC017", message, "use `sampled` to draw some of them")]
     values = _size(own) + max((sum(max(map(_weight, axis)) for axis in block) for block in axes), default=0)
     if number * values > MAX_TOTAL_VALUES:

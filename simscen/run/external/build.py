@@ -63,7 +63,7 @@ def with_external_reference(prepared: PreparedScenario) -> PreparedScenario:
     tolerances = {name: getattr(stack.goal_checker, name) for name in GoalTolerances.model_fields}
     shared = {name: getattr(stack, name) for name in StackBase.model_fields if name != "goal_checker"}
     external = ExternalStackSpec(
-        external="reference", ground_truth=stack.told_truth, goal_checker=GoalTolerances(**tolerances), **shared
+        external="reference", ground_truth=stack.gets_ground_truth, goal_checker=GoalTolerances(**tolerances), **shared
     )
     runs = ExternalCommand(argv, clean_environment(), str(Path.cwd()))
     return replace(prepared, stack=external, loaded=replace(prepared.loaded, runs=runs))

@@ -45,7 +45,7 @@ class FaultContexts:
             separation=getattr(self._robot.drive, "wheel_separation", 0.0),
             clock=self._clock,
             now=self._now,
-            kind=sensor.says if sensor is not None else KIND_BY_INSTANCE[entry.sensor],
+            kind=sensor.reading_type if sensor is not None else KIND_BY_INSTANCE[entry.sensor],
             sight=None if sensor is None else self._sight(entry.sensor, sensor.chosen),
         )
 

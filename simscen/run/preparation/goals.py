@@ -7,7 +7,7 @@ from dataclasses import replace
 from simscen.actions.robot import NewGoal
 from simscen.core.messages.goal_names import loop_goal_name
 from simscen.core.messages.navigation import Goal
-from simscen.model.navigation import failure_of
+from simscen.model.navigation import expected_failure_name
 from simscen.model.scenario import GoalEntry, ScenarioSpec
 from simscen.model.stack_base import StackBase
 
@@ -31,7 +31,7 @@ def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, 
     found = {}
     for number, goal in enumerate(goals):
         entry = spec.goals[-1] if through else spec.goals[number % len(spec.goals)]
-        if failure := failure_of(entry.expect):
+        if failure := expected_failure_name(entry.expect):
             found[goal.name] = failure
     return found
 
@@ -44,7 +44,7 @@ def event_goals(spec: ScenarioSpec, concerns: Callable[[str | None], bool]) -> d
     """Return the goals that events send to the robot selected by `concerns`, by their path in the scenario file."""
     checker = spec.stack.goal_checker
     found: dict[tuple[str | int, ...], Goal] = {}
-    for keys, action in (placed for step in spec.steps for placed in step.placed()):
+    for keys, action in (placed for step in spec.steps for placed in step.located_actions()):
         if isinstance(sent := action.chosen, NewGoal) and concerns(action.robot):
             where = (*keys, "new_goal")
             found[where] = Goal(

@@ -75,7 +75,7 @@ def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
 
 
 def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
-    entry = loaded.spec.own
+    entry = loaded.spec.only_robot
     if entry.payload is None and entry.motor_torque == 1.0:
         return body
     from simscen.sim.body.robot_body import add_payload, center_of_mass, hull_height, is_stable, scale_motor_torque

@@ -19,7 +19,7 @@ from simscen.loading.plugins import plugins_of
 from simscen.loading.resolved import disturbances_of
 from simscen.model.localizers import OdometryOnly
 from simscen.model.robot import RobotSpec
-from simscen.model.scenario import ScenarioSpec, estimate_of
+from simscen.model.scenario import ScenarioSpec, initial_estimate
 from simscen.model.stack import StackSpec
 from simscen.model.stack_files import AnyStack
 from simscen.run.preparation.filter_masks import load_criterion_masks, load_masks
@@ -116,7 +116,7 @@ def _prepared(loaded: LoadedScenario, world_of: BuildWorld, legs: FindLegs) -> P
     world = built.world
     standing = blocking_solids(world.solids, body)
     obstacles = built.mesh if standing is world.solids else fuse(standing)
-    start = spec.own.pose.pose
+    start = spec.only_robot.pose.pose
     goals = scenario_goals(spec)
     case = Case(
         start=start,
@@ -140,7 +140,7 @@ def _prepared(loaded: LoadedScenario, world_of: BuildWorld, legs: FindLegs) -> P
         body=body,
         stack=effective_stack(spec),
         start=start,
-        estimate=estimate_of(spec.own, start),
+        estimate=initial_estimate(spec.only_robot, start),
         case=with_shortest_paths(case, built, obstacles, legs),
         obstacles=obstacles,
         plugins=plugins_of(loaded),

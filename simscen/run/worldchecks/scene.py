@@ -19,7 +19,7 @@ from simscen.criteria.result import ErrorCodeIs, Result
 from simscen.loading.checks.registry import Keys, Stage
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import MappingNode
-from simscen.model.navigation import failure_of
+from simscen.model.navigation import expected_failure_name
 from simscen.model.scenario import ScenarioSpec
 from simscen.run.caching.world_cache import WorldCache
 from simscen.run.preparation.goals import event_goals, scenario_goals
@@ -101,7 +101,7 @@ class Scene:
     @cached_property
     def start(self) -> Pose2:
         """The true start pose of the robot."""
-        return self.loaded.spec.own.pose.pose
+        return self.loaded.spec.only_robot.pose.pose
 
     @property
     def start_poses(self) -> list[Pose2]:
@@ -159,7 +159,7 @@ class Scene:
     @cached_property
     def actions(self) -> list[tuple[Keys, str, BaseModel]]:
         """Keys, kind and specification of every action of every event."""
-        placed = [found for step in self.loaded.spec.steps for found in step.placed()]
+        placed = [found for step in self.loaded.spec.steps for found in step.located_actions()]
         mine = [(keys, action) for keys, action in placed if self.loaded.concerns(action.robot)]
         return [((*keys, action.kind), action.kind, action.chosen) for keys, action in mine]
 
@@ -210,7 +210,7 @@ def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
     """
     through = spec.navigation.mode == "navigate_through_poses"
     entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
-    if any(matches_goal_name(goal, name) and failure_of(entry.expect) for name, entry in entries):
+    if any(matches_goal_name(goal, name) and expected_failure_name(entry.expect) for name, entry in entries):
         return True
     results = [entry.chosen for entry in spec.pass_ if entry.severity == "fail"]
     failing = any(isinstance(result, Result) and result.status == "FAILED" for result in results)

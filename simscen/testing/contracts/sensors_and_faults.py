@@ -186,9 +186,9 @@ class SensorContract(Contract):
         sensor, view, period = self.built()
         require(sensor.name == NAME, f"is called {sensor.name!r}, not {NAME!r}")
         require(sensor.period == period, f"has a period of {sensor.period!r} ticks, not {period}")
-        kind = getattr(sensor_data, self.spec.says)
+        kind = getattr(sensor_data, self.spec.reading_type)
         for k, reading in enumerate(self.measured(sensor, view, period), start=1):
-            require(type(reading) is kind, f"says {type(reading).__name__}, not {self.spec.says}")
+            require(type(reading) is kind, f"returns {type(reading).__name__}, not {self.spec.reading_type}")
             signed = (reading.sensor, reading.tick)
             require(signed == (NAME, k * period), f"signs a reading of tick {k * period} as {signed}")
 

@@ -73,7 +73,7 @@ def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
     assert len(weak.drives) == len(medium.drives) == len(strong.drives) == len(FAULTS)
     for a, b in list(zip(weak.drives, strong.drives, strict=True))[::3]:
         before, after = (load_scenario(drive.file, weak.root, weak.world_path).spec for drive in (a, b))
-        assert before.own.pose == after.own.pose and before.goals == after.goals
+        assert before.only_robot.pose == after.only_robot.pose and before.goals == after.goals
         assert before.faults != after.faults
         assert a.world == file.name  # its interval is over buildings, not over faults in one
 

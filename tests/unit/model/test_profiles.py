@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.model.localizers import GroundTruth
-from simscen.model.profiles import NAV2, over, with_profile
+from simscen.model.profiles import NAV2, apply_profile, merge_parameters
 from simscen.model.stack import ADVANCED_BUILDER, REFERENCE_BUILDER, StackSpec
 
 NAV2_PARAMS = {
@@ -67,7 +67,7 @@ def test_a_specification_that_is_made_already_stays_as_it_is() -> None:
 
 
 def test_without_a_profile_nothing_changes() -> None:
-    assert with_profile({"controller": {"type": "dwb"}}) == {"controller": {"type": "dwb"}}
+    assert apply_profile({"controller": {"type": "dwb"}}) == {"controller": {"type": "dwb"}}
     assert StackSpec(profile="reference") == StackSpec()
 
 
@@ -92,7 +92,7 @@ def test_advanced_chooses_the_advanced_components() -> None:
 
 
 def test_mappings_are_merged_to_their_ends() -> None:
-    assert over({"a": {"b": 1, "c": {"d": 2}}, "e": 3}, {"a": {"c": {"d": 4}}, "e": {"f": 5}}) == {
+    assert merge_parameters({"a": {"b": 1, "c": {"d": 2}}, "e": 3}, {"a": {"c": {"d": 4}}, "e": {"f": 5}}) == {
         "a": {"b": 1, "c": {"d": 4}},
         "e": {"f": 5},
     }

@@ -89,7 +89,7 @@ def test_no_latency_at_all_is_bit_identical_to_none_said(tmp_path: Path, said: s
 
 
 def test_a_latency_of_a_sensor_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="`latency` names `sonar`, which is none of its sensors"):
+    with pytest.raises(InvalidInput, match="`latency` names `sonar`, which is not a sensor of the robot"):
         moments(tmp_path, 1, latency="latency: {sensors: {sonar: 1 ms}}")
 
 

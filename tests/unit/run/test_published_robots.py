@@ -181,7 +181,7 @@ def test_an_argument_may_be_declared_where_nothing_is_expanded(published):
 def test_arguments_mean_nothing_without_a_urdf():
     spec = {"simscen": 1, "name": "x", "mass": 1.0, "body": [{"box": [0.1, 0.1, 0.1], "z": 0.1}], "sensors": {}}
     limits = {"linear": 1, "angular": 1, "linear_acceleration": 1, "angular_acceleration": 1}
-    with pytest.raises(ValidationError, match="`packages` and `arguments` are for a `urdf`"):
+    with pytest.raises(ValidationError, match="`packages` and `arguments` are only valid with `urdf`"):
         RobotSpec.model_validate(
             {**spec, "drive": {"type": "omnidirectional"}, "limits": limits, "arguments": {"a": 1}}
         )

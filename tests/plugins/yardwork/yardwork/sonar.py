@@ -14,7 +14,7 @@ class Sonar(SensorSpec):
     """
 
     component: ClassVar[str] = "yardwork.sonar_ring:SonarRing"
-    says: ClassVar[str] = "Scan"
+    reading_type: ClassVar[str] = "Scan"
 
     rate: Frequency = 20.0
     sensors: Annotated[int, Field(ge=1, le=64)] = 8
