@@ -7,7 +7,7 @@ import numpy as np
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.core.stage import Situation
-from simscen.model.disturbances import FaultEntry, Step
+from simscen.model.disturbances import FaultEntry, SequenceStep
 from simscen.run.faults.injector import FaultInjector
 from simscen.run.live_world.random_streams import stream_names
 from simscen.run.live_world.stage import LiveStage
@@ -21,7 +21,12 @@ class Director:
     """Evaluates all triggers at each beat: first of events, then of faults, each in the order of the scenario."""
 
     def __init__(
-        self, steps: list[Step], faults: list[FaultEntry], streams: Streams, stage: LiveStage, rig: FaultInjector
+        self,
+        steps: list[SequenceStep],
+        faults: list[FaultEntry],
+        streams: Streams,
+        stage: LiveStage,
+        rig: FaultInjector,
     ) -> None:
         self._stage, self._rig, self._faults = stage, rig, faults
         self._steps = [
@@ -53,7 +58,7 @@ class Director:
             if not firing.spent and firing.fires(self._stage) and index not in self._ends:
                 self._begin_fault(index)
 
-    def _perform(self, number: int, step: Step) -> None:
+    def _perform(self, number: int, step: SequenceStep) -> None:
         kinds: list[Value] = [action.kind for action in step.actions]
         self._stage.tell(Event(0, EventKind.EVENT_STARTED, step.name, {"entry": number, "actions": kinds}))
         effects = [action.perform(self._stage) for action in step.actions]
