@@ -25,6 +25,10 @@ class SensorView(Protocol):
         """Return the linear (m/s) and angular (rad/s) velocity of the base frame along the world axes."""
         ...
 
+    def placements(self) -> int:
+        """Return how many times the robot was placed elsewhere (`kidnap`), which no sensor measures as motion."""
+        ...
+
     def encoders(self) -> tuple[float, ...]:
         """Return the accumulated rotation of the wheels.
 

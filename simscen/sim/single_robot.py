@@ -64,6 +64,10 @@ class SingleRobotSimulation(Simulation):
         """Return the velocity in the base frame."""
         return self.robot.base_twist()
 
+    def placements(self) -> int:
+        """Return how many times the robot was placed elsewhere."""
+        return self.robot.placements()
+
     def encoders(self) -> tuple[float, ...]:
         """Return the accumulated rotation of the wheels."""
         return self.robot.encoders()

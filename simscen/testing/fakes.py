@@ -158,6 +158,10 @@ class FakeSensorView:
         yaw = ANGULAR_SPEED * self.seconds
         return (LINEAR_SPEED * math.cos(yaw), LINEAR_SPEED * math.sin(yaw), 0.0), (0.0, 0.0, ANGULAR_SPEED)
 
+    def placements(self) -> int:
+        """Return 0: the robot is never placed elsewhere."""
+        return 0
+
     def encoders(self) -> tuple[float, ...]:
         """Radians of the left and the right wheel."""
         half = DRIVE.wheel_separation / 2

@@ -90,7 +90,14 @@ class CollisionTracker:
         self._end_collisions(tick)
 
     def _end_collisions(self, tick: int) -> None:
-        for name in sorted(name for name, one in self._ongoing.items() if tick - one.last_tick >= self._end_delay):
+        self._end(tick, sorted(name for name, one in self._ongoing.items() if tick - one.last_tick >= self._end_delay))
+
+    def end_all(self, tick: int) -> None:
+        """End all collisions, because the robot is placed elsewhere at `tick`."""
+        self._end(tick, sorted(self._ongoing))
+
+    def _end(self, tick: int, names: list[str]) -> None:
+        for name in names:
             ended = self._ongoing.pop(name)
             data = {"impulse": ended.impulse, "ticks": ended.last_tick - ended.first_tick + 1}
             self._events.append(Event(tick, EventKind.COLLISION_ENDED, name, data))

@@ -140,6 +140,7 @@ class Robot:
         """All movable bodies by name; the same object until one is added or removed."""
         self.body = Body(name, body.solid, Pose3.planar(pose), body.mass)
         self._collisions = CollisionTracker(scene.tick_rate)
+        self._placements, self._placed_tick = 0, -1
         is_uneven = bool(scene.terrain and self.base.ground_links)
         self.clearance = Clearance(
             scene.client,
@@ -235,9 +236,14 @@ class Robot:
         """Return the accumulated rotation of the wheels; see `SensorView.encoders`."""
         return self._drive.encoders()
 
+    def placements(self) -> int:
+        """Return how many times the robot was placed elsewhere."""
+        return self._placements
+
     def touching(self) -> bool:
         """Return whether the hull touches anything besides the ground."""
-        return self._collisions.is_colliding
+        tick = self._scene.tick
+        return self._collisions.is_colliding or (tick == self._placed_tick and self.clearance.measure(tick) <= 0.0)
 
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
@@ -250,7 +256,9 @@ class Robot:
         return render_image(self._scene.client, self.base_pose().compose(mount), width, height, field_of_view, far)
 
     def place(self, pose: Pose2) -> None:
-        """Place the robot somewhere else at rest."""
+        """Place the robot somewhere else at rest, which ends its collisions."""
+        self._collisions.end_all(self._scene.tick)
+        self._placements, self._placed_tick = self._placements + 1, self._scene.tick
         self.set_pose(pose)
         self._scene.after_change()
 

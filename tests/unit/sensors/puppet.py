@@ -18,12 +18,16 @@ class Puppet:
     angular: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rolled: tuple[float, ...] = (0.0, 0.0)
     pressed: bool = False
+    placed: int = 0
 
     def base_pose(self):
         return self.pose
 
     def base_velocity(self):
         return self.linear, self.angular
+
+    def placements(self):
+        return self.placed
 
     def encoders(self):
         return self.rolled

@@ -54,10 +54,11 @@ def test_noise_is_new_each_time_and_the_bias_stays():
     assert np.std(biases) == pytest.approx(0.5, rel=0.12)
 
 
-def test_being_placed_elsewhere_is_no_acceleration():
+@pytest.mark.parametrize("pose", [Pose3.from_rpy(3, 1, 0, 0, 0, 2), Pose3.from_rpy(0.01, 0, 0, 0, 0, 2), Pose3()])
+def test_being_placed_elsewhere_is_no_acceleration(pose):
     view = Puppet(linear=(0.4, 0.0, 0.0))
     sensor = imu(view, **EXACT)
-    view.pose, view.linear = Pose3.from_rpy(3, 1, 0, 0, 0, 2), (0.0, 0.0, 0.0)
+    view.pose, view.linear, view.placed = pose, (0.0, 0.0, 0.0), 1
     assert sensor.read(4).linear_acceleration == pytest.approx((0.0, 0.0, 9.81))
     view.linear = (0.02, 0.0, 0.0)
     assert math.hypot(*sensor.read(8).linear_acceleration[:2]) == pytest.approx(1.2)

@@ -7,7 +7,9 @@ import pytest
 from playground import box
 
 from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, MotionPath
+from simscen.core.records.events import EventKind
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
 
@@ -103,3 +105,17 @@ def test_a_force_on_the_robot_adds_up_to_its_impulse_evenly_and_ends(simulate):
         simulation.step(12)
         speeds.append(simulation.base_velocity()[0][0])
     assert speeds == pytest.approx([0.25, 0.5, 0.5], rel=0.03)
+
+
+def test_a_robot_that_is_placed_elsewhere_touches_only_what_is_there(simulate):
+    simulation = simulate(bodies=[crate(0.5, mass=0.0)])
+    simulation.drive(Twist(0.5, 0.0, 0.0))
+    simulation.step(240)
+    assert simulation.touching()
+    simulation.place_robot(Pose2(-3.0, 0.0))
+    assert not simulation.touching()
+    assert simulation.truth().clearance > 1.0
+    assert [event.kind for event in simulation.collisions()] == [EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED]
+    simulation.place_robot(Pose2(0.5, 0.0))
+    assert simulation.touching()
+    assert simulation.truth().clearance <= 0.0
