@@ -35,7 +35,7 @@ def apply_correction(belief: Belief, map_from_odom: Pose2) -> Belief:
 def change_distances(reading: Reading, change: Callable[[Array], Array]) -> Reading:
     """Return the reading with changed ranges or depths; beams and pixels without a hit keep their value.
 
-    A lidar reports inf for ranges beyond its maximum and nan for ranges below its minimum.
+    A lidar reports inf for ranges beyond its maximum and -inf for ranges below its minimum (REP 117).
     """
     match reading:
         case Scan(ranges=ranges):
@@ -52,10 +52,10 @@ def _change_finite(distances: Array, change: Callable[[Array], Array]) -> Array:
 
 
 def clip_to_sensor_range(scan: Scan, ranges: Array) -> Array:
-    """Return the ranges as the lidar reports them: inf beyond its maximum, nan below its minimum."""
+    """Return the ranges as the lidar reports them: inf beyond its maximum, -inf below its minimum (REP 117)."""
     with np.errstate(invalid="ignore"):
         ranges = np.where(ranges > scan.range_max, np.inf, ranges)
-        return np.where(ranges < scan.range_min, np.nan, ranges)
+        return np.where(ranges < scan.range_min, -np.inf, ranges)
 
 
 def ranges_with_scan_errors(scan: Scan, distances: Array, nominal: Array) -> Array:

@@ -28,7 +28,7 @@ class Pose2D(NamedTuple):
 class LaserScan(NamedTuple):
     """sensor_msgs/msg/LaserScan: beam k points at `angle_min + k * angle_increment`.
 
-    A range is inf where nothing was hit, nan where the beam gave no answer.
+    By REP 117, a range is inf if nothing was hit, -inf if a hit was too close, and nan if the measurement is invalid.
     """
 
     stamp: Stamp

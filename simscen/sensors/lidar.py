@@ -36,7 +36,7 @@ class LidarSensor:
         self._noise_buffer, self._next = np.empty((0, spec.beams)), 0
 
     def read(self, tick: int) -> Scan:
-        """Return a scan; inf: no hit within range, nan: a hit below the minimum range."""
+        """Return a scan; inf: no hit within range, -inf: a hit below the minimum range (REP 117)."""
         pose = self._view.base_pose()
         px, py, pz, i, j, k, w = pose
         x, y, z = rotated((i, j, k, w), self._origin)
@@ -57,7 +57,7 @@ class LidarSensor:
         if farthest > spec.max_range:
             ranges[ranges > spec.max_range] = np.inf
         if nearest < spec.min_range:
-            ranges[ranges < spec.min_range] = np.nan
+            ranges[ranges < spec.min_range] = -np.inf
         return ranges
 
     def _draw_noise(self) -> Array:

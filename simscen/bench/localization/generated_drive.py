@@ -238,5 +238,5 @@ def measured(distances: Array, spec: Lidar, chance: np.random.Generator) -> Arra
         np.round((distances + chance.normal(0, spec.noise, distances.shape)) / spec.resolution) * spec.resolution
     )
     ranges[ranges > spec.max_range] = np.inf
-    ranges[ranges < spec.min_range] = np.nan
+    ranges[ranges < spec.min_range] = -np.inf
     return ranges

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 class Scan:
     """Planar lidar scan.
 
-    `ranges` (n,) are in m; inf if nothing was hit up to `range_max`, nan if the beam returned nothing. Beam k points at
-    `angle_min + k * angle_increment` in the lidar frame, which is at `mount` in the base frame of the robot.
+    `ranges` (n,) are in m; by REP 117, inf if nothing was hit up to `range_max`, -inf if a hit is closer than
+    `range_min`, and nan if a beam gave no valid measurement. Beam k points at `angle_min + k * angle_increment` in the
+    lidar frame, which is at `mount` in the base frame of the robot.
     """
 
     sensor: str

@@ -34,7 +34,7 @@ def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, Scenario
     sent = {
         action.chosen.name: _line(tree, *keys)
         for step in spec.steps
-        for keys, action in step.placed()
+        for keys, action in step.located_actions()
         if action.kind == "new_goal" and hasattr(action.chosen, "name")
     }
     return SourceLines(

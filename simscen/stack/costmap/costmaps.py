@@ -3,8 +3,6 @@
 import math
 from dataclasses import replace
 
-import numpy as np
-
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Image, Scan
@@ -136,9 +134,9 @@ class _Rhythm:
 
 
 def _blind(scan: Scan) -> bool:
-    """Whether no beam says anything."""
-    ranges = scan.ranges
-    return not len(ranges) or bool(math.isnan(ranges.item(0)) and np.isnan(ranges).all())
+    """Return whether no beam of a scan measured free space or a hit: all are invalid or too close."""
+    ranges, nearest = scan.ranges, scan.range_min
+    return not len(ranges) or not (ranges.item(0) >= nearest or bool((ranges >= nearest).any()))
 
 
 _View = tuple[Pose2, Scan | Image, Frames]

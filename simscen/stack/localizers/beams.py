@@ -89,10 +89,10 @@ def _directions(first: float, increment: float, count: int, turn: float) -> Plan
 
 
 def select_beams(scan: Scan, count: int, least: float, most: float) -> Beams:
-    """Every k-th beam, so that there are at most `count`, without those that are nan.
+    """Return every k-th beam, so that there are at most `count`, without invalid (nan) ones.
 
-    Ranges are cut at `most` and the lidar's own maximum. Those not above `least` and the lidar's own minimum count as
-    maximal: nav2_amcl has no notion of too near either.
+    Ranges are limited to `most` and the lidar's maximum. As in nav2_amcl, ranges that are not above `least` and the
+    lidar's minimum, including -inf, count as the maximum.
     """
     step = -(-len(scan.ranges) // count) or 1
     ranges, towards = scan.ranges[::step], directions(scan)[::step]

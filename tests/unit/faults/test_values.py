@@ -64,7 +64,7 @@ def test_every_noisy_belief_is_off_by_another_draw_and_its_odometry_is_not():
 
 def test_a_bias_is_added_to_what_is_measured_and_to_nothing_else():
     assert begun({"bias": {"range": "-20 cm"}}, "Scan").reading(scan([1.0, np.inf, np.nan, 0.2])).ranges == (
-        pytest.approx([0.8, np.inf, np.nan, np.nan], nan_ok=True)
+        pytest.approx([0.8, np.inf, np.nan, -np.inf], nan_ok=True)
     )
     felt = begun({"bias": {"gyro": 0.1, "accelerometer": -0.5}}, "Imu").reading(imu())
     assert felt.angular_velocity == pytest.approx((0, 0, 0.3))

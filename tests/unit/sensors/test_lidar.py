@@ -53,10 +53,10 @@ def test_a_single_beam_looks_straight_ahead():
     assert scan.ranges == pytest.approx([2.0])
 
 
-def test_nothing_in_reach_is_inf_and_what_is_too_near_is_nan():
-    assert np.isinf(lidar(at(0, 0), Nothing()).read(0).ranges).all()
-    assert np.isinf(lidar(at(0, 0), SquareRoom(3.0), max_range=2.0).read(0).ranges).all()
-    assert np.isnan(lidar(at(0, 0), SquareRoom(3.0), min_range=5.0).read(0).ranges).all()
+def test_ranges_out_of_bounds_follow_rep_117():
+    assert np.isposinf(lidar(at(0, 0), Nothing()).read(0).ranges).all()
+    assert np.isposinf(lidar(at(0, 0), SquareRoom(3.0), max_range=2.0).read(0).ranges).all()
+    assert np.isneginf(lidar(at(0, 0), SquareRoom(3.0), min_range=5.0).read(0).ranges).all()
 
 
 def test_the_mount_is_where_the_lidar_is_and_where_it_looks():

@@ -6,6 +6,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.costmaps import Costmap as Spec
+from simscen.stack.costmap import costmaps
 from simscen.stack.costmap.frame import Frame
 from simscen.stack.costmap.obstacle_layer import crossed, hits
 
@@ -43,6 +44,15 @@ def test_crossed_cells_are_those_a_walk_along_the_beams_comes_through(beams: int
 
 
 def test_hits_are_points_in_the_map() -> None:
-    scan = Scan("l", 0, np.array([1.0, np.inf, np.nan, 2.0, 9.0]), 0.0, math.pi / 2, 0.05, 12.0, Pose2(0.1, 0, 0))
+    ranges = np.array([1.0, np.inf, np.nan, 2.0, 9.0, -np.inf])
+    scan = Scan("l", 0, ranges, 0.0, math.pi / 2, 0.05, 12.0, Pose2(0.1, 0, 0))
     points, _ = hits(scan, Pose2(1.0, 1.0, math.pi / 2), 0.0, 2.5)
     assert points == pytest.approx(np.array([1.0 + 2.1j, 3.0 + 1.1j]))
+
+
+@pytest.mark.parametrize(
+    ("ranges", "is_blind"),
+    [([], True), ([np.nan, -np.inf, 0.01], True), ([np.nan, np.inf], False), ([-np.inf, 3.0], False)],
+)
+def test_a_scan_without_free_space_or_hits_is_blind(ranges: list[float], is_blind: bool) -> None:
+    assert costmaps._blind(Scan("l", 0, np.array(ranges), 0.0, 0.1, 0.05, 12.0)) is is_blind
