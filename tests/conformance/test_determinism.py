@@ -145,4 +145,4 @@ def test_a_run_that_another_session_has_otherwise_or_not_at_all_is_an_error(pair
     assert missing.code == 3
     assert "seed-99/run.mcap: No such file or directory" in missing.out
     nowhere = simscen("run", "a.scenario.yaml", "--out", "never", "--check-against", "nowhere")
-    assert (nowhere.code, nowhere.err) == (2, "simscen: --check-against nowhere: there are no runs in it\n")
+    assert (nowhere.code, nowhere.err) == (2, "simscen: --check-against nowhere: the folder contains no runs\n")

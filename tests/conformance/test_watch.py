@@ -63,7 +63,7 @@ def test_it_runs_what_a_saved_file_touches_and_what_keys_say_until_q(watch: Watc
     told = watch.until("q = quit")
     assert "1 scenario ·" in told and "✓ b" in told
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO.replace("collisions: {max: 0}", "clearance: {min: 2}"))
-    assert "0 passed, 1 failed" in watch.until("what did not pass (1), q = quit")
+    assert "0 passed, 1 failed" in watch.until("f = run those that did not pass (1), q = quit")
     watch.press("f")
     told = watch.until("q = quit")
     assert "0 passed, 1 failed" in told and "1 scenario ·" in told

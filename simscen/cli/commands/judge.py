@@ -23,8 +23,8 @@ from simscen.cli.log_options import (
     foreign_log_options,
 )
 from simscen.cli.session.judging import LogJudge, runs_without_log
-from simscen.cli.session.logs import logs_of
-from simscen.cli.session.output_files import verdict
+from simscen.cli.session.logs import find_logs
+from simscen.cli.session.output_files import exit_code
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import result_data
 from simscen.record.foreign.options import ForeignLogOptions
@@ -61,10 +61,10 @@ def command(
     not be judged, or one of several logs is unusable; 5: no logs found.
     """
     foreign = foreign_log_options(truth, topic, time, tick_rate, same_frame)
-    files = logs_of(logs)
+    files = find_logs(logs)
     judging = LogJudge(foreign, scenario, root, world_path or [])
     lost = runs_without_log(logs)
-    runs = [*((str(file), judging.judged(file, alone=len(files) + len(lost) == 1)) for file in files), *lost]
+    runs = [*((str(file), judging.judge(file, alone=len(files) + len(lost) == 1)) for file in files), *lost]
     if foreign != ForeignLogOptions() and not judging.foreign:
         judging.notes.append("logs of simscen contain truth and times; options for foreign logs have no effect")
     for note in judging.notes:
@@ -74,7 +74,7 @@ def command(
         print(_document([run for _, run in runs], options), end="")
     else:
         _print(runs, scenario is not None)
-    sys.exit(verdict([run for _, run in runs]))
+    sys.exit(exit_code([run for _, run in runs]))
 
 
 def _print(runs: list[tuple[str, RunFinished]], one_scenario: bool) -> None:

@@ -22,7 +22,7 @@ from simscen.cli.log_options import (
     foreign_log_options,
 )
 from simscen.cli.session.judging import LogJudge
-from simscen.cli.session.logs import LOGS, logs_of
+from simscen.cli.session.logs import LOGS, find_logs
 from simscen.cli.session.output_files import save
 from simscen.core.errors import UsageError
 
@@ -59,12 +59,12 @@ def command(
 
     Exit code 0: written; 2: a log is unusable, or the page cannot be written; 5: no logs found.
     """
-    files = logs_of(runs)
+    files = find_logs(runs)
     if len(files) > 1 and (against is not None or out is not None):
         option = "--against" if against is not None else "--out"
         raise UsageError(f"{option} takes one run, but {len(files)} were found")
     judging = LogJudge(foreign_log_options(truth, topic, time, tick_rate, same_frame), scenario, root, world_path or [])
-    others = [] if against is None else logs_of([against])
+    others = [] if against is None else find_logs([against])
     if len(others) > 1:
         raise UsageError(f"--against takes one run, but {escaped(str(against))} contains {len(others)}")
     for file in files:
@@ -80,5 +80,5 @@ def command(
 def _write(judging: LogJudge, files: list[Path], page: Path) -> None:
     from simscen.report.replay import write_replay
 
-    shown = [judging.shown(file) for file in files]
-    save(page, lambda path: write_replay(path, shown), files)
+    runs_shown = [judging.judge_for_replay(file) for file in files]
+    save(page, lambda path: write_replay(path, runs_shown), files)

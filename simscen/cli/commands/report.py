@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli.diagnostics import print_text
-from simscen.cli.session.output_files import JunitFamily, Reports, require_writable, verdict
+from simscen.cli.session.output_files import JunitFamily, Reports, exit_code, require_writable
 from simscen.cli.session.terminal import Format, screen
 from simscen.core.errors import Exit
 from simscen.judge.metrics.session_summary import session_summary_line, summarize_session
@@ -39,13 +39,13 @@ def command(
     require_writable(junit, folder)
     reports = Reports(folder, junit, junit_family.value, only=junit is not None)
     answers = past.answers
-    with screen(format_) as shown:
-        shown(past.started(folder))
+    with screen(format_) as output:
+        output(past.started(folder))
         for answer in answers:
-            shown(answer)
+            output(answer)
         comparison = compare_stacks((answer.result for answer in answers), past.stacks)
         written = reports.write(answers, comparison)
-        shown(reports.closing(answers, past.wall, past.interrupted, comparison))
+        output(reports.finished_event(answers, past.wall, past.interrupted, comparison))
     if format_ is Format.TEXT:
         for stack, results in results_by_stack(answers).items():
             print_text(
@@ -53,5 +53,5 @@ def command(
                 if stack
                 else session_summary_line(summarize_session(results))
             )
-    code = verdict(answers) if written else Exit.INCOMPLETE
-    sys.exit(shown.exit(code))
+    code = exit_code(answers) if written else Exit.INCOMPLETE
+    sys.exit(output.exit(code))

@@ -8,7 +8,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.session.output_files import JunitFamily
-from simscen.cli.session.run_session import SessionRequest, cores, execute_session
+from simscen.cli.session.run_session import SessionRequest, available_cores, execute_session
 from simscen.cli.session.selection import Selection, shard_of
 from simscen.cli.session.stacks import STACK_HELP
 from simscen.cli.session.terminal import Format
@@ -114,11 +114,18 @@ def command(
     """
     if check_determinism and (earlier := [path for path in paths if (path / JOURNAL_FILE).is_file()]):
         paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]
-    asked = SessionRequest(
+    request = SessionRequest(
         paths,
         Selection(keyword, tag or [], shard_of(shard), variation or []),
         SessionOptions(
-            workers or cores(), seed, repeat, check_determinism, fail_fast, wall_limit, check_against, replay=replay
+            workers or available_cores(),
+            seed,
+            repeat,
+            check_determinism,
+            fail_fast,
+            wall_limit,
+            check_against,
+            replay=replay,
         ),
         root,
         world_path or [],
@@ -133,4 +140,4 @@ def command(
         last_failed,
         open_,
     )
-    sys.exit(watch_session(asked) if watch else execute_session(asked))
+    sys.exit(watch_session(request) if watch else execute_session(request))

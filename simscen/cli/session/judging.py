@@ -1,4 +1,4 @@
-"""Judges one log after the other, each by its own criteria or all by those of a file."""
+"""Evaluation of recorded logs with their own criteria or with those of a file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -30,9 +30,9 @@ from simscen.run.sessions.output_folder import run_folder
 
 
 class LogJudge:
-    """Judges logs by `scenario`, or each by its own; `notes` are what is odd about them.
+    """Evaluates logs with the criteria of `scenario`, or each with its own.
 
-    `foreign` is how many of them simscen did not write.
+    `notes` collects remarks about the logs. `foreign` counts the logs that simscen did not write.
     """
 
     def __init__(
@@ -51,51 +51,48 @@ class LogJudge:
             except InvalidInput as error:
                 raise InvalidInput(from_here(error.problems, home)) from error
 
-    def judged(self, log: Path, alone: bool) -> RunFinished:
-        """What a log says. One that cannot be used is an error of its own among several; alone it is the command's."""
+    def judge(self, log: Path, alone: bool) -> RunFinished:
+        """Evaluate a log. An unusable one raises InvalidInput if it is `alone`; otherwise its result is an error."""
         try:
-            return self._own(log) if _may_be_own(log) and is_simscen_log(log) else self._foreign(log)
+            return self._judge_own_log(log) if _may_be_own(log) and is_simscen_log(log) else self._judge_foreign(log)
         except InvalidInput as error:
             if alone or isinstance(error, UnusableScenario):
                 raise
-            told = "; ".join(": ".join(filter(None, (one.message, one.hint))) for one in error.problems)
-            result = error_result(RunKey(log.stem, 0), str(log), RunFailure("invalid", told))
+            reason = "; ".join(": ".join(filter(None, (one.message, one.hint))) for one in error.problems)
+            result = error_result(RunKey(log.stem, 0), str(log), RunFailure("invalid", reason))
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
 
-    def shown(self, log: Path) -> tuple[Log, RunResult]:
-        """A log with all that there is to see in it, and what its criteria say, or those of the file.
-
-        Raises InvalidInput.
-        """
+    def judge_for_replay(self, log: Path) -> tuple[Log, RunResult]:
+        """Return a log with all data for a replay, and its result. Raises InvalidInput."""
         if _may_be_own(log) and is_simscen_log(log):
             read = read_run(log, looks=True)
-            return read, recorded_result(read, log) if self._criteria is None else self._own(log).result
+            return read, recorded_result(read, log) if self._criteria is None else self._judge_own_log(log).result
         self.foreign += 1
         if self._criteria is None:
-            told, case = read_foreign_log(log, self._wanted, looks=True), Case(Pose2(0.0, 0.0), ())
-            result = skipped_result(RunKey(log.stem, 0), "", "nothing was judged: --scenario says by what")
-            result = replace(result, simulated=told.trace.seconds(told.trace.end), tick_rate=told.trace.tick_rate)
+            read, case = read_foreign_log(log, self._wanted, looks=True), Case(Pose2(0.0, 0.0), ())
+            result = skipped_result(RunKey(log.stem, 0), "", "not evaluated; set criteria with --scenario")
+            result = replace(result, simulated=read.trace.seconds(read.trace.end), tick_rate=read.trace.tick_rate)
         else:
-            told, result = self._judged_foreign(log, looks=True)
+            read, result = self._judge_foreign_log(log, looks=True)
             case = self._foreign_case()
-        self.notes += [f"{log}: {note}" for note in told.notes]
+        self.notes += [f"{log}: {note}" for note in read.notes]
         text = "" if self._scenario is None else self._scenario.read_text(encoding="utf-8")
-        about = LogHeader(log.stem, 0, case, text, told.map)
-        return Log(about, told.trace, "", complete=True, seen=told.seen), result
+        about = LogHeader(log.stem, 0, case, text, read.map)
+        return Log(about, read.trace, "", complete=True, seen=read.seen), result
 
-    def _own(self, log: Path) -> RunFinished:
+    def _judge_own_log(self, log: Path) -> RunFinished:
         read = read_run(log)
         if not read.robots:
-            return self._of_one(log, read, "")
-        runs = {name: self._of_one(log, one, name) for name, one in read.robots.items()}
+            return self._judge_robot(log, read, "")
+        runs = {name: self._judge_robot(log, one, name) for name, one in read.robots.items()}
         traces = {name: one.trace for name, one in read.robots.items()}
-        said = criteria_of_text(read.about.scenario, str(log), read.about.facts)
-        expected = expected_failure(said if self._criteria is None else self._criteria.spec)
+        recorded = criteria_of_text(read.about.scenario, str(log), read.about.facts)
+        expected = expected_failure(recorded if self._criteria is None else self._criteria.spec)
         result = combine_robots({name: run.result for name, run in runs.items()}, traces, expected)
         return replace(next(iter(runs.values())), result=result)
 
-    def _of_one(self, log: Path, read: Log, robot: str) -> RunFinished:
-        """What a log says of its only robot, or of one of several."""
+    def _judge_robot(self, log: Path, read: Log, robot: str) -> RunFinished:
+        """Evaluate the log of the only robot, or of one of several."""
         about, case = read.about, read.about.case
         key = about.key
         if self._criteria is None:
@@ -105,22 +102,22 @@ class LogJudge:
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         with _scenario_errors(self._criteria):
             criteria = self._criteria.of(robot)
-        # What had to happen stands in the scenario of the log, at lines that the file of criteria does not have.
+        # The disturbances are in the scenario of the log, at lines that the criteria file does not have.
         case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
         case = replace(case, masks={**case.masks, **self._masks(criteria)})
-        return self._finished(log, key, read.trace, case, read.coverage, criteria)
+        return self._judge_by_file(log, key, read.trace, case, read.coverage, criteria)
 
-    def _foreign(self, log: Path) -> RunFinished:
+    def _judge_foreign(self, log: Path) -> RunFinished:
         self.foreign += 1
         if self._criteria is None:
-            hint = "say with --scenario what must hold; a file with `pass:` is enough"
+            hint = "set criteria with --scenario; a file with `pass:` is enough"
             raise InvalidInput([Problem(str(log), 0, 0, "SC801", "not a log of simscen", hint)])
-        read, result = self._judged_foreign(log)
+        read, result = self._judge_foreign_log(log)
         self.notes += [f"{log}: {note}" for note in read.notes]
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(self._scenario))
 
-    def _judged_foreign(self, log: Path, looks: bool = False) -> tuple[ForeignLog, RunResult]:
-        """A log of others, and what the file of criteria says of it."""
+    def _judge_foreign_log(self, log: Path, looks: bool = False) -> tuple[ForeignLog, RunResult]:
+        """Return a foreign log and its result by the criteria file."""
         assert self._criteria is not None
         with _scenario_errors(self._criteria):
             criteria = self._criteria.of("")
@@ -131,10 +128,10 @@ class LogJudge:
         if case.footprint:
             del missing[Evidence.FOOTPRINT]
         coverage = replace(read.coverage, missing=missing)
-        return read, self._finished(log, RunKey(log.stem, 0), read.trace, case, coverage, criteria).result
+        return read, self._judge_by_file(log, RunKey(log.stem, 0), read.trace, case, coverage, criteria).result
 
     def _masks(self, criteria: LoadedCriteria) -> Mapping[str, MaskBlocks]:
-        """The filter masks that criteria name; those of a file that is the same for all robots are read once."""
+        """Return the filter masks that the criteria use; those of the criteria file are read once."""
         if criteria is self._criteria and self._named is not None:
             return self._named
         from simscen.run.preparation.foreign_logs import masks_from_criteria
@@ -145,7 +142,7 @@ class LogJudge:
         return named
 
     def _foreign_case(self) -> Case:
-        """What the file of criteria says about the robot's surroundings; read once."""
+        """Return the surroundings of the robot according to the criteria file, which is read once."""
         assert self._criteria is not None
         if self._case is None:
             from simscen.run.preparation.foreign_logs import case_from_criteria
@@ -154,10 +151,10 @@ class LogJudge:
                 self._case = case_from_criteria(self._criteria, self._world_path)
         return self._case
 
-    def _finished(
+    def _judge_by_file(
         self, log: Path, key: RunKey, trace: Trace, case: Case, coverage: LogCoverage, criteria: LoadedCriteria
     ) -> RunFinished:
-        """Judged by the file of criteria."""
+        """Evaluate a log with the criteria file."""
         file, spec = str(self._scenario), criteria.spec
         expected = expected_failure(spec)
         result = judge_run(key, file, spec.pass_, trace, case, criteria.lines, coverage, spec.metrics, expected)
@@ -169,12 +166,12 @@ def _may_be_own(log: Path) -> bool:
 
 
 class UnusableScenario(InvalidInput):
-    """The file of criteria is wrong, whatever the log."""
+    """The criteria file is invalid, independently of the log."""
 
 
 @contextmanager
 def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
-    """What is wrong with the file of criteria, as UnusableScenario."""
+    """Convert InvalidInput of the criteria file to UnusableScenario."""
     try:
         yield
     except InvalidInput as error:
@@ -182,7 +179,7 @@ def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
 
 
 def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
-    """The runs of output folders that left no log: a session must not look better judged than it was."""
+    """Return the runs of output folders that have no log, so that they do not drop out of the evaluation."""
     return [
         (str(run_folder(folder, answer.key)), _without_log(answer))
         for folder in folders

@@ -1,4 +1,4 @@
-"""Which logs the arguments of a command mean: a file, the folder of a run, a rosbag2, or a folder full of them."""
+"""Search for logs: a file, the folder of a run, a rosbag2, or a folder that contains any of them."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -19,15 +19,16 @@ BAG = "metadata.yaml"
 SUFFIXES = (".mcap", ".db3", ".bag")
 
 
-def logs_of(paths: Sequence[Path]) -> list[Path]:
-    """All of them, each once, sorted within a folder. Raises InvalidInput, and NothingSelected where there are none."""
+def find_logs(paths: Sequence[Path]) -> list[Path]:
+    """Return all logs without duplicates, sorted within a folder. Raises InvalidInput, and NothingSelected if there are
+    none."""
     found: dict[Path, None] = {}
     for path in paths:
         try:
             path.lstat()
         except (OSError, ValueError) as error:
-            told = os_error_reason(error) if isinstance(error, OSError) else "no such file or directory"
-            raise InvalidInput([Problem(str(path), 0, 0, "SC800", told)]) from error
+            reason = os_error_reason(error) if isinstance(error, OSError) else "no such file or directory"
+            raise InvalidInput([Problem(str(path), 0, 0, "SC800", reason)]) from error
         inside = sorted(_logs(path), key=lambda log: log.parts) if is_folder(path) else [path]
         found.update(dict.fromkeys(inside))
     if not found:
@@ -49,7 +50,7 @@ def _logs(path: Path) -> Iterator[Path]:
 
 
 def is_bag(names: Sequence[str]) -> bool:
-    """Whether the files of a folder are those of a rosbag2."""
+    """Return whether a folder with these files is a rosbag2."""
     return BAG in names and any(name.endswith((".db3", ".mcap", ".db3.zstd", ".mcap.zstd")) for name in names)
 
 
@@ -57,7 +58,7 @@ LOGS = ("run.mcap", "run.partial.mcap")
 
 
 def log_file(run: Path) -> Path:
-    """The log itself. Raises InvalidInput when a folder holds none."""
+    """Return the log in the folder of a run, or the file itself. Raises InvalidInput if the folder contains no log."""
     if not run.is_dir():
         return run
     found = [run / name for name in LOGS if (run / name).is_file()]
@@ -68,15 +69,15 @@ def log_file(run: Path) -> Path:
 
 
 def recorded_result(log: Log, file: Path) -> RunResult:
-    """What the run said of itself; for one that broke off, what its criteria say of what there is."""
+    """Return the result in a log; for an incomplete log, the result of its criteria for the recorded part."""
     if log.result:
         return from_json(log.result)
-    results = {name: _judged(one, file, name) for name, one in (log.robots or {"": log}).items()}
+    results = {name: _evaluate(one, file, name) for name, one in (log.robots or {"": log}).items()}
     traces = {name: one.trace for name, one in log.robots.items()}
     return combine_robots(results, traces) if traces else results[""]
 
 
-def _judged(log: Log, file: Path, robot: str) -> RunResult:
+def _evaluate(log: Log, file: Path, robot: str) -> RunResult:
     about = log.about
     spec = criteria_of_text(about.scenario, str(file), about.facts, robot)
     return judge_run(about.key, about.name, spec.pass_, log.trace, about.case, (), log.coverage, spec.metrics)

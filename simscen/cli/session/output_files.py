@@ -1,4 +1,4 @@
-"""What a session leaves behind: results.json, junit.xml, report.html, run.json; and its exit code."""
+"""Output files of a session: results.json, junit.xml, report.html, and run.json; and its exit code."""
 
 import errno
 import json
@@ -34,21 +34,22 @@ from simscen.run.reproducibility.environment import arithmetic_fingerprints, cpu
 from simscen.run.sessions.output_folder import RUNS_FOLDER, probe_writable, write_atomically
 
 PAGE = "report.html"
-OWN = ("results.json", PAGE, "run.json", JOURNAL_FILE, RUNS_FOLDER)
-"""What a session writes into its folder beside junit.xml."""
+RESERVED_NAMES = ("results.json", PAGE, "run.json", JOURNAL_FILE, RUNS_FOLDER)
+"""Names that a session uses in its output folder, without junit.xml."""
 
 
 class JunitFamily(str, Enum):
-    """Dialects of JUnit XML."""
+    """Dialect of JUnit XML."""
 
     SIMSCEN = "simscen"
     XUNIT2 = "xunit2"
 
 
 class Reports:
-    """The reports of one session in `folder`; `junit` is the report that is named at the end.
+    """Writer of the reports of a session in `folder`, and of the JUnit report `junit`.
 
-    With `only`, that one is all that is written. `used` are the installed packages and external stacks of its runs.
+    With `only`, no other report than `junit` is written. `used` are the installed packages and external stacks of the
+    runs.
     """
 
     def __init__(
@@ -65,14 +66,14 @@ class Reports:
         self._family: Family = family
 
     def begin(self) -> None:
-        """Write run.json, so that a session that is killed has said where it ran. Raises UsageError."""
+        """Write run.json before the first run, so that it exists even if the session is killed. Raises UsageError."""
         try:
             write_atomically(self.folder / "run.json", session_info_json(self._used))
         except OSError as error:
             raise UsageError(f"cannot use the output folder {self.folder}: {error.strerror}") from error
 
     def write(self, answers: Sequence[RunFinished], comparison: Comparison | None = None) -> bool:
-        """Write the reports; one that cannot be written is told, and the one before it stays whole."""
+        """Write the reports and return whether all were written; the old file of a failed one is kept."""
         junit = to_xml(answers, self._family)
         whole = {
             self.folder / "results.json": to_json(answers, str(self.folder), comparison).encode(),
@@ -80,13 +81,13 @@ class Reports:
             self.folder / PAGE: self._page(answers, comparison),
         }
         documents = {**({} if self._only else whole), self.junit: junit}
-        self._missing = frozenset(path for path, data in documents.items() if not _written(path, data))
+        self._missing = frozenset(path for path, data in documents.items() if not _write(path, data))
         return not self._missing
 
     def write_live(self, answers: Sequence[RunFinished], live: RunningSession) -> bool:
-        """Write the page of a session that goes on."""
+        """Write the page of a running session."""
         page = to_html(Session(answers, self._past, folder=str(self.folder), live=live))
-        return _written(self.folder / PAGE, page.encode())
+        return _write(self.folder / PAGE, page.encode())
 
     def _page(self, answers: Sequence[RunFinished], comparison: Comparison | None) -> bytes:
         files = ("results.json", "junit.xml", "run.json")
@@ -96,14 +97,14 @@ class Reports:
     def _past(self) -> Sequence[PastSession]:
         return past_sessions(self.folder)
 
-    def end(self, wall: float) -> bool:
-        """Write run.json anew, with the seconds that the session took."""
-        return _written(self.folder / "run.json", session_info_json(self._used, wall))
+    def write_duration(self, wall: float) -> bool:
+        """Write run.json again with the duration of the session in seconds."""
+        return _write(self.folder / "run.json", session_info_json(self._used, wall))
 
-    def closing(
+    def finished_event(
         self, answers: Sequence[RunFinished], wall: float, interrupted: bool, comparison: Comparison | None = None
     ) -> SessionFinished:
-        """The last event of a session; names no report that could not be written."""
+        """Return the last event of a session, without reports that could not be written."""
         count = {outcome: sum(answer.outcome is outcome for answer in answers) for outcome in Outcome}
         return SessionFinished(
             count[Outcome.PASSED],
@@ -121,8 +122,8 @@ class Reports:
         )
 
 
-def verdict(answers: Sequence[RunFinished]) -> Exit:
-    """The exit code of a session that was not interrupted."""
+def exit_code(answers: Sequence[RunFinished]) -> Exit:
+    """Return the exit code of a session that was not interrupted."""
     outcomes = {answer.outcome for answer in answers}
     if outcomes == {Outcome.SKIPPED}:
         return Exit.NOTHING_SELECTED
@@ -133,9 +134,9 @@ def verdict(answers: Sequence[RunFinished]) -> Exit:
 
 
 def require_writable(junit: Path | None, folder: Path | None, inputs: Iterable[Path] = ()) -> None:
-    """Raise UsageError for a report that cannot be written: that should be known before anything runs.
+    """Raise UsageError if a JUnit report cannot be written, before anything runs.
 
-    Nor may it be one of the `inputs`, or what else simscen writes in its output `folder`.
+    It must not be one of the `inputs`, nor another file that simscen writes in the output `folder`.
     """
     if junit is None:
         return
@@ -149,15 +150,15 @@ def require_writable(junit: Path | None, folder: Path | None, inputs: Iterable[P
 
 
 def _require_free_name(junit: Path, folder: Path | None) -> None:
-    """Raise OSError where simscen writes something else of that name, in this session's folder or another's."""
+    """Raise OSError if simscen writes another file of this name in the folder of this or another session."""
     real = Path(os.path.realpath(junit))
     for home in real.parents:
         is_output = home == (folder and Path(os.path.realpath(folder))) or (home / JOURNAL_FILE).exists()
-        if is_output and real.relative_to(home).parts[0] in OWN:
-            raise OSError(errno.EINVAL, "the output folder has something else of that name")
+        if is_output and real.relative_to(home).parts[0] in RESERVED_NAMES:
+            raise OSError(errno.EINVAL, "simscen writes another file of this name there")
 
 
-def _written(path: Path, data: bytes) -> bool:
+def _write(path: Path, data: bytes) -> bool:
     try:
         write_atomically(path, data)
     except OSError as error:
@@ -167,9 +168,10 @@ def _written(path: Path, data: bytes) -> bool:
 
 
 def session_info_json(used: Mapping[str, object], wall: float | None = None) -> bytes:
-    """run.json; `used` are installed packages and external stacks, `wall` the seconds that the session took.
+    """Return the content of run.json.
 
-    While it is under way `wall` is None.
+    `used` are installed packages and external stacks, `wall` is the duration of the session in seconds, or None while
+    it runs.
     """
     return json.dumps(
         {
@@ -189,7 +191,7 @@ def session_info_json(used: Mapping[str, object], wall: float | None = None) -> 
 
 
 def save(path: Path, write: Callable[[Path], None], inputs: Iterable[Path] = ()) -> None:
-    """Let `write` make the file; raises UsageError where that cannot be done or would overwrite what was read."""
+    """Write a file with `write`. Raises UsageError if that fails or would overwrite an input."""
     try:
         require_regular_file(path)
         require_not_input(path, inputs)
@@ -201,13 +203,14 @@ def save(path: Path, write: Callable[[Path], None], inputs: Iterable[Path] = ())
 
 # MERGED: `simscen run --open`: the session's page in a browser while it runs, written anew as runs end; no server.
 MIN_UPDATE_INTERVAL_S = 1.0
-"""Seconds from one writing of the page to the next; the page itself looks every two seconds."""
+"""Minimum time between two updates of the page, in seconds; the page itself reloads every two seconds."""
 UPDATE_INTERVAL_FACTOR = 10
-"""Of the time that passes, writing takes no more than a tenth."""
+"""Minimum time between two updates as a multiple of the time that an update takes."""
 
 
 class LivePage:
-    """Listens to a session; its page is there, and open, before anything runs. The last one is that of the reports."""
+    """Listener that writes and opens the page of a session before the first run, and updates it until the reports are
+    written."""
 
     def __init__(self, reports: Reports) -> None:
         self._reports = reports
@@ -216,7 +219,7 @@ class LivePage:
         self._under_way: dict[RunKey, None] = {}
 
     def __call__(self, event: SessionEvent) -> None:
-        """Write the page anew where something ended, and it is time."""
+        """Update the page after a run if the last update is old enough."""
         match event:
             case SessionStarted():
                 self._total = event.total
@@ -240,6 +243,6 @@ class LivePage:
 
 
 def open_page(page: Path) -> None:
-    """Show a page in the reader's browser ($BROWSER, or the system's); say where it is when there is none."""
+    """Open a page in the browser ($BROWSER, or that of the system); print its path if there is none."""
     if not webbrowser.open(page.absolute().as_uri()):
-        print_text(f"simscen: no browser was found; open {page} in one", sys.stderr)
+        print_text(f"simscen: no browser found; open {page} in a browser", sys.stderr)

@@ -1,4 +1,4 @@
-"""What a session has to do: all of its runs, or those that an earlier one in the same folder left."""
+"""Runs that a session has to execute: all, or those that an earlier session in the same folder did not complete."""
 
 import json
 from collections.abc import Collection, Sequence
@@ -20,14 +20,14 @@ from simscen.run.sessions.results import repeat_command, shown
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
 SAME_IN_LOG = ("scenario", "seed", "variation", "stack_name", "simulated_seconds", "verdicts")
-"""Keys of result.json that a log and the journal hold alike."""
+"""Keys of result.json that the log and the journal both contain."""
 
 
 @dataclass(frozen=True)
 class PendingRuns:
-    """The journal of the session, the jobs to do, and the answers that are `kept` from the session before.
+    """Journal of a session, its jobs to execute, and the `kept` results of an earlier session.
 
-    `stacks` are the NAME=VALUE of those that were chosen.
+    `stacks` are the NAME=VALUE of the selected stacks.
     """
 
     journal: Journal
@@ -37,26 +37,25 @@ class PendingRuns:
     stacks: tuple[str, ...] = ()
 
     def started(self, folder: Path) -> SessionStarted:
-        """The first event of the session."""
+        """Return the first event of the session."""
         keys = [*(job.key for job in self.jobs), *(answer.key for answer in self.kept)]
         return session_started(__version__, keys, self.workers, folder, self.stacks)
 
 
 def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> PendingRuns:
-    """Plan the session in its journal. Raises UsageError when not even that can be written.
+    """Write the plan of the session to its journal and return the pending runs. Raises UsageError if that fails.
 
-    Kept are verdicts, not errors, on scenarios that are as they were; of two runs that are to be compared, both or
-    none.
+    Results of unchanged scenarios are kept unless they are errors; of two runs to be compared, both or neither.
     """
-    scenarios = {_asked(job): job.scenario for job in jobs}
-    digests = {asked: scenario_digest(scenario) for asked, scenario in scenarios.items()}
-    planned = [_planned(job, digests[_asked(job)]) for job in jobs]
-    known = _verdicts(journal)
+    scenarios = {_job_identity(job): job.scenario for job in jobs}
+    digests = {identity: scenario_digest(scenario) for identity, scenario in scenarios.items()}
+    planned = [_planned(job, digests[_job_identity(job)]) for job in jobs]
+    known = _previous_results(journal)
     answers = [known.get(run) for run in planned]
     kept: list[RunFinished] = []
     left: list[Job] = []
     for number, (job, answer) in enumerate(zip(jobs, answers, strict=True)):
-        if answer is not None and answers[_twin(jobs, number)] is not None:
+        if answer is not None and answers[_compared_index(jobs, number)] is not None:
             kept.append(replace(answer, resumed=True))
         else:
             left.append(job)
@@ -74,8 +73,8 @@ def _planned(job: Job, scenario_digest: str) -> PlannedRun:
     return PlannedRun(job.key, scenario.path, scenario_digest, again, shown(scenario.file), scenario.stack)
 
 
-def _verdicts(journal: Journal) -> dict[PlannedRun, RunFinished]:
-    """The verdicts that the folder holds already, by what was asked; only those whose logs are still theirs."""
+def _previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
+    """Return the results in the folder by planned run, without errors and without runs whose log does not match."""
     try:
         past = read_journal(journal.folder)
     except InvalidInput:  # a new folder
@@ -96,43 +95,42 @@ def _has_log(answer: RunFinished) -> bool:
     return recorded is not None and all(recorded.get(key) == expected[key] for key in SAME_IN_LOG)
 
 
-def _twin(jobs: Sequence[Job], number: int) -> int:
-    """The number of the run that is to be compared with this one (--check-determinism); its own when there is none."""
+def _compared_index(jobs: Sequence[Job], number: int) -> int:
+    """Return the index of the run to compare with (--check-determinism), or the same index if there is none."""
     twin = number ^ 1
     if twin < len(jobs) and jobs[twin].key != jobs[number].key and jobs[twin].key.first == jobs[number].key.first:
         return twin
     return number
 
 
-def _asked(job: Job) -> tuple[str, str, str]:
-    """Scenario, variation and stack."""
+def _job_identity(job: Job) -> tuple[str, str, str]:
+    """Return the scenario, the variation, and the stack of a job."""
     return job.scenario.id, job.scenario.variation, job.scenario.stack_name
 
 
-EVERYTHING = "everything that is chosen runs"
+ALL_RUN = "all selected scenarios run"
 
 
 def failed_runs(
     scenarios: Sequence[LoadedScenario], options: SessionOptions, out: Path | None
 ) -> tuple[frozenset[RunKey] | None, str]:
-    """The runs of these scenarios that failed when they were run last, and what to tell.
+    """Return the runs of these scenarios that failed in the last session, and a message.
 
-    None where there is nothing to choose by: then, as with pytest, everything runs. Sessions are looked for beside the
-    output folder `out`. A failed run keeps its seed, unless the options name seeds.
+    Returns None if there is no such session or nothing failed; then everything runs, as with pytest. Sessions are
+    searched in the parent of the output folder `out`. A failed run keeps its seed unless the options set seeds.
     """
     home = DEFAULT_FOLDER if out is None else out.absolute().parent
     last = last_failed(home)
     if last is None:
-        return None, f"there is no earlier session in {home}: {EVERYTHING}"
+        return None, f"there is no earlier session in {home}: {ALL_RUN}"
     if not last.runs:
-        return None, f"nothing failed in the last session, {last.folder}: {EVERYTHING}"
+        return None, f"nothing failed in the last session, {last.folder}: {ALL_RUN}"
     chosen = {(one.title, one.stack_name): one for one in scenarios if one.spec.skip is None}
     found = frozenset(key for key in last.runs if _run_key(key, chosen.get((key.test, key.stack_name)), options))
     left = len(last.runs) - len(found)
-    where = f"{left} {_is(left)} not among what is chosen"
     if not found:
-        return None, f"{_runs(last.runs)} failed last, and {_is(left)} not among what is chosen: {EVERYTHING}"
-    return found, f"{_runs(last.runs)} failed last" + (f": {len(found)} {_is(len(found))} run, {where}" if left else "")
+        return None, f"{_runs(last.runs)} failed last, none of them selected: {ALL_RUN}"
+    return found, f"{_runs(last.runs)} failed last" + (f": {len(found)} selected, {left} not" if left else "")
 
 
 def _run_key(key: RunKey, scenario: LoadedScenario | None, options: SessionOptions) -> bool:
@@ -143,7 +141,3 @@ def _run_key(key: RunKey, scenario: LoadedScenario | None, options: SessionOptio
 
 def _runs(runs: Collection[RunKey]) -> str:
     return f"{len(runs)} run{'' if len(runs) == 1 else 's'}"
-
-
-def _is(number: int) -> str:
-    return "is" if number == 1 else "are"

@@ -1,4 +1,4 @@
-"""One session of `simscen run`, from its options to its exit code."""
+"""Session of `simscen run`, from its options to its exit code."""
 
 import os
 import sys
@@ -10,7 +10,7 @@ from typing import Protocol
 
 from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.interrupts import signals_interrupt
-from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, require_writable, verdict
+from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
 from simscen.cli.session.pending_runs import PendingRuns, begin, failed_runs
 from simscen.cli.session.selection import Selection, load_all
 from simscen.cli.session.stacks import commands_of
@@ -31,20 +31,20 @@ WARM_PROCESS = ("-m", "simscen.cli.session.warm_process")
 
 
 class Observer(Protocol):
-    """Whoever wants to know what a session is about and how it goes."""
+    """Receiver of the scenarios and the events of a session."""
 
     def loaded(self, scenarios: Sequence[LoadedScenario]) -> None:
-        """These are valid and chosen."""
+        """Receive the selected scenarios, which are all valid."""
         ...
 
     def __call__(self, event: SessionEvent) -> None:
-        """Take one event."""
+        """Handle an event."""
         ...
 
 
 @dataclass(frozen=True)
 class SessionRequest:
-    """What the command line asks for; each field means what the option of its name does."""
+    """Options of `simscen run`; each field has the meaning of the option with its name."""
 
     paths: Sequence[Path]
     wanted: Selection = field(default_factory=Selection)
@@ -63,49 +63,51 @@ class SessionRequest:
     open_: bool = False
 
 
-def execute_session(asked: SessionRequest, observer: Observer | None = None) -> Exit:
-    """Do it, and leave its reports. Raises InvalidInput, UsageError and NothingSelected before anything runs."""
-    options = asked.options
-    scenarios, warnings = load_all(asked.paths, asked.root, asked.world_path, asked.lenient, asked.wanted, asked.stacks)
+def execute_session(request: SessionRequest, observer: Observer | None = None) -> Exit:
+    """Run the session and write its reports. Raises InvalidInput, UsageError, and NothingSelected before any run."""
+    options = request.options
+    scenarios, warnings = load_all(
+        request.paths, request.root, request.world_path, request.lenient, request.wanted, request.stacks
+    )
     if observer is not None:
         observer.loaded(scenarios)
     if warnings:
         print_text(as_text(warnings), sys.stderr)
     if options.against is not None and not (options.against / RUNS_FOLDER).is_dir():
-        raise UsageError(f"--check-against {options.against}: there are no runs in it")
+        raise UsageError(f"--check-against {options.against}: the folder contains no runs")
     for scenario in scenarios:
         scenario_seeds(scenario, options)
-    if asked.last_failed:
-        options = replace(options, only=_last_failed(scenarios, asked))
+    if request.last_failed:
+        options = replace(options, only=_last_failed(scenarios, request))
     inputs = {file for each in scenarios for file in (*each.files.values(), *each.read)}
-    require_writable(asked.junit, asked.out or asked.resume, inputs)
-    folder, journal = output_folder(asked.out, asked.resume)
+    require_writable(request.junit, request.out or request.resume, inputs)
+    folder, journal = output_folder(request.out, request.resume)
     used = {"plugins": plugin_packages(plugins_of_all(scenarios)), "stacks": commands_of(scenarios)}
-    reports = Reports(folder, asked.junit, asked.junit_family.value, used=used)
+    reports = Reports(folder, request.junit, request.junit_family.value, used=used)
     reports.begin()
     work = begin(journal, plan_jobs(scenarios, options, folder), options.workers)
-    with screen(asked.format_, asked.durations) as shown:
-        listeners: list[Listener] = [*([observer] if observer else []), *([LivePage(reports)] if asked.open_ else [])]
-        code = _run(work, options, reports, shown, listeners)
-    return shown.exit(code)
+    with screen(request.format_, request.durations) as output:
+        listeners: list[Listener] = [*([observer] if observer else []), *([LivePage(reports)] if request.open_ else [])]
+        code = _run(work, options, reports, output, listeners)
+    return output.exit(code)
 
 
-def _last_failed(scenarios: Sequence[LoadedScenario], asked: SessionRequest) -> frozenset[RunKey] | None:
-    if asked.resume is not None:
+def _last_failed(scenarios: Sequence[LoadedScenario], request: SessionRequest) -> frozenset[RunKey] | None:
+    if request.resume is not None:
         raise UsageError("--last-failed and --resume exclude each other")
-    only, told = failed_runs(scenarios, asked.options, asked.out)
-    print_text(f"simscen: {told}", sys.stderr)
+    only, message = failed_runs(scenarios, request.options, request.out)
+    print_text(f"simscen: {message}", sys.stderr)
     return only
 
 
 def _run(
-    work: PendingRuns, options: SessionOptions, reports: Reports, shown: Screen, listeners: Sequence[Listener]
+    work: PendingRuns, options: SessionOptions, reports: Reports, output: Screen, listeners: Sequence[Listener]
 ) -> Exit:
-    """Do what is left to do, tell the journal, the screen, all who listen and the reports, and say how it went."""
+    """Execute the pending runs, report to journal, screen, listeners, and reports, and return the exit code."""
     begun = time.monotonic()
 
     def show(event: SessionEvent) -> None:
-        shown(event)
+        output(event)
         for each in listeners:
             each(event)
 
@@ -123,24 +125,24 @@ def _run(
     comparison = compare_stacks((answer.result for answer in answers), work.stacks)
     written = reports.write(answers, comparison)
     wall = time.monotonic() - begun
-    listen(reports.closing(answers, wall, stopped is not None, comparison))
-    written = reports.end(wall) and written and _kept(work.journal)
-    code = verdict(answers)
+    listen(reports.finished_event(answers, wall, stopped is not None, comparison))
+    written = reports.write_duration(wall) and written and _check_journal(work.journal)
+    code = exit_code(answers)
     if code is Exit.NOTHING_SELECTED:
-        print_text("simscen: nothing was run: every scenario that was chosen says to skip it", sys.stderr)
+        print_text("simscen: nothing was run: all selected scenarios are marked with `skip`", sys.stderr)
     return stopped or (code if written else Exit.INCOMPLETE)
 
 
-def _kept(journal: Journal) -> bool:
-    """Whether the journal is whole; told if it is not."""
+def _check_journal(journal: Journal) -> bool:
+    """Return whether the journal is complete; print a message if it is not."""
     if journal.error is not None:
-        told = f"simscen: lines are missing from the journal in {journal.folder}: {journal.error.strerror}"
-        print_text(told, sys.stderr)
+        reason = journal.error.strerror
+        print_text(f"simscen: the journal in {journal.folder} is incomplete: {reason}", sys.stderr)
     return journal.error is None
 
 
 def output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]:
-    """The folder and its journal, locked. Raises UsageError before anything in it is touched."""
+    """Return the output folder and its locked journal. Raises UsageError before anything in the folder changes."""
     if resume is not None and out is not None:
         raise UsageError("--out and --resume exclude each other")
     if resume is not None:
@@ -154,6 +156,6 @@ def output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]
         raise UsageError(f"cannot use the output folder {folder}: {error.strerror}") from error
 
 
-def cores() -> int:
-    """How many processors this process may use."""
+def available_cores() -> int:
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0))

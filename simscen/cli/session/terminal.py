@@ -1,4 +1,4 @@
-"""What a session prints. Its files matter more: a full disk or a closed pipe behind stdout ends the printing only."""
+"""Printed output of a session, which may fail (closed pipe, full disk) without affecting the output files."""
 
 import os
 import sys
@@ -20,11 +20,11 @@ from simscen.run.sessions.output_folder import probe_writable
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 PICTURES_URL = "SIMSCEN_PICTURES_URL"
-"""Names the address at which the pictures of the output folder will be found by who reads the summary."""
+"""Variable with the address of the pictures of the output folder, for the summary of a step."""
 
 
 class Format(str, Enum):
-    """What is printed."""
+    """Output format."""
 
     TEXT = "text"
     JSON = "json"
@@ -32,7 +32,8 @@ class Format(str, Enum):
 
 
 class Screen:
-    """Passes events on until the printer fails; `lost` is why, `lost_summary` why there is no summary of the step."""
+    """Prints events until printing fails. `lost` is the error of stdout, `lost_summary` that of the summary of the
+    step."""
 
     def __init__(self, printer: Reporter) -> None:
         self._printer = printer
@@ -40,14 +41,15 @@ class Screen:
         self.lost_summary: OSError | None = None
 
     def __call__(self, event: SessionEvent) -> None:
-        """Print what the event is worth."""
+        """Print an event."""
         if self.lost is None:
-            with self.forgiving():
+            with self.suppressing_errors():
                 self._printer(event)
 
     @contextmanager
-    def forgiving(self) -> Iterator[None]:
-        """Survive a stdout that takes no more, and keep the interpreter from failing on it when it flushes at exit."""
+    def suppressing_errors(self) -> Iterator[None]:
+        """Record an error of stdout, and discard further output so that the interpreter does not fail when it flushes
+        at exit."""
         try:
             yield
         except OSError as error:
@@ -56,8 +58,8 @@ class Screen:
             os.dup2(nowhere, sys.stdout.fileno())
             os.close(nowhere)
 
-    def sum_up(self, text: str) -> None:
-        """Add to the file that GitHub Actions shows as the summary of a step."""
+    def append_summary(self, text: str) -> None:
+        """Append to the file that GitHub Actions shows as the summary of a step."""
         try:
             with Path(os.environ[STEP_SUMMARY]).open("a", encoding="utf-8") as file:
                 file.write(text)
@@ -65,7 +67,7 @@ class Screen:
             self.lost_summary = error
 
     def exit(self, code: Exit) -> Exit:
-        """The exit code of the session, or that of output that was lost. Who closes a pipe has read enough."""
+        """Return the exit code of the session, or INCOMPLETE if output was lost. A closed pipe is not an error."""
         lost = {STEP_SUMMARY: self.lost_summary}
         if not isinstance(self.lost, BrokenPipeError):
             lost["to stdout"] = self.lost
@@ -78,23 +80,22 @@ class Screen:
 
 @contextmanager
 def screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
-    """Print a session on stdout, and on GitHub also as the summary of the step.
+    """Print a session on stdout, and on GitHub also as the summary of the step. Raises UsageError if that is not
+    writable.
 
-    `slow` is how many of the slowest runs to list in the end; 0 = all.
-
-    Raises UsageError when that cannot be written: it should be known before anything runs.
+    `slow` is the number of slowest runs to list at the end; 0 lists all.
     """
     summary = _step_summary() if format_ is Format.GITHUB else None
     printer = _printer(format_, summary, slow)
-    shown = Screen(printer)
+    output = Screen(printer)
     printer.__enter__()
     try:
-        yield shown
+        yield output
     finally:
-        with shown.forgiving():
+        with output.suppressing_errors():
             printer.__exit__(*sys.exc_info())
         if summary is not None:
-            shown.sum_up(summary.getvalue())
+            output.append_summary(summary.getvalue())
 
 
 def _printer(format_: Format, summary: TextIO | None, slow: int | None) -> Reporter:
@@ -108,7 +109,7 @@ def _printer(format_: Format, summary: TextIO | None, slow: int | None) -> Repor
 
 
 def _step_summary() -> StringIO | None:
-    """Where the summary of the step is put together, where there is one."""
+    """Return the buffer of the summary of the step, or None outside of GitHub Actions. Raises UsageError."""
     path = os.environ.get(STEP_SUMMARY)
     if not path:
         return None

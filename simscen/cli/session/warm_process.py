@@ -1,4 +1,4 @@
-"""The program of the warm process: `python -I -m simscen.cli.session.warm_process [WHEREABOUTS] FD`. Not for people."""
+"""Program of the warm process: `python -I -m simscen.cli.session.warm_process [PLUGIN_PATH] FD`, for internal use."""
 
 import os
 import resource
@@ -33,7 +33,7 @@ Image.preinit()  # imports what it would import when the first picture is writte
 
 
 def main() -> None:
-    """Serve the supervisor until it closes its end."""
+    """Serve the supervisor until it closes its end of the connection."""
     *told, replies = sys.argv[1:]
     for whereabouts in told:
         apply_plugin_path(whereabouts)
@@ -41,9 +41,9 @@ def main() -> None:
 
 
 def _warm_up(job: Job) -> None:
-    """Prepare the scenario, import what its runs need, and make what is the same in all of them.
+    """Prepare the scenario, import the modules of its runs, and compute what all of them share.
 
-    Before what is kept takes more than half of the memory there is, it is let go.
+    Clears the caches first if they use more than half of the allowed memory.
     """
     if _memory() > MAX_MEMORY_BYTES / 2:
         _PREPARED.clear()
@@ -55,7 +55,7 @@ def _warm_up(job: Job) -> None:
 
 
 def _memory() -> int:
-    """The address space in use, in bytes, which is what is bounded (Linux: field 1 of /proc/self/statm, in pages)."""
+    """Return the address space in use in bytes (Linux: field 1 of /proc/self/statm, in pages)."""
     return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 
 

@@ -1,4 +1,4 @@
-"""What `--watch` knows: which files each scenario is made of, and how it came out last."""
+"""Watch mode of `simscen run`: reruns the scenarios whose files have changed."""
 
 import json
 import os
@@ -25,40 +25,40 @@ FileStamps = dict[Path, tuple[int, int, int] | None]
 
 
 def file_stamps(files: Iterable[Path]) -> FileStamps:
-    """What changes when a file is saved, of each; None = it is not there."""
+    """Return a stamp of each file that changes when it is saved; None if the file does not exist."""
     return {file: _stamp(file) for file in files}
 
 
 def _stamp(file: Path) -> tuple[int, int, int] | None:
     try:
-        found = file.stat()
+        status = file.stat()
     except OSError:
         return None
-    return found.st_mtime_ns, found.st_size, found.st_ino
+    return status.st_mtime_ns, status.st_size, status.st_ino
 
 
 class WatchReporter:
-    """Listens to a session and writes down for the one that watches what it is made of and how it comes out."""
+    """Observer of a session that reports the files and outcomes of scenarios to the watching process as JSON lines."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
         self._files: dict[str, str] = {}
 
     def loaded(self, scenarios: Sequence[LoadedScenario]) -> None:
-        """Write down the files of each."""
-        made_of: dict[str, set[Path]] = {}
+        """Report the files of each scenario."""
+        files_of: dict[str, set[Path]] = {}
         for scenario in scenarios:
             self._files[scenario.id] = str(scenario.file)
-            made_of.setdefault(str(scenario.file), set()).update(scenario_files(scenario))
-        for file, others in made_of.items():
+            files_of.setdefault(str(scenario.file), set()).update(scenario_files(scenario))
+        for file, others in files_of.items():
             self._write({"scenario": file, "files": sorted(map(str, others))})
 
-    def mistakes(self, problems: Iterable[Problem]) -> None:
-        """Write down which files keep the session from running."""
-        self._write({"mistaken": sorted({str(Path(problem.path).absolute()) for problem in problems})})
+    def invalid_files(self, problems: Iterable[Problem]) -> None:
+        """Report the files that prevent the session from running."""
+        self._write({"invalid": sorted({str(Path(problem.path).absolute()) for problem in problems})})
 
     def __call__(self, event: SessionEvent) -> None:
-        """Write down how a run came out."""
+        """Report the outcome of a run."""
         if isinstance(event, RunFinished):
             self._write({"scenario": self._files[event.key.scenario], "good": event.outcome.good})
 
@@ -68,110 +68,111 @@ class WatchReporter:
 
 
 class WatchState:
-    """The scenarios that `found` finds below `paths`, the files of each, and those that did not pass.
+    """The watched scenarios, the files of each, and which of them did not pass.
 
-    A session that a mistake in some file kept from running is not done: any change of a file lets it try again.
+    `find_scenarios` returns the scenarios below `paths`. After a session that an invalid file prevented from running,
+    the change of any file starts it again.
     """
 
-    def __init__(self, found: Callable[[], Sequence[Path]], paths: Iterable[Path]) -> None:
-        self._found = found
+    def __init__(self, find_scenarios: Callable[[], Sequence[Path]], paths: Iterable[Path]) -> None:
+        self._find_scenarios = find_scenarios
         self._folders = {path.absolute() for path in paths if path.is_dir()}
         self._files: dict[Path, set[Path]] = {file: {file} for file in self._discovered()}
-        self._bad: set[Path] = set()
-        self._mistaken: set[Path] = set()
-        self._asked: Sequence[Path] = ()
+        self._not_passed: set[Path] = set()
+        self._invalid: set[Path] = set()
+        self._requested: Sequence[Path] = ()
         self._unfinished: Sequence[Path] = ()
 
     @property
     def scenarios(self) -> list[Path]:
-        """All that there are."""
+        """All scenarios."""
         return sorted(self._files)
 
     @property
     def failed(self) -> list[Path]:
-        """Those with a run that did not pass when it was made last."""
-        return sorted(self._bad & self._files.keys())
+        """Scenarios of which a run did not pass in their last session."""
+        return sorted(self._not_passed & self._files.keys())
 
     @property
     def files(self) -> list[Path]:
-        """What to look at: files, and the folders in which new scenarios may appear."""
-        return sorted({*self._folders, *self._mistaken, *(file for files in self._files.values() for file in files)})
+        """Files to watch, and folders in which new scenarios may appear."""
+        return sorted({*self._folders, *self._invalid, *(file for files in self._files.values() for file in files)})
 
     def begin(self, paths: Sequence[Path]) -> None:
-        """A session of these begins."""
-        self._asked, self._mistaken = paths, set()
-        self._bad -= {file for path in paths for file in self._below(path)}
+        """Record that a session with these paths begins."""
+        self._requested, self._invalid = paths, set()
+        self._not_passed -= {file for path in paths for file in self._below(path)}
 
-    def learn(self, line: str) -> None:
-        """Take a line of a session's report."""
+    def update(self, line: str) -> None:
+        """Process a line of the WatchReporter of a session."""
         message = json.loads(line)
-        if "mistaken" in message:
-            self._mistaken = set(map(Path, message["mistaken"]))
+        if "invalid" in message:
+            self._invalid = set(map(Path, message["invalid"]))
             return
         scenario = Path(message["scenario"])
         if "files" in message:
             self._files[scenario] = {Path(file) for file in message["files"]}
             self._folders |= {scenario.parent}
         elif not message["good"]:
-            self._bad.add(scenario)
+            self._not_passed.add(scenario)
 
     def end(self, code: int) -> None:
-        """The session has ended so; after a mistake in a file it is still to be done."""
-        self._unfinished = self._asked if code == Exit.USAGE else ()
+        """Record that the session ended; after an invalid file it is still pending."""
+        self._unfinished = self._requested if code == Exit.USAGE else ()
 
-    def touched(self, changed: set[Path]) -> Sequence[Path]:
-        """The scenarios to run now that these files have changed."""
+    def scenarios_to_run(self, changed: set[Path]) -> Sequence[Path]:
+        """Return the scenarios to run after these files have changed."""
         unfinished = {file for path in self._unfinished for file in self._below(path)}
         known = set(self._files)
-        there = set(self._discovered()) if changed & self._folders else known
-        self._files = {file: self._files.get(file, {file}) for file in sorted(there)}
-        new = there - known
-        touched = {file for file, files in self._files.items() if files & changed}
-        return sorted((touched | new | unfinished) & there)
+        existing = set(self._discovered()) if changed & self._folders else known
+        self._files = {file: self._files.get(file, {file}) for file in sorted(existing)}
+        new = existing - known
+        affected = {file for file, files in self._files.items() if files & changed}
+        return sorted((affected | new | unfinished) & existing)
 
     def _below(self, path: Path) -> list[Path]:
         return [file for file in self._files if file.is_relative_to(path.absolute())]
 
     def _discovered(self) -> Sequence[Path]:
-        """None where they cannot be told apart: the session will say why."""
+        """Return the scenarios; none if searching for them fails, which the next session reports."""
         try:
-            return self._found()
+            return self._find_scenarios()
         except SimscenError:
             return ()
 
 
 POLL_INTERVAL_S = 0.25
-"""Seconds between two looks at the files; two looks that are equal end a burst of saving."""
+"""Time between two checks of the files, in seconds; two equal checks end a burst of changes."""
 STOPPED = (Exit.HUNG_UP, Exit.INTERRUPTED, Exit.TERMINATED)
 
 
-def watch_session(asked: SessionRequest) -> int:
-    """Run it, wait, run again what was touched, until q or Ctrl-C; the exit code is that of the last session.
+def watch_session(request: SessionRequest) -> int:
+    """Run a session, rerun affected scenarios until q or Ctrl-C is pressed, and return the last exit code.
 
-    Each session has a process of its own, a copy of this one: what it loads, plug-ins too, is loaded anew each time.
+    Each session is a fork of this process, so that everything, including plug-ins, is loaded again each time.
     """
-    for name, value in (("--out", asked.out), ("--resume", asked.resume)):
+    for name, value in (("--out", request.out), ("--resume", request.resume)):
         if value is not None:
-            raise UsageError(f"--watch and {name} exclude each other: every session has a folder of its own")
-    if asked.open_:
-        raise UsageError("--watch and --open exclude each other: every session has a page of its own")
-    if asked.wanted.shard != (1, 1):
+            raise UsageError(f"--watch and {name} exclude each other: each session has its own folder")
+    if request.open_:
+        raise UsageError("--watch and --open exclude each other: each session has its own page")
+    if request.wanted.shard != (1, 1):
         raise UsageError("--watch and --shard exclude each other")
-    home = asked.root or default_root(asked.paths)
-    watching = WatchState(lambda: discover(asked.paths, home), asked.paths)
-    code, seen = _run_in_child(replace(asked, root=home), watching)
+    home = request.root or default_root(request.paths)
+    watching = WatchState(lambda: discover(request.paths, home), request.paths)
+    code, seen = _run_in_child(replace(request, root=home), watching)
     while code not in STOPPED:
         _print_status(watching)
-        files = _next(watching, seen)
+        files = _wait_for_changes(watching, seen)
         if files is None:
             break
-        again = replace(asked, paths=files, root=home, last_failed=False)
+        again = replace(request, paths=files, root=home, last_failed=False)
         code, seen = _run_in_child(again, watching)
     return code
 
 
-def _run_in_child(asked: SessionRequest, watching: WatchState) -> tuple[int, FileStamps]:
-    """One session in a process of its own: its exit code, and the files as they were before it began."""
+def _run_in_child(request: SessionRequest, watching: WatchState) -> tuple[int, FileStamps]:
+    """Run a session in a child process. Return its exit code, and the stamps of the files from before it began."""
     before = file_stamps(watching.files)
     reading, writing = os.pipe()
     sys.stdout.flush()
@@ -179,18 +180,18 @@ def _run_in_child(asked: SessionRequest, watching: WatchState) -> tuple[int, Fil
     pid = os.fork()
     if pid == 0:
         os.close(reading)
-        with os.fdopen(writing, "w", encoding="utf-8") as told:
-            report = WatchReporter(told)
+        with os.fdopen(writing, "w", encoding="utf-8") as pipe:
+            report = WatchReporter(pipe)
             try:
-                sys.exit(execute_session(asked, report))
+                sys.exit(execute_session(request, report))
             except InvalidInput as error:
-                report.mistakes(error.problems)
+                report.invalid_files(error.problems)
                 raise
     os.close(writing)
     with _ignoring_interrupts(), os.fdopen(reading, encoding="utf-8") as lines:
-        watching.begin(asked.paths)
+        watching.begin(request.paths)
         for line in lines:
-            watching.learn(line)
+            watching.update(line)
         code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     watching.end(code)
     now = file_stamps(watching.files)
@@ -199,7 +200,7 @@ def _run_in_child(asked: SessionRequest, watching: WatchState) -> tuple[int, Fil
 
 @contextmanager
 def _ignoring_interrupts() -> Iterator[None]:
-    """Ctrl-C is for the session, which has it, too; its exit code says so."""
+    """Ignore Ctrl-C in this process, since the session receives it, too, and its exit code tells."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
@@ -209,13 +210,13 @@ def _ignoring_interrupts() -> Iterator[None]:
 
 def _print_status(watching: WatchState) -> None:
     failed = len(watching.failed)
-    keys = f"a = all, f = what did not pass ({failed}), q = quit"
+    keys = f"a = run all, f = run those that did not pass ({failed}), q = quit"
     print_text(f"watching {len(watching.files)} files of {len(watching.scenarios)} scenarios: {keys}")
     sys.stdout.flush()
 
 
-def _next(watching: WatchState, seen: FileStamps) -> Sequence[Path] | None:
-    """The scenarios to run next, as soon as a key or a saved file says so; None = to quit."""
+def _wait_for_changes(watching: WatchState, seen: FileStamps) -> Sequence[Path] | None:
+    """Return the scenarios to run next once a key is pressed or a file changes; None to quit."""
     with _keys() as keys:
         while True:
             key = keys()
@@ -232,19 +233,19 @@ def _next(watching: WatchState, seen: FileStamps) -> Sequence[Path] | None:
                 now = later
             changed = {file for file in {*now, *seen} if now.get(file) != seen.get(file)}
             seen = now
-            if touched := watching.touched(changed):
-                return touched
+            if affected := watching.scenarios_to_run(changed):
+                return affected
 
 
 def _stamps_after_pause(watching: WatchState) -> FileStamps:
-    """The files after another pause."""
+    """Return the stamps after another pause."""
     select.select([], [], [], POLL_INTERVAL_S)
     return file_stamps(watching.files)
 
 
 @contextmanager
 def _keys() -> Iterator["_Keys"]:
-    """What is typed, key by key and without being shown; the terminal is left as it was."""
+    """Read single keys without echo, and restore the terminal in the end."""
     if not os.isatty(0):
         yield _Keys()
         return
@@ -257,7 +258,7 @@ def _keys() -> Iterator["_Keys"]:
 
 
 class _Keys:
-    """Called, it waits a little for a key; "" = none. Where standard input has ended there will be none."""
+    """Reader of single keys: a call waits briefly and returns the key, or "" if there is none."""
 
     _ended = False
 

@@ -32,7 +32,7 @@ def ran(folder: Path) -> list[tuple[str, int, str]]:
 @pytest.mark.slow
 def test_only_what_failed_runs_again_until_nothing_is_left(simscen, project: Path) -> None:
     ended = simscen("run", ".", "--last-failed")
-    assert ended.err == "simscen: there is no earlier session in simscen-out: everything that is chosen runs\n"
+    assert ended.err == "simscen: there is no earlier session in simscen-out: all selected scenarios run\n"
     assert len(ran(project)) == 3
     ended = simscen("run", ".", "--lf")
     assert (ended.code, ended.err) == (1, "simscen: 2 runs failed last\n")
@@ -41,10 +41,10 @@ def test_only_what_failed_runs_again_until_nothing_is_left(simscen, project: Pat
     (project / "new.scenario.yaml").write_text(FAILING)
     (project / "c.scenario.yaml").rename(project / "d.scenario.yaml")
     ended = simscen("run", ".", "--lf")
-    assert (ended.code, ended.err) == (0, "simscen: 2 runs failed last: 1 is run, 1 is not among what is chosen\n")
+    assert (ended.code, ended.err) == (0, "simscen: 2 runs failed last: 1 selected, 1 not\n")
     assert ran(project) == [("b", 1, "passed")]
     ended = simscen("run", "a.scenario.yaml", "--lf")
-    assert ended.err == "simscen: 1 run failed last, and is not among what is chosen: everything that is chosen runs\n"
+    assert ended.err == "simscen: 1 run failed last, none of them selected: all selected scenarios run\n"
     assert ran(project) == [("a", 1, "passed")]
 
 
@@ -61,7 +61,7 @@ def test_a_failed_run_keeps_its_seed(simscen, project: Path) -> None:
 def test_sessions_are_looked_for_beside_the_output_folder(simscen, project: Path) -> None:
     simscen("run", "a.scenario.yaml", "--out", "ci/1")
     ended = simscen("run", "a.scenario.yaml", "--out", "ci/2", "--lf")
-    nothing = f"simscen: nothing failed in the last session, {project}/ci/1: everything that is chosen runs\n"
+    nothing = f"simscen: nothing failed in the last session, {project}/ci/1: all selected scenarios run\n"
     assert (ended.code, ended.err) == (0, nothing)
 
 

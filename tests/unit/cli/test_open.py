@@ -62,7 +62,7 @@ def test_without_a_browser_it_says_where_the_page_is(simscen, tmp_path: Path, mo
     monkeypatch.setattr(webbrowser, "open", lambda uri: False)
     ended = simscen("run", "a.scenario.yaml", "--out", "out", "--open")
     assert ended.code == 0
-    assert ended.err == "simscen: no browser was found; open out/report.html in one\n"
+    assert ended.err == "simscen: no browser found; open out/report.html in a browser\n"
 
 
 def test_a_watched_folder_has_no_one_page_to_open(simscen, tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def test_junit_takes_no_name_of_the_output_folder(simscen, tmp_path: Path, name,
         (tmp_path / "out/events.jsonl").write_text("{}\n")
     ended = simscen("run", "good.scenario.yaml", *options, "--junit", f"out/{name}")
     assert ended.code == 2
-    assert ended.err == f"simscen: cannot write out/{name}: the output folder has something else of that name\n"
+    assert ended.err == f"simscen: cannot write out/{name}: simscen writes another file of this name there\n"
 
 
 @pytest.mark.parametrize("name", [".", "..", "", "deep/", "deep/.", ".scenario.yaml"])
@@ -153,5 +153,5 @@ def test_a_report_that_could_not_be_written_is_not_named(tmp_path: Path, monkeyp
     monkeypatch.setattr("simscen.cli.session.output_files.write_atomically", write)
     reports = Reports(tmp_path, None, "simscen")
     assert not reports.write([])
-    ended = reports.closing([], 1.0, False)
+    ended = reports.finished_event([], 1.0, False)
     assert (ended.junit, ended.page) == ("", "")

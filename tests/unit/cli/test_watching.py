@@ -25,8 +25,8 @@ def watching(files: Path) -> WatchState:
     for name, others in (("a", ["room", "robot"]), ("b", ["robot"])):
         scenario = str(files / f"{name}.scenario.yaml")
         made_of = [scenario, *(str(files / f"{other}.yaml") for other in others)]
-        found.learn(json.dumps({"scenario": scenario, "files": made_of}))
-        found.learn(json.dumps({"scenario": scenario, "good": name == "a"}))
+        found.update(json.dumps({"scenario": scenario, "files": made_of}))
+        found.update(json.dumps({"scenario": scenario, "good": name == "a"}))
     found.end(Exit.FAILED)
     return found
 
@@ -39,13 +39,13 @@ def names(paths) -> str:
     ("saved", "told"), [("room.yaml", "a"), ("robot.yaml", "a b"), ("b.scenario.yaml", "b"), ("notes.txt", "")]
 )
 def test_what_a_file_is_part_of_runs_again(watching: WatchState, files: Path, saved: str, told: str) -> None:
-    assert names(watching.touched({files / saved})) == told
+    assert names(watching.scenarios_to_run({files / saved})) == told
 
 
 def test_a_new_scenario_runs_and_a_removed_one_is_forgotten(watching: WatchState, files: Path) -> None:
     (files / "new.scenario.yaml").write_text("")
     (files / "b.scenario.yaml").unlink()
-    assert names(watching.touched({files})) == "new"
+    assert names(watching.scenarios_to_run({files})) == "new"
     assert names(watching.scenarios) == "a new"
     assert watching.failed == []
 
@@ -61,12 +61,12 @@ def test_a_session_that_a_mistake_kept_from_running_is_tried_again_with_what_was
 ) -> None:
     watching.begin([files / "b.scenario.yaml"])
     report = io.StringIO()
-    WatchReporter(report).mistakes([Problem(str(files / "world.yaml"), 1, 1, "SC012", "unknown key")])
-    watching.learn(report.getvalue())
+    WatchReporter(report).invalid_files([Problem(str(files / "world.yaml"), 1, 1, "SC012", "unknown key")])
+    watching.update(report.getvalue())
     watching.end(Exit.USAGE)
     assert files / "world.yaml" in watching.files
-    assert names(watching.touched({files / "world.yaml"})) == "b"
-    assert names(watching.touched({files / "room.yaml"})) == "a b"
+    assert names(watching.scenarios_to_run({files / "world.yaml"})) == "b"
+    assert names(watching.scenarios_to_run({files / "room.yaml"})) == "a b"
 
 
 def test_a_file_that_is_saved_has_another_stamp_also_when_it_comes_or_goes(files: Path) -> None:
