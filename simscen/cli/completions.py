@@ -68,9 +68,9 @@ def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
                 yield f"{parent}{slash}{path.name}"
 
 
-# MERGED: Location of the shipped scenarios: beside the package in a checkout, inside the package when installed.
 SUFFIX = ".scenario.yaml"
 _PLACES = (PACKAGE / "data" / "library", PACKAGE.parent)
+"""Folders of the shipped scenarios: in an installed package, and in a checkout."""
 
 
 def shipped_scenarios() -> dict[str, Path]:

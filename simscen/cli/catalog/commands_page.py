@@ -1,4 +1,4 @@
-"""The commands with their arguments and options as a page, made from the functions that typer is given."""
+"""Reference page of the commands, generated from their functions."""
 
 import importlib
 import inspect
@@ -14,13 +14,13 @@ from typer.models import ArgumentInfo, OptionInfo
 from simscen.core.errors import Exit
 
 EXITS = {
-    Exit.PASSED: "All passed, or failed as their scenarios say; nothing is wrong.",
+    Exit.PASSED: "All runs passed, or failed as expected by their scenarios.",
     Exit.FAILED: "A criterion failed, or held although it was expected to fail.",
-    Exit.USAGE: "An invalid file, wrong usage or an unusable output folder. Nothing was run.",
+    Exit.USAGE: "Invalid file, wrong usage, or unusable output folder. Nothing was run.",
     Exit.INCOMPLETE: "A run could not be completed (crash, timeout, out of memory), or a result could not be written.",
     Exit.INTERNAL: "A bug in simscen.",
-    Exit.NOTHING_SELECTED: "Nothing was selected, or all of it is skipped.",
-    Exit.HUNG_UP: "Interrupted by SIGHUP: the terminal has gone.",
+    Exit.NOTHING_SELECTED: "Nothing was selected, or all selected scenarios are skipped.",
+    Exit.HUNG_UP: "Interrupted by SIGHUP: the terminal was closed.",
     Exit.INTERRUPTED: "Interrupted by Ctrl-C (SIGINT).",
     Exit.TERMINATED: "Interrupted by SIGTERM.",
 }
@@ -29,7 +29,7 @@ _WORDS = {int: "integer", float: "number", str: "text", Path: "path"}
 
 @dataclass(frozen=True)
 class Parameter:
-    """An argument or option: how it is written, what it takes, its default ("" = none) and what it means."""
+    """Argument or option: its spelling, the kind of its value, its default ("" = none), and its description."""
 
     written: str
     value: str
@@ -38,7 +38,7 @@ class Parameter:
 
 
 def commands_of(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """The functions of a command and of its subcommands, each with the words that call it."""
+    """Yield the functions of a command and its subcommands, each with the words that call it."""
     module = importlib.import_module(f"simscen.cli.commands.{name}")
     app = getattr(module, "app", None)
     if app is None:
@@ -53,31 +53,31 @@ def commands_of(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
 
 
 def parameters_of(function: Callable[..., Any]) -> list[Parameter]:
-    """What the function of a command takes, in the order of its help."""
+    """Return the parameters of the function of a command in the order of its help."""
     return [_parameter(*found) for found in _parameters_of(function)]
 
 
 def section(words: str, function: Callable[..., Any]) -> str:
-    """A command as a section of the page."""
+    """Return the section of a command."""
     rows = [
         f"| `{p.written}` | {p.value} | {f'`{p.default}`' if p.default else ''} | {_plain(p.help)} |"
         for p in parameters_of(function)
     ]
     head = ["| argument or option | value | default | meaning |", "|---|---|---|---|"]
-    table = "\n".join([*head, *rows]) if rows else "It takes nothing."
+    table = "\n".join([*head, *rows]) if rows else "No arguments or options."
     return f"## `simscen {words}`\n\n{_plain(inspect.cleandoc(function.__doc__ or ''))}\n\n{table}\n"
 
 
 def exits() -> str:
-    """The table of exit codes."""
+    """Return the table of exit codes."""
     rows = "\n".join(f"| {code.value} | {text} |" for code, text in EXITS.items())
-    text = "Of several that apply, the first of 129, 130 and 143, 4, 3, 1 is returned."
+    text = "If several apply, the first of 129, 130, 143, 4, 3, 1 is returned."
     return f"## Exit codes\n\n{text}\n\n| code | meaning |\n|---|---|\n{rows}\n"
 
 
 def _parameters_of(function: Callable[..., Any]) -> list[tuple[inspect.Parameter, Any, ArgumentInfo | OptionInfo]]:
     found = []
-    # Not get_type_hints: Python 3.10 hides the annotation in an Optional where the default is None.
+    # get_type_hints cannot be used: in Python 3.10 it hides Annotated in an Optional if the default is None.
     for parameter in inspect.signature(function, eval_str=True).parameters.values():
         annotation = parameter.annotation
         if get_origin(annotation) is Annotated:
@@ -95,14 +95,14 @@ def _parameter(parameter: inspect.Parameter, kind: Any, info: ArgumentInfo | Opt
         word = (info.metavar or parameter.name).upper()
         written = f"{word}…" if repeated else word if required else f"[{word}]"
     else:
-        # Within Annotated, typer takes the first name for what is its default elsewhere.
+        # Within Annotated, typer stores the first name as the default.
         names = [name for name in (info.default, *(info.param_decls or ())) if isinstance(name, str)]
         written = ", ".join(names or [f"--{parameter.name.replace('_', '-')}"])
     return Parameter(written, "" if kind is bool else _word(kind, info), default, info.help or "")
 
 
 def _bare(kind: Any) -> tuple[bool, Any]:
-    """Whether a type that may be None is a list, and of what."""
+    """Return whether a type that may be None is a list, and the type of its items."""
     if get_origin(kind) in (Union, types.UnionType):
         kind = next(member for member in get_args(kind) if member is not type(None))
     repeated = get_origin(kind) is list
@@ -119,7 +119,7 @@ def _word(kind: Any, info: ArgumentInfo | OptionInfo) -> str:
 
 
 def _plain(text: str) -> str:
-    """Text that Markdown leaves as it is: *.world.yaml and <run-id> are neither emphasis nor HTML."""
+    """Escape text for Markdown, so that *.world.yaml and <run-id> are neither emphasis nor HTML."""
     return text.replace("*", "\\*").replace("<", "\\<").replace("|", "\\|")
 
 

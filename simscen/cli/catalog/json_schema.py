@@ -1,4 +1,4 @@
-"""JSON Schemas of the language, shaped for editors: completion, hover texts, and errors that name the mistake."""
+"""JSON Schemas of the language for editors: completion, hover texts, and precise errors."""
 
 import json
 from typing import Any
@@ -28,50 +28,57 @@ MODELS: dict[str, type[BaseModel]] = {
     "base": ScenarioSpec,
 }
 DRAFT = "http://json-schema.org/draft-07/schema#"
-"""What yaml-language-server knows best; nothing newer is needed."""
+"""Version that yaml-language-server supports best."""
 
 
 def schema_of(name: str, installed: bool = False) -> Schema:
-    """The JSON Schema of a kind of file, e.g. "scenario"; of what is `installed`, too, if asked."""
+    """Return the JSON Schema of a kind of file such as "scenario"; with installed types if `installed`."""
     model = MODELS[name]
-    generated = model.model_json_schema(schema_generator=_WithInstalled if installed else _Generator)
+    generated = model.model_json_schema(schema_generator=_InstalledTypesGenerator if installed else _Generator)
     if name == "stack":
-        _leave_to_the_scenario(generated)
+        _remove_scenario_keys(generated)
     if name == "base":
-        _leave_to_those_that_extend(generated)
-    known = {"extends": _EXTENDS, **generated["properties"], **(_added(generated) if model is ScenarioSpec else {})}
-    schema = _mended({**generated, "properties": known}, generated.get("$defs", {}))
-    # Any other key may come from the file it extends or from the defaults.yaml beside it.
+        _make_extensible_keys_optional(generated)
+    known = {
+        "extends": _EXTENDS,
+        **generated["properties"],
+        **(_append_keys(generated) if model is ScenarioSpec else {}),
+    }
+    schema = _simplified({**generated, "properties": known}, generated.get("$defs", {}))
+    # Other required keys may come from the extended file or from a defaults.yaml in the same folder.
     needed = ["simscen"] if model.model_fields["simscen"].is_required() and name != "base" else []
     return {"$schema": DRAFT, "title": f"simscen {name}", **schema, "required": needed}
 
 
-def _leave_to_the_scenario(generated: Schema) -> None:
-    """What a stack file may not say of a stack."""
+def _remove_scenario_keys(generated: Schema) -> None:
+    """Remove the keys that a stack file must leave to the scenario."""
     for definition in generated["$defs"].values():
         for key in SCENARIO_KEYS:
             definition.get("properties", {}).pop(key, None)
 
 
-def _added(generated: Schema) -> Schema:
-    """`pass+` and the like: what is added to the list of the file that is extended."""
-    lists = {name: told for name, told in generated["properties"].items() if told.get("type") == "array"}
+def _append_keys(generated: Schema) -> Schema:
+    """Return the schemas of keys such as `pass+`, which append to a list of the extended file."""
+    lists = {name: value for name, value in generated["properties"].items() if value.get("type") == "array"}
     return {
-        f"{name}{APPEND_SUFFIX}": {**told, "description": f"Added to `{name}` of the file that is extended."}
-        for name, told in lists.items()
+        f"{name}{APPEND_SUFFIX}": {
+            **value,
+            "description": f"Entries that are appended to `{name}` of the extended file.",
+        }
+        for name, value in lists.items()
     }
 
 
-def _leave_to_those_that_extend(generated: Schema) -> None:
-    """What extends a base can add keys to its mappings, but nothing to what stands in its lists."""
+def _make_extensible_keys_optional(generated: Schema) -> None:
+    """Make keys of a base file optional where an extending file can add them, which is not possible in lists."""
     definitions = generated.get("$defs", {})
-    in_lists = _reached(generated, definitions, lists=True)
-    for name in _reached(generated, definitions, lists=False) - in_lists:
+    in_lists = _referenced_definitions(generated, definitions, lists=True)
+    for name in _referenced_definitions(generated, definitions, lists=False) - in_lists:
         definitions[name].pop("required", None)
 
 
-def _reached(schema: Schema, definitions: Schema, lists: bool) -> set[str]:
-    """The definitions that a schema leads to without passing a list; or with `lists`, behind one."""
+def _referenced_definitions(schema: Schema, definitions: Schema, lists: bool) -> set[str]:
+    """Return the definitions that a schema refers to outside of lists, or within lists with `lists`."""
     found: set[str] = set()
     seen: set[tuple[str, bool]] = set()
 
@@ -96,18 +103,18 @@ def _reached(schema: Schema, definitions: Schema, lists: bool) -> set[str]:
 
 
 def as_text(schema: Schema) -> str:
-    """As it is written to a file."""
+    """Return the text of a schema file."""
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 
 _EXTENDS: Schema = {
     "type": "string",
-    "description": "A file of the same kind, relative to this one: its keys hold where this file does not give them.",
+    "description": "File of the same kind, relative to this file; its keys apply unless this file sets them.",
 }
 
 
 class _Generator(GenerateJsonSchema):
-    """Pydantic's generator with what it cannot know: single-key choices, and the docstrings of bare values."""
+    """Generator of pydantic schemas that adds single-key choices and the docstrings of bare values."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         made, model = super().model_schema(schema), schema["cls"]
@@ -118,8 +125,8 @@ class _Generator(GenerateJsonSchema):
         return made
 
 
-class _WithInstalled(_Generator):
-    """The same, with the choices that installed packages add; broken ones are left out, as nobody can write them."""
+class _InstalledTypesGenerator(_Generator):
+    """Generator that also adds the usable types of installed packages."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         made, model = super().model_schema(schema), schema["cls"]
@@ -130,24 +137,25 @@ class _WithInstalled(_Generator):
         return {**made, **_exactly_one(model, [*model.choices(), *installed_choices(model)])}
 
     def function_wrap_schema(self, schema: core_schema.WrapValidatorFunctionSchema) -> JsonSchemaValue:
-        made, told = super().function_wrap_schema(schema), schema.get("metadata", {})
-        models = dict(extensible_union.installed_specs(told[GROUP_KEY])) if GROUP_KEY in told else {}
-        more: list[Schema] = [self._named(name, model) for name, model in models.items() if told[MAPPINGS_ALLOWED_KEY]]
-        if models and told[NAMES_ALLOWED_KEY]:
+        made, value = super().function_wrap_schema(schema), schema.get("metadata", {})
+        models = dict(extensible_union.installed_specs(value[GROUP_KEY])) if GROUP_KEY in value else {}
+        more: list[Schema] = [self._named(name, model) for name, model in models.items() if value[MAPPINGS_ALLOWED_KEY]]
+        if models and value[NAMES_ALLOWED_KEY]:
             more.append({"enum": list(models)})
         return {"anyOf": [made, *more]} if more else made
 
     def _named(self, name: str, model: type[BaseModel]) -> JsonSchemaValue:
-        """The schema of a specification that is chosen by the name of its entry point."""
+        """Return the schema of a specification that is selected by the name of its entry point."""
         typed: Schema = {"properties": {"type": {"const": name}}, "required": ["type"]}
         model.model_rebuild()
         return {"allOf": [self.generate_inner(model.__pydantic_core_schema__), typed]}
 
 
 def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
-    """One of `keys`, and only one; where there is none, a misspelled one is told about by what does not know it.
+    """Return a schema that requires exactly one of `keys`.
 
-    With `maxProperties` yaml-language-server would offer nothing: it counts the key that is being typed.
+    Without any of them, the error is left to the schema that does not know the key. `maxProperties` is not used, since
+    yaml-language-server would then offer no completions: it counts the key that is being typed.
     """
     given: list[Schema] = [{"type": "object", "required": [key]} for key in keys]
     beside = [field.alias or name for name, field in model.model_fields.items() if name in model.modifiers]
@@ -159,25 +167,25 @@ def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
     }
 
 
-def _mended(node: Any, definitions: Schema) -> Any:
-    """A schema without titles, nulls and bulky defaults, its unions told apart by `type` as if/then."""
+def _simplified(node: Any, definitions: Schema) -> Any:
+    """Return a schema without titles, nulls, and large defaults, and with unions as if/then."""
     if isinstance(node, list):
-        return [_mended(item, definitions) for item in node]
+        return [_simplified(item, definitions) for item in node]
     if not isinstance(node, dict):
         return node
     node = _without_noise(_without_null(node))
     node = _by_json_type(_by_type(node, definitions))
     return {
-        # Under these are names, not keywords: a property may be called `title`.
-        key: {name: _mended(schema, definitions) for name, schema in value.items()}
+        # The keys below these are names, not keywords: a property may be named `title`.
+        key: {name: _simplified(schema, definitions) for name, schema in value.items()}
         if key in ("properties", "$defs")
-        else _mended(value, definitions)
+        else _simplified(value, definitions)
         for key, value in node.items()
     }
 
 
 def _by_type(node: Schema, definitions: Schema) -> Schema:
-    """A union told apart by `type`: an editor then completes and checks the one that is meant, not all of them."""
+    """Return a union discriminated by `type` as if/then, so that an editor considers only the selected member."""
     members = {
         ref["$ref"]: definitions[ref["$ref"].rpartition("/")[2]] for ref in node.get("oneOf", []) if "$ref" in ref
     }
@@ -199,7 +207,7 @@ def _by_type(node: Schema, definitions: Schema) -> Schema:
 
 
 def _by_key(node: Schema, apart: dict[str, str], definitions: Schema) -> Schema:
-    """A union some members of which have no `type`: each is known by the one key that it requires."""
+    """Return a union of which some members have no `type`: each of them is selected by its only required key."""
     rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
     others = [option for option in node["oneOf"] if option.get("$ref") not in apart]
     made = others[0] if len(others) == 1 else _by_type({"oneOf": others}, definitions)
@@ -209,7 +217,7 @@ def _by_key(node: Schema, apart: dict[str, str], definitions: Schema) -> Schema:
 
 
 def _by_json_type(node: Schema) -> Schema:
-    """A text or a mapping, one or a list: the mistake is told about the one that was written."""
+    """Return a union of text and mapping, or of item and list, as if/then, so that errors refer to the right member."""
     options = node.get("oneOf", [])
     plain = [option for option in options if option.get("type") in ("string", "array")]
     if len(options) != 2 or not plain or options[0].get("type") == options[1].get("type"):
@@ -217,12 +225,12 @@ def _by_json_type(node: Schema) -> Schema:
     other = next(option for option in options if option is not plain[0])
     rest = {key: value for key, value in node.items() if key != "oneOf"}
     words = plain[0].get("enum", plain[0].get("examples", []))
-    offered = {"examples": words} if words else {}  # where nothing is written yet, an editor looks at neither branch
+    offered = {"examples": words} if words else {}  # an editor uses neither branch for an empty value
     return {**rest, **offered, "if": {"type": plain[0]["type"]}, "then": plain[0], "else": other}
 
 
 def _without_null(node: Schema) -> Schema:
-    """An optional key is left out, never null."""
+    """Return an optional value without null, since an optional key is omitted instead."""
     options = node.get("anyOf", [])
     if {"type": "null"} not in options:
         return node

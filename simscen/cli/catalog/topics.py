@@ -1,4 +1,4 @@
-"""Everything the language knows, by name, with its docstring, fields and example: for `explain` and the reference."""
+"""Topics of the scenario language with description, fields, and example, for `simscen explain` and the reference."""
 
 import inspect
 import re
@@ -53,7 +53,7 @@ _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
 @dataclass(frozen=True)
 class Field:
-    """A key, what may be written there, its default ("" = required), and what it means."""
+    """Key of a mapping: the kind of its value, its default ("" = required), and its description."""
 
     key: str
     kind: str
@@ -63,7 +63,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Topic:
-    """One thing of the language: `name` as it is written, in a `group` such as "trigger"."""
+    """Named part of the language, such as a criterion, in a `group` such as "trigger"."""
 
     group: str
     name: str
@@ -72,27 +72,27 @@ class Topic:
     example: str = ""
     rows: tuple[Field, ...] = ()
     origin: str = ""
-    """The package that adds it, and its version; "" for what simscen ships."""
+    """Package that adds the topic, with its version; "" for topics of simscen."""
     alias: str = ""
-    """What else it is called: the number of a code."""
+    """Other name of the topic: the number of an error code."""
 
     @property
     def fields(self) -> list[Field]:
-        """Its keys in order; none for a bare value."""
+        """Keys in order; empty for a bare value."""
         if self.rows:
             return list(self.rows)
         return fields_of(self.model) if self.model is not None and not issubclass(self.model, RootModel) else []
 
     @property
     def value(self) -> str:
-        """What is written behind the name, for a bare value."""
+        """Kind of a bare value."""
         if self.model is not None and issubclass(self.model, RootModel):
             return kind_of(self.model)
         return ""
 
 
 def topics(installed: bool = False) -> list[Topic]:
-    """Every topic, group by group, in the order of the language; with what `installed` packages add, if asked."""
+    """Return all topics in the order of the language; with those of installed packages if `installed`."""
     return [
         *_choices("trigger", AnyCondition),
         *added_topics(AnyCondition, installed),
@@ -193,7 +193,7 @@ _ROBOT: dict[str, type[BaseModel]] = {
 
 
 def fields_of(model: type[BaseModel]) -> list[Field]:
-    """The keys of a mapping, in the order of the model; of a choice only what may stand beside it."""
+    """Return the keys of a mapping in the order of the model; of a choice, only its modifiers."""
     docs = field_docs(model)
     shown = model.modifiers if issubclass(model, Choice) else model.model_fields.keys()
     return [
@@ -204,7 +204,7 @@ def fields_of(model: type[BaseModel]) -> list[Field]:
 
 
 def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
-    """A type in words, with unit and range: "length in m, ≥ 0"."""
+    """Return a type in words, with unit and range: "length in m, ≥ 0"."""
     if isinstance(kind, FieldInfo):
         return kind_of(kind.annotation, tuple(kind.metadata))
     if mark := next((mark for mark in metadata if isinstance(mark, ExtensibleUnion)), None):
@@ -228,7 +228,7 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
 
 
 def by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
-    """The shipped members of a union told apart by `type`."""
+    """Yield the shipped members of a union discriminated by `type`."""
     mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ExtensibleUnion)), None)
     members = get_args(get_args(union if mark is None else mark.own)[0])
     for member in members:
@@ -258,7 +258,7 @@ def _plain(kind: Any, metadata: tuple[Any, ...]) -> str:
 
 
 def _flat(metadata: tuple[Any, ...]) -> Iterator[Any]:
-    """Annotations of pydantic's Field are nested in it."""
+    """Yield all annotations, including those nested in pydantic's Field."""
     for mark in metadata:
         yield from mark.metadata if isinstance(mark, FieldInfo) else [mark]
 
@@ -284,7 +284,7 @@ def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
 
 
 def added_topics(choice: type[Choice], wanted: bool = True) -> Iterator[Topic]:
-    """What installed packages add to a choice, if that is `wanted`; without those that cannot be used."""
+    """Yield the usable choices of installed packages if they are `wanted`."""
     if not wanted:
         return
     origins = {entry.name: entry.origin for entry in registry.installed(choice.group)}
@@ -293,7 +293,7 @@ def added_topics(choice: type[Choice], wanted: bool = True) -> Iterator[Topic]:
 
 
 def _more(group: str, wanted: bool) -> Iterator[Topic]:
-    """What installed packages add to a group that is told apart by `type`."""
+    """Yield the usable types of installed packages in a group if they are `wanted`."""
     if wanted:
         origins = {entry.name: entry.origin for entry in registry.installed(group)}
         for name, model in extensible_union.installed_specs(group):

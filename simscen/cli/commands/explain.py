@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.catalog.reference_topics import everything, key_topics, known_names
+from simscen.cli.catalog.reference_topics import all_topics, key_topics, known_names
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import UsageError
@@ -42,14 +42,14 @@ def command(
 
 
 def explained(name: str, width: int = 100) -> str:
-    """Return the explanation of everything called `name`. Raises UsageError if there is nothing."""
+    """Return the explanation of all_topics called `name`. Raises UsageError if there is nothing."""
     if name.upper() in CODES:
         return f"{name.upper()}\n{_wrapped(CODES[name.upper()], width, '  ')}"
     return "\n\n".join(_explained(topic, width) for topic in _topics_named(name))
 
 
 def _topics_named(name: str) -> list[Topic]:
-    known = everything()
+    known = all_topics()
     lowered = name.lower()
     found = [topic for topic in known if lowered in (name.lower() for name in _names(topic))]
     found = found or key_topics(name, known)
@@ -65,13 +65,13 @@ def _names(topic: Topic) -> tuple[str, ...]:
     return (topic.name, f"{topic.group}.{topic.name}", *((topic.alias,) if topic.alias else ()))
 
 
-def _bare_keys(everything: list[Topic]) -> list[str]:
-    return [field.key for topic in everything for field in topic.fields]
+def _bare_keys(all_topics: list[Topic]) -> list[str]:
+    return [field.key for topic in all_topics for field in topic.fields]
 
 
 def _overview(width: int) -> str:
     groups: dict[str, list[str]] = {}
-    for topic in everything():
+    for topic in all_topics():
         groups.setdefault(topic.group, []).append(topic.name)
     lines = [f"{group}:\n{_wrapped(', '.join(names), width, '  ')}" for group, names in groups.items()]
     return "\n".join(

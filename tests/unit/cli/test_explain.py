@@ -43,7 +43,7 @@ def test_codes_are_explained(simscen) -> None:
 
 
 def test_a_code_with_which_nothing_in_the_reference_stack_ends_is_told_as_one_of_others(simscen) -> None:
-    assert "The reference stack never ends with it" in simscen("explain", "107").out.replace("\n  ", " ")
+    assert "The reference stack never returns it" in simscen("explain", "107").out.replace("\n  ", " ")
     stack = Path(package.__file__).parent / "stack"
     sources = [path.read_text(encoding="utf-8") for path in stack.rglob("*.py")]
     named = {code for code in ErrorCode if any(f"ErrorCode.{code.name}" in text for text in sources)}
@@ -94,7 +94,7 @@ def test_signals_are_listed_with_their_units_and_each_is_explained(simscen) -> N
         ("physics.tick_rate", "frequency in Hz"),
         ("GOAL_OCCUPIED", "Nav2's error code 206."),
         ("206", "GOAL_OCCUPIED (error code)"),
-        ("stack-timeout", "An external stack gave no answer"),
+        ("stack-timeout", "An external stack did not answer"),
         ("exit 3", "could not be completed"),
         ("5", "Nothing was selected"),
     ],
@@ -114,7 +114,7 @@ def test_misspelled_keys_and_codes_are_told_what_was_meant(simscen, name: str, m
 
 
 def test_every_topic_every_key_and_every_code_is_explained(monkeypatch) -> None:
-    everything = reference_topics.everything()
+    everything = reference_topics.all_topics()
     for module in (explain, reference_topics):
         monkeypatch.setattr(module, "everything", lambda: everything)  # to collect it costs most of the time
     for name in [*known_names(), *known_names(keys=True)]:
