@@ -1,8 +1,8 @@
-"""How much more the ground turns a robot than its wheels say, and the command that makes good for it.
+"""Compensation of one-sided wheel slip by a disturbance observer with feedforward.
 
-Wheels of which one side slips more than the other drive a bend where a straight was asked for. A controller that
-steers at a point ahead then drives beside its path for good, by half that bend times its look-ahead squared: more than
-the room there is in a narrow gap. A disturbance observer, and feedforward: what was measured is taken off the command.
+If one side slips more than the other, the robot drives a curve instead of a straight line. A pure-pursuit controller
+then has a steady lateral error of half the curvature times the squared lookahead distance, which can exceed the
+clearance in a narrow gap. The observer measures the curvature and subtracts it from the commands.
 """
 
 import math
@@ -11,23 +11,20 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 
 DECAY_DISTANCE_M = 0.5
-"""Meters driven in which what was learned fades by a factor of e: turns and ground change."""
+"""Distance in which an earlier estimate decays by a factor of e, because the ground changes."""
 MAX_CURVATURE_PER_M = 1.0
-"""1/m: no more of a bend is believed, whatever a broken sensor says."""
+"""Limit of the estimate, in case of a broken sensor."""
 
 
 class TurnSlipObserver:
-    """Compares the wheels' steps with those that wheels and gyroscope agree on."""
+    """Compares wheel odometry with the odometry that fuses wheels and gyroscope."""
 
     def __init__(self) -> None:
-        self._bend = 0.0
+        self._curvature = 0.0
         self._before: tuple[Pose2, Pose2] | None = None
 
     def learn(self, wheels: Pose2, fused: Pose2) -> None:
-        """Where the wheels say the robot is, each step along what they turned, and where it is taken to be.
-
-        Numbers that are not finite, as of a broken sensor, teach nothing.
-        """
+        """Update the estimate with poses of wheel and fused odometry; ignores values that are not finite."""
         if not math.isfinite(wheels.x + wheels.y + wheels.yaw + fused.yaw):
             return
         before, self._before = self._before, (wheels, fused)
@@ -38,11 +35,11 @@ class TurnSlipObserver:
         turned = math.remainder((fused.yaw - before[1].yaw) - (wheels.yaw - before[0].yaw), math.tau)
         share = min(1.0, abs(ahead) / DECAY_DISTANCE_M)
         if ahead != 0.0:
-            bend = self._bend + share * (turned / ahead - self._bend)
-            self._bend = min(max(bend, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
+            curvature = self._curvature + share * (turned / ahead - self._curvature)
+            self._curvature = min(max(curvature, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
 
     def countered(self, command: Twist) -> Twist:
-        """The command to send so that the robot turns as this one says."""
-        if command.vx == 0.0 or self._bend == 0.0:
+        """Return the command to send so that the robot turns as `command` intends."""
+        if command.vx == 0.0 or self._curvature == 0.0:
             return command
-        return Twist(command.vx, command.vy, command.wz - self._bend * command.vx)
+        return Twist(command.vx, command.vy, command.wz - self._curvature * command.vx)

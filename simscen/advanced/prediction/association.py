@@ -1,4 +1,4 @@
-"""Which piece of a scan continues which track, and which begins one."""
+"""Data association: which cluster of a scan updates which track, and which starts a new one."""
 
 import math
 
@@ -8,24 +8,24 @@ from simscen.advanced.prediction.track import Track
 from simscen.core.decorators import fast_dataclass
 
 NOISE, RELATIVE, HALF_SEEN = 0.02, 0.004, 0.10
-"""Standard deviation in m of a measured center: near by, for each meter of range, and more where a piece is hidden."""
+"""Standard deviation in m of a measured center: constant part, part per meter of range, and part if partly hidden."""
 FIRST_SEEN = 0.1
-"""Meters more of what is seen for the first time."""
+"""Additional standard deviation in m of the first measurement of a track."""
 GATE, GATE_SIGMAS = 0.25, 3.0
-"""Meters, and standard deviations, beyond which a piece is no continuation of a track."""
+"""Gate of the association: a distance in m plus a number of standard deviations."""
 LEAST_RADIUS = 0.15
-"""Meters: of what may begin a track without having come where it was free."""
+"""Minimum radius in m of a cluster that starts a track without having appeared in free space."""
 HALF_RADIUS = 0.3
-"""Meters: the least radius of what is half hidden when it is first seen: that of a person."""
+"""Minimum radius in m of a partly hidden cluster that starts a track: that of a person."""
 RADIUS_GAIN = 0.3
-"""How much a new look at a whole piece changes the radius of a track."""
+"""Gain of the radius update with a completely visible cluster."""
 
 
 @fast_dataclass(eq=False)
 class Seen:
-    """A scan at a tick, in pieces of its hits `places` (m,), by a lidar that is at `lidar` in the odom frame.
+    """The clusters of a scan with their hits `places` (m,), seen by a lidar at `lidar` in the odom frame.
 
-    Which of them stand where it was free, and which where something was hit before.
+    `came` tells which of them are where earlier scans saw free space, `stood` which are where something was hit before.
     """
 
     tick: int
@@ -36,12 +36,12 @@ class Seen:
     stood: list[bool]
 
     def stands(self, piece: int) -> bool:
-        """Whether one stands where it stood before."""
+        """Return whether a cluster is at the same place as before."""
         return self.stood[piece] and not self.came[piece]
 
 
 def associate(tracks: list[Track], seen: Seen) -> set[int]:
-    """Give each track the piece nearest to where it should be, nearest pairs first; the pieces that were given."""
+    """Update each track with the nearest cluster, nearest pairs first. Return the indices of the clusters used."""
     pieces, lidar = seen.pieces, seen.lidar
     if not tracks or not pieces:
         return set()
@@ -49,7 +49,7 @@ def associate(tracks: list[Track], seen: Seen) -> set[int]:
     for number, track in enumerate(tracks):
         expected, gate = lidar.into(track.place), GATE + GATE_SIGMAS * track.place_deviation
         for piece, (_, _, center, _, edges) in enumerate(pieces):
-            # Of what is half hidden, the middle of the visible part may be a radius off.
+            # The center of a partly hidden obstacle can be off by its radius.
             far, hidden = abs(expected - center), 0.0 if edges == BOTH else track.radius
             if far <= gate + hidden and (not seen.stands(piece) or _stood(track, center, lidar, hidden)):
                 possible.append((far, number, piece))
@@ -66,12 +66,12 @@ def associate(tracks: list[Track], seen: Seen) -> set[int]:
 
 
 def _stood(track: Track, center: complex, lidar: LidarPose, hidden: float) -> bool:
-    """Whether what stands there is what the track was hit at: nothing hops from one post to the next."""
+    """Return whether a static cluster is the one that the track was last updated with."""
     return abs(lidar.into(track.lately[-1].place) - center) <= GATE + hidden
 
 
 def _update(given: list[tuple[Track, int]], seen: Seen) -> None:
-    """Tracks are seen as these pieces."""
+    """Update tracks with their clusters."""
     lidar = seen.lidar
     for track, number in given:
         first, last, guess, radius, edges = seen.pieces[number]
@@ -86,14 +86,14 @@ def _update(given: list[tuple[Track, int]], seen: Seen) -> None:
 
 
 def begin(tracks: list[Track], seen: Seen, taken: set[int]) -> None:
-    """Tracks of pieces that no track has taken and that stand where it was free."""
-    # Among moving things others may, of which a thing that passed hid that they were not there before.
+    """Start tracks for unused clusters that are in formerly free space."""
+    # While something moves, it may have hidden the free space in which another obstacle appears.
     least = LEAST_RADIUS if any(track.moving for track in tracks) else math.inf
     for number, (_, _, center, radius, edges) in enumerate(seen.pieces):
         came, stood = seen.came[number], seen.stood[number]
         if number in taken or not (came or (radius >= least and not stood)):
             continue
-        # Of what is half hidden more may be there than is seen.
+        # A partly hidden obstacle may be larger than its visible part.
         whole, noise = edges == BOTH, NOISE + RELATIVE * abs(center)
         size = radius if whole else max(radius, HALF_RADIUS)
         track = Track.begun(seen.tick, seen.lidar.out(center), noise + FIRST_SEEN, size)

@@ -1,10 +1,10 @@
-"""Keeps out of the way of what moves, whoever drives: ways through time, compared with where things will be then.
+"""Avoidance of moving obstacles: compares trajectories of the robot with the predicted positions of the obstacles.
 
-As long as the way that the controller is on meets nothing, its command is left as it is. When something will come too
-near, a few hundred ways are compared that the base can go from here: the controller's own way slower, and pairs of
-velocities one after the other. The way that is least likely to be met costs least; among those that are safe, the one
-that gets on. So the robot slows early, passes behind, and where it stands it steps aside: as a person would.
-(Time-indexed rollouts as in Fox, Burgard, Thrun 1997 and, with moving things, Seder and Petrović 2007.)
+As long as the controller's trajectory is safe, its command stays. Otherwise, a few hundred trajectories are compared:
+the controller's own at lower speeds, and sequences of two velocities. The cost is the risk of coming too close, and
+among safe trajectories the lack of progress. The robot therefore slows down early, passes behind obstacles, and steps
+aside when it stands. (Trajectory rollouts as in Fox, Burgard, Thrun 1997 and, with moving obstacles, Seder and Petrović
+2007.)
 """
 
 import math
@@ -22,33 +22,33 @@ from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles, R
 from simscen.stack.protocols import CostmapView, RobotModel
 
 ROOM = 0.25
-"""Meters that the robot keeps off what moves, besides a standard deviation of where that will be."""
+"""Distance in m to keep from moving obstacles, in addition to a standard deviation of their position."""
 SOON = 1.2
-"""Seconds in which what may happen counts e times less."""
+"""Time in s in which the weight of a predicted event decays by a factor of e."""
 SOONER: Array = np.exp(-TIMES / SOON)
 NEAR, HIT, LASTING = 3.0, 10.0, 1.0
-"""Cost of coming too near at the worst moment, of being hit, and of being too near all the time."""
+"""Weights of the closest approach, of a collision, and of the mean nearness."""
 WALL, WALL_ROOM = 8.0, 0.08
-"""Cost of a way into something that stands, and meters kept off it."""
+"""Weight of a collision with a static obstacle, and the distance in m to keep from it."""
 PROGRESS, BACKWARD, CHANGE, OWN = 1.0, 0.15, 0.08, 0.1
-"""Gain of a way that goes ahead at full speed; cost of going backward, of another command than the last one, and of any
-way but the controller's."""
+"""Weights of progress, of driving backward, of a changed command, and of not using the controller's trajectory."""
 CALM = 0.02
-"""Risk below which the controller's way is left alone, …"""
+"""Risk below which the controller's command stays."""
 CALMER = 0.01
-"""… and below which it is given back to it."""
+"""Risk below which the controller gets back control after avoidance."""
 SLOWER = (1.0, 0.75, 0.5, 0.25, 0.0)
-"""Parts of the controller's speed that are tried on its own way."""
+"""Factors on the controller's speed that are tried on its own trajectory."""
 AT_ONCE, ROUNDING = 64, 1e-9
-"""Ways that are looked at together, and what sums in another order may differ by."""
+"""Number of trajectories that are evaluated together, and the tolerance for rounding of their costs."""
 NEARLY_ROUND = 0.15
-"""Meters between its inscribed and its circumscribed radius up to which a robot is taken for round."""
+"""Maximum difference in m of circumscribed and inscribed radius for which a robot counts as round."""
 
 
 class Avoidance:
-    """Changes a command when something that moves will be in its way."""
+    """Replaces commands that lead too close to moving obstacles."""
 
     def __init__(self, spec: Prediction, robot: RobotModel, full_speed: float) -> None:
+        """Take the parameters, the robot, and the full speed of its controller in m/s."""
         self._spec, self._robot = spec, robot
         self._speed = max(full_speed, 0.3)
         round_enough = robot.circumscribed_radius - robot.inscribed_radius < NEARLY_ROUND
@@ -57,11 +57,11 @@ class Avoidance:
 
     @cached_property
     def _repertoire(self) -> Repertoire:
-        """Takes a millisecond to make, and most robots never have to get out of anybody's way."""
+        """Candidate velocities; built on first use because most runs do not need them."""
         return Repertoire(self._robot, self._speed)
 
     def rest(self) -> None:
-        """Nothing moves."""
+        """Reset, because nothing moves."""
         self._last = None
 
     def steer(
@@ -74,9 +74,9 @@ class Avoidance:
         path: Followed | None,
         home: Pose2 | None = None,
     ) -> Twist:
-        """The command to give for the one that is wanted; the same object where nothing is in its way.
+        """Return the command to send instead of `wanted`; the same object if that is safe.
 
-        All in one frame. `path` is what is followed; a robot that follows none belongs at `home`.
+        All arguments are in one frame. `path` is the path that the robot follows; without one, it stays at `home`.
         """
         near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + MAX_UNCERTAINTY_M, self._speed, HORIZON)
         if not near.things:
@@ -93,7 +93,7 @@ class Avoidance:
         return self._last
 
     def _clear(self, wanted: Twist, pose: Pose2, twist: Twist, moving: MovingObstacles, path: Followed | None) -> bool:
-        """Whether the controller's own way is told at once to come near nothing: most that is in sight stays off."""
+        """Return True if a quick check shows that the controller's trajectory comes close to nothing."""
         if path is None or len(path) < 2 or wanted.vx == 0.0:
             return False
         place, speed, off = path.course(pose, twist, wanted, self._robot)
@@ -109,9 +109,9 @@ class Avoidance:
         path: Followed | None,
         home: Pose2 | None,
     ) -> Twist:
-        """The command that begins the way which costs least; the first of several that cost the same.
+        """Return the first command of the trajectory with the lowest cost; the first one of several.
 
-        Risks are worked out for the ways that could be it by what they cost besides, the cheapest first.
+        The risk is only computed for trajectories that can be the best by their other costs, in order of these.
         """
         fan, goal = self._repertoire.roll(pose, twist), self._goal(pose, path, home)
         everything = np.arange(len(fan.commands))
@@ -145,7 +145,7 @@ class Avoidance:
         least: float,
         other: float,
     ) -> Array:
-        """What each way (n,) costs; `least` meters are kept off walls, `other` is added to all."""
+        """Return the costs (n,) of trajectories, with `least` m kept from walls; `other` is added to all."""
         cost = self._risk(ways, moving)
         progress = self._progress(ways.x[:, -1], ways.y[:, -1], pose, goal)
         cost += self._walls(ways, costmap, least) - PROGRESS * progress
@@ -157,46 +157,46 @@ class Avoidance:
     def _own(
         self, wanted: Twist, pose: Pose2, twist: Twist, path: Followed | None, parts: tuple[float, ...]
     ) -> Rollouts:
-        """The controller's own way, at these parts of its speed."""
+        """Return the controller's own trajectory at fractions of its speed."""
         if path is None or len(path) < 2 or wanted.vx == 0.0:
             return arc(pose, wanted, parts if wanted != STOP else (1.0,))
         return path.driven(pose, twist, wanted, parts, self._robot, not self._discs.centered)
 
     def _risk(self, ways: Rollouts, moving: MovingObstacles) -> Array:
-        """What each way (n,) costs for what it comes near to."""
+        """Return the costs (n,) of trajectories for their nearness to moving obstacles."""
         worst, hit = self._discs.nearness(moving, ways.x, ways.y, ways.yaw, TIMES, ROOM)
         near = np.minimum(np.maximum(worst, 0.0), 2.0) ** 2 * SOONER
         risk: Array = NEAR * near.max(axis=1) + LASTING * near.mean(axis=1) + HIT * (hit * SOONER).max(axis=1)
         return risk
 
     def _walls(self, ways: Rollouts, costmap: CostmapView, least: float) -> Array:
-        """What each way (n,) costs for what stands in it, nearer than `least` meters."""
+        """Return the costs (n,) of trajectories for static obstacles that are closer than `least` m."""
         touched = (self._room(ways, costmap, np.s_[:, 1::2]) < least) * np.exp(-TIMES[1::2] / (2 * SOON))
         cost: Array = WALL * touched.max(axis=1)
         return cost
 
     def _room(self, ways: Rollouts, costmap: CostmapView, some: tuple[slice, int | slice]) -> Reals:
-        """Meters from ways to what stands, of some of their moments."""
+        """Return the distances in m of trajectories from static obstacles at some of their times."""
         return np.asarray(self._discs.clearance(costmap, ways.x[some], ways.y[some], ways.yaw[some]))
 
     def _goal(self, pose: Pose2, path: Followed | None, home: Pose2 | None) -> tuple[float, float]:
-        """Where it is to get."""
+        """Return the position that the robot should approach."""
         if path is not None:
             return path.ahead(pose, self._speed * HORIZON)
         return (pose.x, pose.y) if home is None else (home.x, home.y)
 
     def _progress(self, x: Array, y: Array, pose: Pose2, goal: tuple[float, float]) -> Array:
-        """How far (n,) ways get that end at x and y (n,), as a part of what full speed would do."""
+        """Return the progress (n,) of trajectories that end at x and y (n,), relative to full speed."""
         before = math.hypot(goal[0] - pose.x, goal[1] - pose.y)
         gain: Array = (before - np.hypot(x - goal[0], y - goal[1])) / (self._speed * HORIZON)
         return gain
 
     def _backward(self, vx: Array) -> Array:
-        """How much speeds (n, moments) go backward, as a part of full speed."""
+        """Return the mean backward speed (n,) of trajectories with speeds (n, times), relative to full speed."""
         return np.asarray(np.maximum(-vx / self._speed, 0.0).mean(axis=1))
 
     def _change(self, commands: Array) -> Array:
-        """What commands (n, 2) cost for being others than the last one."""
+        """Return the costs (n,) of commands (n, 2) for differing from the previous command."""
         if self._last is None:
             return np.zeros(len(commands))
         change = np.abs(commands[:, 0] - self._last.vx) / self._speed
@@ -204,38 +204,39 @@ class Avoidance:
 
 
 THERE, TURNED = 0.08, 0.15
-"""Meters and rad within which the robot stands where it belongs."""
+"""Distance in m and angle in rad within which the robot is at its stand position."""
 LEFT = 0.15
-"""Meters from there at which it sets out to come back."""
+"""Distance in m from which the robot returns."""
 PART, GAIN = 0.3, 1.0
-"""Of full speed at most on the way back, and m/s for each meter that is left."""
+"""Maximum speed of returning relative to full speed, and gain in 1/s of the speed on the distance."""
 TURN = 1.0
-"""rad/s at most on the way back."""
+"""Maximum turn rate in rad/s of returning."""
 FACING = 0.4
-"""rad off its line beyond which it turns before it drives."""
+"""Angle in rad to the line back above which the robot turns before it drives."""
 
 
 class StandPosition:
-    """Remembers the pose; the way back is straight, forward or backward, and last the heading is turned to."""
+    """Pose to which a standing robot returns after it has stepped aside: in a straight line, then by turning."""
 
     def __init__(self, robot: RobotModel, full_speed: float) -> None:
+        """Take the robot and its full speed in m/s."""
         self._speed, self._turn = PART * full_speed, min(TURN, robot.max_angular)
         self._reverses, self._turns = robot.max_reverse > 0.0, robot.turning_radius == 0.0
         self._home: Pose2 | None = None
         self._away = False
 
     def leave(self) -> None:
-        """It drives again."""
+        """Forget the pose, because the robot drives."""
         self._home, self._away = None, False
 
     def home(self, pose: Pose2, moving: bool) -> Pose2 | None:
-        """Where it belongs, once something moves around it; None while it need not care."""
+        """Return the stand position, which is set when the first obstacle moves nearby; None before."""
         if self._home is None and moving:
             self._home = pose
         return self._home
 
     def back(self, pose: Pose2) -> Twist:
-        """The command on the way back; STOP where it belongs, or when it cannot turn to its line."""
+        """Return the command to return; STOP at the stand position, and for a robot that cannot turn in place."""
         home = self._home
         if home is None or not self._turns:
             return STOP

@@ -1,4 +1,4 @@
-"""A scan in pieces: runs of neighboring beams that hit the same thing, and the cylinder that would look like that."""
+"""Clusters of a scan: runs of neighboring beams that hit the same obstacle, and the cylinder that fits them."""
 
 import cmath
 import math
@@ -12,23 +12,23 @@ from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array
 
 GAP, SPARSE = 0.15, 2.5
-"""Two hits belong together when they are no farther apart than this many meters, or times the spacing of beams."""
+"""Maximum distance between hits of one cluster: in m, or as a multiple of the beam spacing."""
 MISSED = 2
-"""Beams that may miss within a piece."""
+"""Maximum number of consecutive beams without a hit within a cluster."""
 VALLEY = 0.1
-"""Meters by which the range must rise between two things that touch, as the scan sees them."""
+"""Minimum rise of the range in m between two obstacles that are neighbors in the scan."""
 BOTH = 2
-"""Edges of what is seen whole."""
+"""Number of visible edges of a completely visible obstacle."""
 STEP_APART = 1e3
-"""Meters: more than any beam sees."""
+"""A distance in m larger than any range."""
 STEEPEST = math.radians(80.0)
-"""Half the angle that a piece fills at most, as far as its radius is concerned."""
+"""Limit in rad of half the angle that a cluster covers, for computing its radius."""
 FEWEST = 3
-"""Hits of a piece that is looked at."""
+"""Minimum number of hits of a cluster."""
 ROUNDING = 1e-6
-"""Meters."""
+"""Tolerance in m for rounding."""
 STEPS, ENOUGH = 4, 3e-3
-"""Of Gauss-Newton: from half a radius off, a circle is found to a millimeter; meters of a step that is the last."""
+"""Maximum number of Gauss-Newton iterations, and the step in m below which they end."""
 
 Indices = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
@@ -38,9 +38,9 @@ Places = npt.NDArray[np.complex128]
 
 @fast_dataclass(eq=False)
 class Hits:
-    """What the `beams` of a scan hit, in order: `ranges` and `places` (m,).
+    """Hits of a scan in order: indices of `beams`, `ranges`, and `places` (m,).
 
-    Of two that follow each other one may be `sparse` times its range away from the other, to belong to it.
+    Two successive hits belong together if their distance is at most `sparse` times the range.
     """
 
     beams: Indices
@@ -49,7 +49,7 @@ class Hits:
     sparse: float
 
     def may_be_together(self, which: list[int], few: int) -> bool:
-        """Whether so many of these hits in a row may be in one run: none is parted from those beside it."""
+        """Return whether `few` of these successive hits may be in one run."""
         row = 1
         for one, other in pairwise(which):
             row = row + 1 if self._linked(one) and self._linked(other - 1) else 1
@@ -58,7 +58,7 @@ class Hits:
         return False
 
     def _linked(self, hit: int) -> bool:
-        """Whether the next hit belongs to this one, as to be told without arrays; in doubt it does."""
+        """Return whether the next hit may belong to this one, computed with scalars."""
         here, there = self.places.item(hit), self.places.item(hit + 1)
         near = min(self.ranges.item(hit), self.ranges.item(hit + 1))
         return abs(there - here) <= max(self.sparse * near, GAP) + ROUNDING
@@ -66,26 +66,23 @@ class Hits:
 
 @fast_dataclass(eq=False)
 class Runs:
-    """Hits of which neighbors that are not far apart make a run: things that stand apart.
-
-    A run is the hits `first[k]` … `last[k]`.
-    """
+    """Hits divided into runs of neighbors that are close together. Run k contains the hits `first[k]` … `last[k]`."""
 
     hits: Hits
     first: Indices
     last: Indices
 
     def together(self, which: Mask, few: int) -> bool:
-        """Whether at least so many, more than one, of these hits (m,) are in one run."""
+        """Return whether at least `few` (more than one) of these hits (m,) are in one run."""
         runs = self.first.searchsorted(which.nonzero()[0], side="right")
         return bool((runs[few - 1 :] == runs[: 1 - few]).any())
 
 
 class Piece(NamedTuple):
-    """A piece of a scan, in the lidar's frame: the hits `first` … `last`.
+    """Cluster of the hits `first` … `last` of a scan, in the lidar frame.
 
-    `center` (x + iy) and `radius` in m are of the cylinder that fills the same angle at the same distance. `edges`: at
-    how many of its two ends nothing nearer stands, nor the scan ends; at BOTH, all of it is seen.
+    `center` (x + iy) and `radius` in m are those of the cylinder that covers the same angle at the same distance.
+    `edges` is the number of its ends that are visible, i.e. not hidden by a closer obstacle or the end of the scan.
     """
 
     first: int
@@ -96,24 +93,21 @@ class Piece(NamedTuple):
 
     @property
     def hits(self) -> int:
-        """How many these are."""
+        """Number of hits."""
         return self.last - self.first + 1
 
 
 def answers(ranges: Array, places: Places, step: float, least: float, most: float) -> Hits:
-    """The hits of a scan of beams that answer between `least` and `most` meters, each `step` rad further.
+    """Return the hits of a scan with ranges between `least` and `most` m.
 
-    `places` (n,) are what they hit.
+    `places` (n,) are the ends of the beams, which are `step` rad apart.
     """
     beams = ((ranges >= least) & (ranges <= most)).nonzero()[0]
     return Hits(beams, ranges[beams], places[beams], SPARSE * abs(step))
 
 
 def runs(hits: Hits) -> Runs:
-    """The runs of hits.
-
-    A circle's first and last run are not joined: what lies behind the robot across the seam is two.
-    """
+    """Return the runs of hits. The first and the last run of a full circle are not joined."""
     beams, ranges, places = hits.beams, hits.ranges, hits.places
     gap = np.minimum(ranges[1:], ranges[:-1])
     gap *= hits.sparse
@@ -124,9 +118,9 @@ def runs(hits: Hits) -> Runs:
 
 
 def clusters(found: Runs, scanned: Array, start: float, step: float, largest: float) -> list[Piece]:
-    """The pieces of a scan of ranges `scanned` in which these runs were found, none with a radius over `largest`.
+    """Return the clusters with a radius up to `largest` in a scan with ranges `scanned` and these runs.
 
-    The first beam goes along `start`, the next `step` rad further.
+    The first beam points along `start`; beams are `step` rad apart.
     """
     wide = abs(step)
     hits = found.hits
@@ -150,7 +144,7 @@ def clusters(found: Runs, scanned: Array, start: float, step: float, largest: fl
 
 
 def _clear(ranges: Array, beam: int, beside: int, full_circle: bool) -> bool:
-    """Whether the beam beside another goes on beyond it."""
+    """Return whether the beam `beside` has a longer range than `beam`."""
     if not 0 <= beside < len(ranges):
         if not full_circle:
             return False
@@ -159,13 +153,13 @@ def _clear(ranges: Array, beam: int, beside: int, full_circle: bool) -> bool:
 
 
 def shares(pieces: list[Piece], which: Mask) -> list[tuple[int, int]]:
-    """How many of each piece's hits these are, of all (m,), and how many it has."""
+    """Return for each cluster how many of its hits are marked in `which` (m,), and how many it has."""
     told = which.tobytes()
     return [(told.count(1, first, last + 1), last + 1 - first) for first, last, *_ in pieces]
 
 
 def _between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
-    """First and last of so many hits in a row that is parted after these (k,)."""
+    """Return the first and last indices of the runs of `count` hits that are separated after `breaks` (k,)."""
     if not count:
         return breaks, breaks
     first, last = np.zeros(len(breaks) + 1, np.int64), np.empty(len(breaks) + 1, np.int64)
@@ -175,12 +169,12 @@ def _between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
 
 
 def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[list[int], list[int]]:
-    """First and last hits of pieces, cut where two things that touch meet: there the range is greater than somewhere to
-    either side.
+    """Return the first and last hits of runs, divided where two adjacent obstacles meet.
 
-    Along one convex thing it falls to its nearest point and then rises, whatever its shape.
+    Along one convex obstacle, the range falls to its closest point and then rises. A local maximum of the range
+    therefore separates two obstacles.
     """
-    # Of all pieces at once, each a step below or above the one before: so none knows of the others.
+    # All runs are processed at once. An offset that increases from run to run keeps them independent.
     count = last - first + 1
     steps = np.repeat(STEP_APART * np.arange(len(first)), count)
     after = ranges + steps
@@ -196,7 +190,7 @@ def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[list[int], li
 
 
 def _parts(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]:
-    """Those of one run, in order."""
+    """Return the parts of one run, in order."""
     left = [(begin, end)]
     parts: list[tuple[int, int]] = []
     while left:
@@ -214,18 +208,18 @@ def _parts(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]:
 
 
 def fitted(arc: list[complex], radius: float, center: complex) -> complex:
-    """The center of the circle of this radius that fits an arc, points x + iy, best; `center` is a first guess.
+    """Return the center of the circle with this radius that fits points x + iy best; `center` is the initial guess.
 
-    In floats: a dozen points are too few for arrays.
+    Computed with scalars, because a dozen points are too few for arrays.
     """
-    half = 0.52 * len(arc)  # a little more: a short arc says little of how the circle lies across; there, stay
+    half = 0.52 * len(arc)  # slightly damped, because a short arc does not determine the lateral position
     for _ in range(STEPS):
         squares = miss = 0j
         for place in arc:
             off = center - place
             distance = abs(off)
             towards = off / max(distance, 1e-6)
-            # Of unit vectors x + iy the squares add up to x² - y² + 2ixy, the squared lengths to their number.
+            # The squares of unit vectors x + iy sum up to x² - y² + 2ixy, their squared lengths to their number.
             squares += towards * towards
             miss += towards * (distance - radius)
         square = squares / 2

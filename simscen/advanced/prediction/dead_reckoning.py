@@ -1,8 +1,7 @@
-"""Where the robot has rolled to, with the gyroscope's word for how it turned where there is one.
+"""Dead reckoning with wheel odometry and the gyroscope's heading, for comparing scans within about a second.
 
-Wheels that skid while they turn, as those of a skid-steered robot do, say little of the turn: everything would seem to
-swing around the robot, and so to move. This frame need not agree with anybody else's: it is for comparing scans that
-were taken a second apart.
+The heading of skidding wheels is wrong, so that everything would seem to rotate around the robot and to move. The frame
+is independent of the odom frame.
 """
 
 from collections import deque
@@ -14,15 +13,16 @@ from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.stack.odometry_history import HISTORY_S
 
 FASTEST = 100.0
-"""rad/s: no robot turns faster; a gyroscope that says so is broken."""
+"""Turn rates above this (rad/s) come from a broken gyroscope."""
 WAITING = 10_000
-"""Readings that may wait to be added up: of minutes, after which nobody compares scans."""
+"""Maximum number of readings that wait for integration."""
 
 
 class DeadReckoning:
-    """Adds up the wheels' steps along the gyroscope's heading, when it is asked: a scan is rarer than a step."""
+    """Integrates wheel odometry along the gyroscope's heading, only when a pose is requested."""
 
     def __init__(self, tick_rate: int) -> None:
+        """Take the tick rate in Hz."""
         self._rate = tick_rate
         self._last: Odometry | None = None
         self._turned, self._turns = 0.0, 0
@@ -30,16 +30,16 @@ class DeadReckoning:
         self._poses = deque([(-1, 0.0, 0.0, 0.0)])
         self._now = _pose(self._poses[-1])
         self.take: Callable[[Odometry | Imu], None] = self._waiting.append
-        """Takes a reading in; there are eighty a second, so that is all that it does."""
+        """Append a reading; called so often that it does nothing else."""
 
     @property
     def now(self) -> Pose2:
-        """The newest pose, the same object until there is another; the origin before there is any."""
+        """The latest pose; the same object until it changes."""
         self._add_up()
         return self._now
 
     def at(self, tick: int) -> Pose2:
-        """The newest pose up to a tick; the oldest known before that."""
+        """Return the latest pose up to a tick, or the oldest one."""
         self._add_up()
         poses = self._poses
         if poses[-1][0] <= tick:
@@ -64,7 +64,7 @@ class DeadReckoning:
                 (there_x, there_y, heading), (before_x, before_y, before) = reading.pose, last.pose
                 step = remainder(heading - before, tau)
                 turn = turned / turns * (tick - last.tick) / self._rate if turns else step
-                # The wheels' step, turned into this frame, and by half of what they know too little of the turn.
+                # Rotate the step of the wheels into this frame, with half of the additional turn of the gyroscope.
                 into = yaw - before + (turn - step) / 2
                 c, s, dx, dy = cos(into), sin(into), there_x - before_x, there_y - before_y
                 x, y, yaw, newest = x + c * dx - s * dy, y + s * dx + c * dy, yaw + turn, tick

@@ -1,4 +1,4 @@
-"""Motion prediction as the reference stack has it: trackers of its lidars, and what keeps it out of the way."""
+"""Motion prediction: trackers for the lidars, and avoidance of the tracked obstacles."""
 
 import math
 
@@ -16,23 +16,24 @@ from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
 from simscen.stack.protocols import CostmapView, RobotModel
 
 WARM_UP_S, WARM_UP_SPEED_M_S = 0.7, 0.5
-"""Seconds after its first scan in which a robot does not yet know what moves, and m/s that it drives at most till then:
-Nav2's usual speed, at which it can still stop for what it has not made out."""
+"""Time after the first scan in which obstacles cannot be tracked yet, and the speed limit during that time: Nav2's
+usual speed, at which the robot can still stop for obstacles."""
 
 
 class MotionPrediction:
-    """What moves around the robot, and the commands that keep out of its way. Tracks are in the frame of `Rolled`."""
+    """Moving obstacles around the robot, and commands that avoid them. Tracks are in the frame of DeadReckoning."""
 
     def __init__(
         self, spec: Prediction, robot: RobotModel, lidars: tuple[str, ...], tick_rate: int, full_speed: float
     ) -> None:
+        """Take the parameters, the robot, the names of its lidars, the tick rate in Hz, and the full speed in m/s."""
         self._spec, self._rate = spec, tick_rate
         self._trackers = {name: Tracker(spec, tick_rate) for name in lidars} if spec.enabled else {}
         self._avoidance = Avoidance(spec, robot, full_speed)
         self._standing = StandPosition(robot, full_speed)
         self._enough, self._held = WARM_UP_S * tick_rate, False
         self.stands = False
-        """Whether it has been told to stand since it last drove."""
+        """Whether the robot was asked to stand since it last drove."""
         self._rolled = DeadReckoning(tick_rate)
         self._nothing = no_moving_obstacles(spec.acceleration)
         self._seeing: list[Tracker] = []
@@ -41,12 +42,12 @@ class MotionPrediction:
         self._plan: Path | None = None
         self._followed: Followed | None = None
         self.take = self._rolled.take
-        """Takes in the wheels' odometry, or a turn rate."""
+        """Process an odometry or IMU reading."""
         self.calm = not self._trackers
-        """Whether nothing moves that it knows of, and it has looked long enough to know: then it changes no command."""
+        """Whether no obstacle moves and the warm-up is over, so that no command is changed."""
 
     def on_scan(self, scan: Scan) -> None:
-        """Take a scan in."""
+        """Process a scan."""
         tracker = self._trackers.get(scan.sensor)
         if tracker is None:
             return
@@ -62,14 +63,14 @@ class MotionPrediction:
             self._avoidance.rest()
 
     def marking(self, scan: Scan) -> Scan:
-        """The scan as costmaps should take it in: what it shows of things that move is not to be marked."""
+        """Return the scan for costmaps, in which hits on moving obstacles are flagged so that they are not marked."""
         tracker = self._trackers.get(scan.sensor)
         if tracker is None or tracker.hits is None or tracker.tick != scan.tick:
             return scan
         return ScanAmongMoving(**vars(scan), moving=tracker.hits)
 
     def moving(self, tick: int) -> MovingObstacles:
-        """What moves at a tick, in the frame of `Rolled`; with several lidars, as each of them sees it."""
+        """Return the moving obstacles at a tick in the frame of DeadReckoning, from all lidars."""
         if not self._seeing:
             return self._nothing
         if self._foretold is None or self._foretold[0] != tick:
@@ -81,7 +82,7 @@ class MotionPrediction:
         return MovingObstacles.of([thing for each in seen for thing in each.things], self._spec.acceleration)
 
     def seen_from(self, tick: int, pose: Pose2) -> MovingObstacles:
-        """What moves at a tick, in a frame in which the robot is at `pose` now."""
+        """Return the moving obstacles at a tick in a frame in which the robot is at `pose` now."""
         moving = self.moving(tick)
         if not moving.things:
             return moving
@@ -93,7 +94,7 @@ class MotionPrediction:
     def steer(
         self, tick: int, wanted: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None
     ) -> Twist:
-        """The command to give for the one that is wanted; `pose`, `costmap` and `plan` are in one frame."""
+        """Return the command to send instead of `wanted`; `pose`, `costmap`, and `plan` are in one frame."""
         if not self._seeing:
             return wanted if self.calm else _limit_speed(wanted)
         if plan is not self._plan:
@@ -101,16 +102,16 @@ class MotionPrediction:
         return self._avoidance.steer(wanted, pose, twist, self.seen_from(tick, pose), costmap, self._followed)
 
     def settle(self) -> None:
-        """The robot drives: where it stands next is where it belongs."""
+        """Record that the robot drives, so that it gets a new stand position afterward."""
         self._standing.leave()
         self._held = self.stands = False
 
     def hold(self) -> None:
-        """Somebody has told the robot to stop: it stays where it is, come what may, until it is told to drive."""
+        """Stay in place until the robot drives again, even if an obstacle approaches."""
         self._held = self.stands = True
 
     def stand(self, tick: int, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """The command to give to a robot that is to stand: to get out of the way, and to come back."""
+        """Return the command for a standing robot: step aside for obstacles, and return afterward."""
         self.stands = True
         if self._held:
             return STOP
@@ -124,7 +125,7 @@ class MotionPrediction:
 
 
 def _limit_speed(wanted: Twist) -> Twist:
-    """The command, slowed down as long as nothing can be known yet of what moves."""
+    """Return the command with the speed limit of the warm-up."""
     speed = math.hypot(wanted.vx, wanted.vy)
     if speed <= WARM_UP_SPEED_M_S:
         return wanted

@@ -1,7 +1,7 @@
-"""A costmap on which what moves is where it will be when the robot gets there, so that plans pass behind it.
+"""Costs of predicted moving obstacles in a costmap, so that plans pass behind them.
 
-A cell has no time, but a robot that drives to it has: the straight way at full speed. Each cell is as dear as what
-moves will be near it then, so of a crossing's whole way only the part is marked at which both would meet.
+For each cell, the obstacles are predicted for the time at which the robot would arrive there in a straight line at full
+speed. Of the path of a crossing obstacle, only the part where both would meet gets a cost.
 """
 
 import math
@@ -19,14 +19,16 @@ from simscen.stack.planners.traversal_costs import MAX_NON_OBSTACLE
 from simscen.stack.protocols import CostmapView
 
 DECAY_TIME_S = 2.0
-"""Seconds in which what will be counts e times less: at constant velocity, nobody goes on for ever."""
+"""Time in which the cost decays by a factor of e, because no obstacle keeps its velocity forever."""
 BLOCK_SIZE_M = 0.2
-"""Meters, about: the edge of what is marked alike."""
+"""Approximate size of the blocks of cells that get the same cost."""
 
 
 def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:
-    """The same with costs, at most MAX_NON_OBSTACLE, where a robot at `robot` that drives at `speed` would meet what
-    moves: no way is shut. `radius` is the robot's. The same object where it would meet nothing.
+    """Return the costmap with costs of at most MAX_NON_OBSTACLE where the robot would meet moving obstacles.
+
+    The robot starts at `robot`, drives at `speed` m/s, and has a `radius` in m. Without such cells, the same object is
+    returned.
     """
     if not len(costmap.moving):
         return costmap
@@ -59,9 +61,9 @@ def _dear(moving: MovingObstacles, x: Array, y: Array, times: Array, radius: flo
 def meets_moving_obstacle(
     moving: MovingObstacles, robot: Pose2, way: Iterable[complex], speed: float, radius: float
 ) -> bool:
-    """Whether a robot at `robot` that drives along `way` (x + iy) at `speed` comes too near to what moves.
+    """Return whether a robot at `robot` that drives along `way` (x + iy) at `speed` comes too close to an obstacle.
 
-    As `Moving.nearness` has it, in floats: until what is foreseen ends it comes to a handful of places.
+    The distances are those of `MovingObstacles.nearness`, computed with scalars because there are only few points.
     """
     moving = moving.near(robot.x, robot.y, radius + MAX_UNCERTAINTY_M, speed, HORIZON)
     if not moving.things:

@@ -1,4 +1,4 @@
-"""Where the robot may be in the next seconds: what it can do, moment by moment."""
+"""Candidate trajectories of the robot for the next seconds."""
 
 import math
 from bisect import bisect_right
@@ -13,26 +13,26 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.stack.protocols import RobotModel
 
 STEP, HORIZON = 0.1, 3.0
-"""Seconds between two moments, and up to the last."""
+"""Time step and horizon in s."""
 FIRST = (0.5, 1.2)
-"""Seconds for which the first of two velocities is kept."""
+"""Durations in s of the first velocity."""
 SPEEDS = (-0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
-"""Parts of full speed that are tried first."""
+"""First speeds relative to full speed."""
 TURNS = (0.0, 0.1, 0.3, 0.6, 1.0)
-"""Parts of the greatest turn rate that are tried first, to either side."""
+"""First turn rates relative to the maximum, in both directions."""
 THEN = (0.0, 0.5, 1.0)
-"""Parts of full speed that are tried after that, straight on or turned back."""
+"""Second speeds relative to full speed, straight or turning back."""
 TURN_MOST = 3.0
-"""rad/s, where the robot could turn faster."""
+"""Maximum turn rate in rad/s of candidates."""
 BACK_TO_PATH = 0.7
-"""Seconds in which a controller takes the robot back to its path, about."""
+"""Approximate time constant in s with which a controller returns to its path."""
 
 TIMES: Array = np.arange(1, round(HORIZON / STEP) + 1, dtype=np.float64) * STEP
 
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:
-    """Ways (n, moments) of the robot: positions and headings at TIMES, and the command (n, 2) that begins each."""
+    """Trajectories (n, times) of the robot: positions and headings at TIMES, speeds, and first commands (n, 2)."""
 
     x: Array
     y: Array
@@ -42,9 +42,10 @@ class Rollouts:
 
 
 class Repertoire:
-    """Two velocities, one after the other, all that a base can be told: as fast as its motors reach them."""
+    """All candidate sequences of two velocities, reached with the accelerations of the robot."""
 
     def __init__(self, robot: RobotModel, full_speed: float) -> None:
+        """Take the robot and its full speed in m/s."""
         self._robot = robot
         turn = min(robot.max_angular, TURN_MOST)
         turns = [0.0, *(sign * part * turn for part in TURNS[1:] for sign in (1.0, -1.0))]
@@ -64,12 +65,12 @@ class Repertoire:
             )
             plan = plan[able]
         self.commands: Array = plan[:, :2]
-        """What begins each way (n, 2)."""
+        """First command (n, 2) of each trajectory."""
         self._speeds, self._speed = np.unique(plan[:, (0, 2, 3)], axis=0, return_inverse=True)
         self._turns, self._turn = np.unique(plan[:, (1, 2, 4)], axis=0, return_inverse=True)
 
     def roll(self, pose: Pose2, twist: Twist) -> "Fan":
-        """All of it, from here."""
+        """Return all trajectories from a pose and velocity."""
         robot, speeds, turns = self._robot, self._speeds, self._turns
         first, lasts, then = (speeds[:, k : k + 1] for k in range(3))
         vx = _ramped(twist.vx, first, lasts, then, robot.linear_acceleration, robot.linear_deceleration)
@@ -82,9 +83,10 @@ class Repertoire:
 
 @dataclass(frozen=True, eq=False)
 class Fan:
-    """Many ways, of few courses of the speed and few of the turn rate: `speed` and `turn` (n,) are each one's numbers.
+    """Many trajectories, as combinations of few speed profiles and few turn profiles with indices `speed` and `turn`
+    (n,).
 
-    Speeds `vx` (k, moments), headings `yaw` and the cosines and sines of those in between (m, moments).
+    Speeds `vx` (k, times), headings `yaw`, and the cosines and sines of the headings in between (m, times).
     """
 
     pose: Pose2
@@ -98,13 +100,13 @@ class Fan:
 
     @property
     def ends(self) -> tuple[Array, Array]:
-        """x and y (n,) at their ends, but for rounding."""
+        """Final x and y (n,), except for rounding."""
         speed, turn, (x, y, _) = self.speed, self.turn, self.pose
         along, aside = self.vx @ self.cosine.T, self.vx @ self.sine.T
         return x + along[speed, turn] * STEP, y + aside[speed, turn] * STEP
 
     def ways(self, which: npt.NDArray[np.intp], moments: int = len(TIMES)) -> Rollouts:
-        """Some of them (k,), for so many moments."""
+        """Return the trajectories with indices `which` (k,), for the first `moments` time steps."""
         some, turn = np.s_[:, :moments], self.turn[which]
         vx = self.vx[some][self.speed[which]]
         x = self.pose.x + np.cumsum(vx * self.cosine[some][turn], axis=1) * STEP
@@ -113,7 +115,7 @@ class Fan:
 
 
 def _ramped(now: float, first: Array, lasts: Array, then: Array, faster: float, slower: float) -> Array:
-    """Velocities (n, moments) that begin at `now`, go to `first`, and after `lasts` seconds to `then`."""
+    """Return velocities (n, times) that ramp from `now` to `first`, and after `lasts` seconds to `then`."""
     up = np.where(np.abs(first) >= abs(now), faster, slower)
     early = now + np.clip(first - now, -up * np.minimum(TIMES, lasts), up * np.minimum(TIMES, lasts))
     change = np.where(np.abs(then) >= np.abs(early), faster, slower) * np.maximum(TIMES - lasts, 0.0)
@@ -122,9 +124,10 @@ def _ramped(now: float, first: Array, lasts: Array, then: Array, faster: float, 
 
 
 class Followed:
-    """A path (n, 2) that a controller follows, as often as it is asked where that leads."""
+    """Path that a controller follows, for predicting its trajectory."""
 
     def __init__(self, path: Array) -> None:
+        """Take the points (n, 2) of the path."""
         self._x, self._y = np.ascontiguousarray(path[:, 0]), np.ascontiguousarray(path[:, 1])
         steps = np.hypot(np.diff(self._x), np.diff(self._y))
         self._along = np.concatenate(([0.0], np.cumsum(steps)))
@@ -135,7 +138,7 @@ class Followed:
         return len(self._x)
 
     def nearest(self, pose: Pose2) -> int:
-        """The number of its point nearest to a pose."""
+        """Return the index of the point nearest to a pose."""
         dx, dy = self._x - pose.x, self._y - pose.y
         dx *= dx
         dy *= dy
@@ -143,7 +146,7 @@ class Followed:
         return int(dx.argmin())
 
     def ahead(self, pose: Pose2, reach: float) -> tuple[float, float]:
-        """Its first point beyond the one nearest to a pose that is so many meters off the pose; else its last."""
+        """Return the first point, from the nearest one on, that is `reach` m away from a pose, or the last point."""
         here = self.nearest(pose)
         beyond = np.hypot(self._x[here:] - pose.x, self._y[here:] - pose.y) >= reach
         number = here + int(beyond.argmax()) if beyond.any() else -1
@@ -152,9 +155,9 @@ class Followed:
     def driven(
         self, pose: Pose2, twist: Twist, wanted: Twist, parts: tuple[float, ...], robot: RobotModel, turns: bool
     ) -> Rollouts:
-        """What a controller would do that follows it from here, at these parts of the speed that it wants.
+        """Return the trajectories of a controller that follows the path from here, at fractions of its wanted speed.
 
-        A robot that turns in place first is taken to stand. Headings are worked out where it `turns`, else 0.
+        A robot that first turns in place counts as standing. Headings are only computed if `turns`, otherwise 0.
         """
         here, along = self.nearest(pose), self._along
         scale = np.array(parts)[:, None]
@@ -172,9 +175,9 @@ class Followed:
     def course(
         self, pose: Pose2, twist: Twist, wanted: Twist, robot: RobotModel
     ) -> tuple[Callable[[float], complex], float, float]:
-        """Where (x + iy) `driven` is after so many seconds at the whole of the speed, told at once for any of them.
+        """Return a function for the position (x + iy) of `driven` at full wanted speed after any number of seconds.
 
-        With that the greatest speed in m/s, and how far off in m the moments of `driven` may be.
+        Also return the maximum speed in m/s, and the maximum deviation in m from the time steps of `driven`.
         """
         here, now, then = self.nearest(pose), twist.vx, wanted.vx
         rate = robot.linear_acceleration if abs(then) >= abs(now) else robot.linear_deceleration
@@ -191,7 +194,7 @@ class Followed:
         return place, max(abs(now), abs(then)) * wider, 0.5 * STEP * abs(then - now) * wider
 
     def _at(self, length: float) -> complex:
-        """Its place so far along it."""
+        """Return the point at a length along the path."""
         lengths, places = self._lengths, self._places
         after = min(max(bisect_right(lengths, length), 1), len(lengths) - 1)
         before, piece = lengths[after - 1], lengths[after] - lengths[after - 1]
@@ -199,7 +202,7 @@ class Followed:
         return places[after - 1] + part * (places[after] - places[after - 1])
 
     def _headings(self, came: Array, here: int, backward: bool) -> Array:
-        """Headings (…,) where one has come so far along it, from the point `here` on."""
+        """Return the headings (…,) at lengths along the path, from the point `here` on."""
         along, x, y = self._along, self._x, self._y
         later = np.minimum(came + 0.1, along[-1])
         before = np.maximum(later - 0.2, along[here])
@@ -211,7 +214,7 @@ class Followed:
 
 
 def arc(pose: Pose2, wanted: Twist, parts: tuple[float, ...]) -> Rollouts:
-    """The command kept, at these parts of it; where nobody follows a path."""
+    """Return the trajectories of a constant command at fractions of its velocity, for a robot without a path."""
     scale = np.array(parts)[:, None]
     vx, wz = scale * wanted.vx + 0.0 * TIMES, scale * wanted.wz + 0.0 * TIMES
     yaw = pose.yaw + wz * TIMES

@@ -1,4 +1,4 @@
-"""Where a lidar is, for points as complex numbers."""
+"""A scan with the pose of its lidar, for questions about the visibility of tracks."""
 
 import cmath
 import math
@@ -18,31 +18,28 @@ Spot = TypeVar("Spot", complex, Places)
 
 
 class LidarPose(NamedTuple):
-    """A frame in another: `at` x + iy in m, and looking along the unit vector `towards`."""
+    """Pose of a lidar: position `at` as x + iy in m, and heading as the unit vector `towards`."""
 
     at: complex
     towards: complex
 
     @classmethod
     def of(cls, pose: Pose2) -> "LidarPose":
-        """That of a pose."""
+        """Convert a pose."""
         return cls(complex(pose.x, pose.y), cmath.rect(1.0, pose.yaw))
 
     def out(self, points: Spot) -> Spot:
-        """Points of this frame as the other has them."""
+        """Transform points from the lidar frame to the parent frame."""
         return points * self.towards + self.at
 
     def into(self, points: Spot) -> Spot:
-        """Points of the other frame as this one has them."""
+        """Transform points from the parent frame to the lidar frame."""
         return (points - self.at) * self.towards.conjugate()
 
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """A scan whose beams end at `ends` (n,) as its lidar sees them, which is `at` a pose in the frame of the tracks.
-
-    `before` is what an earlier one saw.
-    """
+    """A scan with its beam ends (n,) in the lidar frame, the pose `at` of the lidar, and an earlier scan `before`."""
 
     scan: Scan
     ends: Places
@@ -51,20 +48,20 @@ class Sight:
 
     @cached_property
     def lidar(self) -> LidarPose:
-        """Where the lidar is."""
+        """Pose of the lidar."""
         return LidarPose.of(self.at)
 
     def past(self, track: Track) -> bool:
-        """Whether the lidar sees past the place where the middle of a track should be."""
+        """Return whether the lidar sees past the predicted center of a track."""
         off = self.lidar.into(track.place)
         beam = self._towards(off)
         return beam is not None and bool(self.scan.ranges[beam] > abs(off))
 
     def left(self, track: Track) -> bool:
-        """Whether a track has left where it was: there nothing stands now that an earlier scan hit, too.
+        """Return whether a track has left its earlier positions: nothing there now was also hit by an earlier scan.
 
-        Of one that hops from post to post, the posts stay. Of all its places at most half may look like that: another
-        thing may be where it was, as of those who go behind one another.
+        A false track that jumps between posts leaves the posts behind. Up to half of the positions may be occupied,
+        because another obstacle can follow the same path.
         """
         here, radius = self.lidar.into(track.place), track.radius
         places = [update.place for update in track.lately if abs(update.place - track.place) > radius]
@@ -75,7 +72,7 @@ class Sight:
         return 2 * int(np.count_nonzero(stood)) <= len(places)
 
     def _beside(self, place: complex, here: complex, reach: float) -> complex | None:
-        """What the beam towards a place hits, if that is so near to it, and not what is `here`."""
+        """Return the hit of the beam toward a place if it is within `reach` of it and not part of what is `here`."""
         beam = self._towards(place)
         end = None if beam is None else complex(self.ends[beam])
         return end if end is not None and abs(end - place) <= reach < abs(end - here) else None

@@ -1,9 +1,8 @@
-"""Constant velocity: the Kalman filter of a point in the plane whose velocity wanders.
+"""Track of a moving obstacle: a Kalman filter with a constant-velocity model.
 
-White acceleration, constant within a step (Bar-Shalom, Li, Kirubarajan 2001, section 6.3.2). The same as filterpy's
-KalmanFilter with Q_discrete_white_noise. What is known is alike along all axes, as measurements and noise are: so place
-and velocity are complex numbers, and of a covariance (4, 4) three are left. (Importing filterpy takes longer than half
-a run.)
+The acceleration is white and constant within a step (Bar-Shalom, Li, Kirubarajan 2001, section 6.3.2). The results are
+those of filterpy's KalmanFilter with Q_discrete_white_noise. Because noise and measurements are isotropic, position and
+velocity are complex numbers, and three values replace the covariance (4, 4).
 """
 
 import math
@@ -14,7 +13,7 @@ from typing import NamedTuple
 
 @dataclass(slots=True)
 class ConstantVelocityFilter:
-    """A point's place (m) and velocity (m/s), x + iy; along any axis, the variances of both, and their covariance."""
+    """Position (m) and velocity (m/s) of a point as x + iy, with variances and covariance along any axis."""
 
     place: complex
     velocity: complex
@@ -23,7 +22,7 @@ class ConstantVelocityFilter:
     velocity_variance: float
 
     def predict(self, seconds: float, acceleration: float) -> None:
-        """It is so much later; `acceleration` is its standard deviation in m/s² along each axis."""
+        """Predict the state after `seconds`; `acceleration` is the standard deviation in m/s² along each axis."""
         noise, drift = (acceleration * seconds) ** 2, self.velocity_variance * seconds
         self.place += self.velocity * seconds
         self.variance += seconds * (2.0 * self.covariance + drift) + 0.25 * seconds * seconds * noise
@@ -31,7 +30,7 @@ class ConstantVelocityFilter:
         self.velocity_variance += noise
 
     def correct(self, measured: complex, deviation: float) -> None:
-        """Its place was measured, with this standard deviation in m along each axis."""
+        """Correct the state with a measured position, with its standard deviation in m along each axis."""
         off, noise = measured - self.place, deviation * deviation
         kept, gain = noise / (self.variance + noise), self.covariance / (self.variance + noise)
         self.place, self.velocity = measured - kept * off, self.velocity + gain * off
@@ -41,15 +40,15 @@ class ConstantVelocityFilter:
 
 
 LATELY = 10
-"""Updates that are looked at: who turns round has not come far from where he was first seen."""
+"""Number of recent updates that are kept."""
 FIRST_SPEED = 1.5
-"""m/s: standard deviation of the velocity of what has just been seen."""
+"""Standard deviation in m/s of the initial velocity."""
 
 
 class Update(NamedTuple):
-    """When and where a track was hit; whether it stood where it had been free, or where something had been hit before.
+    """Update of a track: whether it `came` to formerly free space, or `stood` where something was hit before.
 
-    `deviation` is the standard deviation in m of the place, along any axis, `edges` how many of its two ends were seen.
+    `deviation` is the standard deviation in m of the position along any axis; `edges` is the number of visible edges.
     """
 
     tick: int
@@ -62,7 +61,7 @@ class Update(NamedTuple):
 
 @dataclass(slots=True)
 class Track(ConstantVelocityFilter):
-    """What is known of a track: besides its state its `radius` in m, where it was `born`, and its last updates."""
+    """State of a track with its `radius` in m, the position where it was `born`, and its last updates."""
 
     radius: float
     born: complex
@@ -71,32 +70,32 @@ class Track(ConstantVelocityFilter):
     moving: bool = False
     moved: bool = False
     uncome: int = 0
-    """Its last updates in which it has not stood where it had been free, …"""
+    """Number of last updates that were not in formerly free space."""
     stands: int = 0
-    """… and in which it stood where something had been hit before."""
+    """Number of last updates where something had been hit before."""
 
     @classmethod
     def begun(cls, tick: int, place: complex, deviation: float, radius: float) -> "Track":
-        """At a place that is known to so many meters, and of unknown speed."""
+        """Start a track at a position with a standard deviation in m, and with unknown velocity."""
         return cls(place, 0j, deviation * deviation, 0.0, FIRST_SPEED**2, radius, place, tick)
 
     @property
     def hit_at(self) -> int:
-        """When it was last hit."""
+        """Tick of the last update."""
         return self.lately[-1].tick
 
     def note(self, tick: int, came: bool, stood: bool, edges: int, deviation: float) -> None:
-        """Note that it was hit, and how well its place is known by that, in m."""
+        """Record an update with the standard deviation in m of the position."""
         self.lately.append(Update(tick, self.place, deviation, came, stood, edges))
         self.uncome = 0 if came else self.uncome + 1
         self.stands = self.stands + 1 if stood and not came else 0
 
     @property
     def place_deviation(self) -> float:
-        """Standard deviation in m of its place, along any axis."""
+        """Standard deviation in m of the position along any axis."""
         return math.sqrt(self.variance)
 
     @property
     def speed_deviation(self) -> float:
-        """The same in m/s of its velocity."""
+        """Standard deviation in m/s of the velocity along any axis."""
         return math.sqrt(self.velocity_variance)

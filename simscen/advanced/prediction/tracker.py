@@ -1,8 +1,8 @@
-"""Follows what moves from scan to scan.
+"""Tracking of moving obstacles in the scans of one lidar.
 
-What has come where an earlier scan saw through begins a track; a piece of a later scan near where a track should be
-continues it; a track that keeps its speed for some updates, by more than noise would make it, is told as moving. What
-nothing continues ends: soon where the lidar sees through the place, later where something hides it.
+A cluster that appears in formerly free space starts a track. A later cluster near the predicted position updates it. A
+track with a significant speed over some updates counts as moving. A track without updates ends: soon if its position is
+visible, later if it is hidden.
 """
 
 import numpy as np
@@ -19,42 +19,42 @@ from simscen.model.guards import Prediction
 from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles, no_moving_obstacles
 
 CHECKED = 120
-"""Beams of a scan that are looked at while nothing moves; all, when what one of these hits has appeared."""
+"""Number of beams that are checked while nothing moves; if one of them hits something new, all are."""
 APPEARED, FEW = 0.3, 3
-"""Share of a piece's hits, and how many at least, that must have appeared to begin a track."""
+"""Minimum share and number of new hits of a cluster that starts a track."""
 STANDS = 0.5
-"""Share of its hits that an earlier scan hit, too, from which a piece stands there."""
+"""Share of hits that an earlier scan also has, above which a cluster is static."""
 BODY = 0.25
-"""Meters: the least radius of what is told as moving. Of another robot the lidar may see no more than its mast, of a
-person a leg."""
+"""Minimum radius in m of a moving obstacle. The lidar may see only the mast of a robot or the leg of a person."""
 
 
 class Tracker:
-    """The tracks of one lidar, in the odom frame."""
+    """Tracks of one lidar in the odom frame."""
 
     def __init__(self, spec: Prediction, tick_rate: int) -> None:
+        """Take the parameters and the tick rate in Hz."""
         self._spec, self._rate = spec, tick_rate
         self._memory = FreeSpaceMemory(tick_rate)
         self._every, self._restless = 1, False
         self._towards = self._towards_some = np.zeros(0, dtype=np.complex128)
         self._tracks, self._going = list[Track](), TrackLifecycle(spec, tick_rate)
         self.tick = 0
-        """When the newest scan was taken."""
+        """Tick of the latest scan."""
         self.began: int | None = None
-        """When the first scan was taken."""
+        """Tick of the first scan."""
         self.hits: Mask | None = None
-        """Which beams of the newest scan hit something that moves; None when none does."""
+        """Mask of the beams of the latest scan that hit moving obstacles; None if there are none."""
         self._nothing = no_moving_obstacles(spec.acceleration)
         self.moving = self._nothing
-        """What moves, at the tick of the newest scan."""
+        """Moving obstacles at the tick of the latest scan."""
 
     @property
     def sees(self) -> bool:
-        """Whether anything moves."""
+        """Whether there are moving obstacles."""
         return self.moving is not self._nothing
 
     def on_scan(self, scan: Scan, odometry: Pose2) -> None:
-        """Take a scan in that was taken with the base at `odometry`."""
+        """Process a scan that was taken with the base at `odometry`."""
         lidar = odometry.compose(scan.mount)
         if len(self._towards) != len(scan.ranges):
             self._look_along(scan)
@@ -71,13 +71,13 @@ class Tracker:
         self._memory.remember(scan, lidar)
 
     def _look_along(self, scan: Scan) -> None:
-        """Note where the beams go, and which are looked at while nothing moves."""
+        """Compute the directions of the beams, and of those that are checked while nothing moves."""
         self._every = max(1, len(scan.ranges) // CHECKED)
         self._towards = np.exp(1j * scan.angles())
         self._towards_some = self._towards[:: self._every].copy()
 
     def _suspicious(self, scan: Scan, lidar: Pose2, before: Earlier) -> bool:
-        """Whether one of the beams that are looked at hits what has appeared."""
+        """Return whether one of the checked beams hits something new."""
         ranges = scan.ranges[:: self._every]
         looked = before.looked(_ends(ranges, self._towards_some), lidar)
         come = looked.free()
@@ -105,7 +105,7 @@ class Tracker:
             self._tell(moving, sight)
 
     def _seen(self, sight: Sight) -> Seen | None:
-        """The scan in pieces, and what an earlier one saw where they are; None where no track is nor can begin."""
+        """Return the clusters of the scan compared with an earlier one; None if there is no track and none starts."""
         scan, before, tracks = sight.scan, sight.before, self._tracks
         hits = answers(scan.ranges, sight.ends, scan.angle_increment, scan.range_min, self._farthest(scan))
         looked = None if before is None or not len(hits.beams) else before.looked(hits.places, sight.at)
@@ -120,22 +120,22 @@ class Tracker:
         came = stood = [False] * len(pieces)
         if looked is not None and appeared is not None and pieces:
             came = [count >= max(FEW, APPEARED * every) for count, every in shares(pieces, appeared)]
-            if tracks:  # else nobody asks
+            if tracks:
                 stood = [count > STANDS * every for count, every in shares(pieces, looked.stood())]
         return Seen(scan.tick, hits.places, pieces, sight.lidar, came, stood)
 
     def _may_begin(self, hits: Hits, free: Mask) -> bool:
-        """Whether enough that stands where it was free may be one thing; mostly it is a chair leg here and there."""
+        """Return whether enough hits in formerly free space may belong to one obstacle."""
         which = free.nonzero()[0].tolist()
         self._restless = len(which) > 0
         return hits.may_be_together(which, FEW)
 
     def _begins(self, found: Runs, appeared: Mask) -> bool:
-        """Whether enough of a run has appeared, and one of the beams that are looked at while nothing moves."""
+        """Return whether enough hits of a run are new, including one of the checked beams."""
         return found.together(appeared, FEW) and bool((found.hits.beams[appeared] % self._every == 0).any())
 
     def _tell(self, moving: list[Track], sight: Sight) -> None:
-        """Note what moves, and which beams hit it."""
+        """Update the moving obstacles, and the beams that hit them."""
         scan, ends, lidar = sight.scan, sight.ends, sight.lidar
         things = [
             MovingObstacle(
@@ -156,6 +156,6 @@ class Tracker:
 
 
 def _ends(ranges: Array, towards: Places) -> Places:
-    """Where beams (n,) end: of one that met nothing, or says nothing, farther off than anything was seen."""
-    ends: Places = np.fmin(ranges, 2 * FARTHEST) * towards
+    """Return the ends of beams (n,); beams without a valid range end farther away than anything that can be seen."""
+    ends: Places = np.fmin(np.abs(ranges), 2 * FARTHEST) * towards  # too close beams have the range -inf
     return ends

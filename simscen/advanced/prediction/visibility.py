@@ -1,8 +1,7 @@
-"""Free space, remembered as earlier scans: what stands now where one of them saw through has come there.
+"""Memory of free space as earlier scans: what is now where an earlier beam passed through has appeared since.
 
-A wall of which more is seen from another place, and the edge of what is half hidden, were never seen through. So
-neither turning nor driving makes static things move, and what drift of the odometry does in the time that is
-remembered is less than the margin.
+Parts of a wall that come into view, and the edges of hidden obstacles, were never passed by a beam. Therefore static
+obstacles do not seem to move when the robot moves. The drift of odometry within this time is less than the margin.
 """
 
 import cmath
@@ -19,33 +18,31 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 
 MARGIN, RELATIVE = 0.25, 0.02
-"""Meters, and share of the range, by which an earlier beam must have gone farther."""
+"""Margin, in m and as a share of the range, by which an earlier beam must have passed a point."""
 SLIPPED = (0.05, 0.1, 0.15)
-"""Parts of the way between two scans for which the wheels may have turned in vain. What has come must have been free by
-each of them: posts beside the way of a fast robot seem to hop from one to the next when all come along a little."""
+"""Assumed wheel slip between two scans, as shares of the distance. A new obstacle must be new for each of them;
+otherwise, posts beside a fast robot seem to jump to the next post."""
 LEFT = 1.0 - np.array(SLIPPED)[:, None]
-"""What is left of the way then."""
+"""Remaining share of the distance."""
 AGO, AT_LEAST = 0.9, 0.2
-"""Seconds: the least age of the scan that is asked, and while none is so old the least. At 0.25 m/s a thing near by
-comes as far as the margin in that time."""
+"""Preferred and minimum age in s of the earlier scan. At 0.25 m/s, an obstacle moves by the margin in the former."""
 EVERY = 0.19
-"""Seconds at least between two that are kept."""
+"""Minimum time in s between two scans that are kept."""
 FEWEST_BEAMS = 3
-"""Of a scan that can tell."""
+"""Minimum number of beams of a scan."""
 TURNED = 0.02
-"""rad: what beams beside a point must have gone farther, too: headings that are a second apart are wrong by some of it,
-and at an edge it is chance which beam hits."""
+"""Angle in rad to both sides of a point within which earlier beams must have passed too, for errors of the heading."""
 SAME, SAME_RELATIVE = 0.12, 0.01
-"""Meters, and share of the range, within which an earlier beam must have ended to have hit what stands there now."""
+"""Tolerance, in m and as a share of the range, for an earlier beam to have hit the same obstacle."""
 KEPT = 64
-"""Scans at most."""
+"""Maximum number of scans that are kept."""
 FARTHEST = 1e5
-"""Meters: how far a beam saw that met nothing."""
+"""Range in m of a beam that hit nothing."""
 
 
 @dataclass(frozen=True)
 class View:
-    """Where the beams of a lidar go: `count` of them, `increment` rad apart, the first along `start`."""
+    """Directions of the beams of a lidar: `count` beams, `increment` rad apart, the first along `start`."""
 
     count: int
     start: float
@@ -53,37 +50,37 @@ class View:
 
     @cached_property
     def full(self) -> bool:
-        """Whether it looks all around."""
+        """Whether the field of view is a full circle."""
         return (self.count + 1.5) * self.increment > 2 * math.pi
 
     @cached_property
     def beside(self) -> int:
-        """Beams to either side of a point that must have gone farther than it, too."""
+        """Number of beams to each side of a point that must have passed it as well."""
         return max(1, math.ceil(TURNED / self.increment))
 
     @cached_property
     def around(self) -> Indices:
-        """From the number of a beam in `free` to those of the one before it, of itself and of the next in `lengths`."""
+        """Offsets from the index of a beam in `free` to the previous, the same, and the next beam in `lengths`."""
         return self.beside + np.array(((-1,), (0,), (1,)))
 
     @cached_property
     def more(self) -> int:
-        """Beams that are added at either end, so that every direction is one's."""
+        """Number of beams added at each end, so that each direction has a beam."""
         behind = 0 if self.full else max(0, math.ceil(math.pi / self.increment - self.count / 2))
         return self.beside + 2 + behind
 
     @cached_property
     def middle(self) -> float:
-        """The direction in rad of its middle, …"""
+        """Direction in rad of the center."""
         return self.start + (self.count - 1) / 2 * self.increment
 
     @cached_property
     def center(self) -> float:
-        """… and what that is in beams, those that are added at one end included, but `beside` of them."""
+        """Index of the center in `free`."""
         return self.more - self.beside + (self.count - 1) / 2
 
     def lengths(self, scan: Scan) -> Array:
-        """How far away (n,) the beams of a scan saw, and what is added at either end."""
+        """Return the ranges (n,) of a scan, with the beams added at each end."""
         lengths = np.zeros(self.count + 2 * self.more)
         seen = lengths[self.more : -self.more]
         np.fmin(np.fmax(scan.ranges, 0.0), FARTHEST, out=seen)
@@ -93,7 +90,7 @@ class View:
         return lengths
 
     def free(self, lengths: Array) -> Array:
-        """How far away what appears later in each direction stands at most; `beside` shorter at either end."""
+        """Return the maximum distance of a new obstacle in each direction; shorter by `beside` at each end."""
         free = _least(lengths, 2 * self.beside + 1)
         free -= MARGIN
         free *= 1.0 / (1.0 + RELATIVE)
@@ -101,7 +98,7 @@ class View:
 
 
 def _least(values: Array, width: int) -> Array:
-    """The least of each so many neighbors: of two, of twice as many, …"""
+    """Return the minimum of each `width` neighbors."""
     done = 1
     while done < width:
         step = min(done, width - done)
@@ -112,7 +109,7 @@ def _least(values: Array, width: int) -> Array:
 
 @fast_dataclass(eq=False)
 class Earlier:
-    """What a scan saw through, and where its lidar was in the odom frame."""
+    """Free space of an earlier scan, and the pose of its lidar in the odom frame."""
 
     tick: int
     lidar: Pose2
@@ -121,16 +118,16 @@ class Earlier:
     free: Array
 
     def looked(self, places: Places, lidar: Pose2) -> "Looked":
-        """What it saw of places (n,) that are given as a lidar at `lidar` sees them."""
+        """Compare places (n,), given in the frame of a lidar at `lidar`, with this scan."""
         moved, ahead = self.lidar.between(lidar), self.view.middle
         turned = places * cmath.rect(1.0, moved.yaw - ahead)
         way = complex(moved.x, moved.y) * cmath.rect(1.0, -ahead)
         return Looked(self, turned, way, *self.towards(turned + way))
 
     def towards(self, places: Places) -> tuple[Indices, Array]:
-        """The beams (…,) that went towards places as it sees them, turned to its middle, and how far off these are.
+        """Return the indices in `free` of the beams (…,) toward places, and the distances of the places.
 
-        Beams have their numbers in `free`.
+        Places are in this lidar's frame, rotated to its center direction.
         """
         beam = np.arctan2(places.imag, places.real)
         beam *= 1.0 / self.view.increment
@@ -138,16 +135,16 @@ class Earlier:
         return beam.astype(np.int64), np.abs(places)
 
     def through(self, beam: Indices, distance: Array) -> Mask:
-        """Whether beams (…,) went beyond what is so far off."""
+        """Return whether beams (…,) passed beyond a distance."""
         return np.asarray(self.free.take(beam) > distance)
 
 
 @fast_dataclass(eq=False)
 class Looked:
-    """The beams (n,) of an earlier scan that went towards places, and how far away these were in m.
+    """Beams (n,) of an earlier scan toward places, with the distances of the places in m.
 
-    `turned` are the places as seen from where the lidar is now, with the earlier one's headings, and `way` is from the
-    one to the other.
+    `turned` are the places relative to the current lidar in the earlier orientation; `way` is the displacement between
+    both lidar poses.
     """
 
     earlier: Earlier
@@ -157,11 +154,11 @@ class Looked:
     distance: Array
 
     def free(self) -> Mask:
-        """Which of them were free then. What is farther away than FARTHEST never was."""
+        """Return which places were free then. Places beyond FARTHEST were not."""
         return self.earlier.through(self.beam, self.distance)
 
     def appeared(self, free: Mask) -> Mask:
-        """Which of those that were free were so by each of SLIPPED."""
+        """Return which of the free places were free for each of the assumed slips."""
         earlier, some = self.earlier, free.nonzero()[0]
         appeared: Mask = free.copy()
         if len(some):
@@ -169,7 +166,7 @@ class Looked:
         return appeared
 
     def stood(self) -> Mask:
-        """Which of them were hit then, too."""
+        """Return which places were also hit then."""
         off = self.earlier.lengths.take(self.beam + self.earlier.view.around)
         off -= self.distance
         near = np.abs(off, out=off).min(axis=0)
@@ -177,16 +174,17 @@ class Looked:
 
 
 class FreeSpaceMemory:
-    """The newest scans of one lidar."""
+    """Recent scans of one lidar."""
 
     def __init__(self, tick_rate: int) -> None:
+        """Take the tick rate in Hz."""
         self._ago, self._at_least = round(AGO * tick_rate), round(AT_LEAST * tick_rate)
         self._every = round(EVERY * tick_rate)
         self._scans: deque[Earlier] = deque(maxlen=KEPT)
         self._view = View(0, 0.0, 0.0)
 
     def remember(self, scan: Scan, lidar: Pose2) -> None:
-        """Keep a scan; `lidar` is where it was taken."""
+        """Keep a scan, taken with the lidar at a pose."""
         if self._scans and 0 <= scan.tick - self._scans[-1].tick < self._every:
             return
         view, count = self._view, len(scan.ranges)
@@ -198,7 +196,7 @@ class FreeSpaceMemory:
         self._scans.append(Earlier(scan.tick, lidar, view, lengths, view.free(lengths)))
 
     def before(self, tick: int) -> Earlier | None:
-        """The scan of about AGO before; None while there is none of AT_LEAST."""
+        """Return the scan that is about AGO old, or None if there is none older than AT_LEAST."""
         scans, ago = self._scans, tick - self._ago
         while len(scans) > 1 and scans[1].tick <= ago:
             scans.popleft()

@@ -14,6 +14,7 @@ class ClearingBackoff:
     """
 
     def __init__(self) -> None:
+        """Start as for a new goal."""
         self.reset()
 
     def reset(self) -> None:

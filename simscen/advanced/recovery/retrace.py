@@ -1,4 +1,4 @@
-"""Which velocity leads a robot back the way it came."""
+"""Recovery behavior `retrace`: drives the robot back along its trail."""
 
 import math
 from collections.abc import Sequence
@@ -18,44 +18,44 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 from simscen.stack.setting import Setting
 
 AHEAD = 1.0
-"""Seconds for which each command is tried out: 15 cm at Nav2's backup_speed."""
+"""Horizon in s of each candidate command: 15 cm at Nav2's backup_speed."""
 TIMES: Array = np.linspace(0.0, AHEAD, 11)
 AT_LEAST = 3
-"""Tenths of it for which one must be free, where none is for all."""
+"""Number of steps of TIMES that must be free if no command is free for the whole horizon."""
 SLACK = 0.3
-"""Cells by which it may come nearer to something than it came on its way."""
+"""Cells by which the robot may come closer to an obstacle than on its trail."""
 OFF = 2.0
-"""Meters of the way that are worth as much as a meter less beside it."""
+"""Weight of the deviation from the trail relative to the progress along it."""
 GAIN = 0.01
-"""Meters that a command must be worth more than to stand."""
+"""Minimum advantage in m of a command over standing still."""
 WINDOW = 0.5
-"""Meters of the way ahead among which the robot looks for where it is."""
+"""Length in m of the trail in which the robot is located."""
 SPEEDS = (-1.0, -0.5, 0.0, 0.5)
-"""Parts of the speed; forward, too, for a way may have had cusps."""
+"""Candidate speeds relative to the maximum; also forward, because a trail can have cusps."""
 RATES = (0.0, 0.07, -0.07, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8)
-"""rad/s."""
+"""Candidate turn rates in rad/s."""
 SIDEWAYS = (0.0, 0.5, -0.5, 1.0, -1.0)
-"""Parts of the speed, for a base that can and came so: a controller may have been told not to strafe."""
+"""Candidate lateral speeds relative to the maximum, for a holonomic base whose trail has lateral motion."""
 
 
 class TrailFollower:
-    """Leads back the way that a robot came, turns included; straight where nobody knows it.
+    """Follows the trail of the robot backward; straight backward where there is no trail.
 
-    Who is askew between two posts can neither turn nor leave straight; but he came in, so he can go out. Each step it
-    tries a few velocities on the local costmap, and takes the one that gets the robot farthest back while it keeps to
-    the way: wheels that slip do not lead it off.
+    A robot that stands at an angle between two posts can neither turn nor leave in a straight line, but it can leave
+    the way it entered. Each step compares a few velocities on the local costmap and takes the one with the most
+    progress along the trail, so that slipping wheels do not lead the robot away from it.
     """
 
     def __init__(self, setting: Setting, speed: float) -> None:
-        """`speed`: m/s at most; less where the base cannot reverse as fast."""
+        """Take the setting of the behavior and the maximum speed in m/s."""
         self._footprint, self._way, self._allowed = setting.footprint, setting.trail, setting.limit_command
         self.speed = min(speed, setting.robot.max_reverse)
-        """m/s; 0 for a robot without a reverse gear."""
+        """Speed in m/s; 0 for a robot that cannot reverse."""
         self._last: Pose2 | None = None
         self._commands = _possible(setting.robot, self.speed)
 
     def start(self, pose: Pose2, length: float) -> None:
-        """Begin from this pose in the odom frame, to go back so many meters at most."""
+        """Start at this pose in the odom frame, to drive back at most `length` m."""
         there = np.array([AHEAD])
         self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, there)[0] for each in (*self._commands, STOP)])
         lever = self._footprint.circumscribed
@@ -63,7 +63,7 @@ class TrailFollower:
         self._last = pose
 
     def _came(self) -> Sequence[Pose2]:
-        """The way it came; where it has gone back a part of that since, the rest of it, and what came then."""
+        """Return the poses of the trail, without the part that was already driven back."""
         way = self._way()
         if self._last is None or self._last not in way:
             return way
@@ -72,18 +72,18 @@ class TrailFollower:
         return [*(Pose2(*each) for each in rest[::-1].tolist()), *way[since:]]
 
     def locate(self, pose: Pose2) -> None:
-        """Note where the robot is; it never goes forward again."""
+        """Locate the robot on the trail; it never moves forward on it."""
         ahead, self._last = self._ahead(), pose
         self._at += int(self._trail.apart(self._trail.poses[ahead], np.array(pose)).argmin())
 
     @property
     def driven(self) -> float:
-        """Meters that the base has come back."""
+        """Distance in m that the base has driven back."""
         return float(self._trail.driven[self._at])
 
     @property
     def moved(self) -> float:
-        """Meters that its hull has, which a turn moves, too."""
+        """Distance in m that the footprint has moved, including rotation."""
         return float(self._trail.along[self._at])
 
     def _ahead(self) -> slice:
@@ -91,10 +91,10 @@ class TrailFollower:
         return slice(self._at, int(np.searchsorted(along, along[self._at] + WINDOW, side="right")))
 
     def command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
-        """The command that gets it farthest back of those that are free; else of those that are for a moment.
+        """Return the free command with the most progress, or one that is free for a moment, or None.
 
-        None where to stand is as good. Who touches a post all but may not turn as the way does, says the monitor, which
-        sees by the centimeter what cells do not show: then whatever else leads back, until there is room again.
+        None means that standing still is as good. If the collision monitor rejects the best command, because it sees
+        obstacles more precisely than the costmap, any other command that leads back is tried.
         """
         *worth, standing = self._worth(pose).tolist()
         strafed, vetoed = self._trail.strafed, False
@@ -119,10 +119,10 @@ class TrailFollower:
         return for_now
 
     def _blocked(self, pose: Pose2, poses: Array, costmap: CostmapView) -> Mask:
-        """Which of the poses (n, 3) are in something, and further than the robot is now, or was on its way here.
+        """Return which of the poses (n, 3) collide, unless the robot collided as much on its trail or does so now.
 
-        It came, so that what seems to stand there by less than a cell does not; but in what it drove through by more
-        something has come to stand since.
+        The robot has passed the trail, so that apparent collisions there by less than a cell are errors of the costmap;
+        deeper ones are obstacles that appeared later.
         """
         blocked: Mask = ~self._footprint.free(costmap, poses)
         if not blocked.any():
@@ -137,7 +137,7 @@ class TrailFollower:
         return np.asarray(blocked & nearer.any(axis=1))
 
     def _worth(self, pose: Pose2) -> Array:
-        """How far back (commands + 1,) each leads, less what it leads beside the way; last, what standing does."""
+        """Return the progress (commands + 1,) of each command minus its deviation from the trail; last, of a stop."""
         cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
         ends = np.column_stack((
             pose.x + cosine * self._ends[:, 0] - sine * self._ends[:, 1],
@@ -151,7 +151,7 @@ class TrailFollower:
 
 
 def _possible(robot: RobotModel, speed: float) -> list[Twist]:
-    """What such a base may be told at that speed."""
+    """Return the candidate commands of a robot."""
     commands = list[Twist]()
     for part, side, rate in product(SPEEDS, SIDEWAYS if robot.max_lateral > 0.0 else (0.0,), RATES):
         fastest = robot.max_angular
@@ -163,26 +163,28 @@ def _possible(robot: RobotModel, speed: float) -> list[Twist]:
 
 
 SLOWLY = 1.5
-"""Times as long as the way takes at full speed it may take, for it is driven in part at half of it."""
+"""Factor on the time that the distance takes at full speed, before the behavior times out."""
 
 
 class Retrace:
-    """Drive back the way it came, turns included, until there is room to turn."""
+    """Drives back along the trail of the robot until it can turn in place."""
 
     name = "retrace"
 
     def __init__(self, spec: model.Retrace, setting: Setting) -> None:
+        """Take the parameters and the setting of the behavior."""
         self._spec, self._footprint = spec, setting.footprint
         self._back = TrailFollower(setting, spec.backup_speed)
 
     def start(self, pose: Pose2) -> None:
-        """Begin from this pose."""
+        """Start the behavior at this pose."""
         self._back.start(pose, max(self._spec.backup_dist, self._spec.retrace_dist))
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Back on; None when far enough, or when it has come some way and there is none that is free.
+        """Return the command, or None when the robot is far enough back or cannot get any further.
 
-        Raises BACKUP_COLLISION_AHEAD when there is not even a cell of room, BACKUP_TIMEOUT, BACKUP_INVALID_INPUT.
+        Raises BACKUP_COLLISION_AHEAD if the robot cannot move by a single cell, BACKUP_TIMEOUT, or
+        BACKUP_INVALID_INPUT.
         """
         back = self._back
         if back.speed <= 0.0:
@@ -193,10 +195,10 @@ class Retrace:
         if back.driven >= self._spec.backup_dist and self._may_turn(pose, costmap):
             return None
         if seconds > max(TIME_ALLOWANCE, SLOWLY * self._spec.retrace_dist / back.speed):
-            raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "driving back the way it came took too long")
+            raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "driving back along the trail took too long")
         command = back.command(pose, costmap)
         if command is None and back.moved < costmap.resolution:
-            raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "no room on the way it came")
+            raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "the trail is blocked")
         return command
 
     def _may_turn(self, pose: Pose2, costmap: CostmapView) -> bool:

@@ -29,9 +29,11 @@ class Watch:
         walls: Flatland | None = None,
         view: float = FRONT,
         beams: int = 720,
+        covered: float | None = None,
     ) -> None:
+        """`covered`: range of the first 40 beams, if something covers them."""
         self.discs, self.base, self.told = discs, base, told or base
-        self.walls, self.view, self.beams = walls or Flatland(), view, beams
+        self.walls, self.view, self.beams, self.covered = walls or Flatland(), view, beams, covered
         self.tracker, self.chance, self.time = Tracker(Prediction(), RATE), np.random.default_rng(1), 0.0
 
     def run(self, seconds: float, each: Callable[["Watch"], None] = lambda _: None) -> "Watch":
@@ -43,6 +45,8 @@ class Watch:
             angles = -self.view / 2 + step * np.arange(self.beams)
             ranges = world.cast((here.x, here.y), angles + here.yaw) + self.chance.normal(0, 0.01, self.beams)
             ranges = np.round(np.where(ranges > 30.0, np.inf, ranges), 3)
+            if self.covered is not None:
+                ranges[:40] = self.covered
             scan = Scan("lidar", round(self.time * RATE), ranges, -self.view / 2, step, 0.1, 30.0)
             self.tracker.on_scan(scan, self.told(self.time))
             each(self)
@@ -306,3 +310,9 @@ def test_a_circle_that_is_seen_in_part_is_found_from_half_its_radius_off(seen: f
     towards = math.pi + math.atan2(middle.imag, middle.real)
     arc = [middle + cmath.rect(radius, towards + seen * (k / 14 - 0.5)) for k in range(15)]
     assert abs(fitted(arc, radius, middle + cmath.rect(radius / 2, towards + 0.4)) - middle) < ENOUGH
+
+
+@pytest.mark.filterwarnings("error")
+def test_too_close_returns_say_nothing_about_moving_obstacles() -> None:
+    moving = [Watch(crossing, covered=value).run(3.0).tracker.moving.things for value in (-np.inf, np.nan)]
+    assert moving[0] == moving[1] != ()
