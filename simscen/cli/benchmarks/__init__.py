@@ -1,1 +1,1 @@
-"""The commands of `simscen bench` and their output."""
+"""Commands of `simscen bench` and their output."""

@@ -1,4 +1,4 @@
-"""`simscen bench localization`: how well AMCL knows where the robot is."""
+"""Command `simscen bench localization`, which measures the accuracy of AMCL."""
 
 import json
 import os
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simscen.cli.benchmarks.navigation_table import aligned, broken, fits, named
+from simscen.cli.benchmarks.navigation_table import aligned, fits, labeled, wrapped
 from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import NothingSelected
@@ -23,33 +23,38 @@ if TYPE_CHECKING:
 
 
 class Format(str, Enum):
-    """What is printed."""
+    """Output format."""
 
     TEXT = "text"
     JSON = "json"
 
 
 def command(
-    buildings: Annotated[int, typer.Option(min=1, max=1000, help="How many buildings to generate.")] = 10,
-    first: Annotated[int, typer.Option(min=1, max=1_000_000, help="The number of the first one.")] = 1,
-    only: Annotated[list[str] | None, typer.Option(help="Part of the name of parameters; repeatable.")] = None,
-    workers: Annotated[int | None, typer.Option("--workers", "-j", min=1, max=256, help="Default: all cores.")] = None,
+    buildings: Annotated[int, typer.Option(min=1, max=1000, help="Number of generated buildings.")] = 10,
+    first: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of the first building.")] = 1,
+    only: Annotated[
+        list[str] | None, typer.Option(help="Select sets of parameters by a part of their name; repeatable.")
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", "-j", min=1, max=256, help="Number of parallel processes; default: one per core."),
+    ] = None,
     format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
 ) -> None:
-    """Measure how well AMCL knows where the robot is, on generated logs.
+    """Measure the accuracy of AMCL on generated logs.
 
-    Office floors of 40 m and more without symmetry, a lidar of 181 or 361 beams over 180°, raw odometry of wheels that
-    slip, people, moved furniture, glass. Eleven logs of each floor: five on which the start is told, two in a building
-    as mapped, with clean wheels and with raw ones, one whose start is unknown, one with half of the floor rebuilt since
-    the map was made, one with a map of the other half only, and one of a robot that is carried elsewhere. Each goes
-    through AMCL with Nav2's parameters, simscen's defaults and those whose covariance is true. Intervals are by
-    bootstrap over buildings. What was lost or not found is said on standard error. A few minutes on two cores.
+    The buildings are asymmetric office floors of 40 m and more, with a lidar of 181 or 361 beams over 180°, odometry of
+    slipping wheels, people, moved furniture, and glass. Each has eleven logs: five with a known start, two in a
+    building as mapped, with clean and with raw odometry, one with an unknown start, one with half of the floor rebuilt,
+    one with a map of the other half only, and one of a kidnapped robot. Each log is evaluated with Nav2's parameters,
+    simscen's defaults, and parameters for a consistent covariance. Intervals are by bootstrap over buildings. Lost
+    robots are listed on standard error. Takes a few minutes on two cores.
     """
     from simscen.bench.localization.campaign import PARAMETERS, drive, summed_up
 
     names = [name for name in PARAMETERS if not only or any(part.casefold() in name.casefold() for part in only)]
     if not names:
-        raise NothingSelected("no parameters are called so; there are: " + ", ".join(map(quoted, PARAMETERS)))
+        raise NothingSelected("no set of parameters matches --only; available: " + ", ".join(map(quoted, PARAMETERS)))
     trials: dict[str, list[Trial]] = {name: [] for name in names}
     numbers = range(first, first + buildings)
     for done, of_one in enumerate(drive(numbers, names, min(buildings, workers or len(os.sched_getaffinity(0)))), 1):
@@ -80,17 +85,17 @@ SHARES = {
     "tracked": "tracked", "unknown": "start unknown", "outdated": "half rebuilt", "half": "half a map",
     "kidnapped": "kidnapped",
 }  # fmt: skip
-"""What circumstances are called in the table."""
+"""Circumstances of the logs and their names in the table."""
 
 
 def as_text(rows: "Sequence[Row]", columns: int | None = None) -> str:
-    """A line for each set of parameters, then how sure each was; in at most so many `columns`."""
+    """Return one line per set of parameters, then the consistency of each, in at most `columns`."""
     head = ("parameters", *SHARES.values(), "median error", "ms a scan", "slowest")
     table = [_cells(row) for row in rows]
     lines = aligned([head, *table], str.ljust)
     if columns is not None and not fits(lines, columns):
-        lines = [line for row in table for line in named(head, row, columns)]
-    return "\n".join(broken([*lines, "", *(line for row in rows for line in _belief(row))], columns))
+        lines = [line for row in table for line in labeled(head, row, columns)]
+    return "\n".join(wrapped([*lines, "", *(line for row in rows for line in _consistency_lines(row))], columns))
 
 
 def _cells(row: "Row") -> tuple[str, ...]:
@@ -111,18 +116,18 @@ def _between(interval: "Interval", form: str = ".3f") -> str:
     return "" if interval is None else f" ({interval[0]:{form}} … {interval[1]:{form}})"
 
 
-def _belief(row: "Row") -> list[str]:
+def _consistency_lines(row: "Row") -> list[str]:
     from simscen.bench.localization.trial import MOMENTS
 
     def lines(name: str, sure: "Sureness") -> list[str]:
         within = (
             "" if sure.bounds is None else f"; right on average: {sure.bounds[0]:.2f} … {sure.bounds[1]:.2f} (95 %)"
         )
-        told = ", ".join(f"{value:.2f} at {when:g} s" for when, value in zip(MOMENTS, sure.moments, strict=True))
+        moments = ", ".join(f"{value:.2f} at {when:g} s" for when, value in zip(MOMENTS, sure.moments, strict=True))
         low, high = sure.moment_bounds
         return [
             f"  ANEES {name}: {sure.anees:.2f}{within}; in the 95 % ellipsoid: {sure.inside:.1%}",
-            f"    {told}; normal, independent: {low:.2f} … {high:.2f} (95 %)",
+            f"    {moments}; normal, independent: {low:.2f} … {high:.2f} (95 %)",
         ]
 
     return [row.parameters, *(line for name, sure in row.sure.items() for line in lines(name, sure))]

@@ -1,4 +1,4 @@
-"""`simscen bench nav`: how well the reference stack drives."""
+"""Command `simscen bench nav`, which measures the navigation of the reference stack."""
 
 import os
 import sys
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Format(str, Enum):
-    """What is printed."""
+    """Output format."""
 
     TEXT = "text"
     JSON = "json"
@@ -26,51 +26,57 @@ class Format(str, Enum):
 
 def command(
     barn: Annotated[
-        Path | None, typer.Option(help="Folder with worlds of BARN and their scenarios.csv; none: skipped.")
+        Path | None, typer.Option(help="Folder with BARN worlds and their scenarios.csv; without it, they are skipped.")
     ] = None,
     nav2: Annotated[
-        Path | None, typer.Option(help="Folder with Nav2's TurtleBot3 sandbox: worlds, map, models; none: skipped.")
+        Path | None,
+        typer.Option(help="Folder with Nav2's TurtleBot3 sandbox (worlds, map, models); without it, it is skipped."),
     ] = None,
-    project: Annotated[Path, typer.Option(help="Folder with simscen's scenarios/ and worlds/.")] = Path(),
-    only: Annotated[list[str] | None, typer.Option(help="Part of the name of experiments; repeatable.")] = None,
+    project: Annotated[Path, typer.Option(help="Folder that contains simscen's scenarios/ and worlds/.")] = Path(),
+    only: Annotated[
+        list[str] | None, typer.Option(help="Select experiments by a part of their name; repeatable.")
+    ] = None,
     first: Annotated[
-        int, typer.Option(min=1, max=1_000_000, help="The number of the first field, building, drive and seed.")
+        int, typer.Option(min=1, max=1_000_000, help="Number of the first field, building, drive, and seed.")
     ] = 1,
     seeds: Annotated[
-        int | None, typer.Option(min=1, max=1000, help="Seeds of each scenario; default: 5 for BARN, else 20.")
+        int | None,
+        typer.Option(min=1, max=1000, help="Number of seeds of each scenario; default: 5 for BARN, otherwise 20."),
     ] = None,
     fields: Annotated[
-        int, typer.Option(min=0, max=10_000, help="How many obstacle fields to generate; narrow ones: half as many.")
+        int, typer.Option(min=0, max=10_000, help="Number of generated obstacle fields; half as many narrow fields.")
     ] = 50,
     dynamic: Annotated[
-        int, typer.Option(min=0, max=10_000, help="How many fields of moving cylinders at each speed.")
+        int, typer.Option(min=0, max=10_000, help="Number of fields of moving cylinders at each speed.")
     ] = 20,
     goals: Annotated[
-        int, typer.Option(min=1, max=10_000, help="How many random goals in each world, ramps, corridors.")
+        int, typer.Option(min=1, max=10_000, help="Number of random goals in each world, of ramps, and of corridors.")
     ] = 20,
-    lost: Annotated[int, typer.Option(min=0, max=10_000, help="How often the robot does not know where it is.")] = 50,
+    lost: Annotated[int, typer.Option(min=0, max=10_000, help="Number of drives with an unknown start.")] = 50,
     stack: Annotated[
         Path | None,
         typer.Option(
-            help="A *.stack.yaml, or a parameter file of Nav2: every drive once more with its parameters on top, and "
-            "what that changes."
+            help="Repeat every drive with the parameters of a *.stack.yaml or Nav2 parameter file, and compare."
         ),
     ] = None,
-    workers: Annotated[int | None, typer.Option("--workers", "-j", min=1, max=256, help="Default: all cores.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Output folder, new or empty.")] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", "-j", min=1, max=256, help="Number of parallel runs; default: one per core."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="New or empty output folder.")] = None,
     resume: Annotated[
-        Path | None, typer.Option(help="Go on in this output folder: only runs that have no verdict yet.")
+        Path | None, typer.Option(help="Continue in this output folder with the runs that have no verdict yet.")
     ] = None,
     format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
 ) -> None:
-    """Measure how well the reference stack drives, and print one line for each experiment.
+    """Measure the navigation of the reference stack, and print one line per experiment.
 
-    BARN and fields like it, narrow fields, fields of moving cylinders, random goals in shipped worlds and generated
-    buildings, sensors that fail, ramps, two robots in a corridor, Nav2's own system test, corner cases and
-    localization. Intervals are by bootstrap over worlds. Worlds of BARN and Nav2 are no part of simscen: say where you
-    have them. What is not there is skipped, which is said on standard error, as is every run that did not come out
-    well, with the command that repeats it. Interrupted, it prints what there is by then; with the same options and
-    --resume it goes on. Exit code 0, or 3 when a run could not be completed.
+    The experiments are BARN and similar fields, narrow fields, fields of moving cylinders, random goals in shipped
+    worlds and generated buildings, degraded sensing, ramps, two robots in a corridor, Nav2's system test, corner cases,
+    and localization. Intervals are by bootstrap over worlds. The worlds of BARN and Nav2 are not included; pass their
+    folders as options. Experiments without data are skipped with a message. Each run that does not pass is printed on
+    standard error with the command that repeats it. An interrupted session prints its results so far, and continues
+    with --resume and the same options. Exit code 0; 3: a run could not be completed.
     """
     from simscen.bench.navigation.summary import compare_drives
     from simscen.cli.benchmarks.navigation_experiments import Sizes, available_experiments
@@ -91,7 +97,7 @@ def command(
             continue
         experiments += [each for each in offer.make() if whole or _named(each.name, only)]
     if not experiments:
-        raise NothingSelected("no experiment is called so, or its data is not here")
+        raise NothingSelected("no experiment matches --only, or its data is missing")
     others = [] if stack is None else with_stack(stack, experiments, made, project)
     all_of_them = [*experiments, *others]
     trials, stopped = drive(all_of_them, journal, workers or len(os.sched_getaffinity(0)))
@@ -105,23 +111,23 @@ def command(
     print_text(as_json(rows, pairs) if format_ is Format.JSON else as_text(rows, pairs, columns))
     if stopped:
         count = f"{sum(len(driven(runs)) for runs in trials)} of {sum(map(len, trials))} runs"
-        print_text(f"simscen: interrupted: {count}; go on with --resume {escaped(str(folder))}", sys.stderr)
+        print_text(f"simscen: interrupted: {count}; continue with --resume {escaped(str(folder))}", sys.stderr)
         sys.exit(stopped)
     if any(row.tally.errors for row in rows):
         sys.exit(Exit.INCOMPLETE)
 
 
 def with_stack(file: Path, experiments: list["Experiment"], made: Path, project: Path) -> list["Experiment"]:
-    """The same experiments with the parameters of a stack file. Raises InvalidInput."""
+    """Return the same experiments with the parameters of a stack file. Raises InvalidInput."""
     from simscen.bench.navigation.experiments import with_stack_parameters
     from simscen.loading.stacks.stackfile import load_stack_file
 
     choice = load_stack_file(file.name.split(".")[0], str(file), file, project)
     if choice.notes:
         print_text(problems_as_text(from_here(choice.notes, project)), sys.stderr)
-    said = choice.section.plain if choice.section else {}
+    parameters = choice.section.plain if choice.section else {}
     return [
-        with_stack_parameters(one, f"{one.name}, {choice.name}", said, made / "with_stack" / str(number))
+        with_stack_parameters(one, f"{one.name}, {choice.name}", parameters, made / "with_stack" / str(number))
         for number, one in enumerate(experiments)
     ]
 

@@ -1,4 +1,4 @@
-"""The experiments that `simscen bench nav` has to offer."""
+"""Experiments of `simscen bench nav`."""
 
 from __future__ import annotations
 
@@ -18,12 +18,15 @@ SHIPPED = ("house", "office", "warehouse")
 BARN = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
 NAV2 = "--nav2 names a folder with it: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
 LIDAR_HEIGHT = 0.2
-"""Meters: at which the maps of worlds are made that drives are drawn from."""
+"""Height in meters of the lidar for which the maps of worlds are made."""
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """How many of what, and the number of the first of each; `seeds` is None for each experiment's own number."""
+    """Size of the experiments, and the `first` number of their fields, buildings, drives, and seeds.
+
+    `seeds` is None for the usual number of each experiment.
+    """
 
     first: int = 1
     seeds: int | None = None
@@ -33,20 +36,20 @@ class Sizes:
     lost: int = 50
 
     def seeded(self, usual: int) -> Sequence[int]:
-        """The seeds of a scenario that is usually run with so many."""
+        """Return the seeds of a scenario that usually runs with `usual` seeds."""
         return self.numbers(self.seeds or usual)
 
     def numbers(self, count: int) -> Sequence[int]:
-        """So many, from the first on."""
+        """Return `count` numbers starting at `first`."""
         return range(self.first, self.first + count)
 
 
 @dataclass(frozen=True)
 class AvailableExperiment:
-    """Experiments that come together: what they are called, the folder that they need, and how to get them.
+    """Group of experiments, the folder that it needs, and the function that creates it.
 
-    `parts` are the names of those that are not called as the offer is: to make them all may take a while. Without a
-    folder `source` says which option names it, and where its data comes from.
+    `parts` are the names of its experiments with other names than the group; creating them all may take a while.
+    Without a folder, `source` names the option for it and the origin of its data.
     """
 
     name: str
@@ -57,7 +60,7 @@ class AvailableExperiment:
 
     @property
     def missing(self) -> str:
-        """Why they cannot be driven; "" where nothing is missing."""
+        """Reason why the group cannot run, or ""."""
         if self.needs is None:
             return self.source
         return "" if self.needs.is_dir() else f"there is no folder {self.needs}"
@@ -66,7 +69,7 @@ class AvailableExperiment:
 def available_experiments(
     data: Path | None, nav2: Path | None, project: Path, made: Path, sizes: Sizes
 ) -> list[AvailableExperiment]:
-    """All of them, in the order of the table; what is generated goes to `made`."""
+    """Return all groups of experiments in the order of the table; generated files are written to `made`."""
     worlds, scenarios = project / "worlds", project / "scenarios"
     return [
         replace(offer, parts=_parts(offer.name, scenarios))
@@ -75,7 +78,7 @@ def available_experiments(
 
 
 def _parts(name: str, scenarios: Path) -> list[str]:
-    """What the experiments of an offer are called that are not called as it is."""
+    """Return the names of the experiments of a group that differ from its name."""
     match name:
         case "BARN":
             return [f"BARN, {variant}" for variant in ("default parameters", *barn.CONTROLLERS)]
@@ -134,7 +137,7 @@ def _offers(
 
 
 def _barn(made: Path, data: Path, sizes: Sizes) -> Iterator[Experiment]:
-    """As it is set up for 2 m/s, with no parameter changed, and each controller at the same speed."""
+    """Yield the BARN challenge at 2 m/s, with default parameters, and with each controller at the same speed."""
     seeds = sizes.seeded(5)
     yield experiments.barn_challenge(made, data, seeds)
     yield experiments.barn_challenge(made, data, seeds, "default parameters", barn.DEFAULT)
@@ -152,7 +155,7 @@ def _random_goals(made: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment
 
 
 def _degraded(made: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
-    """In a quarter as many worlds as there are random goals in each: the shipped ones, and generated buildings."""
+    """Return the experiments in shipped worlds and generated buildings, a quarter as many worlds as `goals`."""
     folder, maps = made / "degraded", made / "degraded_buildings"
     count = max(1, sizes.goals // 4)
     buildings = _buildings(maps, sizes.numbers(max(0, count - len(SHIPPED))))
@@ -170,7 +173,7 @@ def _buildings(folder: Path, numbers: Sequence[int]) -> Mapping[str, BuiltWorld]
 
 
 def _built(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, BuiltWorld]:
-    """Worlds by the name that scenarios in `folder` give them, made ready."""
+    """Return the built worlds by the names that scenarios in `folder` use for them."""
     from simscen.loading.files.worldfile import load_world_file
     from simscen.run.preparation.loaders import world_from_file
     from simscen.worlds.build import build

@@ -1,4 +1,4 @@
-"""Runs the experiments of `simscen bench nav`, through the same door as every other run."""
+"""Execution of the experiments of `simscen bench nav` as normal runs."""
 
 import shlex
 import sys
@@ -29,17 +29,17 @@ from simscen.run.process.jobs import Job
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
-PATIENCE = 1800.0
-"""Seconds of wall time that a run may take: a busy machine is no failure of the stack."""
-MOMENTS = (5.0, 10.0, 20.0, 30.0)
-"""Seconds of a run at which ANEES is averaged over the runs."""
+WALL_LIMIT_S = 1800.0
+"""Wall-clock limit of a run in seconds; long, because a busy machine is not a failure of the stack."""
+MOMENTS_S = (5.0, 10.0, 20.0, 30.0)
+"""Times in a run, in seconds, at which ANEES is averaged over the runs."""
 
 
 @dataclass(frozen=True)
 class Localized:
-    """How well the robot knew where it was: root mean square errors in m (mean and worst over runs), ANEES at MOMENTS.
+    """Accuracy of the localization: RMSE in m (mean and worst over runs), and ANEES at MOMENTS_S.
 
-    `bounds` are those of ANEES with 95 % probability when the belief is consistent.
+    `bounds` are those of ANEES with 95 % probability if the covariance is consistent.
     """
 
     rmse: float | None
@@ -50,17 +50,16 @@ class Localized:
 
 @dataclass(frozen=True)
 class Measured:
-    """One experiment's line."""
+    """Result of one experiment."""
 
     tally: Row
     localized: Localized | None = None
 
 
 def drive(experiments: Sequence[Experiment], journal: Journal, workers: int) -> tuple[list[list[Trial]], Exit | None]:
-    """Do all runs of each experiment that the journal has no verdict on, and tell of progress and of what went wrong on
-    stderr.
+    """Execute all runs of each experiment without a result in the journal; print progress and failures to stderr.
 
-    Returns all runs of each, and the exit code of an interrupt where there was one. Raises InvalidInput.
+    Returns the trials of each experiment, and the exit code of an interrupt or None. Raises InvalidInput.
     """
     jobs, owners = _planned(experiments, journal.folder)
     work = begin(journal, jobs, workers)
@@ -72,20 +71,20 @@ def drive(experiments: Sequence[Experiment], journal: Journal, workers: int) -> 
 
     with signals_interrupt():
         answers, stopped = run_session(
-            work.jobs, SessionOptions(workers=workers, wall_limit=PATIENCE), WARM_PROCESS, listen
+            work.jobs, SessionOptions(workers=workers, wall_limit=WALL_LIMIT_S), WARM_PROCESS, listen
         )
     print_progress("")
-    of = {answer.key: answer for answer in (*work.kept, *answers)}
+    finished = {answer.key: answer for answer in (*work.kept, *answers)}
     trials: list[list[Trial]] = [[] for _ in experiments]
     for job in jobs:
         number, drive = owners[job.key]
         world, speed = drive.world or str(drive.file), _top_speed(job.scenario)
-        trials[number].append(Trial(of[job.key], drive.reference_length, world, speed))
+        trials[number].append(Trial(finished[job.key], drive.reference_length, world, speed))
     return trials, stopped
 
 
 def driven(trials: Sequence[Trial]) -> list[Trial]:
-    """Those that no interrupt has kept from being driven to their end."""
+    """Return the trials that were not interrupted."""
     return [trial for trial in trials if not _undecided(trial.run)]
 
 
@@ -97,10 +96,11 @@ Owner = tuple[int, Drive]
 
 
 def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, Owner]]:
-    """A job for each run, and the experiment and the drive that it belongs to. Raises ValueError for two of one key.
+    """Return a job for each run, and the experiment and drive of each.
 
-    One scenario of each experiment is checked as `simscen validate` does: the others are made as it is, and whether the
-    goal can be reached has been looked at when it was drawn, which takes as long as half a run.
+    Raises ValueError for two runs with the same key. Only the first scenario of each experiment is checked as by
+    `simscen validate`: the others are generated the same way, and the reachability of their goals was checked when they
+    were drawn.
     """
     jobs: list[Job] = []
     owners: dict[RunKey, Owner] = {}
@@ -113,20 +113,20 @@ def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], d
             for seed in planned.seeds:
                 key = RunKey(scenario.id, seed)
                 if key in owners:
-                    raise ValueError(f"two runs are called {key.scenario}, seed {seed}")
-                jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), PATIENCE))
+                    raise ValueError(f"several runs of {key.scenario} with seed {seed}")
+                jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), WALL_LIMIT_S))
                 owners[key] = number, planned
     return jobs, owners
 
 
 def _top_speed(scenario: LoadedScenario) -> float | None:
-    """Of the fastest of its robots; None where one is none of ours."""
+    """Return the speed in m/s of the fastest robot; None if a robot is not defined by a robot file."""
     robots = [view.robot.spec for view in scenario.each.values()]
     return max(robot.top_speed for robot in robots if robot) if all(robots) else None
 
 
 def repeat_command(job: Job) -> str:
-    """The command that repeats a run."""
+    """Return the command that repeats a run."""
     scenario = job.scenario
     folders = [part for folder in scenario.world_path for part in ("--world-path", str(folder))]
     root = ["--root", str(scenario.root)]
@@ -134,25 +134,27 @@ def repeat_command(job: Job) -> str:
 
 
 class _Progress:
-    """A counter on a terminal; each run that was not passed in full."""
+    """Prints a counter to a terminal, and each run that did not pass."""
 
     def __init__(self, total: int, done: int, jobs: dict[RunKey, Job]) -> None:
         self._total, self._jobs, self._done = total, jobs, done
 
     def __call__(self, event: SessionEvent) -> None:
-        """Take one event of the session."""
+        """Process an event of the session."""
         if not isinstance(event, RunFinished) or _undecided(event):
             return
         self._done += 1
         if event.outcome is not Outcome.PASSED:
             print_progress("")
-            told = replace(event, again=repeat_command(self._jobs[event.key]))
-            print_text("\n".join(plain_text(line) for line in run_lines(told, RunNaming(every_seed=True))), sys.stderr)
+            repeatable = replace(event, again=repeat_command(self._jobs[event.key]))
+            print_text(
+                "\n".join(plain_text(line) for line in run_lines(repeatable, RunNaming(every_seed=True))), sys.stderr
+            )
         print_progress(f"{self._done} of {self._total} runs" if self._done < self._total else "")
 
 
 def measured(experiment: Experiment, trials: list[Trial]) -> Measured:
-    """The line of an experiment whose runs these are."""
+    """Return the result of an experiment with these trials."""
     row = summarize(experiment.name, trials)
     return Measured(row, _localized(trials) if experiment.localization else None)
 
@@ -160,7 +162,7 @@ def measured(experiment: Experiment, trials: list[Trial]) -> Measured:
 def _localized(trials: list[Trial]) -> Localized:
     errors = [value for trial in trials if (value := trial.metric("ape_trans_rmse")) is not None]
     traces = [read_log(Path(trial.run.artifacts.mcap)).trace for trial in trials if trial.run.artifacts.mcap]
-    at = {seconds: [v for trace in traces if (v := nees_at(trace, seconds)) is not None] for seconds in MOMENTS}
+    at = {seconds: [v for trace in traces if (v := nees_at(trace, seconds)) is not None] for seconds in MOMENTS_S}
     return Localized(
         rmse=mean(errors),
         worst_rmse=max(errors, default=None),

@@ -1,4 +1,4 @@
-"""Tables of the commands of `simscen bench`, as wide as they are or as the terminal is."""
+"""Tables of `simscen bench`, fitted to the width of the terminal."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -14,12 +14,12 @@ Adjust = Callable[[str, int], str]
 
 
 def fits(lines: Sequence[str], columns: int | None) -> bool:
-    """Whether no line is longer than so many columns; None = as long as they are."""
+    """Return whether no line is longer than `columns`; None is unlimited."""
     return columns is None or max(map(len, lines)) <= columns
 
 
 def aligned(table: Sequence[TableRow], adjust: Adjust = str.rjust) -> list[str]:
-    """A line for each row, its cells below those of the others; the first from the left, the rest as `adjust` says."""
+    """Return one line per row with aligned cells: the first cell left-aligned, the others as by `adjust`."""
     widths = widths_of(table)
     return [
         "  ".join((row[0].ljust(widths[0]), *map(adjust, row[1:], widths[1:]))).rstrip()
@@ -28,25 +28,25 @@ def aligned(table: Sequence[TableRow], adjust: Adjust = str.rjust) -> list[str]:
 
 
 def stacked(table: Sequence[TableRow], columns: int) -> list[str]:
-    """Two lines for each row: its name, and its numbers below those of the others."""
+    """Return two lines per row: its name, and its aligned numbers."""
     widths = widths_of(table)[1:]
     gap = "  " if 2 + sum(widths) + 2 * (len(widths) - 1) <= columns else " "
     return [line for name, *rest in table for line in (name, "  " + gap.join(map(str.rjust, rest, widths)))]
 
 
-def named(head: TableRow, row: TableRow, columns: int) -> list[str]:
-    """The name of a row, then each of its numbers behind what it is, as many in a line as fit."""
+def labeled(head: TableRow, row: TableRow, columns: int) -> list[str]:
+    """Return the name of a row, then its labeled numbers, as many per line as fit."""
     pieces = tuple(StyledText(f"  {name} {cell}") for name, cell in zip(head[1:], row[1:], strict=True))
     return [row[0], *(plain_text(line) for line in wrap_line(pieces, columns))]
 
 
-def broken(lines: Sequence[str], columns: int | None) -> list[str]:
-    """The lines, broken between words where they are too long."""
+def wrapped(lines: Sequence[str], columns: int | None) -> list[str]:
+    """Return the lines, wrapped between words if they are too long."""
     return [plain_text(piece) for line in lines for piece in wrap_line((StyledText(line),), columns)]
 
 
 def widths_of(table: Sequence[TableRow]) -> list[int]:
-    """How wide the columns of a table are."""
+    """Return the widths of the columns of a table."""
     return [max(map(len, cells)) for cells in zip(*table, strict=True)]
 
 
@@ -70,9 +70,9 @@ HEAD = (
 
 
 def as_text(rows: Sequence[Measured], pairs: Sequence[DriveComparison] = (), columns: int | None = None) -> str:
-    """Aligned columns; what another stack changes; published figures of another simulator as a footnote.
+    """Return the table of results, the effect of another stack, and published figures for comparison.
 
-    Where a line would be longer than so many `columns`, an experiment has one for its name and one for its numbers.
+    If a line would be longer than `columns`, each experiment has one line for its name and one for its numbers.
     """
     table = [HEAD, *(_cells(measured.tally) for measured in rows)]
     lines = aligned(table)
@@ -80,31 +80,31 @@ def as_text(rows: Sequence[Measured], pairs: Sequence[DriveComparison] = (), col
         lines = stacked(table, columns)
     for measured in rows:
         if measured.localized is not None:
-            lines += ["", *_belief(measured.tally.case, measured.localized)]
+            lines += ["", *_localization_lines(measured.tally.case, measured.localized)]
     if pairs:
-        lines += ["", *_versus(pairs, columns)]
+        lines += ["", *_comparison_lines(pairs, columns)]
     if any(measured.tally.case.startswith("BARN") for measured in rows):
         lines += ["", PUBLISHED]
-    return "\n".join(broken(lines, columns))
+    return "\n".join(wrapped(lines, columns))
 
 
 def as_json(rows: Sequence[Measured], pairs: Sequence[DriveComparison] = ()) -> str:
-    """All numbers, and DWA's."""
-    told = {"experiments": [asdict(row) for row in rows], "dwa_published": DWA}
-    return json.dumps({**told, "versus": [asdict(pair) for pair in pairs]} if pairs else told, indent=2)
+    """Return all numbers, and those of DWA, as JSON."""
+    data = {"experiments": [asdict(row) for row in rows], "dwa_published": DWA}
+    return json.dumps({**data, "versus": [asdict(pair) for pair in pairs]} if pairs else data, indent=2)
 
 
-def _versus(pairs: Sequence[DriveComparison], columns: int | None) -> list[str]:
-    """A line for each pair of experiments, or where that is too long each number with what it is."""
+def _comparison_lines(pairs: Sequence[DriveComparison], columns: int | None) -> list[str]:
+    """Return one line per pair of experiments, or labeled numbers if such lines are too long."""
     changes = [_changes(pair) for pair in pairs]
     lines = aligned([VERSUS, *changes])
     if columns is None or fits(lines, columns):
         return lines
-    return [VERSUS[0], *(line for row in changes for line in named(VERSUS, row, columns))]
+    return [VERSUS[0], *(line for row in changes for line in labeled(VERSUS, row, columns))]
 
 
 def _changes(pair: DriveComparison) -> tuple[str, ...]:
-    """What the other stack changes in the same drives, pair by pair."""
+    """Return the cells for the effect of the other stack on the same drives."""
     forms = ((pair.success, ".3f"), (pair.seconds, ".1f"), (pair.sct, ".3f"), (pair.score, ".3f"))
     changes = (_change(difference, form) for difference, form in forms)
     return (pair.case, f"{pair.pairs}", f"{pair.better}", f"{pair.worse}", *changes)
@@ -139,7 +139,7 @@ def _or_none(value: float | None, form: str, unit: str = "") -> str:
     return "-" if value is None else f"{value:{form}}{unit}"
 
 
-def _belief(case: str, localized: Localized) -> list[str]:
+def _localization_lines(case: str, localized: Localized) -> list[str]:
     low, high = localized.bounds
     moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in localized.anees.items())
     errors = f"{_or_none(localized.rmse, '.3f', ' m')} RMSE, worst run {_or_none(localized.worst_rmse, '.3f', ' m')}"

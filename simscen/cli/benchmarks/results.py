@@ -1,4 +1,4 @@
-"""Results of `simscen bench` as files: what is written, and read again to be compared."""
+"""Result files of `simscen bench`, and their comparison."""
 
 import json
 import sys
@@ -16,12 +16,12 @@ from simscen.cli.installation import processor
 from simscen.core.errors import UsageError
 
 FORMAT = 1
-"""Of the JSON; another number means that names or meanings have changed."""
+"""Version of the JSON format; it increases when names or meanings change."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What one call has measured, where and with which version of simscen."""
+    """Measurements of one call, with the machine and the version of simscen."""
 
     figures: Measurements
     machine: str
@@ -29,38 +29,38 @@ class Result:
 
     @classmethod
     def here(cls, figures: Measurements) -> "Result":
-        """Measured just now."""
+        """Return the result of measurements on this machine."""
         return cls(figures, processor(), version("simscen"))
 
 
 def as_json(result: Result, sections: dict[str, Any] | None = None) -> str:
-    """All numbers; `sections` are what they were worked out from."""
-    told = {"simscen_bench": FORMAT, "simscen": result.simscen, "machine": result.machine}
+    """Return all numbers as JSON; `sections` are the data from which they were computed."""
+    header = {"simscen_bench": FORMAT, "simscen": result.simscen, "machine": result.machine}
     figures = {name: asdict(figure) for name, figure in result.figures.items()}
-    return json.dumps({**told, "figures": figures, **(sections or {})}, indent=2)
+    return json.dumps({**header, "figures": figures, **(sections or {})}, indent=2)
 
 
 def read_result(file: Path) -> Result:
-    """A result that was written as JSON. Raises UsageError for what is none, or of another version."""
+    """Read a result from a JSON file. Raises UsageError if it is not a result or has another version."""
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "no text"
         raise UsageError(f"cannot read {file}: {why}") from None
     try:
-        told = json.loads(text)
+        data = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise UsageError(f"{file} is no result of `simscen bench --format json`: {error}") from None
-    if not isinstance(told, dict) or "simscen_bench" not in told:
-        raise UsageError(f"{file} is no result of `simscen bench --format json`: it has no key `simscen_bench`")
-    if told["simscen_bench"] != FORMAT:
-        other = f"format {told['simscen_bench']!r}, this version reads {FORMAT}"
+        raise UsageError(f"{file} is not a result of `simscen bench --format json`: {error}") from None
+    if not isinstance(data, dict) or "simscen_bench" not in data:
+        raise UsageError(f"{file} is not a result of `simscen bench --format json`: the key `simscen_bench` is missing")
+    if data["simscen_bench"] != FORMAT:
+        other = f"format {data['simscen_bench']!r}, this version reads {FORMAT}"
         raise UsageError(
             f"{file} is a result of another version of simscen bench ({other}): measure again with this one"
         )
     try:
-        figures = {str(name): _figure(entry) for name, entry in told["figures"].items()}
-        return Result(figures, str(told["machine"]), str(told["simscen"]))
+        figures = {str(name): _figure(entry) for name, entry in data["figures"].items()}
+        return Result(figures, str(data["machine"]), str(data["simscen"]))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UsageError(f"{file} is a damaged result of simscen bench: {type(error).__name__} at {error}") from None
 
@@ -71,27 +71,27 @@ def _figure(entry: dict[str, Any]) -> Measurement:
 
 
 HEAD = ("", "before", "after", "ratio", "rounds before", "rounds after", "")
-FEWEST = 2
-"""Rounds from which on something can be said about noise."""
+MIN_ROUNDS = 2
+"""Minimum number of rounds for a statement about noise."""
 
 
 def compare_command(
-    before: Annotated[Path, typer.Argument(help="A result of --format json.")],
-    after: Annotated[Path, typer.Argument(help="Another one.")],
+    before: Annotated[Path, typer.Argument(help="Result of --format json.")],
+    after: Annotated[Path, typer.Argument(help="Another result to compare with it.")],
 ) -> None:
-    """Hold two results of `simscen bench --format json` against each other.
+    """Compare two results of `simscen bench --format json`.
 
-    For each figure that both have: before, after, their ratio, and the least and the most of its rounds. Where these
-    overlap the difference is noise. Times are those of a machine: of results from two machines only ratios tell.
+    For each common figure, print the value before and after, their ratio, and the range of its rounds. If the ranges
+    overlap, the difference is noise. Times depend on the machine: compare only ratios of results from two machines.
     """
     print_text(comparison_text(read_result(before), read_result(after)))
 
 
 def comparison_text(before: Result, after: Result) -> str:
-    """A line for each figure of both, then what only one of them has. Raises UsageError when they share none."""
+    """Return one line per common figure, then the figures of only one result. Raises UsageError if none is common."""
     common = [name for name in after.figures if name in before.figures]
     if not common:
-        raise UsageError("the two results have no figure in common: compare results of the same command")
+        raise UsageError("the two results have no common figure; compare results of the same command")
     table = [HEAD, *(_row(name, before.figures[name], after.figures[name]) for name in common)]
     widths = [max(len(row[column]) for row in table) for column in range(len(HEAD))]
     lines = [_aligned(row, widths) for row in table]
@@ -101,13 +101,14 @@ def comparison_text(before: Result, after: Result) -> str:
     if before.simscen != after.simscen:
         lines.append(f"simscen {before.simscen} before, {after.simscen} after")
     if before.machine != after.machine:
-        lines.append(f"not the same machine: {before.machine} before, {after.machine} after; only ratios tell")
+        lines.append(f"different machines: {before.machine} before, {after.machine} after; compare only ratios")
     return "\n".join(lines)
 
 
 def judgment(before: Measurement, after: Measurement) -> str:
-    """`noise` where the rounds overlap, `better` or `worse` where they do not; "" where there are too few of them."""
-    if min(len(before.rounds), len(after.rounds)) < FEWEST:
+    """Return `noise` if the ranges of the rounds overlap, otherwise `better` or `worse`; "" if there are too few
+    rounds."""
+    if min(len(before.rounds), len(after.rounds)) < MIN_ROUNDS:
         return ""
     if min(after.rounds) <= max(before.rounds) and min(before.rounds) <= max(after.rounds):
         return "noise"
@@ -134,23 +135,23 @@ def _aligned(row: tuple[str, ...], widths: list[int]) -> str:
 
 
 class Format(str, Enum):
-    """What is printed."""
+    """Output format."""
 
     TEXT = "text"
     JSON = "json"
 
 
-COMPARE_HELP = "A result of this command as JSON: what has changed since, and what of that is noise."
+COMPARE_HELP = "Compare with this result of --format json, and tell changes from noise."
 
 
 def print_progress(what: str) -> None:
-    """Say on a terminal what is being measured."""
+    """Print what is being measured, if stderr is a terminal."""
     if sys.stderr.isatty():
         print(f"\r\x1b[K{what}", end="", file=sys.stderr, flush=True)
 
 
 def print_result(result: Result, text: str, sections: dict[str, Any], format_: Format, before: Result | None) -> None:
-    """Print a result; as text also how it compares with one from before."""
+    """Print a result; as text, also the comparison with an earlier one."""
     print_progress("")
     if format_ is Format.JSON:
         print(as_json(result, sections))
@@ -161,6 +162,5 @@ def print_result(result: Result, text: str, sections: dict[str, Any], format_: F
 
 
 def load_baseline(file: Path | None) -> Result | None:
-    """The result to compare with, read before anything is measured. Raises UsageError."""
-
+    """Read the result to compare with, before anything is measured. Raises UsageError."""
     return None if file is None else read_result(file)

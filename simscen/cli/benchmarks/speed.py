@@ -1,4 +1,4 @@
-"""`simscen bench growth`: how the cost grows with what there is."""
+"""Commands `simscen bench suite`, `growth`, and `worlds`."""
 
 import json
 import os
@@ -17,20 +17,19 @@ from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit
 
 if TYPE_CHECKING:
-    from simscen.bench.speed.session_speed import Suite
-if TYPE_CHECKING:
     from simscen.bench.speed.large_worlds import Cost
+    from simscen.bench.speed.session_speed import Suite
 
 
 def growth_command(
     format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
-    rounds: Annotated[int, typer.Option(min=1, max=100, help="Runs of each; the median counts.")] = 3,
+    rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of runs of each; the median is used.")] = 3,
     compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
 ) -> None:
-    """Measure how the cost of a simulated second grows with what there is.
+    """Measure how the cost of a simulated second grows with the size of the scenario.
 
-    The patrol of 15 s with more of one thing at a time: obstacles that stand, objects that could be pushed, objects
-    that a script moves, beams of the lidar, particles of AMCL, robots. CPU time of one core; a minute and a half.
+    A patrol of 15 s with more of one thing at a time: static obstacles, pushable objects, scripted objects, lidar
+    beams, AMCL particles, and robots. Prints CPU times of one core; takes a minute and a half.
     """
     from simscen.cli.process import engine_output_on_stderr
 
@@ -43,9 +42,9 @@ def growth_command(
 
 
 def growth_text(figures: Measurements) -> str:
-    """A line for each; beside it how many times as much as the least of its kind."""
+    """Return one line per figure, with its ratio to the first figure of its kind."""
     width = max(map(len, figures))
-    lines = ["the patrol with                 CPU a simulated second"]
+    lines = ["the patrol with                 CPU per simulated second"]
     first: dict[str, float] = {}
     for name, figure in figures.items():
         kind = name.partition(" ")[2]
@@ -56,12 +55,13 @@ def growth_text(figures: Measurements) -> str:
 
 def worlds_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print all numbers as JSON.")] = False,
-    rounds: Annotated[int, typer.Option(min=1, max=100, help="Runs in each world; the median counts.")] = 3,
+    rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of runs in each world; the median is used.")] = 3,
 ) -> None:
-    """Measure what a simulated second costs in large worlds.
+    """Measure the cost of a simulated second in large worlds.
 
     The patrol of a house, a generated hall with 40 movable meshes, and a generated ROS map of 100 x 100 m with 400
-    blocks and noise: at most 60 s each with everything on, CPU time of one core, as multiples of the house.
+    blocks and noise: at most 60 s each with all features enabled, as CPU time of one core and as multiples of the
+    house.
     """
     from simscen.cli.process import engine_output_on_stderr
 
@@ -73,7 +73,7 @@ def worlds_command(
 
 
 def worlds_text(costs: "Sequence[Cost]") -> str:
-    """A line for each world; the first is what the others are held against."""
+    """Return one line per world; ratios are relative to the first one."""
     width = max(len(cost.name) for cost in costs)
     lines = [f"{'':{width}}  triangles  movable  CPU a second   ratio  preparing   memory"]
     lines += [
@@ -89,18 +89,20 @@ def suite_command(
         list[Path] | None,
         typer.Argument(help="Scenario files, or folders to search; default: scenarios.", show_default=False),
     ] = None,
-    most: Annotated[int, typer.Option(min=1, max=100_000, help="At most so many runs, evenly taken from all.")] = 60,
+    most: Annotated[
+        int, typer.Option(min=1, max=100_000, help="Maximum number of runs, evenly selected from all.")
+    ] = 60,
     jobs: Annotated[
-        int | None, typer.Option("--jobs", "-j", min=1, max=256, help="Runs at a time; default: one for each core.")
+        int | None, typer.Option("--jobs", "-j", min=1, max=256, help="Number of parallel runs; default: one per core.")
     ] = None,
     format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
     compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
 ) -> None:
-    """Measure how fast a suite of scenarios is run on all cores.
+    """Measure the speed of a suite of scenarios on all cores.
 
-    Each scenario once, with everything that `simscen run` does but reports: runs a minute, wall time from the session's
-    start to its end as a multiple of what PyBullet alone takes on one core to step and scan for the same simulated time
-    (measured before and after), memory of the workers. Exit code 0, or 3 when a run broke off.
+    Runs each scenario once with all steps of `simscen run` except reports. Prints runs per minute, the wall time of the
+    session as a multiple of the time that PyBullet alone needs on one core to step and scan (measured before and
+    after), and the memory of the workers. Exit code 0; 3: a run was aborted.
     """
     from simscen.cli.process import engine_output_on_stderr
     from simscen.cli.session.run_session import WARM_PROCESS
@@ -115,12 +117,12 @@ def suite_command(
         suite = measure_suite(evenly_spaced(scenarios, most), workers, Path(folder), WARM_PROCESS, print_progress)
     print_result(Result.here(suite.figures), suite_text(suite), {"suite": asdict(suite)}, format_, before)
     if suite.unfinished:
-        print(f"{len(suite.unfinished)} runs broke off: {', '.join(suite.unfinished)}", file=sys.stderr)
+        print(f"{len(suite.unfinished)} runs were aborted: {', '.join(suite.unfinished)}", file=sys.stderr)
         sys.exit(Exit.INCOMPLETE)
 
 
 def suite_text(suite: "Suite") -> str:
-    """What it took, on how many cores, and beside PyBullet alone."""
+    """Return the lines about the wall time, the CPU time, and the memory of a suite."""
     figures, alone = suite.figures, suite.bare * suite.simulated
     took = f"{suite.simulated:.0f} s simulated in {suite.wall:.1f} s of wall time, {suite.workers} at a time"
     return "\n".join([

@@ -1,4 +1,4 @@
-"""`simscen bench`: how fast it is here, and the other benchmarks as its commands."""
+"""Command `simscen bench`, which measures speed, and its subcommands."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -28,19 +28,20 @@ app.command("localization")(localization.command)
 def command(
     ctx: typer.Context,
     format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
-    rounds: Annotated[int, typer.Option(min=1, max=100, help="Runs of the patrol; the median counts.")] = 5,
+    rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of runs of the patrol; the median is used.")] = 5,
     compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
 ) -> None:
     """Measure speed, navigation, and localization.
 
-    A patrol of 60 s with everything on (240 Hz physics, 360 beams at 10 Hz, 500 to 2000 particles, full MCAP log) on
-    one core: times real time, as a multiple of what PyBullet alone takes to step and scan as often, and what share each
-    part has. What surrounds a run: set-up and verdicts, its process, the start of a session, memory of a worker. Then a
-    720-beam scan and a step in two fields of obstacles, beside PyBullet with one body for each. These are CPU times.
-    Last the patrol with its stack behind the stack protocol: µs of wall time that the engine waits for it at each beat.
+    Without a subcommand, measures a patrol of 60 s with all features enabled (240 Hz physics, 360 beams at 10 Hz, 500
+    to 2000 particles, full MCAP log) on one core: speed relative to real time and to PyBullet alone with the same steps
+    and scans, and the share of each part; the overhead of a run: set-up and verdicts, its process, the start of a
+    session, and the memory of a worker; a scan of 720 beams and a step in two fields of obstacles, compared to PyBullet
+    with one body each; and the patrol with its stack as an external process: wall time that the engine waits for it per
+    cycle. Other times are CPU times.
 
-    Less than a minute on an idle machine. Other commands take longer: `suite` on all cores, `growth` with what there
-    is, `worlds` that are large. --compare FILE holds the result against one of --format json, `compare` two of these.
+    Takes less than a minute on an idle machine. The subcommands take longer. --compare FILE compares the result with
+    one of --format json, `compare` compares two of them.
     """
     if ctx.invoked_subcommand is not None:
         return
@@ -57,7 +58,7 @@ def command(
         overhead = measure_overhead(rounds, WARM_PROCESS, print_progress)
         print_progress("fields of obstacles")
         fields = [run_speed.measure_field(count) for count in (209, 2090)]
-        print_progress("the stack as a process of its own")
+        print_progress("the stack as an external process")
         external = measure_external(max(1, rounds // 2))
     figures = {**_patrol_figures(patrol), **overhead.figures, **_other_figures(fields, external)}
     lines = [*_patrol_lines(patrol, rounds), *_overhead_lines(overhead), *_field_lines(fields)]
@@ -97,10 +98,10 @@ def _other_figures(fields: "list[Field]", external: "ExternalStackCost") -> Meas
 def _patrol_lines(patrol: "Patrol", rounds: int) -> list[str]:
     width = max(map(len, patrol.parts))
     shares = sorted(patrol.parts.items(), key=lambda part: -part[1])
-    ratio = f"{patrol.ratio:.2f} times what PyBullet alone takes to step and scan as often"
+    ratio = f"{patrol.ratio:.2f} times the time of PyBullet alone for the same steps and scans"
     spread = f"{min(patrol.ratios):.2f} … {max(patrol.ratios):.2f} in single rounds"
     return [
-        f"patrol of {patrol.simulated:g} s, everything on, one core",
+        f"patrol of {patrol.simulated:g} s, all features, one core",
         f"  {patrol.factor:.0f} times real time ({patrol.cpu:.2f} s of CPU time, median of {rounds})",
         f"  {ratio} ({patrol.bare:.2f} s; {spread})",
         f"    {'':{width}}  share   ms a simulated second   times PyBullet alone",
@@ -113,8 +114,8 @@ def _patrol_lines(patrol: "Patrol", rounds: int) -> list[str]:
 
 def _overhead_lines(overhead: "Overhead") -> list[str]:
     width = max(map(len, overhead.figures))
-    told = [f"    {name:{width}} {one.value:7.1f} {one.unit}" for name, one in overhead.figures.items()]
-    return ["what surrounds a run (CPU time unless it says so)", *told]
+    lines = [f"    {name:{width}} {one.value:7.1f} {one.unit}" for name, one in overhead.figures.items()]
+    return ["overhead of a run (CPU time unless noted otherwise)", *lines]
 
 
 def _field_lines(fields: "list[Field]") -> list[str]:
@@ -131,6 +132,6 @@ def _field_lines(fields: "list[Field]") -> list[str]:
 
 def _external_lines(external: "ExternalStackCost") -> list[str]:
     return [
-        f"the stack of the patrol as a process of its own, all it hears and says in full, {external.beats} beats",
-        f"    {external.there_us:.0f} µs a beat; in the engine {external.here_us:.0f} µs ({external.ratio:.1f} times)",
+        f"the stack of the patrol as an external process with all topics, {external.beats} cycles",
+        f"    {external.there_us:.0f} µs per cycle; in process {external.here_us:.0f} µs ({external.ratio:.1f} times)",
     ]

@@ -1,4 +1,4 @@
-"""`simscen completion`."""
+"""Command `simscen completion`."""
 
 from enum import Enum
 from typing import Annotated

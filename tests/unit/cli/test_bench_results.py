@@ -48,7 +48,7 @@ def test_each_figure_of_both_has_a_line_with_what_is_noise() -> None:
 def test_another_machine_and_another_version_are_told() -> None:
     told = comparison_text(BEFORE, replace(AFTER, machine="aarch64, 4 cores", simscen="0.2.0"))
     assert "simscen 0.1.0 before, 0.2.0 after" in told
-    assert "not the same machine: x86_64, 2 cores, avx before, aarch64, 4 cores after; only ratios tell" in told
+    assert "different machines: x86_64, 2 cores, avx before, aarch64, 4 cores after; compare only ratios" in told
 
 
 def test_more_of_what_is_better_is_better_and_fewer_than_two_rounds_say_nothing() -> None:
@@ -73,10 +73,10 @@ def test_a_result_is_read_as_it_was_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("", "is no result of `simscen bench --format json`: Expecting value"),
-        ("[" * 100_000, "is no result of `simscen bench --format json`"),
-        ("[1]", "is no result of `simscen bench --format json`: it has no key `simscen_bench`"),
-        ('{"patrol": {"cpu": 2.17}}', "it has no key `simscen_bench`"),
+        ("", "is not a result of `simscen bench --format json`: Expecting value"),
+        ("[" * 100_000, "is not a result of `simscen bench --format json`"),
+        ("[1]", "is not a result of `simscen bench --format json`: the key `simscen_bench` is missing"),
+        ('{"patrol": {"cpu": 2.17}}', "the key `simscen_bench` is missing"),
         (json.dumps({"simscen_bench": FORMAT + 1}), f"of another version of simscen bench (format {FORMAT + 1}, this"),
         (json.dumps({"simscen_bench": FORMAT}), "is a damaged result of simscen bench: KeyError at 'figures'"),
         (json.dumps({"simscen_bench": FORMAT, "figures": [1]}), "is a damaged result of simscen bench: AttributeError"),
@@ -105,5 +105,5 @@ def test_a_file_that_cannot_be_read_is_told_in_words(tmp_path: Path, there: bool
 
 
 def test_results_of_different_commands_have_nothing_to_compare() -> None:
-    with pytest.raises(UsageError, match="no figure in common: compare results of the same command"):
+    with pytest.raises(UsageError, match="no common figure; compare results of the same command"):
         comparison_text(BEFORE, replace(AFTER, figures={"2 robots": Measurement(80.0, "ms a simulated second")}))
