@@ -200,7 +200,7 @@ class GapFollower {
         ranges_.resize(scan.take<uint32_t>());
         for (double& range : ranges_) {
             float said = scan.take<float>();
-            range = said >= least && said <= most ? said : std::isnan(said) ? 0.0 : most;
+            range = said >= least && said <= most ? said : std::isnan(said) || said < least ? 0.0 : most;
         }
     }
 

@@ -19,7 +19,7 @@ from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
 
 T = TypeVar("T")
 _DISTANCE_ARRAYS = frozenset({"ranges", "depth"})
-"""Arrays in which nan (no measurement) and inf (no hit within range) are valid."""
+"""Arrays in which nan (invalid), inf (no hit within range), and -inf (too close, REP 117) are valid."""
 
 
 def build_sensors(
@@ -95,7 +95,7 @@ def _defect(name: str, value: object) -> str:
     """Return what is wrong with the field `name` of a reading, or ""."""
     match value:
         case np.ndarray() if name in _DISTANCE_ARRAYS:
-            is_wrong = value.dtype.kind != "f" or np.isneginf(value).any() or (value < 0).any() or not value.size
+            is_wrong = value.dtype.kind != "f" or (np.isfinite(value) & (value < 0)).any() or not value.size
             return "is not an array of distances" if is_wrong else ""
         case np.ndarray():
             return "" if value.dtype == np.uint8 and value.ndim == 3 else "is not an array of colors"

@@ -19,7 +19,7 @@ class SignsForAnother(Wrapper):
         return replace(self.inner.read(tick), sensor="other")
 
 
-@breaks(SENSOR, "it says what it says", "says Odometry, not Bump")
+@breaks(SENSOR, "it says what it says", "returns Odometry, not Bump")
 class SaysSomethingElse(Wrapper):
     def read(self, tick):
         return Odometry(self.name, tick, Pose2(0, 0, 0), Twist())
