@@ -110,7 +110,7 @@ def _simscen(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Declarative, deterministic scenario tests for mobile-robot navigation."""
+    """Run declarative, deterministic scenario tests for mobile-robot navigation."""
 
 
 def main() -> None:

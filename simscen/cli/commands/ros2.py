@@ -1,4 +1,4 @@
-"""`simscen ros2`."""
+"""Command `simscen ros2`: adapter between a run and a ROS 2 graph."""
 
 import json
 import os
@@ -24,21 +24,21 @@ _BASE = "base_link"
 
 
 class What(str, Enum):
-    """What is behind the graph."""
+    """Kind of the ROS 2 graph."""
 
     GRAPH = "graph"
     NAV2 = "nav2"
 
 
 class Sync(str, Enum):
-    """Who waits for whom."""
+    """Synchronization of simulation and graph."""
 
     LOCKSTEP = "lockstep"
     PACED = "paced"
 
 
 class Goals(str, Enum):
-    """How goals are given."""
+    """Interface to which goals are sent."""
 
     AUTO = "auto"
     NAVIGATE_TO_POSE = "navigate_to_pose"
@@ -48,64 +48,64 @@ class Goals(str, Enum):
 
 
 def command(
-    what: Annotated[What, typer.Argument(help="`nav2` looks for what Nav2 needs, too.")] = What.GRAPH,
+    what: Annotated[What, typer.Argument(help="`nav2` also checks for the nodes that Nav2 needs.")] = What.GRAPH,
     launch: Annotated[
-        str | None, typer.Option(help="Start the nodes with this command, for each run anew, and end them with it.")
+        str | None, typer.Option(help="Command that starts the nodes for each run; they are stopped after it.")
     ] = None,
     params: Annotated[
-        Path | None, typer.Option(help="With nav2: the parameter file that Nav2 was started with, to be checked.")
+        Path | None, typer.Option(help="With nav2: check the parameter file with which Nav2 was started.")
     ] = None,
     python: Annotated[
-        str | None, typer.Option(help="The Python that has rclpy; default: the first on the PATH that has.")
+        str | None, typer.Option(help="Python interpreter with rclpy; default: the first one on the PATH.")
     ] = None,
-    sync: Annotated[Sync, typer.Option(help="Simulation waits for the graph, or runs at a pace of its own.")] = (
+    sync: Annotated[Sync, typer.Option(help="Let the simulation wait for the graph, or run at its own pace.")] = (
         Sync.LOCKSTEP
     ),
-    factor: Annotated[float, typer.Option(min=0.01, max=1000, help="With paced: times real time.")] = 1.0,
-    goals: Annotated[Goals, typer.Option(help="An action of Nav2, or a pose on /goal_pose; auto: what is there.")] = (
+    factor: Annotated[float, typer.Option(min=0.01, max=1000, help="With paced: speed relative to real time.")] = 1.0,
+    goals: Annotated[Goals, typer.Option(help="Action of Nav2, or topic /goal_pose; auto: whichever exists.")] = (
         Goals.AUTO
     ),
-    namespace: Annotated[str, typer.Option(help="The namespace of the robot's topics, all but /clock.")] = "",
+    namespace: Annotated[str, typer.Option(help="Namespace of all topics of the robot, except /clock.")] = "",
     remap: Annotated[
-        list[str] | None, typer.Option(help="/from:=/to: a topic that is called otherwise in your graph.")
+        list[str] | None, typer.Option(help="/from:=/to: other name of a topic in your graph; repeatable.")
     ] = None,
-    without: Annotated[list[str] | None, typer.Option(help="A topic that simscen shall not publish.")] = None,
-    base_frame: Annotated[str, typer.Option(help="What the robot's base is called, too, e.g. base_footprint.")] = _BASE,
+    without: Annotated[list[str] | None, typer.Option(help="Topic not to publish; repeatable.")] = None,
+    base_frame: Annotated[str, typer.Option(help="Additional name of the base frame, e.g. base_footprint.")] = _BASE,
     domain: Annotated[
-        int | None, typer.Option(min=0, max=232, help="ROS_DOMAIN_ID; default with --launch: one that is free.")
+        int | None, typer.Option(min=0, max=232, help="ROS_DOMAIN_ID; default with --launch: an unused one.")
     ] = None,
     warm_up: Annotated[
         float,
-        typer.Option(min=0, max=600, help="Simulated seconds at the pace of real time before the goals are sent."),
+        typer.Option(min=0, max=600, help="Simulated seconds in real time before the goals are sent."),
     ] = 0.0,
-    ready: Annotated[float, typer.Option(min=0.1, max=3600, help="Seconds to wait for the graph.")] = 20.0,
+    ready: Annotated[float, typer.Option(min=0.1, max=3600, help="Maximum time to wait for the graph, in s.")] = 20.0,
     settle: Annotated[
-        float, typer.Option(min=0, max=60, help="Seconds in which no node may come or go before the run begins.")
+        float, typer.Option(min=0, max=60, help="Time without changes of the graph before the run starts, in s.")
     ] = 1.0,
-    answer: Annotated[float, typer.Option(min=0.1, max=3600, help="Seconds a node may take to answer.")] = 5.0,
+    answer: Annotated[float, typer.Option(min=0.1, max=3600, help="Maximum time for an answer of a node, in s.")] = 5.0,
     wait: Annotated[
-        float, typer.Option(min=0, max=60, help="With lockstep: seconds to wait for a command that has not come.")
+        float, typer.Option(min=0, max=60, help="With lockstep: maximum time to wait for a command, in s.")
     ] = 0.05,
     rounds: Annotated[
         int,
-        typer.Option(min=0, max=100, help="With lockstep: rounds to wait for a command; 0: one for each node."),
+        typer.Option(min=0, max=100, help="With lockstep: rounds to wait for a command; 0: one per node."),
     ] = 0,
     wall_time: Annotated[bool, typer.Option(help="Accept nodes that do not use sim time.")] = False,
 ) -> None:
     """Connect a ROS 2 graph, such as Nav2, as the stack of a run.
 
-    Say `simscen run SCENARIO --stack mine='simscen ros2 --launch "ros2 launch …"'`. It runs under your own ROS Python,
-    whichever distribution and RMW that is, and needs nothing there but rclpy. Sensors, /tf, /map and /clock go out,
-    commands come in, goals go to Nav2's actions or to /goal_pose. When the graph is not what a run needs, the run ends
-    in an error that says what is missing.
+    Use it as `simscen run SCENARIO --stack mine='simscen ros2 --launch "ros2 launch …"'`. It runs under your own ROS
+    Python with any distribution and RMW, and needs only rclpy there. It publishes sensors, /tf, /map, and /clock,
+    receives commands, and sends goals to Nav2's actions or to /goal_pose. If the graph lacks something that the run
+    needs, the run ends with an error that names it.
 
-    With `nav2` and --params, called by hand, it checks the parameter file alone. Exit code 0: nothing keeps Nav2 from
-    working; 2: something does, or the command line cannot be used.
+    Without a run, `simscen ros2 nav2 --params FILE` only checks the parameter file. Exit code 0: Nav2 can work with it;
+    2: it cannot, or the command line is invalid.
     """
     bases = [_BASE] if base_frame == _BASE else [_BASE, base_frame]
     parameters = _read(params) if params is not None else None
     if SOCKET not in os.environ:
-        _by_hand(what, parameters, bases)
+        _check_parameters(what, parameters, bases)
         return
     options = {
         **{"launch": launch, "domain": domain, "namespace": namespace, "remap": remap or [], "without": without or []},
@@ -122,7 +122,7 @@ def command(
         "parameters": parameters.nodes if parameters is not None else None,
         "parameter_file": str(params) if params is not None else "",
     }
-    _become(python or _find_python(), options)
+    _execute_adapter(python or _find_python(), options)
 
 
 def _read(params: Path) -> Nav2Parameters:
@@ -132,25 +132,21 @@ def _read(params: Path) -> Nav2Parameters:
     return parameters
 
 
-def _by_hand(what: What, parameters: Nav2Parameters | None, bases: list[str]) -> None:
-    """Without a run to serve, only a parameter file can be checked."""
+def _check_parameters(what: What, parameters: Nav2Parameters | None, bases: list[str]) -> None:
+    """Check a parameter file. Raises UsageError if there is none, since there is no run, either."""
     if what is not What.NAV2 or parameters is None:
         words = shlex.join(["simscen", *sys.argv[1:]])
-        raise UsageError(
-            f"there is no run to serve: this is for simscen run SCENARIO --stack mine={shlex.quote(words)}"
-        )
+        raise UsageError(f"no run to connect to; use simscen run SCENARIO --stack mine={shlex.quote(words)}")
     problems = parameters.problems(Offer(["/scan"], "/odom", bases))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(problems)
     if problems:
         print_text(as_text(problems), sys.stderr)
-    print_text(
-        f"{parameters.shown}: nothing keeps Nav2 from working with simscen's /scan, /odom and {' or '.join(bases)}"
-    )
+    print_text(f"{parameters.shown}: Nav2 can work with simscen's /scan, /odom, and {' or '.join(bases)}")
 
 
 def _find_python() -> str:
-    """The first Python 3 on the PATH that has rclpy; a virtual environment around simscen has none as a rule."""
+    """Return the first Python 3 on the PATH that has rclpy, which the environment of simscen usually lacks."""
     named = os.environ.get("SIMSCEN_ROS_PYTHON")
     if named:
         return named
@@ -159,8 +155,8 @@ def _find_python() -> str:
     for candidate in dict.fromkeys([*candidates, "/usr/bin/python3"]):
         if _has_rclpy(candidate):
             return candidate
-    hint = "source the setup.bash of your ROS before, or name one: simscen ros2 --python /usr/bin/python3"
-    raise UsageError(f"no Python on the PATH has rclpy: {hint}")
+    hint = "source the setup.bash of your ROS first, or use simscen ros2 --python /usr/bin/python3"
+    raise UsageError(f"no Python on the PATH has rclpy; {hint}")
 
 
 def _has_rclpy(python: str) -> bool:
@@ -171,8 +167,8 @@ def _has_rclpy(python: str) -> bool:
     return tried.returncode == 0
 
 
-def _become(python: str, options: Mapping[str, object]) -> NoReturn:
-    """Go on as the adapter: the socket to the engine is inherited, and this process is what the engine watches."""
+def _execute_adapter(python: str, options: Mapping[str, object]) -> NoReturn:
+    """Replace this process by the adapter, which inherits the socket to the engine."""
     try:
         os.execvp(python, [python, str(_START), json.dumps(options)])
     except OSError as error:

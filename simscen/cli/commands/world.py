@@ -1,4 +1,4 @@
-"""`simscen world`: inspect, convert and export worlds."""
+"""Command `simscen world`: inspect, convert, and export worlds."""
 
 import json
 import os
@@ -43,17 +43,17 @@ def _world() -> None:
 @app.command()
 def inspect(
     path: File,
-    png: Annotated[Path | None, typer.Option(help="Draw the cut at lidar height and the map over it.")] = None,
+    png: Annotated[Path | None, typer.Option(help="Draw the cross-section at lidar height and the map (png).")] = None,
     height: Height = LIDAR_HEIGHT,
-    everything: Annotated[bool, typer.Option("--all", help="List every solid, however many there are.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of lines.")] = False,
+    everything: Annotated[bool, typer.Option("--all", help="List all solids instead of the first ones.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
     root: Root = None,
     world_path: WorldPath = None,
     lenient: Lenient = False,
 ) -> None:
-    """Print what a world holds: solids, bodies, their extents and triangles, places, regions, warnings.
+    """Print the content of a world: solids, bodies, extents, triangles, places, regions, and warnings.
 
-    Exit code 0; 2: the file or something in it cannot be used.
+    Exit code 0; 2: the file or something in it is unusable.
     """
     from simscen.worlds.build import build
     from simscen.worlds.inspection import inspect as inspected
@@ -78,17 +78,17 @@ def inspect(
 @app.command()
 def export(
     path: File,
-    map_: Annotated[Path, typer.Option("--map", help="The map's yaml; its image (pgm) goes beside it.")],
+    map_: Annotated[Path, typer.Option("--map", help="Map YAML file to write; its image (pgm) is written beside it.")],
     height: Height = LIDAR_HEIGHT,
-    resolution: Annotated[float, typer.Option(min=0.005, max=1.0, help="Meters for each cell.")] = 0.05,
+    resolution: Annotated[float, typer.Option(min=0.005, max=1.0, help="Cell size in meters.")] = 0.05,
     root: Root = None,
     world_path: WorldPath = None,
     lenient: Lenient = False,
 ) -> None:
-    """Write a world as a ROS map, which Nav2's map_server reads: what SLAM with a perfect lidar would have drawn.
+    """Write a world as a ROS map for Nav2's map_server, as SLAM with a perfect lidar would have built it.
 
-    A world that came with a map of its own keeps its resolution. Exit code 0; 2: the world cannot be used or the map
-    not be written.
+    A world with its own map keeps the resolution of that map. Exit code 0; 2: the world is unusable or the map cannot
+    be written.
     """
     from simscen.worlds.build import build
     from simscen.worlds.maps.ros_map import save_map
@@ -104,17 +104,17 @@ def export(
 @app.command()
 def convert(
     path: File,
-    out: Annotated[Path, typer.Argument(help="The *.world.yaml to write.")],
+    out: Annotated[Path, typer.Argument(help="*.world.yaml file to write.")],
     height: Height = LIDAR_HEIGHT,
     root: Root = None,
     world_path: WorldPath = None,
     lenient: Lenient = False,
 ) -> None:
-    """Write any world as a *.world.yaml of its own.
+    """Convert a world to a *.world.yaml file.
 
-    Upright boxes, cylinders and prisms stay as they are; meshes and whatever else leans or bulges become upright prisms
-    over their cut at lidar height. Everything that is not as it was is told, one line each. A ROS map stays a file of
-    its own, which the world names. Exit code 0; 2: the world cannot be used or written.
+    Upright boxes, cylinders, and prisms are kept; meshes and all other shapes become upright prisms over their
+    cross-section at lidar height. Each change is printed. A ROS map is not copied; the world refers to its file. Exit
+    code 0; 2: the world is unusable or cannot be written.
     """
     home = root or default_root([path])
     source = load_world_file(path, home, world_path or ())
@@ -126,7 +126,7 @@ def convert(
     for change in changes:
         print_text(f"changed: {escaped(change)}")
     things = len(spec.walls) + len(spec.obstacles) + len(spec.objects) + len(spec.doors)
-    print_text(f"{escaped(str(out))}: {things} walls, obstacles, objects and doors; {len(changes)} changed")
+    print_text(f"{escaped(str(out))}: {things} walls, obstacles, objects, and doors; {len(changes)} changed")
 
 
 def _converted(
@@ -142,8 +142,8 @@ def _converted(
         done = converted(world, height)
         return done.onto(spec), [*done.changes, *world.notes]
     except ValidationError as error:
-        told = "; ".join(f"{'.'.join(map(str, found['loc']))}: {found['msg']}" for found in error.errors()[:3])
-        message = f"a world file cannot hold this world: {told}"
+        details = "; ".join(f"{'.'.join(map(str, found['loc']))}: {found['msg']}" for found in error.errors()[:3])
+        message = f"the world cannot be written as a world file: {details}"
         raise InvalidInput([Problem(str(source.path), 0, 0, "SC312", message)]) from None
 
 
@@ -155,16 +155,16 @@ def _built(source: LoadedWorld, home: Path, world_path: list[Path], lenient: boo
 
 
 def _relative(file: Path, out: Path) -> str:
-    """How a file is named in `out`."""
+    """Return the path of a file relative to the folder of `out`."""
     return Path(os.path.relpath(file.resolve(), out.resolve().parent)).as_posix()
 
 
-MOST_LISTED = 20
-LONGEST = 44
+MAX_SOLIDS = 20
+MAX_NAME_LENGTH = 44
 
 
 def described(found: "Inspection", height: float, everything: bool) -> Iterator[str]:
-    """Everything there is to tell; of many solids only the first, unless `everything` is wanted."""
+    """Yield the lines of an inspection, with the first MAX_SOLIDS solids, or all of them if `everything`."""
     x0, y0, x1, y1 = found.bounds
     yield f"  bounds    x {x0:.2f} … {x1:.2f} m, y {y0:.2f} … {y1:.2f} m ({x1 - x0:.2f} x {y1 - y0:.2f} m)"
     kinds = ", ".join(f"{count} {kind}" for kind, count in found.shapes)
@@ -176,7 +176,7 @@ def described(found: "Inspection", height: float, everything: bool) -> Iterator[
     yield f"  map       {columns} x {rows} cells of {found.map_resolution:g} m, cut at {height:g} m: " + (
         f"{occupied} occupied, {free} free, {unknown} unknown"
     )
-    yield from _items("solids", found.solids, len(found.solids) if everything else MOST_LISTED)
+    yield from _items("solids", found.solids, len(found.solids) if everything else MAX_SOLIDS)
     yield from _items("objects", found.bodies, len(found.bodies))
     for title, names in (("places", found.places), ("regions", found.regions)):
         if names:
@@ -186,7 +186,7 @@ def described(found: "Inspection", height: float, everything: bool) -> Iterator[
 def _items(title: str, items: "Sequence[Item]", most: int) -> Iterator[str]:
     if items:
         yield f"  {title}"
-    width = max((min(len(escaped(item.name)), LONGEST) for item in items[:most]), default=0)
+    width = max((min(len(escaped(item.name)), MAX_NAME_LENGTH) for item in items[:most]), default=0)
     yield from (f"    {_item(item, width)}" for item in items[:most])
     if len(items) > most:
         yield f"    … and {len(items) - most} more (--all lists them)"
@@ -195,7 +195,7 @@ def _items(title: str, items: "Sequence[Item]", most: int) -> Iterator[str]:
 def _item(item: "Item", width: int) -> str:
     x0, y0, z0, x1, y1, z1 = item.extent
     name = escaped(item.name)
-    shown = name if len(name) <= LONGEST else f"…{name[1 - LONGEST :]}"
+    shown = name if len(name) <= MAX_NAME_LENGTH else f"…{name[1 - MAX_NAME_LENGTH :]}"
     where = f"x {x0:.2f} … {x1:.2f}  y {y0:.2f} … {y1:.2f}  z {z0:.2f} … {z1:.2f}"
     mass = "" if item.mass is None else f"  {item.mass:g} kg" if item.mass else "  cannot be pushed"
     return f"{shown:{width}}  {item.shape:9} {item.triangles:7} triangles  {where}{mass}"

@@ -86,7 +86,7 @@ def test_a_converted_world_says_what_has_changed(simscen, room: Path) -> None:
     assert (ended.code, ended.out) == (
         0,
         "changed: m::l::c: a sphere; it became an upright prism over its cut at 0.2 m\n"
-        "shop.world.yaml: 1 walls, obstacles, objects and doors; 1 changed\n",
+        "shop.world.yaml: 1 walls, obstacles, objects, and doors; 1 changed\n",
     )
     assert simscen("validate", "shop.world.yaml").code == 0
 
@@ -112,7 +112,10 @@ def test_a_world_too_large_for_one_file_is_told(simscen, room: Path) -> None:
     (room / "big.sdf").write_text(SDF.format(more=model))
     ended = simscen("world", "convert", "big.sdf", "big.world.yaml")
     assert ended.code == 2
-    assert "big.sdf: error[SC312] a world file cannot hold this world: obstacles: List should have at most" in ended.err
+    assert (
+        "big.sdf: error[SC312] the world cannot be written as a world file: obstacles: List should have at most"
+        in ended.err
+    )
     assert not (room / "big.world.yaml").exists()
 
 
