@@ -51,7 +51,6 @@ _Stacks = Annotated[
 AnyStack = Annotated[InProcessStack | ExternalStackSpec, ExtensibleUnion("stack", _Stacks)]
 
 
-# MERGED: The parameters of a stack, without a scenario around them.
 class StackFileSpec(Spec):
     """Stack for `--stack NAME=FILE`, with the same `stack` section as a scenario.
 
@@ -70,7 +69,6 @@ class StackFileSpec(Spec):
     """Parameters of the stack, as in a scenario."""
 
 
-# MERGED: What a user says once for all sessions on their machine.
 def _check_command(text: str) -> str:
     split_command(text)
     return text

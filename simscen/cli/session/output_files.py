@@ -201,7 +201,6 @@ def save(path: Path, write: Callable[[Path], None], inputs: Iterable[Path] = ())
         raise UsageError(f"cannot write {path}: {error.strerror}") from error
 
 
-# MERGED: `simscen run --open`: the session's page in a browser while it runs, written anew as runs end; no server.
 MIN_UPDATE_INTERVAL_S = 1.0
 """Minimum time between two updates of the page, in seconds; the page itself reloads every two seconds."""
 UPDATE_INTERVAL_FACTOR = 10
