@@ -1,4 +1,4 @@
-"""The guide that lists all words by need has all of them, each in its own part."""
+"""The guide that lists all keys by task contains every trigger, action, fault, and criterion."""
 
 import re
 from pathlib import Path
@@ -21,6 +21,6 @@ CHOICES = {
 
 
 @pytest.mark.parametrize("part", CHOICES)
-def test_each_word_stands_in_its_part(part):
+def test_every_key_is_in_its_section(part):
     said = re.findall(r"`([a-z_]+)`", PARTS[part])
     assert sorted(set(CHOICES[part]) - set(said)) == []
