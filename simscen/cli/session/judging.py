@@ -69,16 +69,18 @@ class LogJudge:
             return read, recorded_result(read, log) if self._criteria is None else self._judge_own_log(log).result
         self.foreign += 1
         if self._criteria is None:
-            read, case = read_foreign_log(log, self._wanted, looks=True), Case(Pose2(0.0, 0.0), ())
+            foreign, case = read_foreign_log(log, self._wanted, looks=True), Case(Pose2(0.0, 0.0), ())
             result = skipped_result(RunKey(log.stem, 0), "", "not evaluated; set criteria with --scenario")
-            result = replace(result, simulated=read.trace.seconds(read.trace.end), tick_rate=read.trace.tick_rate)
+            result = replace(
+                result, simulated=foreign.trace.seconds(foreign.trace.end), tick_rate=foreign.trace.tick_rate
+            )
         else:
-            read, result = self._judge_foreign_log(log, looks=True)
+            foreign, result = self._judge_foreign_log(log, looks=True)
             case = self._foreign_case()
-        self.notes += [f"{log}: {note}" for note in read.notes]
+        self.notes += [f"{log}: {note}" for note in foreign.notes]
         text = "" if self._scenario is None else self._scenario.read_text(encoding="utf-8")
-        about = LogHeader(log.stem, 0, case, text, read.map)
-        return Log(about, read.trace, "", complete=True, seen=read.seen), result
+        about = LogHeader(log.stem, 0, case, text, foreign.map)
+        return Log(about, foreign.trace, "", complete=True, seen=foreign.seen), result
 
     def _judge_own_log(self, log: Path) -> RunFinished:
         read = read_run(log)

@@ -1,4 +1,4 @@
-"""Call the command line as a user does, without a new process."""
+"""Fixture that calls the command line without a new process."""
 
 import sys
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Results of `simscen bench` are read again and compared; what is no result is told in words."""
+"""Result files of `simscen bench`: reading, comparison, and errors."""
 
 import json
 from dataclasses import replace
@@ -40,18 +40,18 @@ only before: scan
 only after: step"""
 
 
-def test_each_figure_of_both_has_a_line_with_what_is_noise() -> None:
-    told = comparison_text(BEFORE, AFTER)
-    assert [line.split() for line in told.splitlines()] == [line.split() for line in TABLE.splitlines()]
+def test_each_common_figure_has_a_line_with_its_judgment() -> None:
+    output = comparison_text(BEFORE, AFTER)
+    assert [line.split() for line in output.splitlines()] == [line.split() for line in TABLE.splitlines()]
 
 
-def test_another_machine_and_another_version_are_told() -> None:
-    told = comparison_text(BEFORE, replace(AFTER, machine="aarch64, 4 cores", simscen="0.2.0"))
-    assert "simscen 0.1.0 before, 0.2.0 after" in told
-    assert "different machines: x86_64, 2 cores, avx before, aarch64, 4 cores after; compare only ratios" in told
+def test_other_machine_and_version_are_reported() -> None:
+    output = comparison_text(BEFORE, replace(AFTER, machine="aarch64, 4 cores", simscen="0.2.0"))
+    assert "simscen 0.1.0 before, 0.2.0 after" in output
+    assert "different machines: x86_64, 2 cores, avx before, aarch64, 4 cores after; compare only ratios" in output
 
 
-def test_more_of_what_is_better_is_better_and_fewer_than_two_rounds_say_nothing() -> None:
+def test_judgment_respects_direction_and_needs_two_rounds() -> None:
     few, many = (
         Measurement.of((10.0, 11.0), "", more_is_better=True),
         Measurement.of((20.0, 21.0), "", more_is_better=True),
@@ -60,18 +60,18 @@ def test_more_of_what_is_better_is_better_and_fewer_than_two_rounds_say_nothing(
     assert judgment(few, Measurement.of((20.0,), "")) == ""
 
 
-def test_a_figure_that_was_nothing_has_no_ratio() -> None:
+def test_zero_before_has_no_ratio() -> None:
     assert comparison_text(BEFORE, BEFORE).splitlines()[-1].split() == ["scan", "0", "ms", "0", "ms", "-", "-", "-"]
 
 
-def test_a_result_is_read_as_it_was_written(tmp_path: Path) -> None:
+def test_result_survives_writing_and_reading(tmp_path: Path) -> None:
     file = tmp_path / "result.json"
     file.write_text(as_json(BEFORE, {"patrol": {"cpu": 2.1}}))
     assert read_result(file) == BEFORE
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "expected_text"),
     [
         ("", "is not a result of `simscen bench --format json`: Expecting value"),
         ("[" * 100_000, "is not a result of `simscen bench --format json`"),
@@ -86,17 +86,17 @@ def test_a_result_is_read_as_it_was_written(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_is_no_result_is_told_in_words(tmp_path: Path, text: str, told: str) -> None:
+def test_invalid_result_is_a_usage_error(tmp_path: Path, text: str, expected_text: str) -> None:
     file = tmp_path / "result.json"
     file.write_text(text)
     with pytest.raises(UsageError) as error:
         read_result(file)
     assert str(file) in str(error.value)
-    assert told in str(error.value)
+    assert expected_text in str(error.value)
 
 
 @pytest.mark.parametrize("there", [False, True])
-def test_a_file_that_cannot_be_read_is_told_in_words(tmp_path: Path, there: bool) -> None:
+def test_unreadable_result_is_a_usage_error(tmp_path: Path, there: bool) -> None:
     file = tmp_path / "result.json"
     if there:
         file.write_bytes(b"\xff\xfe\x00")
@@ -104,6 +104,6 @@ def test_a_file_that_cannot_be_read_is_told_in_words(tmp_path: Path, there: bool
         read_result(file)
 
 
-def test_results_of_different_commands_have_nothing_to_compare() -> None:
+def test_results_of_different_commands_cannot_be_compared() -> None:
     with pytest.raises(UsageError, match="no common figure; compare results of the same command"):
         comparison_text(BEFORE, replace(AFTER, figures={"2 robots": Measurement(80.0, "ms a simulated second")}))

@@ -1,4 +1,4 @@
-"""The runs of `simscen bench nav`: each is its experiment's own."""
+"""Runs of the experiments of `simscen bench nav`."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ def hall(folder: Path) -> Experiment:
     return corridors.ramps(folder, (1, 2))
 
 
-def test_with_another_stack_no_run_of_an_experiment_is_taken_for_one_of_another(tmp_path: Path) -> None:
+def test_runs_with_another_stack_have_different_keys(tmp_path: Path) -> None:
     stack = tmp_path / "slow.stack.yaml"
     stack.write_text("simscen: 1\nstack: {controller: {desired_linear_vel: 0.3}}\n", encoding="utf-8")
     alike = [hall(tmp_path / "made/wide"), hall(tmp_path / "made/narrow")]
@@ -33,7 +33,7 @@ controller_server:
 """
 
 
-def test_a_parameter_file_of_nav2_is_a_stack_file_and_what_means_nothing_of_it_is_told_as_in_validate(
+def test_nav2_parameter_file_is_a_valid_stack_and_ignored_parameters_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "mine.yaml"
@@ -43,10 +43,10 @@ def test_a_parameter_file_of_nav2_is_a_stack_file_and_what_means_nothing_of_it_i
     stack = jobs[0].scenario.spec.stack
     assert stack.controller.type == "regulated_pure_pursuit"
     assert stack.controller.lookahead_dist == 0.77
-    assert "mine.yaml:5:" in (told := capsys.readouterr().err)
-    assert "warning[SC341] controller_server: simscen has no unheard_of (5)" in told
+    assert "mine.yaml:5:" in (output := capsys.readouterr().err)
+    assert "warning[SC341] controller_server: simscen has no unheard_of (5)" in output
 
 
-def test_experiments_whose_runs_have_one_name_are_not_driven(tmp_path: Path) -> None:
+def test_experiments_with_duplicate_runs_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="ramp_1"):
         _planned([hall(tmp_path / "wide"), hall(tmp_path / "narrow")], tmp_path / "out")

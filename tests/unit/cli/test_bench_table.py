@@ -38,7 +38,7 @@ SLOWER = DriveComparison(
 )
 
 
-def test_below_the_table_stand_beliefs_then_what_a_stack_changes_then_what_others_have_published() -> None:
+def test_table_is_followed_by_localization_comparison_and_published_figures() -> None:
     assert as_text([Measured(BARN), Measured(TOUR, KNOWN)], [SLOWER]) == TABLE
 
 
@@ -58,21 +58,21 @@ BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: s
 LONG = "BARN, regulated pure pursuit at 0.5 m/s, with nav2_params"
 
 
-def test_on_a_narrow_terminal_no_line_is_longer_than_it_and_no_number_is_torn_off() -> None:
+def test_lines_fit_a_narrow_terminal_without_splitting_numbers() -> None:
     assert as_text([Measured(BARN)], [SLOWER], columns=86) == NARROW
     shown = as_text([Measured(replace(BARN, case=LONG)), Measured(TOUR, KNOWN)], [SLOWER], columns=80)
     assert max(map(len, shown.splitlines())) <= 80
     assert as_text([Measured(BARN)], [SLOWER], columns=200) == as_text([Measured(BARN)], [SLOWER])
 
 
-def test_the_json_holds_every_number() -> None:
-    told = json.loads(as_json([Measured(BARN), Measured(TOUR, KNOWN)]))
-    assert told["experiments"][0]["tally"]["score"] == 0.476
-    assert told["experiments"][1]["localized"]["anees"] == {"5.0": 0.02, "10.0": 2.5}
-    assert told["dwa_published"]["success"] == 0.85
+def test_json_contains_every_number() -> None:
+    output = json.loads(as_json([Measured(BARN), Measured(TOUR, KNOWN)]))
+    assert output["experiments"][0]["tally"]["score"] == 0.476
+    assert output["experiments"][1]["localized"]["anees"] == {"5.0": 0.02, "10.0": 2.5}
+    assert output["dwa_published"]["success"] == 0.85
 
 
-def test_the_table_of_localization_fits_a_narrow_terminal() -> None:
+def test_localization_table_fits_a_narrow_terminal() -> None:
     shares = {name: Share(9, 10, (0.7, 1.0)) for name in SHARES}
     sure = dict.fromkeys(SURE, Sureness(1.0, (2.1, 4.2), 0.951, (1.0,) * 5, (0.9, 6.34)))
     row = Numbers("Nav2's, likelihood_field_prob", shares, 0.029, (0.021, 0.042), sure, 1.5, 189.0)

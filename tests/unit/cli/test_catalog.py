@@ -1,4 +1,4 @@
-"""Every word of the language is documented, and its example is valid."""
+"""Every topic of the language is documented and has a valid example."""
 
 from importlib import import_module
 from typing import Any
@@ -41,19 +41,19 @@ def _id(topic: Topic) -> str:
 
 
 @pytest.mark.parametrize("topic", TOPICS, ids=_id)
-def test_everything_is_described_in_a_sentence(topic: Topic) -> None:
+def test_every_topic_has_a_description(topic: Topic) -> None:
     first = topic.text.split("\n\n")[0]
     assert first[:1].isupper() or first.startswith("nav2_")
     assert first.rstrip().endswith((".", ":"))
 
 
 @pytest.mark.parametrize("topic", WORDS, ids=_id)
-def test_every_key_of_a_word_is_described(topic: Topic) -> None:
+def test_every_key_of_a_topic_has_a_description(topic: Topic) -> None:
     assert [field.key for field in topic.fields if not field.text] == []
 
 
 @pytest.mark.parametrize("topic", SINGLE, ids=_id)
-def test_every_word_has_an_example_that_is_valid_and_about_it(topic: Topic) -> None:
+def test_every_topic_has_a_valid_example(topic: Topic) -> None:
     example = plain(topic.example)
     models: dict[str, tuple[type[BaseModel], str | None]] = {
         "trigger": (trigger_registry.Trigger, "when"),
@@ -68,18 +68,18 @@ def test_every_word_has_an_example_that_is_valid_and_about_it(topic: Topic) -> N
 
 
 @pytest.mark.parametrize("topic", [t for t in SINGLE if t.group == "criterion"], ids=_id)
-def test_every_criterion_tells_what_when_why_and_whence(topic: Topic) -> None:
+def test_every_criterion_documents_measure_failure_reason_and_source(topic: Topic) -> None:
     for heading in ("What is measured:", "When it fails:", "Why this:", "Source:"):
         assert f"\n{heading} " in topic.text
 
 
-def test_a_type_is_told_with_unit_and_range() -> None:
+def test_type_is_described_with_unit_and_range() -> None:
     assert kind_of(Angle) == "angle in rad, -100 … 100"
     assert kind_of(Probability) == "ratio, 0 … 1"
     assert kind_of(list[Angle] | None) == "list of angle in rad, -100 … 100"
 
 
-def test_defaults_are_told_and_what_is_required_has_none() -> None:
+def test_defaults_are_listed_and_required_keys_have_none() -> None:
     fields = {field.key: field for field in fields_of(Amcl)}
     assert (fields["max_particles"].kind, fields["max_particles"].default) == ("integer, 10 … 50000", "2000")
     assert fields["selective_resampling"].default == "false"
@@ -87,7 +87,7 @@ def test_defaults_are_told_and_what_is_required_has_none() -> None:
     assert names["time"] == ""
 
 
-def test_modifiers_are_listed_apart_from_the_choices() -> None:
+def test_modifiers_are_listed_separately_from_choices() -> None:
     assert {"edge", "delay", "times", "probability"} <= {field.key for field in fields_of(trigger_registry.Trigger)}
     assert {field.key for field in fields_of(trigger_registry.Trigger)}.isdisjoint(trigger_registry.Trigger.choices())
     assert {topic.name for topic in TOPICS if topic.group == "trigger"} == {
@@ -96,13 +96,13 @@ def test_modifiers_are_listed_apart_from_the_choices() -> None:
     }
 
 
-def test_every_key_of_the_language_says_what_it_means() -> None:
+def test_every_key_of_the_language_has_a_description() -> None:
     silent = [f"{topic.name}.{field.key}" for topic in topics() for field in topic.fields if not field.text]
     assert silent == []
 
 
 def test_every_section_of_a_stack_and_every_shipped_component_is_a_topic() -> None:
-    told = {topic.model for topic in TOPICS}
+    output = {topic.model for topic in TOPICS}
     sections = {
         field.annotation
         for model in (StackSpec, Costmap)
@@ -115,4 +115,4 @@ def test_every_section_of_a_stack_and_every_shipped_component_is_a_topic() -> No
         for module, name in (entry.value.split(":") for entry in registry.shipped(group))
     }
     bases = {LocalizerSpec, PlannerSpec, ControllerSpec, GoalCheckerSpec, GoalTolerances}
-    assert (sections | shipped | {Latency}) - bases <= told
+    assert (sections | shipped | {Latency}) - bases <= output

@@ -1,4 +1,4 @@
-"""What a shell offers behind Tab."""
+"""Shell completion."""
 
 import os
 import subprocess
@@ -36,12 +36,12 @@ def offered(*words: str) -> list[str]:
     ],
     ids=" ".join,
 )
-def test_it_offers_commands_files_names_and_options(simscen, words: tuple[str, ...], among: list[str]) -> None:
+def test_completion_offers_commands_files_names_and_options(simscen, words: tuple[str, ...], among: list[str]) -> None:
     Path("deep").mkdir()
     assert set(among) <= set(offered(*words))
 
 
-def test_files_below_a_folder_are_offered_with_their_folder(simscen) -> None:
+def test_files_in_a_folder_are_completed_with_their_folder(simscen) -> None:
     Path("deep").mkdir()
     Path("good.scenario.yaml").rename("deep/one.scenario.yaml")
     assert offered("list", "de") == ["deep/"]
@@ -49,24 +49,24 @@ def test_files_below_a_folder_are_offered_with_their_folder(simscen) -> None:
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
-def test_the_script_for_each_shell_is_printed(simscen, shell: str) -> None:
+def test_script_of_each_shell_is_printed(simscen, shell: str) -> None:
     ended = simscen("completion", shell)
     assert ended.code == 0
     assert "_SIMSCEN_COMPLETE" in ended.out
 
 
-def test_bash_takes_its_script(simscen) -> None:
+def test_bash_accepts_its_script(simscen) -> None:
     script = simscen("completion", "bash").out
     assert subprocess.run(["bash", "-n"], input=script, text=True, check=False).returncode == 0
 
 
 @pytest.mark.parametrize("arguments", [("-h",), ("run", "-h"), ("world", "-h"), ("world", "convert", "-h")])
-def test_help_has_a_short_name(simscen, arguments: tuple[str, ...]) -> None:
+def test_help_has_a_short_option(simscen, arguments: tuple[str, ...]) -> None:
     ended = simscen(*arguments)
     assert (ended.code, "Usage:" in ended.out) == (0, True)
 
 
-def test_the_module_is_the_command(simscen) -> None:
+def test_module_runs_the_command(simscen) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "simscen", "validate", "good.scenario.yaml"], capture_output=True, text=True, check=False
     )

@@ -29,7 +29,7 @@ def _carets(source: str, col: int) -> str:
         ("url: a:b#c", 6, "a:b#c"),
     ],
 )
-def test_the_caret_marks_the_key_or_value(source: str, col: int, marked: str) -> None:
+def test_caret_marks_the_key_or_value(source: str, col: int, marked: str) -> None:
     assert _carets(source, col) == " " * (col - 1) + "^" * len(marked)
 
 
@@ -38,29 +38,29 @@ def test_wide_characters_take_two_columns() -> None:
     assert _carets("机: x", 1) == "^^"
 
 
-def test_a_tab_is_shown_as_a_space() -> None:
+def test_tab_is_shown_as_a_space() -> None:
     assert _carets("\ta: 1", 2) == " ^"
 
 
-def test_a_long_line_is_cut_around_the_place() -> None:
+def test_long_line_is_cut_around_the_position() -> None:
     text = as_text([_problem("x" * 300 + " here " + "y" * 300, 302)])
     line, carets = text.splitlines()[1:3]
     assert len(line) < 120
     assert line[carets.index("^") :].startswith("here")
 
 
-def test_a_place_beyond_the_line_still_gets_a_caret() -> None:
+def test_position_beyond_the_line_gets_a_caret() -> None:
     assert _carets("a:", 3) == "  ^"
 
 
-def test_a_problem_without_a_line_is_one_line() -> None:
+def test_problem_without_a_line_is_one_line() -> None:
     assert as_text([Problem("a.yaml", 0, 0, "SC001", "no such file")]) == "a.yaml: error[SC001] no such file"
 
 
 @pytest.mark.parametrize(
     "text", ["::error::x", "  ::set-output name=a::b", "##[error]x", "a\n::error::b", "\x1b[31m", "\u202e"]
 )
-def test_foreign_text_is_not_obeyed(text: str) -> None:
+def test_control_sequences_in_untrusted_text_are_escaped(text: str) -> None:
     shown = escaped(text)
     assert not shown.lstrip().startswith("::")
     assert "##[" not in shown
@@ -68,14 +68,14 @@ def test_foreign_text_is_not_obeyed(text: str) -> None:
     assert shown.isprintable()
 
 
-def test_annotations_escape_what_github_would_read() -> None:
+def test_annotations_escape_github_syntax() -> None:
     problem = Problem("a,b:c%.yaml", 1, 2, "SC012", "50 %\r\n::error::x", "a:b")
     assert as_github([problem]) == (
         "::error file=a%2Cb%3Ac%25.yaml,line=1,col=2,title=simscen SC012::50 %25%0D%0A::error::x%0Aa:b"
     )
 
 
-def test_a_stream_that_knows_only_ascii_gets_ascii() -> None:
+def test_ascii_stream_gets_ascii() -> None:
     raw = io.BytesIO()
     stream = io.TextIOWrapper(raw, encoding="ascii")
     print_text("a → b … 机", stream)

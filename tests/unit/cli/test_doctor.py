@@ -1,4 +1,4 @@
-"""simscen doctor finds what would keep runs from working."""
+"""Checks of `simscen doctor`."""
 
 import os
 import re
@@ -22,7 +22,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(doctor, "speed", lambda: "not now, either")
 
 
-def test_a_sound_installation_is_well_and_told_in_80_columns(simscen, monkeypatch) -> None:
+def test_working_installation_passes_within_80_columns(simscen, monkeypatch) -> None:
     monkeypatch.setattr(doctor, "speed", lambda: "not now")
     monkeypatch.setenv("COLUMNS", "80")
     ended = simscen("doctor")
@@ -33,7 +33,7 @@ def test_a_sound_installation_is_well_and_told_in_80_columns(simscen, monkeypatc
     assert "1 s simulated twice, equal logs: sha256 " in ended.out.splitlines()[-2]
 
 
-def test_one_ill_thing_is_told_and_the_rest_is_checked(simscen, quick, monkeypatch) -> None:
+def test_failed_check_is_reported_and_the_others_still_run(simscen, quick, monkeypatch) -> None:
     monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(1, 1, 30 << 20))
     ended = simscen("doctor")
     assert ended.code == 3
@@ -43,7 +43,7 @@ def test_one_ill_thing_is_told_and_the_rest_is_checked(simscen, quick, monkeypat
     assert ended.out.splitlines()[-1] == "  ✓ speed      not now, either"
 
 
-def test_the_cache_of_worlds_is_told_and_one_of_others_is_ill(tmp_path: Path, monkeypatch) -> None:
+def test_cache_is_shown_and_a_foreign_cache_fails(tmp_path: Path, monkeypatch) -> None:
     assert doctor.cache() == "disabled by SIMSCEN_CACHE_DIR"
     monkeypatch.setenv("SIMSCEN_CACHE_DIR", str(tmp_path))
     folder = cache_folder(os.environ)
@@ -55,7 +55,7 @@ def test_the_cache_of_worlds_is_told_and_one_of_others_is_ill(tmp_path: Path, mo
         doctor.cache()
 
 
-def test_speed_is_that_of_a_patrol_beside_pybullet(monkeypatch) -> None:
+def test_speed_check_compares_a_patrol_with_pybullet(monkeypatch) -> None:
     def patrol(cpu: float, bare: float) -> run_speed.Patrol:
         return run_speed.Patrol(60.0, cpu, {"physics": 1.0}, bare, (cpu,), (bare,), {"physics": (1.0,)})
 
@@ -67,33 +67,33 @@ def test_speed_is_that_of_a_patrol_beside_pybullet(monkeypatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("what", "value", "told"),
+    ("what", "value", "expected_text"),
     [
         (resource.RLIMIT_AS, 200 << 20, "a run gets 200 MiB of memory; raise `ulimit -v`"),
         (resource.RLIMIT_NOFILE, 20, "may open 20 files; raise `ulimit -n`"),
         (resource.RLIMIT_FSIZE, 1 << 20, "a file may have 1 MiB; raise `ulimit -f`"),
     ],
 )
-def test_limits_that_are_too_tight_are_told_with_what_helps(monkeypatch, what, value, told) -> None:
+def test_tight_limits_fail_with_a_hint(monkeypatch, what, value, expected_text) -> None:
     real = resource.getrlimit
     monkeypatch.setattr(resource, "getrlimit", lambda asked: (value, value) if asked == what else real(asked))
-    with pytest.raises(installation.CheckFailed, match=re.escape(told)):
+    with pytest.raises(installation.CheckFailed, match=re.escape(expected_text)):
         installation.resource_limits()
 
 
-def test_the_memory_of_a_container_counts(monkeypatch) -> None:
+def test_memory_limit_of_a_container_counts(monkeypatch) -> None:
     monkeypatch.setattr(installation, "_cgroup_memory", lambda: 300 << 20)
     with pytest.raises(installation.CheckFailed, match="a run gets 300 MiB of memory"):
         installation.resource_limits()
 
 
-def test_packages_that_do_not_fit_are_ill(monkeypatch) -> None:
+def test_unsupported_packages_fail(monkeypatch) -> None:
     monkeypatch.setattr(installation, "unmet_requirements", lambda: ["numpy 1.0 is installed"])
     with pytest.raises(installation.CheckFailed, match=r"numpy 1\.0 is installed"):
         installation.packages()
 
 
-def test_other_pythons_and_missing_packages_are_ill(monkeypatch) -> None:
+def test_unsupported_python_and_missing_packages_fail(monkeypatch) -> None:
     with pytest.raises(installation.CheckFailed, match="pip install no-such-package"):
         installation._version("no-such-package")
     monkeypatch.setattr(sys, "version_info", (3, 12, 1))
@@ -101,7 +101,7 @@ def test_other_pythons_and_missing_packages_are_ill(monkeypatch) -> None:
         installation.python()
 
 
-def test_a_sandbox_without_pidfd_is_ill(monkeypatch) -> None:
+def test_sandbox_without_pidfd_fails(monkeypatch) -> None:
     def refused(_):
         raise PermissionError(1, "Operation not permitted")
 
@@ -110,12 +110,12 @@ def test_a_sandbox_without_pidfd_is_ill(monkeypatch) -> None:
         installation.pidfd()
 
 
-def test_a_folder_that_takes_no_files_is_ill(tmp_path) -> None:
+def test_unwritable_folder_fails(tmp_path) -> None:
     with pytest.raises(installation.CheckFailed, match="cannot write in"):
         installation.writable(tmp_path / "nowhere")
 
 
-def test_it_tells_what_the_names_of_stacks_run_and_what_of_that_is_not_there(monkeypatch, tmp_path: Path) -> None:
+def test_configured_stacks_are_listed_and_missing_programs_fail(monkeypatch, tmp_path: Path) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     file = tmp_path / "simscen/config.yaml"
     assert doctor.stacks() == f"{file} does not exist; define external stacks with --stack"

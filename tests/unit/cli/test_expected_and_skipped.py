@@ -1,4 +1,4 @@
-"""`expected: {fail: …}` and `skip: …`, from the file to every report."""
+"""`expected` and `skip` in all reports."""
 
 import json
 from pathlib import Path
@@ -33,16 +33,16 @@ def project(simscen, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_every_report_tells_failures_that_are_known_from_others_and_what_was_skipped(simscen, project: Path) -> None:
+def test_reports_distinguish_expected_failures_and_skipped_runs(simscen, project: Path) -> None:
     ended = simscen("run", ".", "--repeat", "2", "--seed", "1", "-k", "not other", "--out", "out", "--format", "github")
     assert ended.code == 1, ended.out
-    told = "failed as expected: too fast, NAV-1 (speed: 0.50 m/s > 0.10 m/s"
+    output = "failed as expected: too fast, NAV-1 (speed: 0.50 m/s > 0.10 m/s"
     lines = [" ".join(line.split()) for line in ended.out.splitlines()]
-    assert any(line.startswith("~ a[known] (seed 1) 1.0 s simulated") and told in line for line in lines)
+    assert any(line.startswith("~ a[known] (seed 1) 1.0 s simulated") and output in line for line in lines)
     assert "- a[skipped] (seed 1) skipped: no lift here, NAV-2" in lines
     assert "expected: everything held; expected a failure: too fast, NAV-1" in ended.out
     assert "0 passed, 2 failed, 2 failed as expected, 1 skipped" in ended.out
-    assert f"::notice file=a.scenario.yaml,line=6,title=a[known] (seed 1)::{told}" in ended.out
+    assert f"::notice file=a.scenario.yaml,line=6,title=a[known] (seed 1)::{output}" in ended.out
     assert "::error file=a.scenario.yaml,line=7,title=a[mended] (seed 1)::expected: everything held" in ended.out
     document = json.loads((project / "out/results.json").read_text())
     assert {name: document[name] for name in ("passed", "failed", "error", "failed-as-expected", "skipped")} == {
@@ -57,7 +57,7 @@ def test_every_report_tells_failures_that_are_known_from_others_and_what_was_ski
     assert suite is not None
     assert [suite.get(name) for name in ("tests", "failures", "errors", "skipped")] == ["5", "2", "0", "3"]
     kinds = [(one.get("type"), str(one.get("message"))[:31]) for one in suite.iter("skipped")]
-    assert kinds == [("simscen.expected-failure", told[:31])] * 2 + [("simscen.skip", "no lift here, NAV-2")]
+    assert kinds == [("simscen.expected-failure", output[:31])] * 2 + [("simscen.skip", "no lift here, NAV-2")]
     page = (project / "out/report.html").read_text()
     assert "2 failed as expected" in page
     assert "no lift here, NAV-2" in page
@@ -66,43 +66,43 @@ def test_every_report_tells_failures_that_are_known_from_others_and_what_was_ski
     assert "0 passed, 2 failed, 2 failed as expected, 1 skipped" in judged.out
 
 
-def test_a_session_in_which_all_goes_as_expected_is_good(simscen, project: Path) -> None:
+def test_session_with_only_expected_outcomes_passes(simscen, project: Path) -> None:
     assert simscen("run", ".", "-k", "known or skipped", "--check-determinism", "--fail-fast").code == 0
 
 
 @pytest.mark.slow
-def test_a_failure_besides_the_one_that_is_expected_fails(simscen, project: Path) -> None:
+def test_unexpected_failure_fails(simscen, project: Path) -> None:
     ended = simscen("run", ".", "-k", "other")
     assert ended.code == 1
     assert "expected: collisions held; expected a failure" in ended.out
     assert "speed: 0.50 m/s > 0.10 m/s" in ended.out
 
 
-def test_a_session_in_which_all_is_skipped_ran_nothing(simscen, project: Path) -> None:
+def test_session_with_only_skipped_scenarios_selects_nothing(simscen, project: Path) -> None:
     ended = simscen("run", ".", "-k", "skipped", "--repeat", "9", "--check-determinism", "--out", "out")
     assert ended.code == 5
     assert "nothing was run" in ended.err
     assert [run["outcome"] for run in json.loads((project / "out/results.json").read_text())["runs"]] == ["skipped"]
 
 
-def test_a_run_that_breaks_off_is_an_error_whatever_was_expected(simscen, project: Path) -> None:
+def test_aborted_run_is_an_error_despite_an_expected_failure(simscen, project: Path) -> None:
     ended = simscen("run", ".", "-k", "known", "--stack", "mine=/bin/false")
     assert ended.code == 3
     assert "1 error" in ended.out
 
 
-def test_a_scenario_that_is_skipped_must_be_valid_all_the_same(simscen, project: Path) -> None:
+def test_skipped_scenario_must_be_valid(simscen, project: Path) -> None:
     (project / "a.scenario.yaml").write_text(TEXT.replace("x: 5", "x: 50"))
     assert simscen("run", ".", "-k", "skipped").code == 2
 
 
-def test_the_list_says_what_is_expected_and_what_is_skipped(simscen, project: Path) -> None:
+def test_list_shows_expected_failures_and_skips(simscen, project: Path) -> None:
     lines = simscen("list", ".").out.splitlines()
     assert lines[0] == "a[known]    (expected to fail: too fast, NAV-1)"
     assert lines[-1] == "a[skipped]  (skipped: no lift here, NAV-2)"
 
 
-def test_from_python_a_known_failure_is_no_pass(project: Path) -> None:
+def test_python_interface_does_not_report_expected_failure_as_passed(project: Path) -> None:
     run = package.simulate("a.scenario.yaml", variation="known")
     assert (run.passed, run.as_expected) == (False, True)
     assert not package.simulate("a.scenario.yaml", variation="mended").as_expected

@@ -13,13 +13,13 @@ from simscen.core.messages.navigation import ErrorCode
 from simscen.model.robot import Limits
 
 
-def test_without_a_name_everything_is_listed(simscen) -> None:
+def test_explain_without_a_name_lists_everything(simscen) -> None:
     out = simscen("explain").out
     for name in ("trigger:", "stopped_within", "amcl", "slip", "spawn", "robot_within"):
         assert name in out
 
 
-def test_a_word_is_told_with_keys_units_defaults_and_an_example(simscen) -> None:
+def test_topic_is_explained_with_keys_units_defaults_and_example(simscen) -> None:
     out = simscen("explain", "collisions").out
     assert out.startswith("collisions (criterion)\n")
     assert "max_impulse: impulse in N s" in out
@@ -27,11 +27,11 @@ def test_a_word_is_told_with_keys_units_defaults_and_an_example(simscen) -> None
     assert "Example: collisions: {max: 0}" in out
 
 
-def test_a_bare_value_is_told(simscen) -> None:
+def test_bare_value_is_explained(simscen) -> None:
     assert "Value: duration in s" in simscen("explain", "trigger.time").out
 
 
-def test_one_name_may_mean_several_things(simscen) -> None:
+def test_ambiguous_name_explains_all_topics(simscen) -> None:
     out = simscen("explain", "localization_error").out
     assert "localization_error (trigger)" in out
     assert "localization_error (criterion)" in out
@@ -42,7 +42,7 @@ def test_codes_are_explained(simscen) -> None:
     assert simscen("explain", "sc012").out == "SC012\n  A key is not known there.\n"
 
 
-def test_a_code_with_which_nothing_in_the_reference_stack_ends_is_told_as_one_of_others(simscen) -> None:
+def test_codes_of_other_stacks_are_marked(simscen) -> None:
     assert "The reference stack never returns it" in simscen("explain", "107").out.replace("\n  ", " ")
     stack = Path(package.__file__).parent / "stack"
     sources = [path.read_text(encoding="utf-8") for path in stack.rglob("*.py")]
@@ -50,7 +50,7 @@ def test_a_code_with_which_nothing_in_the_reference_stack_ends_is_told_as_one_of
     assert set(ErrorCode) - named - {ErrorCode.NONE} <= EXTERNAL_ONLY_CODES
 
 
-def test_no_robot_is_without_reverse_so_that_none_is_told_to_do_what_it_cannot() -> None:
+def test_every_drive_can_reverse() -> None:
     assert ErrorCode.BACKUP_INVALID_INPUT in EXTERNAL_ONLY_CODES
     base = {"linear": 1.0, "angular": 1.0, "linear_acceleration": 1.0, "angular_acceleration": 1.0}
     assert Limits.model_validate({**base, "reverse": 0.1}).reverse == 0.1
@@ -59,20 +59,20 @@ def test_no_robot_is_without_reverse_so_that_none_is_told_to_do_what_it_cannot()
 
 
 @pytest.mark.parametrize(("name", "hint"), [("collision_s", "did you mean"), ("zzzzzz", "for a list")])
-def test_an_unknown_name_is_a_usage_error(simscen, name: str, hint: str) -> None:
+def test_unknown_name_is_a_usage_error(simscen, name: str, hint: str) -> None:
     ended = simscen("explain", name)
     assert ended.code == 2
     assert hint in ended.err
 
 
-def test_a_narrow_terminal_is_respected(simscen, monkeypatch) -> None:
+def test_output_fits_a_narrow_terminal(simscen, monkeypatch) -> None:
     monkeypatch.setenv("COLUMNS", "50")
     text = [line for line in simscen("explain", "stopped_within").out.splitlines() if not line.startswith("  Example")]
     prose = [line for line in text if ": " not in line]
     assert max(map(len, prose)) <= 50
 
 
-def test_signals_are_listed_with_their_units_and_each_is_explained(simscen) -> None:
+def test_signals_are_listed_with_units_and_explained(simscen) -> None:
     out = simscen("explain", "signals").out
     assert "clearance: length in m\n" in out
     assert "in_region: yes or no\n" in out
@@ -82,7 +82,7 @@ def test_signals_are_listed_with_their_units_and_each_is_explained(simscen) -> N
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "expected_text"),
     [
         ("goals.pose", "place or mapping (required)"),
         ("goals.pose", "yaw: angle in rad"),
@@ -99,17 +99,17 @@ def test_signals_are_listed_with_their_units_and_each_is_explained(simscen) -> N
         ("5", "Nothing was selected"),
     ],
 )
-def test_keys_and_codes_are_explained(simscen, name: str, told: str) -> None:
+def test_keys_and_codes_are_explained(simscen, name: str, expected_text: str) -> None:
     ended = simscen("explain", name)
     assert ended.code == 0, ended.err
-    assert told in ended.out
+    assert expected_text in ended.out
 
 
 @pytest.mark.parametrize(
     ("name", "meant"),
     [("amcl.update_min_b", "amcl.update_min_"), ("goal_ocupied", "GOAL_OCCUPIED"), ("lingr", "linger")],
 )
-def test_misspelled_keys_and_codes_are_told_what_was_meant(simscen, name: str, meant: str) -> None:
+def test_misspelled_keys_and_codes_get_a_suggestion(simscen, name: str, meant: str) -> None:
     assert f"did you mean `{meant}" in simscen("explain", name).err
 
 
@@ -121,6 +121,6 @@ def test_every_topic_every_key_and_every_code_is_explained(monkeypatch) -> None:
         assert explained(name), name
 
 
-def test_every_code_of_nav2_and_of_the_command_line_has_a_text() -> None:
+def test_every_nav2_code_and_exit_code_has_a_description() -> None:
     assert set(NAV2_ERROR_CODES) == set(ErrorCode)
     assert {f"exit {code.value}" for code in Exit} <= set(known_names())

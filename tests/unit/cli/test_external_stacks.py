@@ -1,4 +1,4 @@
-"""What the name of an external stack runs: the command line says so, or the user's own configuration."""
+"""Commands of external stacks from the command line and the user configuration."""
 
 import sys
 from pathlib import Path
@@ -47,7 +47,7 @@ def loaded(name: str, *stacks: str):
     return load_all([Path(f"{name}.scenario.yaml")], None, [], False, Selection(), stacks)[0]
 
 
-def test_a_name_that_nobody_defines_is_exit_2_at_its_place_when_it_is_run(simscen, project: Path) -> None:
+def test_undefined_stack_name_is_an_error_with_its_location(simscen, project: Path) -> None:
     ended = simscen("run", ".")
     assert ended.code == 2
     assert "mine.scenario.yaml:7:19: error[SC060] the external stack `mine` has no command" in ended.err
@@ -55,7 +55,7 @@ def test_a_name_that_nobody_defines_is_exit_2_at_its_place_when_it_is_run(simsce
     assert not (project / "simscen-out").exists()
 
 
-def test_a_file_that_names_a_stack_of_others_is_valid_with_a_warning(simscen, project: Path) -> None:
+def test_undefined_stack_name_is_a_warning_in_validate(simscen, project: Path) -> None:
     ended = simscen("validate", "mine.scenario.yaml")
     assert ended.code == 0
     assert "mine.scenario.yaml:7:19: warning[SC060]" in ended.out
@@ -64,7 +64,7 @@ def test_a_file_that_names_a_stack_of_others_is_valid_with_a_warning(simscen, pr
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "expected_text"),
     [
         ("mine=./nowhere", "--stack mine=./nowhere: no such file or directory: `./nowhere`"),
         ("mine=./notes.txt", "permission denied: `./notes.txt` is not executable"),
@@ -79,15 +79,15 @@ def test_a_file_that_names_a_stack_of_others_is_valid_with_a_warning(simscen, pr
     ],
 )
 @pytest.mark.parametrize("command", ["run", "validate"])
-def test_a_program_that_cannot_be_run_is_told_before_anything_runs(simscen, project, command, given, told) -> None:
+def test_unusable_program_is_reported_before_any_run(simscen, project, command, given, expected_text) -> None:
     (project / "home").mkdir()
     (project / "notes.txt").write_text("none\n")
     ended = simscen(command, ".", "--stack", given)
     assert ended.code == 2
-    assert told in ended.err
+    assert expected_text in ended.err
 
 
-def test_the_command_line_wins_over_the_configuration(project: Path) -> None:
+def test_command_line_overrides_the_configuration(project: Path) -> None:
     configure(project, "stacks: {mine: {command: sh -c true}, other: {command: ./nav --other}}\n")
     assert loaded("mine")[0].runs.argv == ("sh", "-c", "true")
     assert loaded("mine", "mine=./nav 'a b'")[0].runs.argv == ("./nav", "a b")
@@ -99,21 +99,21 @@ def test_the_command_line_wins_over_the_configuration(project: Path) -> None:
     ]
 
 
-def test_a_command_keeps_what_the_scenario_asks_of_its_own_stack_and_takes_only_its_name(project: Path) -> None:
+def test_command_keeps_the_scenario_parameters_of_the_stack(project: Path) -> None:
     for name in ("mine", "v2"):
         stack = loaded("mine", f"{name}=./nav")[0].spec.stack
         assert (stack.external, stack.controller_frequency, stack.keepout) == (name, 10.0, ["r"])
     assert loaded("plain", "v2=./nav")[0].spec.stack.external == "v2"
 
 
-def test_a_stack_file_may_name_an_external_stack(project: Path) -> None:
+def test_stack_file_can_name_an_external_stack(project: Path) -> None:
     (project / "slow.stack.yaml").write_text("simscen: 1\nstack: {external: mine, controller_frequency: 5 Hz}\n")
     configure(project, "stacks: {mine: {command: ./nav --slow}}\n")
     (one,) = loaded("plain", "slow=slow.stack.yaml")
     assert (one.spec.stack.controller_frequency, one.runs.argv) == (5.0, ("./nav", "--slow"))
 
 
-def test_every_stack_is_judged_by_the_tolerances_that_the_scenario_asks_for(project: Path) -> None:
+def test_goal_tolerances_of_the_scenario_apply_to_every_stack(project: Path) -> None:
     (project / "lax.stack.yaml").write_text(
         "simscen: 1\nstack: {goal_checker: {xy_goal_tolerance: 1, stateful: false}}\n"
     )
@@ -125,7 +125,7 @@ def test_every_stack_is_judged_by_the_tolerances_that_the_scenario_asks_for(proj
     assert loaded("mine", "ref=reference")[0].spec.stack.controller_frequency == 10.0
 
 
-def test_limits_folder_and_variables_come_from_the_configuration(project: Path, monkeypatch) -> None:
+def test_configuration_sets_limits_folder_and_variables(project: Path, monkeypatch) -> None:
     monkeypatch.setenv("HOME", str(project))
     monkeypatch.setenv("ROS_DOMAIN_ID", "1")
     monkeypatch.setenv("PYTHONPATH", "/opt/mine")
@@ -139,7 +139,7 @@ def test_limits_folder_and_variables_come_from_the_configuration(project: Path, 
     assert (runs.env["ROS_DOMAIN_ID"], runs.env["PYTHONPATH"]) == ("7", "/opt/mine")
 
 
-def test_the_users_environment_is_as_simscen_was_called_with(simscen, project: Path, monkeypatch) -> None:
+def test_stack_gets_the_environment_of_the_caller(simscen, project: Path, monkeypatch) -> None:
     """Whatever simscen sets for itself."""
     monkeypatch.delenv("PYDANTIC_DISABLE_PLUGINS", raising=False)
     monkeypatch.setenv("SOME_SECRET", "x")
@@ -148,7 +148,7 @@ def test_the_users_environment_is_as_simscen_was_called_with(simscen, project: P
     assert caller_environment()["SOME_SECRET"] == "x"
 
 
-def test_the_configuration_is_where_xdg_says(monkeypatch, tmp_path: Path) -> None:
+def test_configuration_is_in_xdg_config_home(monkeypatch, tmp_path: Path) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     for given in ("", "relative/is/ignored"):
         monkeypatch.setenv("XDG_CONFIG_HOME", given)
@@ -169,7 +169,7 @@ stacks:
 """
 
 
-def test_mistakes_in_the_configuration_are_told_where_they_stand(simscen, project: Path) -> None:
+def test_errors_in_the_configuration_have_locations(simscen, project: Path) -> None:
     file = configure(project, WRONG)
     ended = simscen("run", "mine.scenario.yaml")
     assert ended.code == 2
@@ -179,20 +179,20 @@ def test_mistakes_in_the_configuration_are_told_where_they_stand(simscen, projec
     assert "put it in quotes" in ended.err
 
 
-def test_a_configuration_that_nothing_asks_for_is_not_read(simscen, project: Path) -> None:
+def test_configuration_is_read_only_if_needed(simscen, project: Path) -> None:
     configure(project, WRONG)
     assert simscen("validate", "plain.scenario.yaml").code == 0
     assert simscen("validate", "mine.scenario.yaml", "--stack", "mine=./nav").code == 0
 
 
-def test_a_program_of_the_configuration_that_is_not_there_is_told_in_it(simscen, project: Path) -> None:
+def test_missing_program_is_reported_at_its_line_of_the_configuration(simscen, project: Path) -> None:
     file = configure(project, "stacks:\n  mine: {command: ./gone}\n")
     ended = simscen("run", "mine.scenario.yaml")
     assert ended.code == 2
     assert f"{file}:2:19: error[SC061] no such file or directory: `./gone`" in ended.err
 
 
-def test_the_digest_holds_words_the_variables_asked_for_and_the_content_of_files(project: Path, monkeypatch) -> None:
+def test_digest_includes_arguments_variables_and_file_contents(project: Path, monkeypatch) -> None:
     def of(*given: str) -> str:
         return scenario_digest(loaded("mine", *given)[0])
 
@@ -212,7 +212,7 @@ def test_the_digest_holds_words_the_variables_asked_for_and_the_content_of_files
 
 
 @pytest.mark.parametrize("command", ["python3 pkg/main.py", "python3 -m pkg", "python3 -m pkg.main"])
-def test_the_digest_holds_the_modules_beside_a_script_of_python(project: Path, command: str) -> None:
+def test_digest_includes_modules_next_to_a_python_script(project: Path, command: str) -> None:
     (project / "pkg/deep").mkdir(parents=True)
     for name in ("__init__.py", "__main__.py", "main.py", "planner.py", "deep/map.py", "notes.txt"):
         (project / "pkg" / name).write_text("")
@@ -231,7 +231,7 @@ def test_the_digest_holds_the_modules_beside_a_script_of_python(project: Path, c
     assert digest() != changed
 
 
-def test_simscen_itself_is_found_where_nobody_activated_its_environment(project: Path, monkeypatch) -> None:
+def test_simscen_is_found_without_an_activated_environment(project: Path, monkeypatch) -> None:
     """Its adapter for ROS 2 is a command: `--stack mine='simscen ros2 …'`."""
     monkeypatch.setenv("PATH", "/nowhere")
     assert loaded("mine", "mine=simscen ros2")[0].runs.argv == (str(Path(sys.executable).parent / "simscen"), "ros2")
@@ -239,7 +239,7 @@ def test_simscen_itself_is_found_where_nobody_activated_its_environment(project:
         loaded("mine", "mine=sh -c true")
 
 
-def test_a_program_in_the_path_is_looked_for_in_the_path_of_its_own_environment(project: Path) -> None:
+def test_program_is_searched_in_the_path_of_its_environment(project: Path) -> None:
     (project / "bin").mkdir()
     (project / "bin/only-here").write_text("#!/bin/sh\n")
     (project / "bin/only-here").chmod(0o755)
@@ -247,5 +247,5 @@ def test_a_program_in_the_path_is_looked_for_in_the_path_of_its_own_environment(
     assert loaded("mine")[0].runs.argv == ("only-here",)
 
 
-def test_the_schema_of_the_configuration_is_for_editors(simscen, project: Path) -> None:
+def test_schema_of_the_configuration_is_written(simscen, project: Path) -> None:
     assert '"title": "simscen config"' in simscen("schema", "config").out

@@ -1,4 +1,4 @@
-"""A first Ctrl-C ends a session in good order, a second one at once."""
+"""Signals: the first stops a session cleanly, the second one immediately."""
 
 import subprocess
 import sys
@@ -24,13 +24,13 @@ def ended(times, second="SIGINT"):
     return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
 
 
-def test_the_second_ends_it_at_once_and_says_how_to_get_the_reports():
+def test_second_signal_exits_and_names_the_report_command():
     done = ended([0.0, 3.0])
     assert (done.returncode, done.stdout) == (130, "interrupted by 2\n")
     assert done.stderr.startswith("simscen: stopped without reports; run `simscen report`")
     assert ended([0.0, 3.0], "SIGTERM").returncode == 143
 
 
-def test_the_same_press_told_twice_is_one():
+def test_repeated_signal_of_one_key_press_counts_once():
     done = ended([0.0, 0.01])
     assert (done.returncode, done.stdout) == (0, "interrupted by 2\nreports are written\n")

@@ -1,4 +1,4 @@
-"""`simscen judge` on simscen's own logs: one, a folder of them, by their own criteria or by those of a file."""
+"""`simscen judge` on logs of simscen, with their own criteria and with those of a file."""
 
 import json
 import shutil
@@ -46,14 +46,14 @@ def _log(out: Path, name: str) -> Path:
     return found
 
 
-def test_a_run_folder_is_judged_as_its_log(simscen, out: Path) -> None:
+def test_run_folder_is_judged_as_its_log(simscen, out: Path) -> None:
     by_log, by_folder = (simscen("judge", str(path)) for path in (_log(out, "bad"), _log(out, "bad").parent))
     assert by_log == by_folder
     assert by_log.code == 1
     assert "speed: " in by_log.out and "> 0.05 m/s" in by_log.out
 
 
-def test_an_output_folder_is_judged_log_by_log_in_a_line_each(simscen, out: Path) -> None:
+def test_output_folder_gives_one_line_per_log(simscen, out: Path) -> None:
     ended = simscen("judge", "out")
     bad, good, total = ended.out.splitlines()
     assert ended.code == 1
@@ -63,7 +63,7 @@ def test_an_output_folder_is_judged_log_by_log_in_a_line_each(simscen, out: Path
     assert len(json.loads(simscen("judge", "out", "--json").out)["runs"]) == 2
 
 
-def test_a_file_with_nothing_but_criteria_is_enough_and_gives_a_table_of_margins(simscen, out: Path) -> None:
+def test_criteria_file_gives_a_table_of_margins(simscen, out: Path) -> None:
     (out.parent / "limits.yaml").write_text("pass:\n  - speed: {max: 9 m/s}\n  - collisions: {max: 2}\n")
     ended = simscen("judge", "out", "--scenario", "limits.yaml")
     head, bad, good, total = ended.out.splitlines()
@@ -73,11 +73,11 @@ def test_a_file_with_nothing_but_criteria_is_enough_and_gives_a_table_of_margins
     assert all(row.split()[2].startswith("+8.") and row.split()[-1] == "+2" for row in (bad, good))
 
 
-def test_a_log_whose_goal_is_called_like_a_number_is_judged_again(simscen, out: Path) -> None:
+def test_log_with_numeric_goal_name_is_judged(simscen, out: Path) -> None:
     assert simscen("judge", str(_log(out, "good"))).code == 0
 
 
-def test_criteria_may_extend_others_and_take_defaults(simscen, out: Path) -> None:
+def test_criteria_file_can_extend_and_use_defaults(simscen, out: Path) -> None:
     (out.parent / "base.yaml").write_text("# limits of the site\npass:\n  - speed: {max: 0.05 m/s}\n")
     (out.parent / "site.scenario.yaml").write_text("extends: base.yaml\ntags: [site]\n")
     ended = simscen("judge", str(_log(out, "good")), "--scenario", "site.scenario.yaml")
@@ -89,7 +89,7 @@ def test_criteria_may_extend_others_and_take_defaults(simscen, out: Path) -> Non
     assert simscen("judge", str(_log(out, "good")), "--scenario", "sub/only.scenario.yaml").code == 0
 
 
-def test_mistakes_in_criteria_are_told_at_their_line_and_in_their_file(simscen, out: Path) -> None:
+def test_errors_in_criteria_have_file_and_line(simscen, out: Path) -> None:
     (out.parent / "base.yaml").write_text("# limits\npass:\n  - speeed: {max: 1}\n")
     (out.parent / "site.yaml").write_text("\n\nextends: base.yaml\n")
     ended = simscen("judge", str(_log(out, "good")), "--scenario", "site.yaml")
@@ -99,13 +99,13 @@ def test_mistakes_in_criteria_are_told_at_their_line_and_in_their_file(simscen, 
     assert "missing key `pass`" in simscen("judge", str(_log(out, "good")), "--scenario", "empty.yaml").err
 
 
-def test_the_line_of_a_violated_criterion_is_that_of_the_file_it_was_judged_by(simscen, out: Path) -> None:
+def test_violated_criterion_names_the_line_of_the_criteria_file(simscen, out: Path) -> None:
     (out.parent / "limits.yaml").write_text("# site\n\npass:\n  - collisions: {max: 0}\n  - speed: {max: 0.05 m/s}\n")
     ended = simscen("judge", str(_log(out, "good")), "--scenario", "limits.yaml")
     assert "limits.yaml:5" in ended.out
 
 
-def test_a_log_of_several_that_cannot_be_used_is_an_error_of_its_own(simscen, out: Path) -> None:
+def test_unusable_log_among_several_is_an_error_result(simscen, out: Path) -> None:
     _log(out, "bad").write_bytes(_log(out, "bad").read_bytes()[:3000])
     ended = simscen("judge", "out")
     assert ended.code == 3
@@ -114,14 +114,14 @@ def test_a_log_of_several_that_cannot_be_used_is_an_error_of_its_own(simscen, ou
     assert simscen("judge", str(_log(out, "bad"))).code == 2
 
 
-def test_a_run_that_left_no_log_is_missed(simscen, out: Path) -> None:
+def test_run_without_log_is_reported(simscen, out: Path) -> None:
     _log(out, "bad").unlink()
     ended = simscen("judge", "out")
     assert ended.code == 3
     assert "it left no log" in ended.out
 
 
-def test_a_folder_without_logs_is_not_success(simscen, tmp_path: Path) -> None:
+def test_folder_without_logs_is_an_error(simscen, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     ended = simscen("judge", "empty")
     assert ended.code == 5

@@ -30,7 +30,7 @@ def ran(folder: Path) -> list[tuple[str, int, str]]:
 
 
 @pytest.mark.slow
-def test_only_what_failed_runs_again_until_nothing_is_left(simscen, project: Path) -> None:
+def test_only_failed_runs_are_repeated(simscen, project: Path) -> None:
     ended = simscen("run", ".", "--last-failed")
     assert ended.err == "simscen: there is no earlier session in simscen-out: all selected scenarios run\n"
     assert len(ran(project)) == 3
@@ -49,7 +49,7 @@ def test_only_what_failed_runs_again_until_nothing_is_left(simscen, project: Pat
 
 
 @pytest.mark.slow
-def test_a_failed_run_keeps_its_seed(simscen, project: Path) -> None:
+def test_failed_run_keeps_its_seed(simscen, project: Path) -> None:
     simscen("run", "b.scenario.yaml", "--repeat", "2", "--seed", "7")
     simscen("run", "b.scenario.yaml", "--lf")
     assert ran(project) == [("b", 7, "failed"), ("b", 8, "failed")]
@@ -58,13 +58,13 @@ def test_a_failed_run_keeps_its_seed(simscen, project: Path) -> None:
 
 
 @pytest.mark.slow
-def test_sessions_are_looked_for_beside_the_output_folder(simscen, project: Path) -> None:
+def test_sessions_are_searched_next_to_the_output_folder(simscen, project: Path) -> None:
     simscen("run", "a.scenario.yaml", "--out", "ci/1")
     ended = simscen("run", "a.scenario.yaml", "--out", "ci/2", "--lf")
     nothing = f"simscen: nothing failed in the last session, {project}/ci/1: all selected scenarios run\n"
     assert (ended.code, ended.err) == (0, nothing)
 
 
-def test_a_session_that_goes_on_knows_itself_what_is_left(simscen, project: Path) -> None:
+def test_last_failed_and_resume_exclude_each_other(simscen, project: Path) -> None:
     ended = simscen("run", ".", "--resume", "out", "--last-failed")
     assert (ended.code, ended.err) == (2, "simscen: --last-failed and --resume exclude each other\n")

@@ -19,15 +19,15 @@ def _run(name: str, probe: str, use: str) -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_a_library_is_imported_when_it_is_first_used() -> None:
+def test_library_is_imported_on_first_use() -> None:
     _run("numpy", "numpy.linalg", "assert early.hypot(3, 4) == 5 and early.random.default_rng(1).random() < 1")
 
 
-def test_a_library_is_imported_when_a_part_of_it_is() -> None:
+def test_library_is_imported_with_its_submodule() -> None:
     _run("numpy", "numpy.linalg", "import numpy.typing as npt; assert npt.NDArray[early.float64]")
 
 
-def test_a_library_that_is_there_already_stays() -> None:
+def test_imported_library_is_kept() -> None:
     subprocess.run(
         [
             sys.executable,
@@ -38,7 +38,7 @@ def test_a_library_that_is_there_already_stays() -> None:
     )
 
 
-def test_a_function_can_be_imported_without_the_library_until_it_is_called() -> None:
+def test_lazy_function_imports_the_library_when_called() -> None:
     code = """
 import sys
 from simscen.cli.lazy_import import import_lazily
@@ -53,7 +53,7 @@ from importlib.metadata import distribution
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_another_name_of_such_a_library_brings_all_of_it() -> None:
+def test_other_attribute_imports_the_library() -> None:
     code = """
 from simscen.cli.lazy_import import import_lazily
 import_lazily("importlib.metadata", "entry_points")

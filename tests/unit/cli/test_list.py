@@ -15,38 +15,38 @@ def _three(simscen, tmp_path: Path) -> None:
     )
 
 
-def test_each_scenario_is_a_line(simscen) -> None:
+def test_each_scenario_has_a_line(simscen) -> None:
     assert (
         simscen("list", ".").out == "faults/off   lidar off [fault, lidar]\nfaults/slip\ngood         drive [smoke]\n"
     )
 
 
-def test_an_external_stack_is_named(simscen, tmp_path: Path) -> None:
+def test_external_stack_is_listed(simscen, tmp_path: Path) -> None:
     file = tmp_path / "faults/slip.scenario.yaml"
     file.write_text(file.read_text() + "stack: {external: mine}\n")
     assert simscen("list", "faults").out.splitlines()[-1].split() == ["faults/slip", "(stack", "mine)"]
 
 
-def test_keyword_and_tag_select(simscen) -> None:
+def test_keyword_and_tag_select_scenarios(simscen) -> None:
     assert simscen("list", ".", "-k", "faults and not slip").out.split()[0] == "faults/off"
     assert simscen("list", ".", "--tag", "smoke", "--tag", "lidar").out.count("\n") == 2
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "told"),
+    ("arguments", "code", "expected_text"),
     [
         (["-k", "nothing"], 5, "none of 3 scenarios matches -k `nothing`"),
         (["--tag", "smoek"], 5, "did you mean `smoke`?"),
         (["-k", "("], 2, "cannot read -k `(`"),
     ],
 )
-def test_an_empty_or_broken_selection_is_told(simscen, arguments: list[str], code: int, told: str) -> None:
+def test_empty_or_invalid_selection_is_an_error(simscen, arguments: list[str], code: int, expected_text: str) -> None:
     ended = simscen("list", ".", *arguments)
     assert (ended.code, ended.out) == (code, "")
-    assert told in ended.err
+    assert expected_text in ended.err
 
 
-def test_an_invalid_scenario_stops_it(simscen, tmp_path: Path) -> None:
+def test_invalid_scenario_is_an_error(simscen, tmp_path: Path) -> None:
     (tmp_path / "bad.scenario.yaml").write_text("simscen: 1\n")
     ended = simscen("list", ".")
     assert ended.code == 2

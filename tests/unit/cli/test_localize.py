@@ -1,4 +1,4 @@
-"""`simscen localize`: logs written by a run, and by hand, of a drive in a room with a crate."""
+"""`simscen localize` on recorded and handwritten logs of a drive past a crate."""
 
 import json
 import math
@@ -15,7 +15,7 @@ GIVEN = ("--map", "room.yaml", "--robot", "turtlebot")
 
 
 @pytest.mark.parametrize("kind", ["csv", "FLASER", "ROBOTLASER1"])
-def test_a_drive_on_slipping_wheels_is_followed_in_every_format(simscen, tmp_path: Path, kind: str) -> None:
+def test_drive_with_slipping_wheels_is_localized_in_every_format(simscen, tmp_path: Path, kind: str) -> None:
     write_map(tmp_path)
     write_csv(tmp_path) if kind == "csv" else write_carmen(tmp_path, kind)
     log = "drive.csv" if kind == "csv" else "drive.log"
@@ -31,7 +31,7 @@ def test_a_drive_on_slipping_wheels_is_followed_in_every_format(simscen, tmp_pat
     assert simscen("localize", log, *GIVEN, "--json").out == ended.out
 
 
-def test_odometry_alone_drifts_off_and_that_is_told(simscen, tmp_path: Path) -> None:
+def test_drift_of_odometry_is_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_csv(tmp_path)
     Path("stack.yaml").write_text("stack: {localizer: {type: odometry}}\npass: [{goals_reached: {}}]\n")
@@ -47,7 +47,7 @@ def test_odometry_alone_drifts_off_and_that_is_told(simscen, tmp_path: Path) -> 
     assert found["lost"][0]["since"] == pytest.approx(times[off > 0.2][0])
 
 
-def test_without_a_reference_one_says_where_to_begin(simscen, tmp_path: Path) -> None:
+def test_log_without_reference_needs_a_start(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_csv(tmp_path, pose_rows=False)
     assert simscen("localize", "drive.csv", *GIVEN).code == 2
@@ -57,7 +57,7 @@ def test_without_a_reference_one_says_where_to_begin(simscen, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "told"),
+    ("name", "text", "expected_text"),
     [
         ("bad.csv", "odom,0,1,2\n", "line 1: expected 3 numbers"),
         ("bad.csv", "odometry,0,1,2,3\n", "no kind of row"),
@@ -67,12 +67,12 @@ def test_without_a_reference_one_says_where_to_begin(simscen, tmp_path: Path) ->
         ("bad.mcap", "what", "not an MCAP file"),
     ],
 )
-def test_a_log_that_cannot_be_used_is_told_in_words(simscen, tmp_path: Path, name: str, text: str, told: str) -> None:
+def test_unusable_log_is_reported(simscen, tmp_path: Path, name: str, text: str, expected_text: str) -> None:
     write_map(tmp_path)
     Path(name).write_text(text)
     ended = simscen("localize", name, *GIVEN)
     assert ended.code == 2
-    assert told in ended.err
+    assert expected_text in ended.err
     assert "Traceback" not in ended.err
 
 
@@ -105,39 +105,37 @@ stack:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stack", ["", RECOVERY], ids=["no recovery", "recovery"])
-def test_the_log_of_a_run_on_slipping_wheels_among_people_gives_the_figures_of_its_verdict(
-    simscen, tmp_path: Path, stack: str
-) -> None:
+def test_log_of_a_run_gives_the_figures_of_its_verdict(simscen, tmp_path: Path, stack: str) -> None:
     write_map(tmp_path)
     Path("room.scenario.yaml").write_text(SLIPPING + stack + PASS)
     assert simscen("run", "room.scenario.yaml", "--out", "out", "--seed", "3").code == 0
-    log, told = next(Path("out").rglob("run.mcap")), judged(tmp_path / "out")
+    log, output = next(Path("out").rglob("run.mcap")), judged(tmp_path / "out")
     ended = simscen("localize", str(log), *GIVEN, "--scenario", "room.scenario.yaml", "--seed", "3", "--json")
     assert ended.code == 0, ended.err
     found = json.loads(ended.out)
     # A log has ranges in single precision: after a while the particles are others, and as good.
     for name, tolerance in (("max", 0.03), ("rmse", 0.01), ("final", 0.03)):
-        assert found["error"][name] == pytest.approx(told[name], abs=tolerance)
-    assert told["max"] < 0.5
+        assert found["error"][name] == pytest.approx(output[name], abs=tolerance)
+    assert output["max"] < 0.5
     assert found["lost"] == []
 
 
-NAV2S = "stack: {localizer: {type: amcl}}\n"
+SCAN_MATCHING = "stack: {localizer: {type: scan_matching_amcl}}\n"
 
 
 @pytest.mark.slow
-def test_a_kidnapped_robot_is_lost_until_it_is_found_and_as_nav2s_amcl_from_then_on(simscen, tmp_path: Path) -> None:
+def test_kidnapped_robot_is_lost_with_plain_amcl_and_found_by_relocalization(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     lines = [f"{word},{t / 10},{value}" for t, word, value in kidnapped()]
     Path("drive.csv").write_text("\n".join(lines) + "\n")
-    for name, recovery in (("nav2", NAV2S), ("ours", ""), ("recovering", RECOVERY)):
+    for name, recovery in (("plain", ""), ("scan_matching", SCAN_MATCHING), ("recovery", RECOVERY)):
         Path(f"{name}.yaml").write_text(recovery + "pass: [{goals_reached: {}}]\n")
         ended = simscen("localize", "drive.csv", *GIVEN, "--scenario", f"{name}.yaml", "--json")
         assert ended.code == 0, ended.err
         found = json.loads(ended.out)
         assert found["lost"][0]["since"] == pytest.approx(5.0, abs=0.11)
-        assert (found["error"]["final"] < 0.3) == (name != "nav2")
-        assert (found["lost"][-1]["until"] is None) == (name == "nav2")
+        assert (found["error"]["final"] < 0.3) == (name != "plain")
+        assert (found["lost"][-1]["until"] is None) == (name == "plain")
 
 
 def kidnapped() -> list[tuple[int, str, str]]:
@@ -160,7 +158,7 @@ def kidnapped() -> list[tuple[int, str, str]]:
 
 
 @pytest.mark.parametrize("width", [80, 200])
-def test_what_is_printed_is_as_wide_as_the_terminal_or_less(
+def test_output_of_localize_fits_the_terminal(
     simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: int
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(width))

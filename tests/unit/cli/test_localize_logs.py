@@ -1,4 +1,4 @@
-"""`simscen localize` on logs as real recorders write them: rosbag2 folders, odd mounts, odd clocks, and nonsense."""
+"""`simscen localize` on logs of real recorders: rosbag2 folders, unusual mounts and clocks, invalid data."""
 
 import json
 import math
@@ -100,7 +100,7 @@ def localized(simscen, *arguments: str) -> dict[str, Any]:
     return found | {"err": ended.err}
 
 
-def test_the_same_drive_gives_the_same_figures_from_every_kind_of_ros_log(simscen, tmp_path: Path) -> None:
+def test_all_kinds_of_ros_logs_give_the_same_figures(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     messages = said()
     write_mcap(tmp_path / "drive.mcap", messages)
@@ -134,7 +134,7 @@ def told_by_tf() -> Iterable[Said]:
         yield Said("/tf", time + LATENCY - 1, link("base_link", "odom", time, at))
 
 
-def test_odometry_and_reference_are_what_tf_says_of_two_frames(simscen, tmp_path: Path) -> None:
+def test_odometry_and_reference_can_be_tf_frames(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_bag(tmp_path / "topics", said())
     write_bag(tmp_path / "tf", sorted(told_by_tf(), key=lambda one: one.time))
@@ -148,17 +148,17 @@ def test_odometry_and_reference_are_what_tf_says_of_two_frames(simscen, tmp_path
     assert "tf does not connect odom with base; frames: base_link, laser, map, odom" in ended.err
 
 
-def test_without_a_reference_the_robot_begins_where_initialpose_says(simscen, tmp_path: Path) -> None:
-    """Also where that was told on the way: the odometry leads back to the beginning."""
+def test_start_is_initialpose_without_a_reference(simscen, tmp_path: Path) -> None:
+    """The pose can also be published later: odometry leads back to the start."""
     write_map(tmp_path)
     without = [message for message in said() if message.topic != "/gt"]
     t, there, _ = drive()[60]
     time = BEGIN + round(t * SECOND)
     where = T["geometry_msgs/msg/PoseWithCovariance"](pose=pose(*there), covariance=np.zeros(36))
-    told = T["geometry_msgs/msg/PoseWithCovarianceStamped"](header=header(time, "map"), pose=where)
-    write_bag(tmp_path / "told", [*without, Said("/initialpose", time + LATENCY, told)])
+    output = T["geometry_msgs/msg/PoseWithCovarianceStamped"](header=header(time, "map"), pose=where)
+    write_bag(tmp_path / "output", [*without, Said("/initialpose", time + LATENCY, output)])
     write_bag(tmp_path / "untold", without)
-    ended = simscen("localize", "told", *GIVEN, "--json")
+    ended = simscen("localize", "output", *GIVEN, "--json")
     x, y, _ = drive()[-1][1]
     assert json.loads(ended.out)["end"][:2] == pytest.approx([x, y], abs=0.15)
     assert simscen("localize", "untold", *GIVEN).code == 2
@@ -169,7 +169,7 @@ def test_without_a_reference_the_robot_begins_where_initialpose_says(simscen, tm
     [((0.25, 0.0, 0.0), "base_link"), ((0.1, 2.0, 0.0), "chassis"), ((-0.2, 0.5, HUNG), "robot1/base_footprint")],
     ids=["in front", "turned, on a base of another name", "upside down"],
 )
-def test_a_lidar_is_where_tf_static_says_even_upside_down(
+def test_lidar_mount_is_read_from_tf_static(
     simscen, tmp_path: Path, mount: tuple[float, float, float], base: str
 ) -> None:
     write_map(tmp_path)
@@ -216,7 +216,7 @@ def with_nonsense(ranges: np.ndarray) -> np.ndarray:
     ],
     ids=["361 beams", "361 beams clockwise", "clockwise, a quarter without an answer", "all around from ahead"],
 )
-def test_a_scan_is_read_however_its_beams_are_laid_out(
+def test_all_beam_layouts_are_read(
     simscen, tmp_path: Path, layout: Layout, change: Callable[[np.ndarray], np.ndarray]
 ) -> None:
     write_map(tmp_path)
@@ -228,14 +228,14 @@ def test_a_scan_is_read_however_its_beams_are_laid_out(
     assert "note:" not in found["err"]
 
 
-def test_scans_that_measure_nothing_are_told(simscen, tmp_path: Path) -> None:
+def test_empty_scans_are_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     blind = rescanned((-SIDE, DEGREE, 181), lambda ranges: np.zeros(len(ranges)))
     write_mcap(tmp_path / "drive.mcap", blind)
     assert "150 of 150 scans measured nothing" in localized(simscen, "drive.mcap")["err"]
 
 
-def test_a_lidar_that_nobody_mounts_is_told(simscen, tmp_path: Path) -> None:
+def test_lidar_without_mount_is_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_mcap(tmp_path / "drive.mcap", said(frame="velodyne"))
     found = localized(simscen, "drive.mcap")
@@ -243,7 +243,7 @@ def test_a_lidar_that_nobody_mounts_is_told(simscen, tmp_path: Path) -> None:
     assert found["error"]["max"] < 0.2
 
 
-def test_stamps_that_nobody_filled_in_are_those_of_logging(simscen, tmp_path: Path) -> None:
+def test_missing_stamps_are_replaced_by_log_times(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_mcap(tmp_path / "drive.mcap", said(stamp=lambda _: 0))
     found = localized(simscen, "drive.mcap")
@@ -251,7 +251,7 @@ def test_stamps_that_nobody_filled_in_are_those_of_logging(simscen, tmp_path: Pa
     assert found["error"]["max"] < 0.2
 
 
-def test_a_reference_of_another_frame_is_told(simscen, tmp_path: Path) -> None:
+def test_reference_in_another_frame_is_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     changed = [
         replace(one, message=replace(one.message, header=header(one.time - LATENCY, "mocap")))
@@ -263,7 +263,7 @@ def test_a_reference_of_another_frame_is_told(simscen, tmp_path: Path) -> None:
     assert "/gt is told in frame 'mocap'" in localized(simscen, "drive.mcap")["err"]
 
 
-def test_poses_that_are_not_numbers_are_left_out_and_counted(simscen, tmp_path: Path) -> None:
+def test_invalid_poses_are_skipped_and_counted(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     broken = said()
     for k, x in ((60, math.nan), (90, math.inf), (120, 1e300)):
@@ -277,7 +277,7 @@ def test_poses_that_are_not_numbers_are_left_out_and_counted(simscen, tmp_path: 
     assert found["error"]["max"] < 0.3
 
 
-def test_scans_of_another_clock_than_odometrys_are_refused(simscen, tmp_path: Path) -> None:
+def test_scans_with_another_clock_are_rejected(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     other = [
         replace(one, message=scan(5 * SECOND, one.message.ranges, "laser")) if one.topic == "/scan" else one
@@ -289,7 +289,7 @@ def test_scans_of_another_clock_than_odometrys_are_refused(simscen, tmp_path: Pa
     assert "no scan was taken while there was odometry" in ended.err
 
 
-def test_readings_that_count_for_nothing_are_told(simscen, tmp_path: Path) -> None:
+def test_ignored_readings_are_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     looped = said()
     write_mcap(tmp_path / "drive.mcap", [*looped, *looped[1:31]])
@@ -297,7 +297,7 @@ def test_readings_that_count_for_nothing_are_told(simscen, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "expected_text"),
     [
         (lambda one: replace(one, message=scan(one.time, [1.0], "laser", math.nan)), "its angles and ranges are"),
         (lambda one: replace(one, message=replace(one.message, angle_increment=0.0)), "its angle_increment is 0"),
@@ -306,14 +306,14 @@ def test_readings_that_count_for_nothing_are_told(simscen, tmp_path: Path) -> No
     ],
     ids=["angles that are not numbers", "angles that are all the same", "another type", "another topic"],
 )
-def test_scans_that_are_none_are_told_with_what_there_is(
-    simscen, tmp_path: Path, change: Callable[[Said], Said], told: str
+def test_missing_scans_are_reported_with_the_existing_topics(
+    simscen, tmp_path: Path, change: Callable[[Said], Said], expected_text: str
 ) -> None:
     write_map(tmp_path)
     write_mcap(tmp_path / "drive.mcap", [change(one) if one.topic == "/scan" else one for one in said(every=15)])
     ended = simscen("localize", "drive.mcap", *GIVEN, "--reference", "/gt")
     assert ended.code == 2
-    assert told in ended.err
+    assert expected_text in ended.err
     assert "Traceback" not in ended.err
 
 
@@ -331,7 +331,7 @@ def test_scans_that_are_none_are_told_with_what_there_is(
         "",
     ],
 )
-def test_a_csv_log_of_nonsense_is_refused_in_words(simscen, tmp_path: Path, text: str) -> None:
+def test_invalid_csv_log_is_rejected(simscen, tmp_path: Path, text: str) -> None:
     write_map(tmp_path)
     Path("bad.csv").write_text(text)
     ended = simscen("localize", "bad.csv", *GIVEN, "--start", "1,1,0")
@@ -340,7 +340,7 @@ def test_a_csv_log_of_nonsense_is_refused_in_words(simscen, tmp_path: Path, text
     assert "Traceback" not in ended.err
 
 
-def test_every_cut_of_a_log_ends_in_figures_or_in_words(simscen, tmp_path: Path) -> None:
+def test_every_truncated_log_gives_figures_or_an_error(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     whole = write_mcap(tmp_path / "drive.mcap", said(every=15)).read_bytes()
     for share in (0.0, 0.02, 0.3, 0.6, 0.95, 0.999):
@@ -350,7 +350,7 @@ def test_every_cut_of_a_log_ends_in_figures_or_in_words(simscen, tmp_path: Path)
         assert "Traceback" not in ended.err
 
 
-def test_messages_fit_their_definitions() -> None:
+def test_messages_match_their_definitions() -> None:
     """So that what is tested here is what a recorder writes."""
     for one in said(every=50):
         assert STORE.deserialize_cdr(STORE.serialize_cdr(one.message, one.message.__msgtype__), one.message.__msgtype__)

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 
-def test_it_prints_the_layout_of_most_logs_and_rviz_configuration(simscen) -> None:
+def test_default_layout_and_rviz_configuration_are_printed(simscen) -> None:
     ended = simscen("log", "layout")
     assert ended.code == 0
     assert "/simscen/things" in json.loads(ended.out)["configById"]["3D!scene"]["topics"]
@@ -13,7 +13,7 @@ def test_it_prints_the_layout_of_most_logs_and_rviz_configuration(simscen) -> No
     assert "Fixed Frame: map" in Path("simscen.rviz").read_text()
 
 
-def test_what_is_no_log_or_asked_for_twice_is_refused(simscen) -> None:
+def test_invalid_arguments_of_layout_are_rejected(simscen) -> None:
     Path("no.mcap").write_text("nothing")
     ended = simscen("log", "layout", "no.mcap")
     assert ended.code == 2

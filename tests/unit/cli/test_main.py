@@ -15,31 +15,31 @@ def test_help_lists_the_commands_without_importing_them(simscen) -> None:
     )
 
 
-def test_without_a_command_the_help_is_shown(simscen) -> None:
+def test_call_without_a_command_prints_the_help(simscen) -> None:
     ended = simscen()
     assert "Commands:" in ended.out + ended.err
 
 
-def test_the_version_is_printed(simscen) -> None:
+def test_version_is_printed(simscen) -> None:
     assert simscen("--version").out.startswith("simscen 0")
 
 
 @pytest.mark.parametrize(
     "name", [name for name in cli.COMMANDS if cli.importlib.util.find_spec(f"simscen.cli.commands.{name}")]
 )
-def test_the_table_says_what_the_command_says(simscen, name: str) -> None:
-    told = " ".join(simscen(name, "--help").out.split())
-    assert cli.COMMANDS[name].rstrip(".") in told
+def test_command_table_matches_the_help(simscen, name: str) -> None:
+    output = " ".join(simscen(name, "--help").out.split())
+    assert cli.COMMANDS[name].rstrip(".") in output
 
 
-def test_an_unknown_command_is_a_usage_error(simscen) -> None:
+def test_unknown_command_is_a_usage_error(simscen) -> None:
     ended = simscen("rum")
     assert ended.code == 2
     assert "No such command 'rum'" in ended.err
 
 
 @pytest.mark.parametrize(
-    ("error", "code", "told"),
+    ("error", "code", "expected_text"),
     [
         (UsageError("no such folder"), 2, "simscen: no such folder\n"),
         (NothingSelected("nothing matches"), 5, "simscen: nothing matches\n"),
@@ -47,15 +47,17 @@ def test_an_unknown_command_is_a_usage_error(simscen) -> None:
         (KeyboardInterrupt(), 130, ""),
     ],
 )
-def test_errors_become_words_and_exit_codes(simscen, monkeypatch, error: BaseException, code: int, told: str) -> None:
+def test_errors_become_messages_and_exit_codes(
+    simscen, monkeypatch, error: BaseException, code: int, expected_text: str
+) -> None:
     def broken() -> None:
         raise error
 
     monkeypatch.setattr(cli, "app", broken)
-    assert simscen()[0::2] == (code, told)
+    assert simscen()[0::2] == (code, expected_text)
 
 
-def test_what_nobody_foresaw_is_an_internal_error(simscen, monkeypatch) -> None:
+def test_unexpected_exception_is_an_internal_error(simscen, monkeypatch) -> None:
     def broken() -> None:
         raise ZeroDivisionError
 

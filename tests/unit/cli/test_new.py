@@ -4,14 +4,14 @@ import pytest
 
 
 @pytest.mark.parametrize("name", ["aisle", "aisle.scenario.yaml", "deep/er/aisle"])
-def test_writes_a_valid_scenario(simscen, tmp_path: Path, name: str) -> None:
+def test_new_writes_a_valid_scenario(simscen, tmp_path: Path, name: str) -> None:
     assert simscen("new", name).code == 0
     written = f"{name.removesuffix('.scenario.yaml')}.scenario.yaml"
     assert simscen("validate", written) == (0, "1 scenario is valid\n", "")
     assert (tmp_path / written).read_text().count("#") >= 8
 
 
-def test_never_overwrites(simscen, tmp_path: Path) -> None:
+def test_new_never_overwrites_a_file(simscen, tmp_path: Path) -> None:
     (tmp_path / "mine.scenario.yaml").write_text("precious")
     ended = simscen("new", "mine")
     assert ended.code == 2
@@ -20,13 +20,13 @@ def test_never_overwrites(simscen, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["good.scenario.yaml/x", "x" * 300, "a\x00b"])
-def test_an_impossible_name_is_a_usage_error(simscen, name: str) -> None:
+def test_invalid_name_is_a_usage_error(simscen, name: str) -> None:
     ended = simscen("new", name)
     assert ended.code == 2
     assert "Traceback" not in ended.err
 
 
-def test_a_copy_of_a_shipped_scenario_has_what_it_needs_and_is_valid(simscen, tmp_path: Path) -> None:
+def test_copy_of_a_shipped_scenario_is_complete_and_valid(simscen, tmp_path: Path) -> None:
     ended = simscen("new", "mine", "--like", "outdated_map")
     assert ended.code == 0
     assert {path.relative_to(tmp_path).as_posix() for path in (tmp_path / "mine").rglob("*")} == {
@@ -36,7 +36,7 @@ def test_a_copy_of_a_shipped_scenario_has_what_it_needs_and_is_valid(simscen, tm
     assert simscen("validate", "mine.scenario.yaml").code == 0
 
 
-def test_a_copy_within_a_project_names_the_same_files_and_keeps_comments(simscen, tmp_path: Path) -> None:
+def test_copy_in_the_same_project_keeps_files_and_comments(simscen, tmp_path: Path) -> None:
     (tmp_path / ".git").mkdir()
     (tmp_path / "here.world.yaml").write_text("simscen: 1\nplaces: {dock: {x: 0, y: 0}, desk: {x: 2, y: 0}}\n")
     text = "simscen: 1\n# why\nworld: 'here.world.yaml'  # there\nrobot: {pose: dock}\n"
@@ -49,16 +49,16 @@ def test_a_copy_within_a_project_names_the_same_files_and_keeps_comments(simscen
 
 
 @pytest.mark.parametrize(
-    ("like", "told"),
+    ("like", "expected_text"),
     [("outdated_mop", "did you mean `navigation/outdated_map`"), ("cart_crossing", "is ambiguous")],
 )
-def test_a_scenario_to_copy_that_is_not_there_or_not_the_only_one_is_told(simscen, like: str, told: str) -> None:
+def test_unknown_or_ambiguous_scenario_to_copy_is_an_error(simscen, like: str, expected_text: str) -> None:
     ended = simscen("new", "mine", "--like", like)
-    assert (ended.code, told in ended.err) == (2, True), ended.err
+    assert (ended.code, expected_text in ended.err) == (2, True), ended.err
     assert not Path("mine.scenario.yaml").exists()
 
 
-def test_a_copy_overwrites_nothing(simscen, tmp_path: Path) -> None:
+def test_copy_overwrites_nothing(simscen, tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "house.world.yaml").write_text("precious")
     assert simscen("new", "mine", "--like", "navigation/goal").code == 2
@@ -67,7 +67,7 @@ def test_a_copy_overwrites_nothing(simscen, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["aisle.base.yaml", "deep/defaults.yaml"])
-def test_a_base_is_written_with_the_partial_schema_of_the_project(simscen, tmp_path: Path, name: str) -> None:
+def test_base_file_refers_to_the_partial_schema(simscen, tmp_path: Path, name: str) -> None:
     (tmp_path / "pyproject.toml").write_text("")
     assert simscen("schema", "--write", "schemas").code == 0
     assert simscen("new", name).code == 0
@@ -78,7 +78,7 @@ def test_a_base_is_written_with_the_partial_schema_of_the_project(simscen, tmp_p
     assert "$schema=schemas/scenario.schema.json" in (tmp_path / "mine.scenario.yaml").read_text().split("\n")[0]
 
 
-def test_a_copy_of_a_scenario_has_its_variations(simscen, tmp_path: Path) -> None:
+def test_copy_includes_variations(simscen, tmp_path: Path) -> None:
     assert simscen("new", "mine", "--like", "speeds").code == 0
     listed = simscen("list", "mine.scenario.yaml").out
     assert listed.count("mine[desired_linear_vel=") == 4

@@ -1,4 +1,4 @@
-"""simscen run --open: the page is there before anything runs, follows what ends, and is the report in the end."""
+"""`simscen run --open`: the live page before, during, and after the runs."""
 
 import webbrowser
 from pathlib import Path
@@ -33,7 +33,7 @@ def pages(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return opened
 
 
-def test_the_page_opens_at_once_follows_the_runs_and_becomes_the_report(
+def test_live_page_opens_first_and_becomes_the_report(
     simscen, pages: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
@@ -57,7 +57,9 @@ def test_the_page_opens_at_once_follows_the_runs_and_becomes_the_report(
     assert 'data-tags="smoke"' in final
 
 
-def test_without_a_browser_it_says_where_the_page_is(simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_path_of_the_page_is_printed_without_a_browser(
+    simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     monkeypatch.setattr(webbrowser, "open", lambda uri: False)
     ended = simscen("run", "a.scenario.yaml", "--out", "out", "--open")
@@ -65,7 +67,7 @@ def test_without_a_browser_it_says_where_the_page_is(simscen, tmp_path: Path, mo
     assert ended.err == "simscen: no browser found; open out/report.html in a browser\n"
 
 
-def test_a_watched_folder_has_no_one_page_to_open(simscen, tmp_path: Path) -> None:
+def test_watch_and_open_exclude_each_other(simscen, tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     ended = simscen("run", "a.scenario.yaml", "--watch", "--open")
     assert ended.code == 2

@@ -1,4 +1,4 @@
-"""The page of commands tells of the options that there are, and of all exit codes."""
+"""The reference page of the commands lists all options and exit codes."""
 
 import re
 
@@ -23,22 +23,22 @@ def typers_own(words):
 
 
 @pytest.mark.parametrize(("words", "function"), calls(), ids=lambda value: value if isinstance(value, str) else "")
-def test_the_page_lists_what_typer_takes(words, function) -> None:
+def test_commands_page_lists_the_options_of_typer(words, function) -> None:
     taken = [parameter for parameter in typers_own(words).params if parameter.name != "help"]
     names = [", ".join(p.opts) if p.param_type_name == "option" else p.name for p in taken]
-    told = [parameter.written for parameter in parameters_of(function)]
+    output = [parameter.written for parameter in parameters_of(function)]
     arguments = re.compile(r"^\[?[A-Z_]+\]?…?$")
-    assert [name for name in names if name.startswith("-")] == [name for name in told if name.startswith("-")]
-    assert len(told) == len(names)
-    assert all(name.startswith("-") or arguments.match(name) for name in told)
+    assert [name for name in names if name.startswith("-")] == [name for name in output if name.startswith("-")]
+    assert len(output) == len(names)
+    assert all(name.startswith("-") or arguments.match(name) for name in output)
     assert all(parameter.help for parameter in parameters_of(function))
 
 
-def test_every_exit_code_is_explained() -> None:
+def test_every_exit_code_is_documented() -> None:
     assert set(EXITS) == set(Exit)
     assert all(f"| {code.value} |" in exits() for code in Exit)
 
 
-def test_names_with_stars_and_brackets_stay_what_they_are() -> None:
+def test_stars_and_brackets_are_escaped() -> None:
     assert r"\*.scenario.yaml" in section("validate", dict(calls())["validate"])
     assert r"simscen-out/\<session id>" in section("run", dict(calls())["run"])

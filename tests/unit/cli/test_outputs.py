@@ -1,4 +1,4 @@
-"""What simscen writes goes where it should: below --out, and over nothing but plain files that nobody reads."""
+"""Output files never overwrite inputs or other files than plain files."""
 
 import errno
 import os
@@ -38,7 +38,7 @@ def odd(tmp_path: Path):
 
 @pytest.mark.parametrize("name", ["...scenario.yaml", "..scenario.yaml", ".scenario.yaml"])
 @pytest.mark.parametrize("command", ["run", "validate"])
-def test_a_file_name_that_gives_no_id_is_refused(simscen, tmp_path: Path, name, command) -> None:
+def test_file_name_without_a_valid_id_is_rejected(simscen, tmp_path: Path, name, command) -> None:
     (tmp_path / "in").mkdir()
     (tmp_path / "good.scenario.yaml").rename(tmp_path / "in" / name)
     ended = simscen(command, f"in/{name}")
@@ -48,7 +48,7 @@ def test_a_file_name_that_gives_no_id_is_refused(simscen, tmp_path: Path, name, 
 
 
 @pytest.mark.parametrize("scenario", ["junit.xml", "results.json/x", "run.json", "events.jsonl", "runs"])
-def test_no_run_lies_where_a_report_does(scenario: str) -> None:
+def test_run_folders_do_not_collide_with_reports(scenario: str) -> None:
     assert run_folder(Path("out"), RunKey(scenario, 3)) == Path("out/runs") / scenario / "seed-3"
 
 
@@ -62,7 +62,7 @@ def test_no_run_lies_where_a_report_does(scenario: str) -> None:
         ("world", "convert", "room.world.yaml"),
     ],
 )
-def test_only_plain_files_are_written_over(simscen, tmp_path: Path, odd, kind, command) -> None:
+def test_only_plain_files_are_overwritten(simscen, tmp_path: Path, odd, kind, command) -> None:
     (tmp_path / "room.world.yaml").write_text(
         "{simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}"
     )
@@ -76,7 +76,7 @@ def test_only_plain_files_are_written_over(simscen, tmp_path: Path, odd, kind, c
     assert not list(tmp_path.rglob("*.mcap"))
 
 
-def test_schemas_are_not_written_through_a_link(simscen, tmp_path: Path) -> None:
+def test_schemas_are_not_written_through_symbolic_links(simscen, tmp_path: Path) -> None:
     (tmp_path / "precious").write_text("keep me")
     (tmp_path / "schemas").mkdir()
     (tmp_path / "schemas/scenario.schema.json").symlink_to("../precious")
@@ -87,13 +87,13 @@ def test_schemas_are_not_written_through_a_link(simscen, tmp_path: Path) -> None
     assert (tmp_path / "precious").read_text() == "keep me"
 
 
-def test_a_folder_for_schemas_that_cannot_be_made_is_told(simscen) -> None:
+def test_unwritable_schema_folder_is_an_error(simscen) -> None:
     ended = simscen("schema", "--write", "good.scenario.yaml")
     assert (ended.code, ended.out) == (2, "")
     assert ended.err.startswith("simscen: cannot write good.scenario.yaml/scenario.schema.json: ")
 
 
-def test_what_is_read_is_not_written_over(simscen, tmp_path: Path) -> None:
+def test_inputs_are_not_overwritten(simscen, tmp_path: Path) -> None:
     world = "{simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}"
     (tmp_path / "room.world.yaml").write_text(world)
     (tmp_path / "defaults.yaml").write_text("tags: [nightly]\n")
@@ -113,7 +113,7 @@ def test_what_is_read_is_not_written_over(simscen, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["results.json", "events.jsonl", "run.json", "report.html", "runs/good/junit.xml"])
 @pytest.mark.parametrize("before", [False, True])
-def test_junit_takes_no_name_of_the_output_folder(simscen, tmp_path: Path, name, before) -> None:
+def test_junit_cannot_use_reserved_names(simscen, tmp_path: Path, name, before) -> None:
     options = ("--out", "new") if before else ("--out", "out")
     if before:
         (tmp_path / "out").mkdir()
@@ -124,13 +124,13 @@ def test_junit_takes_no_name_of_the_output_folder(simscen, tmp_path: Path, name,
 
 
 @pytest.mark.parametrize("name", [".", "..", "", "deep/", "deep/.", ".scenario.yaml"])
-def test_new_makes_nothing_that_run_refuses(simscen, tmp_path: Path, name) -> None:
+def test_new_rejects_names_that_run_rejects(simscen, tmp_path: Path, name) -> None:
     ended = simscen("new", name)
     assert ended.code == 2
     assert [path.name for path in tmp_path.iterdir()] == ["good.scenario.yaml"]
 
 
-def test_latest_that_is_someones_own_stays(tmp_path: Path, monkeypatch) -> None:
+def test_user_file_named_latest_is_kept(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("simscen-out").mkdir()
     Path("simscen-out/latest").write_text("keep me")
@@ -139,13 +139,13 @@ def test_latest_that_is_someones_own_stays(tmp_path: Path, monkeypatch) -> None:
     assert set(Path("simscen-out").iterdir()) == {folder, Path("simscen-out/latest")}
 
 
-def test_nothing_but_a_plain_file_is_replaced(odd) -> None:
+def test_only_plain_files_are_replaced(odd) -> None:
     for kind in NOT_PLAIN:
         with pytest.raises(OSError, match=r"not a regular file|symbolic link|directory"):
             write_atomically(odd(kind), b"")
 
 
-def test_a_report_that_could_not_be_written_is_not_named(tmp_path: Path, monkeypatch) -> None:
+def test_unwritten_report_is_not_named(tmp_path: Path, monkeypatch) -> None:
     def write(path: Path, data: bytes) -> None:
         if path.name != "results.json":
             raise OSError(errno.ENOSPC, "No space left on device")

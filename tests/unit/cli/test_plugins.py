@@ -1,4 +1,4 @@
-"""`simscen plugins`, and how other commands meet packages that are broken."""
+"""`simscen plugins`, and the effect of broken packages on other commands."""
 
 import json
 
@@ -21,13 +21,13 @@ class Hello(Spec, Criterion):
 '''
 
 
-def test_nothing_installed_is_said_in_words(simscen) -> None:
+def test_no_installed_types_gives_a_message(simscen) -> None:
     done = simscen("plugins")
     assert (done.code, done.err) == (0, "")
     assert done.out == "no plug-ins: no installed package has entry points in a group `simscen.…`\n"
 
 
-def test_every_type_is_listed_with_its_package_and_its_first_sentence(simscen, yardwork) -> None:
+def test_types_are_listed_with_package_and_first_sentence(simscen, yardwork) -> None:
     done = simscen("plugins")
     assert (done.code, done.err) == (0, "")
     assert done.out.splitlines()[:4] == [
@@ -38,7 +38,7 @@ def test_every_type_is_listed_with_its_package_and_its_first_sentence(simscen, y
     ]
 
 
-def test_as_json(simscen, yardwork) -> None:
+def test_types_are_printed_as_json(simscen, yardwork) -> None:
     listed = json.loads(simscen("plugins", "--format", "json").out)["plugins"]
     assert [row["kind"] for row in listed] == ["criterion", "fault", "trigger", "action", "sensor", "metric"]
     assert listed[0] == {
@@ -63,7 +63,7 @@ def test_as_json(simscen, yardwork) -> None:
         ("metric", "success", "hello:Hello", "simscen ships a type with the same name"),
     ],
 )
-def test_one_that_is_broken_says_why_and_the_exit_code_tells(simscen, packages, kind, name, value, why) -> None:
+def test_broken_type_states_the_reason_and_sets_the_exit_code(simscen, packages, kind, name, value, why) -> None:
     packages("hello", "1.0", {kind: {name: value}}, hello=HELLO)
     done = simscen("plugins")
     assert done.code == 3
@@ -71,7 +71,7 @@ def test_one_that_is_broken_says_why_and_the_exit_code_tells(simscen, packages, 
     assert f"cannot be used: {why}" in " ".join(done.out.split()) or why in " ".join(done.out.split())
 
 
-def test_a_broken_package_breaks_only_files_that_use_it(simscen, packages, tmp_path) -> None:
+def test_broken_package_affects_only_files_that_use_it(simscen, packages, tmp_path) -> None:
     packages("hello", "1.0", {"criterion": {"hello": "hello:Hello"}}, hello="raise RuntimeError('no licence')")
     good = (tmp_path / "good.scenario.yaml").read_text()
     (tmp_path / "uses.scenario.yaml").write_text(good.replace("goals_reached: {}", "hello: {}"))
@@ -81,12 +81,12 @@ def test_a_broken_package_breaks_only_files_that_use_it(simscen, packages, tmp_p
     done = simscen("validate", ".")
     assert done.code == 2
     assert "uses.scenario.yaml:10:16: error[SC019]" in done.out + done.err
-    told = "criterion `hello` of hello 1.0 cannot be used: `hello:Hello` cannot be loaded: RuntimeError: no licence"
-    assert told in done.out + done.err
+    output = "criterion `hello` of hello 1.0 cannot be used: `hello:Hello` cannot be loaded: RuntimeError: no licence"
+    assert output in done.out + done.err
     assert "good.scenario.yaml" not in done.out + done.err
 
 
-def test_a_check_of_its_own_that_breaks_down_is_a_problem_of_the_file(simscen, packages, tmp_path) -> None:
+def test_exception_in_a_validator_is_a_problem_of_the_file(simscen, packages, tmp_path) -> None:
     broken = "    @property\n    def horizon(self):\n        return self.nothing\n\n    def judge"
     packages("hello", "1.0", {"criterion": {"hello": "hello:Hello"}}, hello=HELLO.replace("    def judge", broken))
     good = (tmp_path / "good.scenario.yaml").read_text()
@@ -96,7 +96,7 @@ def test_a_check_of_its_own_that_breaks_down_is_a_problem_of_the_file(simscen, p
     assert "good.scenario.yaml:10:16: error[SC019] criterion `hello` of hello 1.0 cannot be used: " in done.out
 
 
-def test_a_folder_of_scenarios_is_never_code(simscen, packages, tmp_path, monkeypatch) -> None:
+def test_scenario_folder_is_never_imported(simscen, packages, tmp_path, monkeypatch) -> None:
     monkeypatch.syspath_prepend(str(tmp_path))  # as `python -m` does with the working directory
     packages.lay(tmp_path, "hello", "1.0", {"criterion": {"hello": "hello:Hello"}}, hello="raise SystemExit('it ran')")
     assert simscen("plugins").out.startswith("no plug-ins")

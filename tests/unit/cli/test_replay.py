@@ -1,4 +1,4 @@
-"""`simscen replay`, and the pages that `simscen run` leaves of runs that failed."""
+"""`simscen replay`, and the replay pages of failed runs."""
 
 import json
 import subprocess
@@ -35,7 +35,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return home / "out"
 
 
-def test_a_run_that_failed_leaves_a_page_that_all_reports_name(out: Path) -> None:
+def test_failed_run_has_a_replay_that_all_reports_link(out: Path) -> None:
     assert [path.parent.parent.name for path in out.rglob("replay.html")] == ["bad"]
     results = json.loads((out / "results.json").read_text())
     pages = {run["scenario"]: run["artifacts"].get("replay") for run in results["runs"]}
@@ -43,14 +43,14 @@ def test_a_run_that_failed_leaves_a_page_that_all_reports_name(out: Path) -> Non
     assert "[[ATTACHMENT|out/runs/bad/seed-1/replay.html]]" in (out / "junit.xml").read_text()
 
 
-def test_the_page_is_the_same_as_that_of_the_command(simscen, out: Path, tmp_path: Path) -> None:
+def test_replay_of_a_run_equals_that_of_the_command(simscen, out: Path, tmp_path: Path) -> None:
     run = out / "runs" / "bad" / "seed-1"
     ended = simscen("replay", str(run), "--out", "page.html")
     assert (ended.code, ended.out) == (0, "page.html\n")
     assert (tmp_path / "page.html").read_bytes() == (run / "replay.html").read_bytes()
 
 
-def test_every_log_below_a_folder_gets_its_page(simscen, out: Path) -> None:
+def test_every_log_in_a_folder_gets_a_replay(simscen, out: Path) -> None:
     page = out / "runs" / "good" / "seed-1" / "replay.html"
     ended = simscen("replay", str(out))
     assert ended.code == 0 and ended.out.splitlines() == [str(page).replace("good", name) for name in ("bad", "good")]
@@ -58,38 +58,38 @@ def test_every_log_below_a_folder_gets_its_page(simscen, out: Path) -> None:
     page.unlink()
 
 
-def test_two_runs_are_set_side_by_side(simscen, out: Path, tmp_path: Path) -> None:
+def test_two_runs_are_shown_side_by_side(simscen, out: Path, tmp_path: Path) -> None:
     good, bad = (str(out / "runs" / name / "seed-1") for name in ("good", "bad"))
     assert simscen("replay", good, "--against", bad, "--out", "both.html").code == 0
     assert "<title>good, seed 1, passed against bad, seed 1, failed</title>" in (tmp_path / "both.html").read_text()
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "told"),
+    ("arguments", "code", "expected_text"),
     [
         (("nowhere",), 2, "nowhere:0:0: error[SC800]"),
         (("good.scenario.yaml",), 2, "SC801"),
         ((".",), 5, "no logs found"),
     ],
 )
-def test_what_is_no_log_is_told(simscen, arguments: tuple[str, ...], code: int, told: str) -> None:
+def test_invalid_log_is_an_error(simscen, arguments: tuple[str, ...], code: int, expected_text: str) -> None:
     ended = simscen("replay", *arguments)
-    assert ended.code == code and told.replace(":0:0", "") in ended.err
+    assert ended.code == code and expected_text.replace(":0:0", "") in ended.err
 
 
-def test_one_page_cannot_be_that_of_several_runs(simscen, out: Path) -> None:
+def test_one_page_for_several_runs_is_rejected(simscen, out: Path) -> None:
     ended = simscen("replay", str(out), "--out", "page.html")
     assert ended.code == 2 and "--out takes one run, but 2 were found" in ended.err
 
 
-def test_the_log_is_not_overwritten(simscen, out: Path) -> None:
+def test_log_is_not_overwritten(simscen, out: Path) -> None:
     log = out / "runs" / "bad" / "seed-1" / "run.mcap"
     before = log.read_bytes()
     assert simscen("replay", str(log), "--out", str(log)).code == 2
     assert log.read_bytes() == before
 
 
-def test_a_page_is_made_without_engines(out: Path, tmp_path: Path) -> None:
+def test_replay_needs_no_engine(out: Path, tmp_path: Path) -> None:
     heavy = {"pybullet", "ompl", "scipy", "filterpy", "PIL", "trimesh", "embreex"}
     probe = (
         "import atexit, sys\nfrom simscen.cli.main import main\n"
@@ -100,7 +100,7 @@ def test_a_page_is_made_without_engines(out: Path, tmp_path: Path) -> None:
     assert done.stdout.splitlines()[-1] == "imported:"
 
 
-def test_the_log_shows_both_costmaps_each_in_its_frame_and_no_faster_than_anybody_looks(out: Path) -> None:
+def test_log_contains_both_costmaps_at_a_limited_rate(out: Path) -> None:
     log = read_run(out / "runs" / "bad" / "seed-1" / "run.mcap", looks=True)
     assert sorted(log.seen.costmaps) == ["/global_costmap/costmap", "/local_costmap/costmap"]
     for topic, period in (("/global_costmap/costmap", 480), ("/local_costmap/costmap", 240)):

@@ -1,4 +1,4 @@
-"""One recorded run: its reports made anew, its picture drawn again."""
+"""`simscen report` and `simscen plot` on a recorded run."""
 
 import errno
 import json
@@ -49,7 +49,7 @@ def out(recorded: Path, tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["results.json", "junit.xml"])
-def test_reports_come_back_byte_for_byte(simscen, out: Path, name: str) -> None:
+def test_reports_are_reproduced_byte_for_byte(simscen, out: Path, name: str) -> None:
     before = (out / name).read_bytes()
     (out / name).write_text("spoilt")
     ended = simscen("report", "out")
@@ -61,13 +61,13 @@ def test_reports_come_back_byte_for_byte(simscen, out: Path, name: str) -> None:
     )
 
 
-def test_reports_come_in_other_forms_and_places(simscen, out: Path) -> None:
+def test_reports_have_other_formats_and_paths(simscen, out: Path) -> None:
     ended = simscen("report", "out", "--format", "json", "--junit", "ci/junit.xml", "--junit-family", "xunit2")
     assert json.loads(ended.out) == json.loads((out / "results.json").read_text())
     assert b'line="' not in (out.parent / "ci/junit.xml").read_bytes()
 
 
-def test_with_a_junit_file_of_its_own_a_report_writes_that_file_only_and_says_so(simscen, out: Path) -> None:
+def test_report_with_junit_writes_only_that_file(simscen, out: Path) -> None:
     before = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.rglob("*") if path.is_file()}
     ended = simscen("report", "out", "--junit", "ci.xml", "--junit-family", "xunit2")
     assert ended.code == 1
@@ -76,7 +76,7 @@ def test_with_a_junit_file_of_its_own_a_report_writes_that_file_only_and_says_so
     assert b'line="' not in (out.parent / "ci.xml").read_bytes()
 
 
-def test_a_report_made_from_elsewhere_names_the_scenario_as_seen_from_there(
+def test_paths_in_reports_are_relative_to_the_working_directory(
     simscen, out: Path, recorded: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (recorded.parent / "short.scenario.yaml").write_text(SCENARIO)
@@ -88,7 +88,7 @@ def test_a_report_made_from_elsewhere_names_the_scenario_as_seen_from_there(
     (recorded.parent / "short.scenario.yaml").unlink()
 
 
-def test_a_full_disk_leaves_the_reports_that_were_there(simscen, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_keeps_existing_reports(simscen, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = {path: path.read_bytes() for path in out.iterdir() if path.is_file()}
 
     def full(_: int) -> None:
@@ -101,7 +101,7 @@ def test_a_full_disk_leaves_the_reports_that_were_there(simscen, out: Path, monk
     assert {path: path.read_bytes() for path in out.iterdir() if path.is_file()} == before
 
 
-def test_a_session_under_way_is_left_alone(simscen, out: Path) -> None:
+def test_running_session_is_not_changed(simscen, out: Path) -> None:
     journal = Journal(out, goes_on=True)
     ended = simscen("report", "out")
     journal.close()
@@ -109,13 +109,13 @@ def test_a_session_under_way_is_left_alone(simscen, out: Path) -> None:
     assert "is in use" in ended.err
 
 
-def test_other_folders_hold_nothing_to_report(simscen, tmp_path: Path) -> None:
+def test_folder_without_session_is_an_error(simscen, tmp_path: Path) -> None:
     ended = simscen("report", ".")
     assert ended.code == 2
     assert "there is no events.jsonl in it" in ended.err
 
 
-def test_a_run_is_drawn_from_its_log_alone(simscen, out: Path, tmp_path: Path) -> None:
+def test_run_is_drawn_from_its_log(simscen, out: Path, tmp_path: Path) -> None:
     log = out / "runs/short/seed-1/run.mcap"
     shutil.move(log, tmp_path / "alone.mcap")
     shutil.rmtree(out)
@@ -126,14 +126,14 @@ def test_a_run_is_drawn_from_its_log_alone(simscen, out: Path, tmp_path: Path) -
         assert picture.width > 600
 
 
-def test_the_picture_is_that_of_the_run(simscen, out: Path) -> None:
+def test_picture_equals_that_of_the_run(simscen, out: Path) -> None:
     before = (out / "runs/short/seed-1/map.png").read_bytes()
     (out / "runs/short/seed-1/map.png").unlink()
     assert simscen("plot", "out/runs/short/seed-1").code == 0
     assert (out / "runs/short/seed-1/map.png").read_bytes() == before
 
 
-def test_a_log_that_broke_off_is_drawn_as_far_as_it_goes(simscen, out: Path) -> None:
+def test_partial_log_is_drawn(simscen, out: Path) -> None:
     folder = out / "runs/short/seed-1"
     data = (folder / "run.mcap").read_bytes()
     (folder / "run.mcap").unlink()
@@ -144,7 +144,7 @@ def test_a_log_that_broke_off_is_drawn_as_far_as_it_goes(simscen, out: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "expected_text"),
     [
         (("nowhere",), "nowhere: error[SC800] cannot read the log: No such file or directory"),
         (("out",), "out: error[SC800] there is no run.mcap in it"),
@@ -152,7 +152,7 @@ def test_a_log_that_broke_off_is_drawn_as_far_as_it_goes(simscen, out: Path) -> 
         (("out/runs/short/seed-1", "--out", "good.scenario.yaml/x.png"), "cannot write good.scenario.yaml/x.png"),
     ],
 )
-def test_what_cannot_be_drawn_is_told(simscen, out: Path, arguments, told) -> None:
+def test_unusable_log_cannot_be_drawn(simscen, out: Path, arguments, expected_text) -> None:
     ended = simscen("plot", *arguments)
     assert ended.code == 2
-    assert told in ended.err
+    assert expected_text in ended.err

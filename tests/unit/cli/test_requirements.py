@@ -1,4 +1,4 @@
-"""An installation that cannot work says so in one line instead of running nothing, or everything into errors."""
+"""Unmet requirements of the installation are reported before any run."""
 
 import importlib.metadata
 import re
@@ -30,7 +30,7 @@ def installed(monkeypatch):
     return installed
 
 
-def test_this_installation_has_what_it_needs() -> None:
+def test_this_installation_meets_its_requirements() -> None:
     assert requirements.unmet_requirements() == []
     assert requirements.unmet_typer() == []
 
@@ -57,7 +57,7 @@ def test_versions_are_compared(installed, need, version, fits) -> None:
     assert (requirements.unmet_requirements() == []) is fits
 
 
-def test_what_is_wrong_is_told_with_what_helps(installed) -> None:
+def test_unmet_requirements_have_a_hint(installed) -> None:
     installed(["typer<1,>=0.20", "ompl>=2"], typer="0.12.5")
     assert requirements.unmet_requirements() == [
         "typer 0.12.5 is installed, but simscen needs typer>=0.20,<1: pip install 'typer>=0.20,<1'",
@@ -65,7 +65,7 @@ def test_what_is_wrong_is_told_with_what_helps(installed) -> None:
     ]
 
 
-def test_a_run_that_cannot_work_is_not_begun(installed, monkeypatch, capsys) -> None:
+def test_run_does_not_start_with_unmet_requirements(installed, monkeypatch, capsys) -> None:
     installed(["pybullet>=3.2.7"], pybullet="3.2.6")
     monkeypatch.setattr(sys, "argv", ["simscen", "run", "nothing"])
     with pytest.raises(SystemExit) as end:
@@ -78,7 +78,7 @@ def test_a_run_that_cannot_work_is_not_begun(installed, monkeypatch, capsys) -> 
 
 
 @pytest.mark.parametrize("command", ["validate", "doctor", "--version"])
-def test_a_typer_that_misreads_options_reads_none(monkeypatch, capsys, command) -> None:
+def test_unsupported_typer_stops_every_command(monkeypatch, capsys, command) -> None:
     monkeypatch.setattr(typer, "__version__", "0.12.5")
     monkeypatch.setattr(sys, "argv", ["simscen", command])
     with pytest.raises(SystemExit) as end:
@@ -87,12 +87,12 @@ def test_a_typer_that_misreads_options_reads_none(monkeypatch, capsys, command) 
     assert "typer 0.12.5 is installed, but simscen needs typer>=0.20" in capsys.readouterr().err
 
 
-def test_the_oldest_typer_is_that_of_pyproject() -> None:
+def test_minimum_typer_matches_pyproject() -> None:
     (oldest,) = re.findall(r'"typer>=([\d.]+),', PYPROJECT)
     assert tuple(map(int, oldest.split("."))) == requirements.MIN_TYPER
 
 
-def test_every_dependency_has_bounds_that_are_read() -> None:
+def test_every_dependency_has_readable_bounds() -> None:
     block = PYPROJECT.split("dependencies = [", 1)[1].split("\n]", 1)[0]
     for line in re.findall(r'"([^"]+)"', block):
         assert re.fullmatch(r"[\w-]+>=[\w.]+(,<\d+)?", line), line

@@ -1,4 +1,4 @@
-"""--resume keeps a verdict only as long as its log is there, and marks it."""
+"""`--resume` keeps verdicts whose logs exist, and marks them."""
 
 import json
 import subprocess
@@ -37,7 +37,7 @@ def kept(folder):
     return [run["scenario"] for run in runs if run.get("resumed")]
 
 
-def test_kept_verdicts_are_marked_in_the_console_and_in_the_reports(session):
+def test_kept_verdicts_are_marked_in_console_and_reports(session):
     folder, resume = session
     assert kept(folder) == []
     assert resume().count(", kept") == 2
@@ -47,7 +47,7 @@ def test_kept_verdicts_are_marked_in_the_console_and_in_the_reports(session):
 
 
 @pytest.mark.parametrize("damage", ["deleted", "replaced", "cut", "emptied"])
-def test_a_run_whose_log_is_gone_or_another_is_run_again(session, damage):
+def test_run_with_missing_or_changed_log_is_repeated(session, damage):
     folder, resume = session
     log, other = folder / "runs/a/seed-1/run.mcap", folder / "runs/b/seed-1/run.mcap"
     whole = log.read_bytes()

@@ -1,4 +1,4 @@
-"""`simscen robot check`: command, odometry and truth of one drive, and what the files say otherwise."""
+"""`simscen robot check`: test drives, and consistency of the files of a robot."""
 
 import json
 import sys
@@ -52,7 +52,7 @@ def robot_yaml(drive):
 
 @pytest.fixture
 def check(tmp_path, monkeypatch, capsys):
-    """Check a robot in a folder with some files: exit code, what is printed, what is told on stderr."""
+    """Check a robot in a folder with some files: exit code, what is printed, and stderr."""
     monkeypatch.chdir(tmp_path)
 
     def check(robot, *options, **files):
@@ -76,38 +76,38 @@ def figures(check):
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("name", ["amr", "car", "jackal", "mecanum", "omni", "turtlebot"])
-def test_every_shipped_robot_drives_what_it_is_told(check, name):
-    code, told, _ = check(name)
-    assert code == 0, told
-    assert "checks passed" in told
-    assert max(map(len, told.splitlines())) <= 80
+def test_every_shipped_robot_passes_the_check(check, name):
+    code, output, _ = check(name)
+    assert code == 0, output
+    assert "checks passed" in output
+    assert max(map(len, output.splitlines())) <= 80
 
 
-def test_a_caster_a_millimeter_too_low_is_told_at_its_line(check):
+def test_low_caster_is_reported_at_its_line(check):
     text = urdf(wheels(), CASTER.format(z=0.019))
-    code, told, _ = check("cart.urdf", cart_urdf=text)
+    code, output, _ = check("cart.urdf", cart_urdf=text)
     assert code == 0
     line = text[: text.index('<link name="caster"')].count("\n") + 1
-    assert f"cart.urdf:{line}:3: warning[SC405] link 'caster' reaches 1.0 mm below the wheels" in told
+    assert f"cart.urdf:{line}:3: warning[SC405] link 'caster' reaches 1.0 mm below the wheels" in output
 
 
-def test_a_caster_that_hangs_above_the_ground_is_told(check):
-    told = check("cart.urdf", cart_urdf=urdf(wheels(), CASTER.format(z=0.03)))[1]
-    assert "link 'caster' hangs 10.0 mm above the ground" in told
+def test_caster_above_the_ground_is_reported(check):
+    output = check("cart.urdf", cart_urdf=urdf(wheels(), CASTER.format(z=0.03)))[1]
+    assert "link 'caster' hangs 10.0 mm above the ground" in output
 
 
-def test_wheels_at_different_heights_are_told(check):
+def test_wheels_at_different_heights_are_reported(check):
     four = wheels(x=-0.15, name="rear_") + wheels(x=0.15, name="front_", z=0.052)
-    told = check("cart.urdf", cart_urdf=urdf(four))[1]
-    assert "the wheel on joint 'front_left_joint' hangs 2.0 mm above the lowest one's ground" in told
+    output = check("cart.urdf", cart_urdf=urdf(four))[1]
+    assert "the wheel on joint 'front_left_joint' hangs 2.0 mm above the lowest one's ground" in output
 
 
-def test_a_robot_as_drawn_has_no_warnings(figures):
+def test_consistent_robot_has_no_warnings(figures):
     assert figures("cart.urdf", cart_urdf=urdf(wheels(), CASTER.format(z=0.02)))["problems"] == []
 
 
 @pytest.mark.parametrize("with_spec", [False, True])
-def test_a_car_drawn_backwards_is_refused_at_its_line(check, with_spec):
+def test_reversed_car_is_rejected_at_its_line(check, with_spec):
     """It had a negative wheel base."""
     knuckles = "".join(KNUCKLE.format(name=f"k_{side}", x=-0.3, y=y) for side, y in (("left", 0.2), ("right", -0.2)))
     front = "".join(
@@ -116,24 +116,24 @@ def test_a_car_drawn_backwards_is_refused_at_its_line(check, with_spec):
     drive = "{type: ackermann, wheel_radius: 0.05, wheel_separation: 0.4, wheel_base: 0.3, max_steering: 0.5}"
     spec = {"cart_robot_yaml": robot_yaml(drive)} if with_spec else {}
     name = "cart.robot.yaml" if with_spec else "cart.urdf"
-    code, _, told = check(name, cart_urdf=urdf(wheels(), knuckles, front), **spec)
+    code, _, output = check(name, cart_urdf=urdf(wheels(), knuckles, front), **spec)
     assert code == 2
-    assert "its steered wheels are 0.3 m behind the driven ones: only front steering is simulated" in told
-    assert "cart.urdf:" in told.split(": error")[0]
+    assert "its steered wheels are 0.3 m behind the driven ones: only front steering is simulated" in output
+    assert "cart.urdf:" in output.split(": error")[0]
 
 
 DIFFERENTIAL = "{{type: differential, wheel_radius: {}, wheel_separation: {}}}"
 
 
-def test_a_wheel_separation_other_than_the_urdfs_is_told_with_both_numbers_and_the_one_that_fits(check):
+def test_wrong_wheel_separation_is_reported_with_the_right_one(check):
     files = {"cart_urdf": urdf(wheels()), "cart_robot_yaml": robot_yaml(DIFFERENTIAL.format(0.05, 0.45))}
-    code, told, _ = check("cart.robot.yaml", **files)
+    code, output, _ = check("cart.robot.yaml", **files)
     assert code == 1
-    assert "cart.robot.yaml:5:62: warning[SC404] wheel_separation is 0.45 m here, but 0.4 m in cart.urdf" in told
-    assert float(told.split("wheel_separation 0.45 m: ")[1].split()[0]) == pytest.approx(0.4, rel=0.002)
+    assert "cart.robot.yaml:5:62: warning[SC404] wheel_separation is 0.45 m here, but 0.4 m in cart.urdf" in output
+    assert float(output.split("wheel_separation 0.45 m: ")[1].split()[0]) == pytest.approx(0.4, rel=0.002)
 
 
-def test_a_scenario_is_told_of_a_wheel_separation_other_than_the_urdfs(simscen):
+def test_wrong_wheel_separation_is_a_warning_of_the_scenario(simscen):
     sensors = "{lidar: {lidar: {mount: {z: 0.3}}}, odom: {odometry: {}}}"
     text = robot_yaml(DIFFERENTIAL.format(0.05, 0.45)).replace("sensors: {}", f"sensors: {sensors}")
     Path("cart.robot.yaml").write_text(text)
@@ -146,7 +146,7 @@ def test_a_scenario_is_told_of_a_wheel_separation_other_than_the_urdfs(simscen):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "code", "told"),
+    ("old", "new", "code", "expected_text"),
     [
         ("x", "x", 0, "1 robot is valid"),
         ("radius: 0.05", "radius: 0.06", 0, "warning[SC404] wheel_radius is 0.06 m here, but 0.05 m in cart.urdf"),
@@ -154,17 +154,17 @@ def test_a_scenario_is_told_of_a_wheel_separation_other_than_the_urdfs(simscen):
         ("0.05, wheel", "0.05, left: [x], right: [y], wheel", 2, "cart.urdf:1:1: error[SC400] no joint called 'x'"),
     ],
 )
-def test_validate_builds_a_robot_of_a_urdf(simscen, old, new, code, told):
+def test_validate_builds_urdf_robots(simscen, old, new, code, expected_text):
     """It called robots valid that no scenario could use."""
     Path("cart.robot.yaml").write_text(robot_yaml(DIFFERENTIAL.format(0.05, 0.4)).replace(old, new))
     Path("cart.urdf").write_text(urdf(wheels()))
     ended = simscen("validate", "cart.robot.yaml")
-    assert told in ended.out
+    assert expected_text in ended.out
     assert ended.code == code
     assert simscen("validate", "--fast", "cart.robot.yaml").code == 0
 
 
-def test_validate_tells_of_a_body_that_would_drag(simscen):
+def test_validate_reports_a_dragging_body(simscen):
     text = robot_yaml(DIFFERENTIAL.format(0.05, 0.4)).replace(
         "urdf: cart.urdf", "mass: 5\nbody: [{box: [0.3, 0.3, 0.2]}]"
     )
@@ -174,19 +174,19 @@ def test_validate_tells_of_a_body_that_would_drag(simscen):
     assert ended.code == 2
 
 
-def test_a_wheel_radius_other_than_the_urdfs_is_told_with_both_numbers_and_the_one_that_fits(check):
+def test_wrong_wheel_radius_is_reported_with_the_right_one(check):
     files = {"cart_urdf": urdf(wheels()), "cart_robot_yaml": robot_yaml(DIFFERENTIAL.format(0.06, 0.4))}
-    code, told, _ = check("cart.robot.yaml", **files)
+    code, output, _ = check("cart.robot.yaml", **files)
     assert code == 1
-    assert "wheel_radius is 0.06 m here, but 0.05 m in cart.urdf" in told
-    assert float(told.split("wheel_radius 0.06 m: ")[1].split()[0]) == pytest.approx(0.05, rel=0.002)
-    assert "wheel_separation 0.4 m:" not in told
+    assert "wheel_radius is 0.06 m here, but 0.05 m in cart.urdf" in output
+    assert float(output.split("wheel_radius 0.06 m: ")[1].split()[0]) == pytest.approx(0.05, rel=0.002)
+    assert "wheel_separation 0.4 m:" not in output
 
 
 SKID = "{{type: skid_steer, wheel_radius: 0.16, wheel_separation: 0.56, wheel_base: 0.5, turning_scale: {}}}"
 
 
-def test_the_effective_track_that_is_told_fits(figures):
+def test_suggested_turning_scale_passes_the_check(figures):
     """Wheels that skid turn a heavy base as if they stood further apart."""
     four = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")
     files = {"cart_urdf": urdf(four, size="0.9 0.4 0.2", mass=45, z=0.25, i=1.5)}
@@ -203,18 +203,18 @@ def test_the_effective_track_that_is_told_fits(figures):
     assert right["value"] < 0.5
 
 
-def test_a_load_that_drags_a_skid_steered_base_off_its_spot_is_told(check):
+def test_drifting_skid_steered_base_is_reported(check):
     four = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")
-    code, told, _ = check("cart.urdf", cart_urdf=urdf(four, size="0.7 0.4 0.2", mass=45, z=0.25, i=1.5, x=-0.1))
+    code, output, _ = check("cart.urdf", cart_urdf=urdf(four, size="0.7 0.4 0.2", mass=45, z=0.25, i=1.5, x=-0.1))
     assert code == 1
-    assert "FAILED  turn: off the spot" in told
-    assert "behind the middle of its wheels" in told
+    assert "FAILED  turn: off the spot" in output
+    assert "behind the middle of its wheels" in output
 
 
 MECANUM = "{{type: mecanum, wheel_radius: 0.05, wheel_separation: {}, wheel_base: 0.4}}"
 
 
-def test_a_urdf_with_four_mecanum_wheels_goes_sideways_where_its_robot_yaml_says_so(figures):
+def test_urdf_with_mecanum_wheels_drives_sideways(figures):
     four = wheels(x=-0.2, name="rear_") + wheels(x=0.2, name="front_")
     found = figures("cart.robot.yaml", cart_urdf=urdf(four), cart_robot_yaml=robot_yaml(MECANUM.format(0.4)))
     assert found["passed"] and not found["problems"]
@@ -222,29 +222,29 @@ def test_a_urdf_with_four_mecanum_wheels_goes_sideways_where_its_robot_yaml_says
     assert sideways["truth"]["end"]["y"] == pytest.approx(2.0, abs=0.01)
 
 
-def test_mecanum_wheels_that_stand_otherwise_than_the_drive_reckons_are_told(check):
+def test_misplaced_mecanum_wheels_are_reported(check):
     four = wheels(x=-0.2, name="rear_") + wheels(x=0.2, name="front_")
-    code, told, _ = check("cart.robot.yaml", cart_urdf=urdf(four), cart_robot_yaml=robot_yaml(MECANUM.format(0.5)))
+    code, output, _ = check("cart.robot.yaml", cart_urdf=urdf(four), cart_robot_yaml=robot_yaml(MECANUM.format(0.5)))
     assert code == 1
-    assert "wheel_separation is 0.5 m here, but 0.4 m in cart.urdf" in told
-    assert "cot(roller_angle) 0.45 m: 0.4 m fits" in told
+    assert "wheel_separation is 0.5 m here, but 0.4 m in cart.urdf" in output
+    assert "cot(roller_angle) 0.45 m: 0.4 m fits" in output
 
 
-def test_two_mecanum_wheels_are_refused(check):
+def test_two_mecanum_wheels_are_rejected(check):
     files = {"cart_urdf": urdf(wheels()), "cart_robot_yaml": robot_yaml(MECANUM.format(0.4))}
-    code, _, told = check("cart.robot.yaml", **files)
+    code, _, output = check("cart.robot.yaml", **files)
     assert code == 2
-    assert "a mecanum drive has one wheel at each of four corners; found: left_joint, right_joint" in told
+    assert "a mecanum drive has one wheel at each of four corners; found: left_joint, right_joint" in output
 
 
-def test_the_same_robot_gives_the_same_figures_and_picture(check, tmp_path):
+def test_robot_check_is_reproducible(check, tmp_path):
     once, again = (check("turtlebot", "--json", "--picture", f"{name}.png")[1] for name in ("a", "b"))
     assert once == again
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 @pytest.mark.parametrize("robot", ["turtlebotx", "gone.urdf"])
-def test_a_robot_that_is_not_there_is_told(check, robot):
-    code, _, told = check(robot)
+def test_missing_robot_is_an_error(check, robot):
+    code, _, output = check(robot)
     assert code == 2
-    assert f"{robot}: error[SC001] no such file or shipped robot: `{robot}`" in told
+    assert f"{robot}: error[SC001] no such file or shipped robot: `{robot}`" in output

@@ -1,4 +1,4 @@
-"""What `simscen run` refuses before it runs anything."""
+"""Errors that `simscen run` reports before any run."""
 
 import errno
 import os
@@ -8,7 +8,7 @@ import pytest
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "expected_text"),
     [
         (("--out", "good.scenario.yaml/out"), "cannot use the output folder"),
         (("--junit", "good.scenario.yaml/junit.xml"), "cannot write good.scenario.yaml/junit.xml"),
@@ -19,15 +19,15 @@ import pytest
         (("--seed", "4294967295", "--repeat", "2"), "beyond the largest, 4294967295"),
     ],
 )
-def test_what_cannot_be_is_told_before_anything_runs(simscen, tmp_path: Path, options, told) -> None:
+def test_invalid_options_are_reported_before_any_run(simscen, tmp_path: Path, options, expected_text) -> None:
     ended = simscen("run", "good.scenario.yaml", *options)
     assert ended.code == 2
-    assert told in ended.err
+    assert expected_text in ended.err
     assert not list(tmp_path.rglob("*.mcap"))
     assert not (tmp_path / "simscen-out").exists()
 
 
-def test_a_disk_that_is_full_already_is_told_before_anything_runs(simscen, tmp_path: Path, monkeypatch) -> None:
+def test_full_disk_is_reported_before_any_run(simscen, tmp_path: Path, monkeypatch) -> None:
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -40,7 +40,7 @@ def test_a_disk_that_is_full_already_is_told_before_anything_runs(simscen, tmp_p
         assert not list((tmp_path / sync).rglob("*.mcap"))
 
 
-def test_an_empty_shard_is_nothing_selected(simscen) -> None:
+def test_empty_shard_selects_nothing(simscen) -> None:
     ended = simscen("run", "good.scenario.yaml", "--shard", "2/2")
     assert (ended.code, ended.err) == (5, "simscen: shard 2/2 of 1 scenarios is empty\n")
 
@@ -50,7 +50,7 @@ SDF = """<sdf version='1.6'><world name='w'><model name='m'><static>1</static><l
 <include><uri>model://nowhere</uri></include></world></sdf>"""
 
 
-def test_what_of_sdf_cannot_be_used_is_an_error_or_with_lenient_a_warning(simscen, tmp_path: Path) -> None:
+def test_unsupported_sdf_is_an_error_or_with_lenient_a_warning(simscen, tmp_path: Path) -> None:
     (tmp_path / "shop.sdf").write_text(SDF)
     (tmp_path / "shop.scenario.yaml").write_text(
         "simscen: 1\nworld: shop.sdf\nmap: none\nrobot: {pose: {x: 3, y: 3}}\npass: [{collisions: {max: 0}}]\n"
@@ -64,7 +64,7 @@ def test_what_of_sdf_cannot_be_used_is_an_error_or_with_lenient_a_warning(simsce
         assert "shop.sdf: warning[SC311] world[w]/include/uri: skipped: model://nowhere" in lenient.out
 
 
-def test_a_stack_that_nobody_defines_runs_nothing(simscen, tmp_path: Path) -> None:
+def test_undefined_stack_runs_nothing(simscen, tmp_path: Path) -> None:
     (tmp_path / "good.scenario.yaml").write_text(
         (tmp_path / "good.scenario.yaml").read_text() + "stack: {external: mine}\n"
     )

@@ -23,7 +23,7 @@ FORM = [
 ]  # fmt: skip
 
 
-def test_what_is_generated_is_what_the_code_says() -> None:
+def test_generated_files_are_up_to_date() -> None:
     assert outdated() == [], "run `make docs`"
 
 
@@ -34,12 +34,12 @@ def _plain(text: str) -> Any:
 
 
 @pytest.mark.parametrize("kind", MODELS)
-def test_a_schema_is_a_schema(kind: str) -> None:
+def test_schemas_are_valid(kind: str) -> None:
     jsonschema.Draft7Validator.check_schema(schema_of(kind))
 
 
 @pytest.mark.parametrize("kind", SHIPPED)
-def test_shipped_files_fit_their_schema(kind: str) -> None:
+def test_shipped_files_match_their_schema(kind: str) -> None:
     validator = jsonschema.Draft7Validator(schema_of(kind))
     for file in SHIPPED[kind]:
         errors = [error.message for error in validator.iter_errors(_plain(file.read_text()))]
@@ -48,7 +48,7 @@ def test_shipped_files_fit_their_schema(kind: str) -> None:
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("name", FORM)
-def test_files_of_the_wrong_form_do_not_fit(name: str) -> None:
+def test_invalid_files_do_not_match_their_schema(name: str) -> None:
     validator = jsonschema.Draft7Validator(schema_of("scenario"))
     assert not validator.is_valid(_plain((DIAGNOSTICS / f"{name}.scenario.yaml").read_text()))
 
@@ -59,7 +59,7 @@ def _errors(text: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "expected_text"),
     [
         ("simscen: 1\nseeed: 7", ": Additional properties are not allowed ('seeed' was unexpected)"),
         ("simscen: 1\nstack: {controller: {type: dwb, gamma: 1}}", "stack.controller: Additional properties"),
@@ -71,11 +71,11 @@ def _errors(text: str) -> list[str]:
         ("simscen: 1\nevents: [{when: {time: 1}, do: [{remove: {nam: x}}]}]", "events.0.do.0.remove: Additional"),
     ],
 )
-def test_one_mistake_gives_an_error_at_its_place(text: str, told: str) -> None:
-    assert any(error.startswith(told) for error in _errors(text)), _errors(text)
+def test_one_mistake_gives_one_error_at_its_location(text: str, expected_text: str) -> None:
+    assert any(error.startswith(expected_text) for error in _errors(text)), _errors(text)
 
 
-def test_every_key_has_a_text_or_a_meaning_by_its_type() -> None:
+def test_every_key_has_a_hover_text() -> None:
     """Hover texts: what a scenario is made of is described; the parameters of the stack carry Nav2's names."""
     definitions = schema_of("scenario")["$defs"]
     for name in ("GoalEntry", "EventEntry", "FaultEntry", "Spawn", "StoppedWithin", "Wall"):
@@ -89,13 +89,13 @@ def _walk(node: Any) -> list[dict[str, Any]]:
     return [found for item in node for found in _walk(item)] if isinstance(node, list) else []
 
 
-def test_nothing_is_null_and_no_default_is_bulky() -> None:
+def test_schema_has_no_nulls_and_no_large_defaults() -> None:
     for node in _walk(schema_of("scenario")):
         assert node.get("type") != "null"
         assert not isinstance(node.get("default"), dict)
 
 
-def test_the_command_writes_what_is_committed(simscen, tmp_path: Path) -> None:
+def test_command_writes_the_committed_schemas(simscen, tmp_path: Path) -> None:
     assert simscen("schema", "--write", "made").code == 0
     for kind in MODELS:
         made = (tmp_path / f"made/{kind}.schema.json").read_text()
@@ -124,5 +124,5 @@ BASES = [
 
 
 @pytest.mark.parametrize(("base", "fits"), BASES)
-def test_a_partial_file_fits_the_partial_schema(base: dict[str, Any], fits: bool) -> None:
+def test_base_file_matches_the_base_schema(base: dict[str, Any], fits: bool) -> None:
     assert jsonschema.Draft7Validator(schema_of("base")).is_valid(base) is fits

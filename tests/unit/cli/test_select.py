@@ -1,4 +1,4 @@
-"""Which scenarios a command runs."""
+"""Selection of scenarios."""
 
 from pathlib import Path
 
@@ -34,18 +34,18 @@ def test_every_scenario_is_in_exactly_one_shard(folder: Path, count: int) -> Non
 
 
 @pytest.mark.parametrize("text", ["", "1", "0/2", "3/2", "1/0", "-1/2", "a/b", "1/2/3", "１/２x"])
-def test_other_shards_are_refused(text: str) -> None:
+def test_invalid_shards_are_rejected(text: str) -> None:
     with pytest.raises(UsageError, match="expected i/n"):
         shard_of(text)
 
 
-def test_one_bad_file_stops_all_even_if_it_was_not_asked_for(folder: Path) -> None:
+def test_invalid_file_stops_the_session_even_if_not_selected(folder: Path) -> None:
     (folder / "bad.scenario.yaml").write_text("simscen: 1\n")
     with pytest.raises(InvalidInput, match=r"bad\.scenario\.yaml"):
         load_all([folder], folder, [], False, Selection(keyword="a"))
 
 
-def test_what_a_world_notes_is_told_once_however_many_scenarios_are_in_it(folder: Path) -> None:
+def test_notes_of_a_world_are_reported_once(folder: Path) -> None:
     sdf = """<sdf version='1.6'><world name='w'><model name='m'><static>1</static><link name='l'><collision name='c'>
     <geometry><box><size>1 1 1</size></box></geometry></collision></link></model></world><world name='x'/></sdf>"""
     (folder / "two.sdf").write_text(sdf)

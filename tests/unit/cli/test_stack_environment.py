@@ -1,4 +1,4 @@
-"""An external stack meets the environment that its user called simscen with; what keeps it from starting is shown."""
+"""Environment of external stacks, and errors of their start."""
 
 import json
 import os
@@ -49,7 +49,7 @@ def program(folder: Path, text: str, name: str = "nav") -> Path:
     return file
 
 
-def test_it_meets_the_environment_and_folder_of_its_user(run, tmp_path: Path, monkeypatch) -> None:
+def test_stack_gets_environment_and_folder_of_the_user(run, tmp_path: Path, monkeypatch) -> None:
     program(tmp_path, TELLS)
     given = {"ROS_DOMAIN_ID": "42", "LD_LIBRARY_PATH": "/opt/x", "PYTHONPATH": "/opt/y", "LINES_": "with\nlines"}
     for name, value in given.items():
@@ -65,14 +65,14 @@ def test_it_meets_the_environment_and_folder_of_its_user(run, tmp_path: Path, mo
     assert (tmp_path / "where.txt").read_text().strip() == str(tmp_path)
 
 
-def test_its_memory_is_bounded_as_its_user_says_and_not_as_an_engines_is(run, tmp_path: Path) -> None:
+def test_stack_has_the_memory_limit_of_the_user(run, tmp_path: Path) -> None:
     program(tmp_path, TELLS)
     run("./nav")
     own = subprocess.run(["sh", "-c", "ulimit -H -v"], capture_output=True, text=True, check=True).stdout
     assert (tmp_path / "memory.txt").read_text() == own
 
 
-def test_a_python_stack_finds_what_pythonpath_offers_and_the_engine_does_not(run, tmp_path: Path, monkeypatch) -> None:
+def test_pythonpath_applies_to_the_stack_only(run, tmp_path: Path, monkeypatch) -> None:
     (tmp_path / "lib").mkdir()
     (tmp_path / "lib/helper_of_mine.py").write_text("SPEED = 0.1\n")
     (tmp_path / "lib/numpy.py").write_text("raise RuntimeError('a numpy of the user')\n")
@@ -86,7 +86,7 @@ def test_a_python_stack_finds_what_pythonpath_offers_and_the_engine_does_not(run
     assert ended.code == 0, ended.out
 
 
-def test_nothing_of_the_environment_is_in_what_a_session_leaves(run, tmp_path: Path, monkeypatch) -> None:
+def test_output_contains_no_environment_variables(run, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("MY_TOKEN", "s3cr3t-of-the-user")
     (tmp_path / "helper_of_mine.py").write_text("SPEED = 0.1\n")
     (tmp_path / "nav.py").write_text(DRIVES)
@@ -100,22 +100,22 @@ def test_nothing_of_the_environment_is_in_what_a_session_leaves(run, tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("first", "told"),
+    ("first", "expected_text"),
     [
         ("#!/no/such/python3", "`./nav` starts with `#!/no/such/python3`, which does not exist"),
         ("#!/bin/sh\r", "the first line of `./nav` has a Windows line end; save the file with Unix line ends"),
         ("#! ", "the first line of `./nav` names no interpreter"),
     ],
 )
-def test_a_script_whose_interpreter_is_not_there_is_told_before_anything_runs(run, tmp_path, first, told) -> None:
+def test_missing_interpreter_is_reported_before_any_run(run, tmp_path, first, expected_text) -> None:
     """The kernel would say "no such file or directory" of the script, which is there."""
     program(tmp_path, f"{first}\nexit 0\n")
     ended = run("./nav")
     assert ended.code == 2
-    assert told in ended.err
+    assert expected_text in ended.err
 
 
-def test_a_program_that_cannot_go_on_is_an_error_with_what_it_printed(run, simscen, tmp_path: Path) -> None:
+def test_crash_of_a_stack_is_an_error_with_its_output(run, simscen, tmp_path: Path) -> None:
     """Each of its own run only."""
     programs = {
         "text": ("hello\n", "cannot be started: Exec format error: neither a program for this machine nor a script"),
@@ -132,16 +132,16 @@ def test_a_program_that_cannot_go_on_is_an_error_with_what_it_printed(run, simsc
     listed = json.loads((tmp_path / "out/results.json").read_text())["runs"]
     errors = {run["stack_name"]: run["error"] for run in listed}
     assert errors.pop("ref") is None
-    for name, (_, told) in programs.items():
+    for name, (_, output) in programs.items():
         assert errors[name]["kind"] == "stack-crashed"
-        assert told in errors[name]["message"] + errors[name]["tail"]
-        assert told in ended.out
+        assert output in errors[name]["message"] + errors[name]["tail"]
+        assert output in ended.out
     assert "nothing to compare" in ended.out
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc to make a program with a library of its own")
-def test_a_library_that_is_missing_is_told_as_the_linker_does_and_found_where_its_user_says(run, tmp_path, monkeypatch):
+def test_missing_library_is_reported_and_found_in_ld_library_path(run, tmp_path, monkeypatch):
     (tmp_path / "lib").mkdir()
     (tmp_path / "it.c").write_text("int answer(void) { return 42; }\n")
     (tmp_path / "main.c").write_text("int answer(void); int main(void) { return answer(); }\n")
@@ -158,7 +158,7 @@ def test_a_library_that_is_missing_is_told_as_the_linker_does_and_found_where_it
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc to make a program with a linker of its own")
-def test_a_program_whose_dynamic_linker_is_not_there_says_so(run, tmp_path: Path) -> None:
+def test_missing_dynamic_linker_is_reported(run, tmp_path: Path) -> None:
     (tmp_path / "main.c").write_text("int main(void) { return 0; }\n")
     linker = "-Wl,--dynamic-linker=/no/such/ld.so"
     subprocess.run(["gcc", linker, "-o", str(tmp_path / "nav"), str(tmp_path / "main.c")], check=True)

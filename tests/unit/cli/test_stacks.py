@@ -1,4 +1,4 @@
-"""`--stack`: every selected scenario runs with each stack that is given, and everything tells them apart."""
+"""`--stack`: every selected scenario runs with every given stack."""
 
 import json
 import shlex
@@ -58,7 +58,7 @@ def runs(folder: Path) -> list[str]:
     return sorted(str(log.parent.relative_to(folder / "runs")) for log in folder.rglob("run.mcap"))
 
 
-def test_each_scenario_runs_with_each_stack_and_seed_in_a_folder_and_case_of_its_own(simscen, project: Path) -> None:
+def test_every_scenario_runs_with_every_stack_and_seed(simscen, project: Path) -> None:
     ended = simscen("run", ".", *BOTH, "--repeat", "2", "--out", "out")
     assert ended.code == 0, ended.err
     names = [f"{name}/seed-{seed}-{stack}" for name in "ab" for seed in (1, 2) for stack in ("dwb", "ref")]
@@ -76,7 +76,7 @@ def test_each_scenario_runs_with_each_stack_and_seed_in_a_folder_and_case_of_its
 
 
 @pytest.mark.slow
-def test_a_report_from_the_journal_compares_as_the_session_did(simscen, project: Path) -> None:
+def test_report_from_the_journal_has_the_same_comparison(simscen, project: Path) -> None:
     assert simscen("run", ".", *BOTH, "--repeat", "2", "--out", "out").code == 0
     before = {name: (project / "out" / name).read_bytes() for name in ("results.json", "junit.xml", "report.html")}
     assert b'"comparison"' in before["results.json"]
@@ -92,7 +92,7 @@ def test_a_report_from_the_journal_compares_as_the_session_did(simscen, project:
 
 
 @pytest.mark.slow
-def test_a_single_stack_needs_no_label_and_the_reference_is_what_runs_without(simscen, project: Path) -> None:
+def test_single_stack_has_no_label(simscen, project: Path) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "plain").code == 0
     ended = simscen("run", "a.scenario.yaml", "--stack", "mine=reference", "--out", "mine", "--check-against", "plain")
     assert ended.code == 0, ended.out
@@ -103,7 +103,7 @@ def test_a_single_stack_needs_no_label_and_the_reference_is_what_runs_without(si
 
 
 @pytest.mark.slow
-def test_the_command_that_repeats_a_run_repeats_it_with_its_stack(simscen, project: Path) -> None:
+def test_repeat_command_includes_the_stack(simscen, project: Path) -> None:
     simscen("run", "a.scenario.yaml", *BOTH, "--seed", "7", "--out", "out")
     listed = json.loads((project / "out/results.json").read_text())["runs"]
     again = next(run["again"] for run in listed if run["stack_name"] == "dwb")
@@ -114,14 +114,14 @@ def test_the_command_that_repeats_a_run_repeats_it_with_its_stack(simscen, proje
 
 
 @pytest.mark.slow
-def test_a_run_that_is_repeated_agrees_with_the_one_of_several_stacks(simscen, project: Path) -> None:
+def test_repeated_run_equals_the_run_with_several_stacks(simscen, project: Path) -> None:
     """The command that repeats it gives one stack, which needs no label."""
     assert simscen("run", "a.scenario.yaml", *BOTH, "--out", "out").code == 0
     ended = simscen("run", "a.scenario.yaml", "--stack", "dwb=dwb.stack.yaml", "--check-against", "out")
     assert ended.code == 0, ended.out
 
 
-def test_a_log_says_which_stack_it_is_of_so_that_it_is_judged_as_that(simscen, project: Path) -> None:
+def test_log_contains_the_name_of_its_stack(simscen, project: Path) -> None:
     assert simscen("run", "a.scenario.yaml", *BOTH, "--out", "out").code == 0
     judged = json.loads(simscen("judge", "out", "--json").out)
     assert sorted(run["stack_name"] for run in judged["runs"]) == ["dwb", "ref"]
@@ -129,7 +129,7 @@ def test_a_log_says_which_stack_it_is_of_so_that_it_is_judged_as_that(simscen, p
     assert facts["stack"] == "dwb=dwb.stack.yaml"
 
 
-def test_from_python_a_stack_is_given_as_on_the_command_line(project: Path) -> None:
+def test_python_interface_accepts_stacks(project: Path) -> None:
     run = simulate("a.scenario.yaml", stack="dwb=dwb.stack.yaml")
     assert run.passed
     assert run.result.again == "simscen run a.scenario.yaml --seed 1 --stack dwb=dwb.stack.yaml"
@@ -141,7 +141,7 @@ def test_from_python_a_stack_is_given_as_on_the_command_line(project: Path) -> N
     assert simulate("a.scenario.yaml", stack="dwb=dwb.stack.yaml").passed
 
 
-def test_a_type_of_stack_of_an_installed_package_is_a_stack(packages, simscen, project: Path) -> None:
+def test_installed_stack_type_is_a_valid_stack(packages, simscen, project: Path) -> None:
     packages("tame", "1.0", {"stack": {"tame": "tame:Tame"}}, tame=TAME)
     ended = simscen("run", "a.scenario.yaml", "--stack", "t=tame", "--stack", "ref=reference", "--out", "out")
     assert ended.code == 0, ended.out + ended.err
@@ -150,14 +150,14 @@ def test_a_type_of_stack_of_an_installed_package_is_a_stack(packages, simscen, p
     assert "did you mean `tame`" in simscen("validate", ".", "--stack", "tam").err
 
 
-def test_equal_runs_are_checked_for_each_stack_by_itself(simscen, project: Path) -> None:
+def test_determinism_is_checked_for_each_stack(simscen, project: Path) -> None:
     ended = simscen("run", "a.scenario.yaml", *BOTH, "--check-determinism", "--out", "out")
     assert ended.code == 0, ended.out
     assert runs(project / "out") == [f"a/seed-1-{stack}" for stack in ("dwb", "dwb.again", "ref", "ref.again")]
 
 
 @pytest.mark.slow
-def test_resume_runs_what_a_changed_stack_file_asks_anew_and_keeps_the_other_stack(simscen, project: Path) -> None:
+def test_resume_repeats_runs_of_a_changed_stack_file_only(simscen, project: Path) -> None:
     def call(*options: str) -> None:
         """In a process of its own, since one holds the folder until it ends."""
         subprocess.run([*COMMAND, "run", "a.scenario.yaml", *BOTH, *options], check=True, capture_output=True)
@@ -175,7 +175,7 @@ def test_resume_runs_what_a_changed_stack_file_asks_anew_and_keeps_the_other_sta
 
 
 @pytest.mark.slow
-def test_keywords_and_shards_choose_scenarios_so_that_pairs_stay_whole(simscen, project: Path) -> None:
+def test_keywords_and_shards_keep_pairs_together(simscen, project: Path) -> None:
     assert simscen("run", ".", *BOTH, "--shard", "2/2", "--out", "shard").code == 0
     assert runs(project / "shard") == ["b/seed-1-dwb", "b/seed-1-ref"]
     assert simscen("run", ".", *BOTH, "-k", "a", "--out", "word").code == 0
@@ -184,7 +184,7 @@ def test_keywords_and_shards_choose_scenarios_so_that_pairs_stay_whole(simscen, 
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "expected_text"),
     [
         (("refrence",), "cannot read --stack refrence: expected NAME=VALUE"),
         (("a b=reference",), "cannot read --stack a b=reference: expected NAME=VALUE"),
@@ -196,15 +196,15 @@ def test_keywords_and_shards_choose_scenarios_so_that_pairs_stay_whole(simscen, 
         (("a=bad.stack.yaml",), "bad.stack.yaml:2:9: error[SC012] unknown key `controler` in `stack`"),
     ],
 )
-def test_what_cannot_be_a_stack_is_told_before_anything_runs(simscen, project: Path, given, told: str) -> None:
+def test_invalid_stack_is_reported_before_any_run(simscen, project: Path, given, expected_text: str) -> None:
     (project / "bad.stack.yaml").write_text("simscen: 1\nstack: {controler: {}}\n")
     ended = simscen("run", ".", *(word for text in given for word in ("--stack", text)))
     assert ended.code == 2
-    assert told in ended.err
+    assert expected_text in ended.err
     assert not (project / "simscen-out").exists()
 
 
-def test_stack_files_are_validated_like_any_other(simscen, project: Path) -> None:
+def test_stack_files_are_validated(simscen, project: Path) -> None:
     (project / "bad.stack.yaml").write_text("simscen: 1\nstack: {controler: {}}\n")
     ended = simscen("validate", ".")
     assert ended.code == 2
@@ -213,7 +213,7 @@ def test_stack_files_are_validated_like_any_other(simscen, project: Path) -> Non
     assert simscen("validate", ".").out == "2 scenarios and 1 stack are valid\n"
 
 
-def test_the_schema_of_a_stack_file_is_for_editors(simscen, project: Path) -> None:
+def test_schema_of_stack_files_is_written(simscen, project: Path) -> None:
     schema = json.loads(simscen("schema", "stack").out)
     assert schema["title"] == "simscen stack"
     assert "keepout" not in schema["$defs"]["StackSpec"]["properties"]

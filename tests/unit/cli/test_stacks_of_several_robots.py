@@ -1,4 +1,4 @@
-"""What --stack means for a scenario of several robots: each one's stack, or what the name of one of them runs."""
+"""`--stack` for scenarios with several robots."""
 
 from pathlib import Path
 
@@ -61,14 +61,14 @@ def runs(scenario) -> dict[str, str]:
     }
 
 
-def test_a_command_under_the_name_of_one_robots_stack_runs_that_alone(project: Path) -> None:
+def test_command_for_the_stack_name_of_one_robot_drives_only_that_robot(project: Path) -> None:
     (one,) = loaded("mixed", "mine=./nav --mine")
     assert runs(one) == {"a": "./nav --mine", "b": "StackSpec", "c": "./nav --other"}
     assert one.stack == "mine=./nav --mine"
     assert one.robots["b"].spec.stack.controller.type == "dwb"
 
 
-def test_any_other_stack_takes_the_place_of_that_of_every_robot(project: Path) -> None:
+def test_other_stack_replaces_the_stacks_of_all_robots(project: Path) -> None:
     (one,) = loaded("mixed", "v2=./nav --v2")
     assert runs(one) == dict.fromkeys("abc", "./nav --v2")
     assert one.robots["a"].spec.stack.controller_frequency == 10.0
@@ -81,7 +81,7 @@ def test_any_other_stack_takes_the_place_of_that_of_every_robot(project: Path) -
     assert {view.spec.stack.controller.type for view in one.robots.values()} == {"mppi"}
 
 
-def test_the_stack_of_all_is_that_of_each_robot_which_says_nothing_else(project: Path) -> None:
+def test_stack_of_the_scenario_applies_to_robots_without_their_own(project: Path) -> None:
     (one,) = loaded("all", "mine=./nav")
     assert runs(one) == {"a": "./nav", "b": "./nav", "c": "StackSpec"}
     assert one.robots["b"].spec.stack.controller_frequency == 10.0
@@ -89,7 +89,7 @@ def test_the_stack_of_all_is_that_of_each_robot_which_says_nothing_else(project:
     assert runs(one) == dict.fromkeys("abc", "StackSpec")
 
 
-def test_what_a_run_keeps_of_the_scenario_has_the_stacks_that_drove(project: Path) -> None:
+def test_recorded_scenario_contains_the_used_stacks(project: Path) -> None:
     for name, given in (("mixed", "v2=./nav"), ("all", "reference")):
         (one,) = loaded(name, given)
         kept = spec_of_text(resolved_text(one), "kept")
@@ -99,7 +99,7 @@ def test_what_a_run_keeps_of_the_scenario_has_the_stacks_that_drove(project: Pat
             assert own == view.spec.stack
 
 
-def test_a_name_that_nobody_defines_is_told_at_each_robot_that_has_it(simscen, project: Path) -> None:
+def test_undefined_name_is_reported_for_each_robot(simscen, project: Path) -> None:
     ended = simscen("run", "mixed.scenario.yaml")
     assert ended.code == 2
     assert "mixed.scenario.yaml:6:45: error[SC060] the external stack `mine` has no command" in ended.err
@@ -108,7 +108,7 @@ def test_a_name_that_nobody_defines_is_told_at_each_robot_that_has_it(simscen, p
     assert simscen("validate", ".").out.count("warning[SC060]") == 2
 
 
-def test_two_names_of_one_scenario_on_one_command_line_would_each_be_a_run_and_are_refused(simscen, project) -> None:
+def test_two_stack_names_of_one_scenario_are_rejected(simscen, project) -> None:
     ended = simscen("run", "mixed.scenario.yaml", "--stack", "mine=./nav", "--stack", "other=./nav")
     assert ended.code == 2
     assert (
@@ -118,12 +118,12 @@ def test_two_names_of_one_scenario_on_one_command_line_would_each_be_a_run_and_a
     assert "home/simscen/config.yaml" in ended.err
 
 
-def test_robots_that_are_no_robots_are_told_whatever_the_stack(simscen, project: Path) -> None:
+def test_invalid_robots_are_reported_with_any_stack(simscen, project: Path) -> None:
     (project / "bad.scenario.yaml").write_text(HEAD + "robots: {a: 3, b: {pose: {x: 1, y: 1}}}\n")
     assert "bad.scenario.yaml:5:13: error" in simscen("validate", "bad.scenario.yaml", "--stack", "v2=./nav").out
 
 
-def test_a_variation_of_what_another_stack_replaces_changes_nothing_and_is_told(simscen, project: Path) -> None:
+def test_variation_of_a_replaced_stack_is_reported(simscen, project: Path) -> None:
     kept, replaced = "robots.a.stack.controller_frequency: [5 Hz, 20 Hz]", "robots.c.stack.external: [third, fourth]"
     for path, lost in ((kept, False), (replaced, True)):
         (project / "varied.scenario.yaml").write_text(MIXED + f"variations: {{grid: {{{path}}}}}\n")
@@ -131,7 +131,7 @@ def test_a_variation_of_what_another_stack_replaces_changes_nothing_and_is_told(
         assert ("SC055" in ended.out, ended.code) == (lost, 2 if lost else 0), ended.out
 
 
-def test_the_digest_has_what_each_robots_stack_runs(project: Path) -> None:
+def test_digest_includes_the_stack_of_each_robot(project: Path) -> None:
     before = scenario_digest(loaded("mixed", "mine=./nav")[0])
     assert scenario_digest(loaded("mixed", "mine=./nav")[0]) == before
     assert scenario_digest(loaded("mixed", "mine=./nav 2")[0]) != before
@@ -139,5 +139,5 @@ def test_the_digest_has_what_each_robots_stack_runs(project: Path) -> None:
     assert scenario_digest(loaded("mixed", "mine=./nav")[0]) != before
 
 
-def test_a_list_names_the_stacks_that_robots_have(simscen, project: Path) -> None:
+def test_list_shows_the_stacks_of_robots(simscen, project: Path) -> None:
     assert "(stacks mine, other)" in simscen("list", ".").out

@@ -1,4 +1,4 @@
-"""The installed command, in a process of its own."""
+"""The installed command in its own process."""
 
 import os
 import subprocess
@@ -26,7 +26,7 @@ HEAVY = [
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize(
-    ("arguments", "code", "told"),
+    ("arguments", "code", "expected_text"),
     [
         (("validate", "good.scenario.yaml"), 0, "1 scenario is valid"),
         (("validate", "bad.scenario.yaml"), 2, "unknown key `pose2`"),
@@ -39,16 +39,16 @@ HEAVY = [
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
 )
-def test_it_prints_everything_and_ends_with_the_code_of_the_command(simscen, arguments, code: int, told: str) -> None:
+def test_output_and_exit_code_of_the_command_are_complete(simscen, arguments, code: int, expected_text: str) -> None:
     good = Path("good.scenario.yaml").read_text()
     Path("bad.scenario.yaml").write_text(good.replace("goals: [{pose:", "goals: [{pose2:"))
     done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, check=False)
     assert done.returncode == code, done.stderr
-    assert told in done.stdout + done.stderr
+    assert expected_text in done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_a_reader_that_is_gone_is_no_error_worth_a_word(simscen, unbuffered: str) -> None:
+def test_closed_pipe_prints_no_error(simscen, unbuffered: str) -> None:
     env = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
     process = subprocess.Popen(
         [*COMMAND, "list", "."], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env
@@ -60,7 +60,7 @@ def test_a_reader_that_is_gone_is_no_error_worth_a_word(simscen, unbuffered: str
     assert process.wait() == 3
 
 
-def test_an_own_world_of_simple_shapes_is_validated_without_numpy_or_any_engine(simscen) -> None:
+def test_simple_world_is_validated_without_numpy_and_engines(simscen) -> None:
     probe = f"import os, sys; os._exit = lambda code: print('imported:', *set(sys.modules) & set({HEAVY}));"
     done = subprocess.run(
         [*COMMAND[:2], probe + COMMAND[2], "validate", "good.scenario.yaml"], capture_output=True, text=True, check=True

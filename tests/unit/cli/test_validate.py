@@ -12,7 +12,7 @@ def test_valid_files_are_counted_by_kind(simscen, tmp_path: Path) -> None:
     assert ended == (0, "1 world and 1 scenario are valid\n", "")
 
 
-def test_one_is_singular(simscen) -> None:
+def test_count_of_one_file_is_singular(simscen) -> None:
     assert simscen("validate", "good.scenario.yaml").out == "1 scenario is valid\n"
 
 
@@ -34,18 +34,18 @@ def test_every_problem_is_shown_with_its_line(simscen, tmp_path: Path) -> None:
     )
 
 
-def test_machines_get_json(simscen, tmp_path: Path) -> None:
+def test_json_is_printed(simscen, tmp_path: Path) -> None:
     (tmp_path / "bad.scenario.yaml").write_text(BAD)
     ended = simscen("validate", ".", "--format", "json")
-    told = json.loads(ended.out)
-    assert (ended.code, told["valid"], told["files"]) == (2, False, 2)
-    assert told["problems"][0] == {
+    output = json.loads(ended.out)
+    assert (ended.code, output["valid"], output["files"]) == (2, False, 2)
+    assert output["problems"][0] == {
         "path": "bad.scenario.yaml", "line": 2, "col": 1, "code": "SC012", "severity": "error",
         "message": "unknown key `wrold`", "hint": "did you mean `world`?",
     }  # fmt: skip
 
 
-def test_github_gets_annotations(simscen, tmp_path: Path) -> None:
+def test_github_annotations_are_printed(simscen, tmp_path: Path) -> None:
     (tmp_path / "bad.scenario.yaml").write_text(BAD)
     first = simscen("validate", ".", "--format", "github").out.splitlines()[0]
     assert first == (
@@ -53,7 +53,7 @@ def test_github_gets_annotations(simscen, tmp_path: Path) -> None:
     )
 
 
-def test_a_goal_in_a_wall_is_found_without_running(simscen, tmp_path: Path) -> None:
+def test_goal_in_a_wall_is_found_without_a_run(simscen, tmp_path: Path) -> None:
     good = (tmp_path / "good.scenario.yaml").read_text()
     (tmp_path / "bad.scenario.yaml").write_text(good.replace("x: 5, y: 3", "x: 3, y: 2"))
     ended = simscen("validate", "bad.scenario.yaml")
@@ -62,23 +62,23 @@ def test_a_goal_in_a_wall_is_found_without_running(simscen, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("argument", "code", "told"),
+    ("argument", "code", "expected_text"),
     [
         ("nowhere", 2, "nowhere: error[SC001] no such file or directory"),
         ("x" * 5000, 2, "the name is too long"),
         ("empty", 5, "no scenarios found in `empty`"),
     ],
 )
-def test_arguments_that_mean_nothing_are_told(simscen, tmp_path: Path, argument: str, code: int, told: str) -> None:
+def test_invalid_arguments_are_errors(simscen, tmp_path: Path, argument: str, code: int, expected_text: str) -> None:
     (tmp_path / "empty").mkdir()
     ended = simscen("validate", argument)
     assert ended.code == code
-    assert told in ended.err
+    assert expected_text in ended.err
     assert "Traceback" not in ended.err
 
 
 @pytest.mark.parametrize("name", ["[/red]", "::error::x", "##[error]x", "]]><script>", "a\nb"])
-def test_no_name_of_a_file_is_obeyed(simscen, tmp_path: Path, name: str) -> None:
+def test_control_sequences_in_file_names_are_escaped(simscen, tmp_path: Path, name: str) -> None:
     file = tmp_path / f"{name.replace('/', '-')}.scenario.yaml"
     file.write_text("simscen: 1\n::set-output name=x:: 1\n")
     for kind in ("text", "github"):
@@ -88,7 +88,7 @@ def test_no_name_of_a_file_is_obeyed(simscen, tmp_path: Path, name: str) -> None
         assert "##[" not in out
 
 
-def test_a_flood_of_problems_is_cut(simscen, tmp_path: Path) -> None:
+def test_number_of_printed_problems_is_limited(simscen, tmp_path: Path) -> None:
     keys = "".join(f"k{i}: 1\n" for i in range(80))
     (tmp_path / "bad.scenario.yaml").write_text("simscen: 1\n" + keys)
     ended = simscen("validate", "bad.scenario.yaml")
@@ -99,7 +99,7 @@ def test_a_flood_of_problems_is_cut(simscen, tmp_path: Path) -> None:
 SEALED = "{points: [[4, 0], [4, 4]], name: partition}, "
 
 
-def test_what_geometry_finds_is_drawn_on_request(simscen, tmp_path: Path) -> None:
+def test_geometric_problems_are_drawn_on_request(simscen, tmp_path: Path) -> None:
     good = (tmp_path / "good.scenario.yaml").read_text()
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub/bad.scenario.yaml").write_text(good.replace("walls: [", f"walls: [{SEALED}"))
@@ -108,7 +108,7 @@ def test_what_geometry_finds_is_drawn_on_request(simscen, tmp_path: Path) -> Non
     assert [path.name for path in (tmp_path / "pictures").rglob("*.png")] == ["bad.png"]
 
 
-def test_a_picture_that_cannot_be_written_is_told(simscen, tmp_path: Path) -> None:
+def test_unwritable_picture_is_an_error(simscen, tmp_path: Path) -> None:
     good = (tmp_path / "good.scenario.yaml").read_text()
     (tmp_path / "bad.scenario.yaml").write_text(good.replace("walls: [", f"walls: [{SEALED}"))
     (tmp_path / "file").write_text("")
@@ -116,7 +116,7 @@ def test_a_picture_that_cannot_be_written_is_told(simscen, tmp_path: Path) -> No
     assert (ended.code, "cannot write the picture file/bad.png" in ended.err) == (2, True)
 
 
-def test_fast_leaves_the_geometry_out_and_nothing_else(simscen, tmp_path: Path) -> None:
+def test_fast_skips_only_geometric_checks(simscen, tmp_path: Path) -> None:
     good = (tmp_path / "good.scenario.yaml").read_text()
     (tmp_path / "sealed.scenario.yaml").write_text(good.replace("walls: [", f"walls: [{SEALED}"))
     assert simscen("validate", "sealed.scenario.yaml").code == 2
@@ -127,7 +127,7 @@ def test_fast_leaves_the_geometry_out_and_nothing_else(simscen, tmp_path: Path) 
     assert "can never happen" in simscen("validate", "late.scenario.yaml", "--fast").out
 
 
-def test_a_base_is_called_one_and_checked_for_what_it_says(simscen, tmp_path: Path) -> None:
+def test_base_file_is_counted_and_checked(simscen, tmp_path: Path) -> None:
     (tmp_path / "aisle.base.yaml").write_text("robot: {model: amr}\npass: [{collisions: {max: 0}}]\n")
     (tmp_path / "defaults.yaml").write_text("tags: [smoke]\n")
     assert simscen("validate", "aisle.base.yaml", "defaults.yaml") == (0, "2 bases are valid\n", "")
@@ -153,7 +153,7 @@ places: {up: {x: 1, y: 2}, shelf: {x: 6, y: 2}}
      ("ramps: []", ["up", "shelf"])],
     ids=["a ramp leads up", "nothing does"],
 )  # fmt: skip
-def test_a_place_may_be_on_what_a_ramp_leads_to(simscen, tmp_path: Path, ramps: str, inside: list[str]) -> None:
+def test_place_can_be_on_a_platform_behind_a_ramp(simscen, tmp_path: Path, ramps: str, inside: list[str]) -> None:
     (tmp_path / "dock.world.yaml").write_text(DOCK.replace("RAMP", ramps))
     ended = simscen("validate", "dock.world.yaml")
     assert [name for name in ("up", "shelf") if f"place `{name}` is inside obstacle" in ended.out] == inside

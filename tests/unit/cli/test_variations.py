@@ -1,4 +1,4 @@
-"""`variations:`: each is a run of its own, and everything tells them apart."""
+"""`variations`: each is a separate run in all reports."""
 
 import json
 import shlex
@@ -39,7 +39,7 @@ def results(folder: Path) -> list[dict[str, object]]:
     return found
 
 
-def test_each_variation_runs_with_each_seed_in_a_folder_and_a_case_of_its_own(simscen, project: Path) -> None:
+def test_every_variation_runs_with_every_seed(simscen, project: Path) -> None:
     ended = simscen("run", ".", "--repeat", "2", "--out", "out")
     assert ended.code == 0, ended.err
     assert ended.out.startswith("simscen")
@@ -61,7 +61,7 @@ def test_each_variation_runs_with_each_seed_in_a_folder_and_a_case_of_its_own(si
 
 
 @pytest.mark.slow
-def test_the_command_that_repeats_a_run_repeats_exactly_that_one(simscen, project: Path) -> None:
+def test_repeat_command_repeats_one_variation(simscen, project: Path) -> None:
     simscen("run", ".", "--seed", "7", "-k", "x=50cm", "--out", "out")
     (run,) = results(project / "out")
     assert run["again"] == "simscen run a.scenario.yaml --seed 7 --variation x=50cm"
@@ -71,7 +71,7 @@ def test_the_command_that_repeats_a_run_repeats_exactly_that_one(simscen, projec
 
 
 @pytest.mark.slow
-def test_stacks_are_compared_variation_by_variation(simscen, project: Path) -> None:
+def test_stacks_are_compared_for_each_variation(simscen, project: Path) -> None:
     (project / "dwb.stack.yaml").write_text("simscen: 1\nstack: {controller: {type: dwb}}\n")
     both = ("--stack", "ref=reference", "--stack", "dwb=dwb.stack.yaml")
     ended = simscen("run", ".", *both, "-k", "x=1 or x=2", "--check-determinism", "--out", "out")
@@ -84,7 +84,7 @@ def test_stacks_are_compared_variation_by_variation(simscen, project: Path) -> N
 
 
 @pytest.mark.slow
-def test_a_session_goes_on_with_the_variations_that_it_lacks(simscen, project: Path) -> None:
+def test_resume_runs_missing_variations(simscen, project: Path) -> None:
     subprocess.run([*COMMAND, "run", ".", "--variation", "x=1", "--out", "out"], check=True, capture_output=True)
     before = (project / "out/runs/a/seed-1-x=1/run.mcap").stat().st_mtime_ns
     assert simscen("run", ".", "--resume", "out").code == 0
@@ -92,19 +92,19 @@ def test_a_session_goes_on_with_the_variations_that_it_lacks(simscen, project: P
     assert [run["variation"] for run in results(project / "out")] == NAMES
 
 
-def test_shards_and_lists_are_of_variations(simscen, project: Path) -> None:
+def test_shards_and_lists_contain_variations(simscen, project: Path) -> None:
     assert simscen("list", ".").out.split() == [f"a[{name}]" for name in NAMES]
     shards = [simscen("run", ".", "--shard", f"{k}/3", "--out", f"out{k}").out for k in (1, 2, 3)]
     assert [name for text in shards for name in NAMES if f"a[{name}]" in text] == NAMES
 
 
-def test_a_variation_that_is_not_there_is_told_with_those_that_are(simscen, project: Path) -> None:
+def test_unknown_variation_is_an_error_with_the_known_ones(simscen, project: Path) -> None:
     ended = simscen("run", ".", "--variation", "x=51cm")
     assert ended.code == 5
     assert "no variation is called `x=51cm`; did you mean `x=50cm`?" in ended.err
 
 
-def test_a_value_that_geometry_refuses_is_told_with_its_variation(simscen, project: Path) -> None:
+def test_geometric_problem_names_its_variation(simscen, project: Path) -> None:
     (project / "a.scenario.yaml").write_text(SHORT.replace("50 cm", "5.95"))
     ended = simscen("validate", ".")
     assert ended.code == 2
@@ -113,7 +113,7 @@ def test_a_value_that_geometry_refuses_is_told_with_its_variation(simscen, proje
     assert simscen("run", ".", "--variation", "x=1").code == 2
 
 
-def test_a_value_for_a_stack_that_another_takes_the_place_of_is_no_run_of_that_name(simscen, project: Path) -> None:
+def test_variation_of_a_replaced_stack_is_rejected(simscen, project: Path) -> None:
     grid = "{grid: {stack.controller.desired_linear_vel: [0.1, 0.2]}}"
     (project / "a.scenario.yaml").write_text(SHORT.replace("{grid: {robot.pose.x: [1, 2, 50 cm]}}", grid))
     ended = simscen("run", ".", "--stack", "mine=/bin/true")
@@ -121,7 +121,7 @@ def test_a_value_for_a_stack_that_another_takes_the_place_of_is_no_run_of_that_n
     assert "`stack.controller.desired_linear_vel` changes nothing with --stack mine=/bin/true" in ended.err
 
 
-def test_from_python_variations_are_listed_and_run_by_name(project: Path) -> None:
+def test_python_interface_lists_and_runs_variations(project: Path) -> None:
     assert package.variations("a.scenario.yaml") == NAMES
     run = package.simulate("a.scenario.yaml", variation="x=2")
     assert run.result.key.variation == "x=2"

@@ -1,4 +1,4 @@
-"""Worlds inspected, exported and converted from the command line."""
+"""`simscen world`: inspect, export, and convert."""
 
 import json
 from pathlib import Path
@@ -30,7 +30,7 @@ def room(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_inspect_tells_what_there_is(simscen, room: Path) -> None:
+def test_inspect_prints_the_content(simscen, room: Path) -> None:
     ended = simscen("world", "inspect", "room.world.yaml")
     assert ended.code == 0
     assert "  bounds    x -0.05 … 6.05 m, y -0.05 … 4.05 m (6.10 x 4.10 m)\n" in ended.out
@@ -40,27 +40,27 @@ def test_inspect_tells_what_there_is(simscen, room: Path) -> None:
     assert ended.out.endswith("  places    dock\n  regions   bay\n")
 
 
-def test_inspect_draws_the_cut_with_the_map_over_it(simscen, room: Path) -> None:
+def test_inspect_draws_cross_section_and_map(simscen, room: Path) -> None:
     assert simscen("world", "inspect", "room.world.yaml", "--png", "new/room.png").code == 0
     with Image.open(room / "new/room.png") as picture:
         assert max(picture.size) == 1200
         assert len(picture.getcolors(1 << 20)) > 3
 
 
-def test_machines_get_json(simscen, room: Path) -> None:
-    told = json.loads(simscen("world", "inspect", "room.world.yaml", "--json").out)
-    assert [body["name"] for body in told["bodies"]] == ["cart"]
-    assert told["map_resolution"] == 0.05
+def test_json_is_printed(simscen, room: Path) -> None:
+    output = json.loads(simscen("world", "inspect", "room.world.yaml", "--json").out)
+    assert [body["name"] for body in output["bodies"]] == ["cart"]
+    assert output["map_resolution"] == 0.05
 
 
-def test_long_lists_are_cut_unless_everything_is_wanted(simscen, room: Path) -> None:
+def test_long_lists_are_cut_without_all(simscen, room: Path) -> None:
     posts = ", ".join(f"{{name: post, box: [0.1, 0.1, 1], pose: {{x: {x}, y: 0}}}}" for x in range(30))
     (room / "many.world.yaml").write_text(f"simscen: 1\nobstacles: [{posts}]\n")
     assert "… and 10 more (--all lists them)" in simscen("world", "inspect", "many.world.yaml").out
     assert simscen("world", "inspect", "many.world.yaml", "--all").out.count("post") == 30
 
 
-def test_what_the_importer_notes_is_told(simscen, room: Path) -> None:
+def test_notes_of_the_importer_are_printed(simscen, room: Path) -> None:
     (room / "shop.sdf").write_text(SDF.format(more="<include><uri>model://nowhere</uri></include>"))
     strict = simscen("world", "inspect", "shop.sdf")
     assert strict.code == 2
@@ -70,7 +70,7 @@ def test_what_the_importer_notes_is_told(simscen, room: Path) -> None:
     assert "shop.sdf: warning[SC311] world[shop]/include/uri: skipped: model://nowhere" in lenient.out
 
 
-def test_an_exported_map_reads_back_as_what_a_lidar_would_have_mapped(simscen, room: Path) -> None:
+def test_exported_map_equals_the_map_of_a_lidar(simscen, room: Path) -> None:
     ended = simscen("world", "export", "room.world.yaml", "--map", "maps/room.yaml")
     assert (ended.code, ended.out) == (0, "maps/room.yaml: 162 x 122 cells of 0.05 m\n")
     loaded = load_world_file(room / "maps/room.yaml", room).map
@@ -80,7 +80,7 @@ def test_an_exported_map_reads_back_as_what_a_lidar_would_have_mapped(simscen, r
     assert grid.values_at(points).tolist() == [OCCUPIED, FREE, OCCUPIED, FREE]
 
 
-def test_a_converted_world_says_what_has_changed(simscen, room: Path) -> None:
+def test_changes_of_a_converted_world_are_printed(simscen, room: Path) -> None:
     (room / "shop.sdf").write_text(SDF.format(more=""))
     ended = simscen("world", "convert", "shop.sdf", "shop.world.yaml")
     assert (ended.code, ended.out) == (
@@ -91,13 +91,13 @@ def test_a_converted_world_says_what_has_changed(simscen, room: Path) -> None:
     assert simscen("validate", "shop.world.yaml").code == 0
 
 
-def test_a_world_of_our_own_stays_as_it_is_but_for_its_comments(simscen, room: Path) -> None:
+def test_world_file_is_converted_without_changes(simscen, room: Path) -> None:
     assert simscen("world", "convert", "room.world.yaml", "sub/copy.world.yaml").code == 0
     before, after = (load_world_file(room / name, room).spec for name in ("room.world.yaml", "sub/copy.world.yaml"))
     assert after == before
 
 
-def test_a_ros_map_stays_a_file_of_its_own(simscen, room: Path) -> None:
+def test_ros_map_stays_a_separate_file(simscen, room: Path) -> None:
     simscen("world", "export", "room.world.yaml", "--map", "maps/room.yaml")
     assert simscen("world", "convert", "maps/room.yaml", "worlds/from_map.world.yaml").code == 0
     converted = load_world_file(room / "worlds/from_map.world.yaml", room)
@@ -105,7 +105,7 @@ def test_a_ros_map_stays_a_file_of_its_own(simscen, room: Path) -> None:
     assert converted.map.path == room / "maps/room.yaml"
 
 
-def test_a_world_too_large_for_one_file_is_told(simscen, room: Path) -> None:
+def test_world_too_large_for_a_file_is_an_error(simscen, room: Path) -> None:
     box = "<collision name='c{}'><geometry><box><size>1 1 1</size></box></geometry></collision>"
     boxes = "".join(box.format(number) for number in range(10_001))
     model = f"<model name='x'><static>1</static><pose>0 0 1 0 0 0</pose><link name='l'>{boxes}</link></model>"
@@ -120,7 +120,7 @@ def test_a_world_too_large_for_one_file_is_told(simscen, room: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "expected_text"),
     [
         (("inspect", "nowhere.world.yaml"), "no such file or directory"),
         (("inspect", "."), "not a regular file"),
@@ -129,7 +129,7 @@ def test_a_world_too_large_for_one_file_is_told(simscen, room: Path) -> None:
         (("convert", "room.world.yaml", "room.world.yaml/x"), "cannot write room.world.yaml/x"),
     ],
 )
-def test_what_cannot_be_done_is_told(simscen, room: Path, arguments, told) -> None:
+def test_impossible_conversions_are_errors(simscen, room: Path, arguments, expected_text) -> None:
     ended = simscen("world", *arguments)
     assert ended.code == 2
-    assert told in ended.err
+    assert expected_text in ended.err

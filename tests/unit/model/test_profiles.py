@@ -1,4 +1,4 @@
-"""Where a stack's parameters have their values from: what is said, then the profile, then our own defaults."""
+"""Parameters of a stack: given values, profile values, and defaults."""
 
 import pytest
 
@@ -43,35 +43,35 @@ def at(spec: object, path: str) -> object:
 
 
 @pytest.mark.parametrize("path", NAV2_PARAMS)
-def test_the_nav2_profile_has_nav2s_own_value(path: str) -> None:
+def test_nav2_profile_has_the_values_of_nav2(path: str) -> None:
     assert at(StackSpec(profile="nav2"), path) == NAV2_PARAMS[path]
 
 
-def test_what_is_said_wins_over_the_profile_and_the_profile_over_our_defaults() -> None:
+def test_given_parameters_override_the_profile_and_the_profile_overrides_defaults() -> None:
     spec = StackSpec(profile="nav2", collision_monitor={"min_points": 2}, controller={"type": "mppi", "vx_max": 1.0})
     assert (spec.collision_monitor.min_points, spec.collision_monitor.source_timeout) == (2, 1.0)
     assert (spec.controller.vx_max, spec.controller.batch_size) == (1.0, 2000)
     assert StackSpec().collision_monitor.source_timeout != 1.0
 
 
-def test_another_type_gets_the_profiles_values_for_that_type() -> None:
+def test_other_types_get_the_profile_values_of_their_type() -> None:
     spec = StackSpec(profile="nav2", controller={"type": "dwb"}, planner={"type": "smac_2d"}, localizer={"type": "ekf"})
     assert (spec.controller.type, spec.controller.max_vel_x, spec.controller.prune_distance) == ("dwb", 0.5, 2.0)
     assert (spec.planner.type, spec.planner.replanning, spec.planner.tolerance) == ("smac_2d", "rate", 0.125)
     assert spec.localizer == StackSpec(localizer={"type": "ekf"}).localizer
 
 
-def test_a_specification_that_is_made_already_stays_as_it_is() -> None:
-    told = GroundTruth(type="ground_truth")
-    assert StackSpec(profile="nav2", localizer=told).localizer is told
+def test_validated_specification_is_unchanged() -> None:
+    output = GroundTruth(type="ground_truth")
+    assert StackSpec(profile="nav2", localizer=output).localizer is output
 
 
-def test_without_a_profile_nothing_changes() -> None:
+def test_parameters_without_a_profile_are_unchanged() -> None:
     assert apply_profile({"controller": {"type": "dwb"}}) == {"controller": {"type": "dwb"}}
     assert StackSpec(profile="reference") == StackSpec()
 
 
-def test_nav2_values_build_the_reference_stack_and_any_advanced_parameter_the_advanced_one() -> None:
+def test_advanced_parameters_select_the_advanced_builder() -> None:
     assert StackSpec(profile="nav2").builder == REFERENCE_BUILDER
     assert StackSpec(profile="nav2", prediction={"enabled": True}).builder == ADVANCED_BUILDER
     assert StackSpec(profile="nav2", recovery={"clear_entirely": False}).builder == ADVANCED_BUILDER
@@ -79,7 +79,7 @@ def test_nav2_values_build_the_reference_stack_and_any_advanced_parameter_the_ad
     assert StackSpec(profile="advanced").builder == ADVANCED_BUILDER
 
 
-def test_advanced_chooses_the_advanced_components() -> None:
+def test_advanced_profile_selects_the_advanced_components() -> None:
     spec = StackSpec(profile="advanced")
     assert (spec.localizer.type, spec.planner.type, spec.planner.cautious) == (
         "scan_matching_amcl",
@@ -91,14 +91,14 @@ def test_advanced_chooses_the_advanced_components() -> None:
     assert (own.planner.type, own.planner.cautious, own.localizer.type) == ("navfn", True, "amcl")
 
 
-def test_mappings_are_merged_to_their_ends() -> None:
+def test_nested_mappings_are_merged() -> None:
     assert merge_parameters({"a": {"b": 1, "c": {"d": 2}}, "e": 3}, {"a": {"c": {"d": 4}}, "e": {"f": 5}}) == {
         "a": {"b": 1, "c": {"d": 4}},
         "e": {"f": 5},
     }
 
 
-def test_every_value_of_the_profile_is_one_that_somebody_could_write() -> None:
+def test_every_value_of_a_profile_is_valid() -> None:
     for section in ("localizer", "planner", "controller", "goal_checker"):
         for kind in NAV2[section]:
             assert at(StackSpec(profile="nav2", **{section: {"type": kind}}), f"{section}.type") == kind

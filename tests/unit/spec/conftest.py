@@ -1,4 +1,4 @@
-"""A module of somebody else, with a criterion that is one and some that are none."""
+"""Module of another package, with a valid criterion and invalid ones."""
 
 import pytest
 

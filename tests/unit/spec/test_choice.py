@@ -1,4 +1,4 @@
-"""A choice with what installed packages add to it."""
+"""Choices that installed packages extend."""
 
 import pickle
 from copy import deepcopy
@@ -11,17 +11,17 @@ from simscen.model.stack import StackSpec
 from simscen.spec.choice import installed_choices, with_installed_choices
 
 
-def test_a_name_that_a_package_adds_is_one_of_the_choices(calm) -> None:
+def test_name_of_an_installed_package_is_a_valid_choice(calm) -> None:
     entry = AnyCriterion.model_validate({"calm": {"max": "0.5 m/s"}, "severity": "warn"}, by_alias=True, by_name=False)
     assert isinstance(entry, AnyCriterion)
     assert (entry.kind, entry.severity, entry.chosen.max) == ("calm", "warn", 0.5)
     assert set(installed_choices(AnyCriterion)) == {"calm"}
 
 
-def test_without_the_package_it_is_an_unknown_key() -> None:
-    with pytest.raises(ValidationError) as told:
+def test_name_is_unknown_without_its_package() -> None:
+    with pytest.raises(ValidationError) as output:
         AnyCriterion.model_validate({"calm": {}})
-    assert "extra_forbidden" in {error["type"] for error in told.value.errors()}
+    assert "extra_forbidden" in {error["type"] for error in output.value.errors()}
     assert with_installed_choices(AnyCriterion) is AnyCriterion
 
 
@@ -34,24 +34,24 @@ def test_without_the_package_it_is_an_unknown_key() -> None:
         ({"calm": {}, "clam": {}}, ("clam",), "extra_forbidden"),
     ],
 )
-def test_a_mistake_in_it_is_told_where_it_is(calm, words, loc, kind) -> None:
-    with pytest.raises(ValidationError) as told:
+def test_error_in_an_installed_choice_has_its_location(calm, words, loc, kind) -> None:
+    with pytest.raises(ValidationError) as output:
         AnyCriterion.model_validate(words)
-    assert [(error["loc"], error["type"]) for error in told.value.errors()] == [(loc, kind)]
+    assert [(error["loc"], error["type"]) for error in output.value.errors()] == [(loc, kind)]
 
 
-def test_a_package_that_is_broken_is_a_problem_of_the_key_that_needs_it(packages) -> None:
+def test_broken_package_is_reported_at_the_key_that_uses_it(packages) -> None:
     packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm="import nowhere")
     assert AnyCriterion.model_validate({"collisions": {}}).kind == "collisions"
-    with pytest.raises(ValidationError) as told:
+    with pytest.raises(ValidationError) as output:
         AnyCriterion.model_validate({"calm": {}})
-    (error,) = told.value.errors()
+    (error,) = output.value.errors()
     assert error["loc"] == ("calm",)
     assert error["msg"].startswith("criterion `calm` of calm 1.0 cannot be used: `calm:Calm` cannot be loaded: ")
     assert installed_choices(AnyCriterion) == {}
 
 
-def test_it_survives_being_copied_and_sent_to_another_process(calm) -> None:
+def test_installed_choice_can_be_copied_and_pickled(calm) -> None:
     entry = AnyCriterion.model_validate({"calm": {"max": 2.0}})
     for again in (pickle.loads(pickle.dumps(entry)), deepcopy(entry), entry.model_copy()):
         assert again == entry
@@ -62,7 +62,7 @@ def test_it_survives_being_copied_and_sent_to_another_process(calm) -> None:
     ("kind", "choice", "before"),
     [("criterion", AnyCriterion, "Calm(Spec, Criterion)"), ("planner", StackSpec, "Calm(PlannerSpec)")],
 )
-def test_a_check_of_its_own_that_breaks_down_is_told_where_it_is_written(packages, kind, choice, before) -> None:
+def test_exception_in_a_validator_of_a_package_is_reported_at_its_key(packages, kind, choice, before) -> None:
     text = (
         "from typing import ClassVar, Literal\nfrom pydantic import model_validator\n"
         "from simscen.criteria.base import Criterion\nfrom simscen.model.planners import PlannerSpec\n"
@@ -73,8 +73,8 @@ def test_a_check_of_its_own_that_breaks_down_is_told_where_it_is_written(package
     )
     packages("calm", "1.0", {kind: {"calm": "calm:Calm"}}, calm=text)
     words = {"calm": {}} if kind == "criterion" else {"planner": {"type": "calm"}}
-    with pytest.raises(ValidationError) as told:
+    with pytest.raises(ValidationError) as output:
         choice.model_validate(words, by_alias=True, by_name=False)
-    (error,) = told.value.errors()
+    (error,) = output.value.errors()
     assert error["loc"] == (("calm",) if kind == "criterion" else ("planner",))
     assert "its validation raises KeyError: 'nothing'" in error["msg"]

@@ -19,7 +19,7 @@ class Site(Spec):
     number: int = 0
 
 
-def test_a_mapping_becomes_the_specification_and_a_specification_stays_itself():
+def test_mapping_is_validated_and_specification_is_returned_unchanged():
     site = Site.model_validate({"wall": {"points": [[0, 0], ["1 m", 0]]}})
     assert isinstance(site.wall, Wall)
     assert site.wall.points == [[0.0, 0.0], [1.0, 0.0]]
@@ -27,7 +27,7 @@ def test_a_mapping_becomes_the_specification_and_a_specification_stays_itself():
     assert Site.model_validate({}).wall is None
 
 
-def test_problems_are_told_at_their_places_together_with_those_around():
+def test_errors_in_lazy_fields_have_their_locations():
     with pytest.raises(ValidationError) as raised:
         Site.model_validate({"wall": {"points": [[0, 0], [1, "x"]], "color": 1}, "number": "one"})
     assert {error["loc"] for error in raised.value.errors()} == {
@@ -37,7 +37,7 @@ def test_problems_are_told_at_their_places_together_with_those_around():
     }
 
 
-def test_the_json_schema_is_that_of_a_field_imported_at_once():
+def test_json_schema_equals_that_of_an_eager_field():
     class Eager(Spec):
         wall: Wall | None = None
         number: int = 0
@@ -49,14 +49,14 @@ def test_the_json_schema_is_that_of_a_field_imported_at_once():
 
 
 @pytest.mark.parametrize("choice", [AnyCriterion, AnyAction, AnyFault, AnyTest])
-def test_every_choice_on_demand_is_there_and_is_what_its_list_promises(choice):
+def test_every_lazy_choice_exists_with_the_promised_type(choice):
     fields = [field for field in choice.model_fields.values() if any(isinstance(m, LazySpec) for m in field.metadata)]
     assert len(fields) >= 6
     for field in fields:
         assert issubclass(annotation_of(field), field.annotation.__args__[0])
 
 
-def test_what_no_file_uses_is_not_imported():
+def test_unused_choices_are_not_imported():
     code = (
         "import sys, simscen.model.scenario; print(*sorted(m for m in sys.modules if m.startswith('simscen.criteria')))"
     )
@@ -72,7 +72,7 @@ class Sites(Spec):
     walls: list[Annotated[Spec, LazySpec("simscen.model.world", "Wall")]]
 
 
-def test_an_item_of_a_list_is_the_specification_and_never_nothing():
+def test_list_items_are_validated_and_not_optional():
     assert isinstance(Sites.model_validate({"walls": [{"points": [[0, 0], [1, 0]]}]}).walls[0], Wall)
     with pytest.raises(ValidationError) as raised:
         Sites.model_validate({"walls": [None]})

@@ -1,4 +1,4 @@
-"""`through` and `keyframes` become the paths that they say."""
+"""Paths from `through` and `keyframes`."""
 
 import itertools
 import math
@@ -17,14 +17,14 @@ def path(here=HERE, **said):
     return Motion.model_validate(said).path(here)
 
 
-def test_waypoints_are_passed_at_the_speed():
+def test_waypoints_are_passed_at_the_given_speed():
     way = path(through=[[4, 0], [4, 2]], speed=2.0)
     assert way.times[-1] == 3.0
     assert [pose_at(way, t)[:2] for t in (1.0, 2.0, 2.5)] == [(2.0, 0.0), (4.0, 0.0), (4.0, 1.0)]
 
 
 @pytest.mark.parametrize("repeat", ["once", "loop", "back_and_forth"])
-def test_what_drives_through_waypoints_faces_where_it_drives_but_for_a_moment_around_a_corner(repeat):
+def test_heading_follows_the_path_except_briefly_at_corners(repeat):
     way = path(through=[[4, 0], [4, 4], [0, 4]], speed=1.0, repeat=repeat)
     corners = [0.0, 4.0, 8.0, 12.0, 16.0]
     for k in range(100 if repeat == "loop" else 120):
@@ -38,7 +38,7 @@ def test_what_drives_through_waypoints_faces_where_it_drives_but_for_a_moment_ar
     assert max(turns) < 0.02, "it never turns at once, also where a loop begins anew"
 
 
-def test_an_eased_way_keeps_below_its_speed_stands_at_each_waypoint_and_turns_there():
+def test_eased_motion_stops_and_turns_at_each_waypoint():
     way = path(through=[[3, 0], [3, 3]], speed=1.5, ease="smooth")
     assert way.times == pytest.approx((0.0, 3.0, 3.5, 6.5))
     assert top_speed(way) == pytest.approx(1.5)
@@ -47,24 +47,24 @@ def test_an_eased_way_keeps_below_its_speed_stands_at_each_waypoint_and_turns_th
     assert pose_at(way, 3.6).yaw == pytest.approx(math.pi / 2)
 
 
-def test_a_loop_of_waypoints_leads_back_to_where_it_began():
+def test_loop_of_waypoints_returns_to_its_start():
     way = path(through=[[4, 0], [4, 3]], speed=1.0, repeat="loop")
     assert way.times[-1] == 12.0
     assert pose_at(way, 11.999999)[:2] == pytest.approx((0.0, 0.0), abs=1e-5)
 
 
-def test_keyframes_with_units_are_where_they_say_when_they_say():
+def test_keyframes_with_units_have_the_given_poses_and_times():
     way = path(keyframes=[["500 ms", "200 cm", 1, "90 deg"], [2.0, 3.0, 1.0, 0.0]])
     assert pose_at(way, 0.0) == HERE, "it comes from where it is"
     assert pose_at(way, 0.5) == pytest.approx(Pose2(2.0, 1.0, math.pi / 2))
     assert pose_at(way, 9.0) == Pose2(3.0, 1.0, 0.0)
 
 
-def test_first_keyframe_at_zero_sets_it_there_at_once():
+def test_first_keyframe_at_zero_sets_the_start_pose():
     assert pose_at(path(keyframes=[[0, 2, 1, 0], [1, 3, 1, 0]]), 0.0) == Pose2(2.0, 1.0, 0.0)
 
 
-def test_a_full_turn_closes_a_loop():
+def test_full_turn_closes_a_loop():
     way = path(
         keyframes=[[0, 1, 1, 0], [1, 2, 1, "120 deg"], [2, 2, 2, "240 deg"], [3, 1, 1, "360 deg"]], repeat="loop"
     )
@@ -89,7 +89,7 @@ SLIPS = {
 }
 
 
-@pytest.mark.parametrize(("told", "said"), SLIPS.items(), ids=str)
-def test_what_is_no_motion_is_refused(told, said):
-    with pytest.raises(ValidationError, match=told):
+@pytest.mark.parametrize(("expected_text", "said"), SLIPS.items(), ids=str)
+def test_invalid_motions_are_rejected(expected_text, said):
+    with pytest.raises(ValidationError, match=expected_text):
         Motion.model_validate(said)

@@ -1,4 +1,4 @@
-"""A number may carry its unit, and a place may stand for its pose, wherever one is meant in any file."""
+"""Units and names of places are valid for all numbers and poses of all files."""
 
 import math
 import sys
@@ -111,7 +111,7 @@ def is_pose(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, PoseSpec)
 
 
-def test_every_number_with_a_dimension_takes_a_unit() -> None:
+def test_every_number_with_a_dimension_accepts_a_unit() -> None:
     assert {str(value) for value in _bare_numbers()} == set(PLAIN)
 
 
@@ -126,19 +126,19 @@ def test_every_number_with_a_dimension_takes_a_unit() -> None:
         (SkidSteer, "turning_scale", "150 %", 1.5),
     ],
 )
-def test_units_of_numbers_that_were_bare(model: type[BaseModel], key: str, written: str, meant: float) -> None:
+def test_numbers_accept_units(model: type[BaseModel], key: str, written: str, meant: float) -> None:
     taken = TypeAdapter(Annotated[(model.model_fields[key].annotation, *model.model_fields[key].metadata)])
     assert taken.validate_python(written, strict=True) == pytest.approx(meant)
     with pytest.raises(ValidationError):
         taken.validate_python("2 kg", strict=True)
 
 
-def test_a_whole_number_with_a_unit_stays_whole() -> None:
+def test_integer_with_a_unit_stays_an_integer() -> None:
     with pytest.raises(ValidationError, match="valid integer"):
         Physics.model_validate({"tick_rate": "240.5 Hz"})
 
 
-def test_a_place_may_stand_wherever_a_pose_or_a_point_of_the_world_is_meant() -> None:
+def test_names_of_places_are_valid_for_all_poses_and_points_of_the_world() -> None:
     found = list(_poses_and_points())
     without = {str(value) for value in found if not any(isinstance(mark, PlaceAllowed) for mark in value.marks)}
     assert without == set(NO_PLACES)

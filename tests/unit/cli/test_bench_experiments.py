@@ -1,4 +1,4 @@
-"""What `simscen bench nav` offers is found by the names of its experiments, before any of them is made."""
+"""Groups of experiments of `simscen bench nav`."""
 
 from pathlib import Path
 
@@ -19,19 +19,19 @@ MADE_QUICKLY = (
 HERE = ("BARN", "random goals", "degraded sensing", "tb3_sandbox", *MADE_QUICKLY)
 
 
-def test_there_are_these_offers(tmp_path: Path) -> None:
+def test_experiment_groups_are_listed_in_order(tmp_path: Path) -> None:
     assert {offer.name for offer in available_experiments(None, None, PROJECT, tmp_path, Sizes())} == set(HERE)
 
 
 @pytest.mark.parametrize("name", MADE_QUICKLY)
-def test_an_offer_knows_what_its_experiments_are_called(tmp_path: Path, name: str) -> None:
+def test_group_lists_the_names_of_its_experiments(tmp_path: Path, name: str) -> None:
     small = Sizes(seeds=1, fields=2, dynamic=1, goals=1, lost=1)
     (offer,) = (offer for offer in available_experiments(None, None, PROJECT, tmp_path, small) if offer.name == name)
     assert [made.name for made in offer.make()] == (list(offer.parts) or [name])
 
 
 @pytest.mark.slow
-def test_a_later_first_number_gives_other_drives_under_the_same_names(tmp_path: Path) -> None:
+def test_first_number_changes_drives_but_not_names(tmp_path: Path) -> None:
     def names(first: int) -> list[str]:
         small = Sizes(first, seeds=1, fields=2, dynamic=1, goals=1, lost=1)
         return [

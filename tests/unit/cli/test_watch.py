@@ -1,4 +1,4 @@
-"""Which scenarios `--watch` runs when a file is saved."""
+"""Scenarios that `--watch` runs after changes of files."""
 
 import io
 import json
@@ -36,13 +36,15 @@ def names(paths) -> str:
 
 
 @pytest.mark.parametrize(
-    ("saved", "told"), [("room.yaml", "a"), ("robot.yaml", "a b"), ("b.scenario.yaml", "b"), ("notes.txt", "")]
+    ("saved", "names_to_run"), [("room.yaml", "a"), ("robot.yaml", "a b"), ("b.scenario.yaml", "b"), ("notes.txt", "")]
 )
-def test_what_a_file_is_part_of_runs_again(watching: WatchState, files: Path, saved: str, told: str) -> None:
-    assert names(watching.scenarios_to_run({files / saved})) == told
+def test_scenarios_that_use_a_changed_file_run_again(
+    watching: WatchState, files: Path, saved: str, names_to_run: str
+) -> None:
+    assert names(watching.scenarios_to_run({files / saved})) == names_to_run
 
 
-def test_a_new_scenario_runs_and_a_removed_one_is_forgotten(watching: WatchState, files: Path) -> None:
+def test_new_scenario_runs_and_removed_one_is_dropped(watching: WatchState, files: Path) -> None:
     (files / "new.scenario.yaml").write_text("")
     (files / "b.scenario.yaml").unlink()
     assert names(watching.scenarios_to_run({files})) == "new"
@@ -50,15 +52,13 @@ def test_a_new_scenario_runs_and_a_removed_one_is_forgotten(watching: WatchState
     assert watching.failed == []
 
 
-def test_what_did_not_pass_is_known_until_it_runs_again(watching: WatchState, files: Path) -> None:
+def test_failed_scenarios_are_known_until_they_run_again(watching: WatchState, files: Path) -> None:
     assert names(watching.failed) == "b"
     watching.begin([files / "b.scenario.yaml"])
     assert watching.failed == []
 
 
-def test_a_session_that_a_mistake_kept_from_running_is_tried_again_with_what_was_touched(
-    watching: WatchState, files: Path
-) -> None:
+def test_session_with_an_invalid_file_is_repeated_after_a_change(watching: WatchState, files: Path) -> None:
     watching.begin([files / "b.scenario.yaml"])
     report = io.StringIO()
     WatchReporter(report).invalid_files([Problem(str(files / "world.yaml"), 1, 1, "SC012", "unknown key")])
@@ -69,7 +69,7 @@ def test_a_session_that_a_mistake_kept_from_running_is_tried_again_with_what_was
     assert names(watching.scenarios_to_run({files / "room.yaml"})) == "a b"
 
 
-def test_a_file_that_is_saved_has_another_stamp_also_when_it_comes_or_goes(files: Path) -> None:
+def test_stamp_changes_when_a_file_is_saved_created_or_deleted(files: Path) -> None:
     file = files / "a.scenario.yaml"
     stamps = [file_stamps([file])]
     (files / "part").write_text("another")
