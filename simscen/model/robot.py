@@ -375,6 +375,11 @@ class RobotSpec(Spec):
         sideways = (self.limits.lateral or self.limits.linear) if isinstance(self.drive, Holonomic) else 0.0
         return float((ahead**2 + sideways**2) ** 0.5)
 
+    @property
+    def has_imu(self) -> bool:
+        """Whether it has an IMU."""
+        return any(sensor.reading_type == "Imu" for sensor in self.sensors.values())
+
     @model_validator(mode="after")
     def _check_consistency(self) -> "RobotSpec":
         if strange := sorted(self.latency.sensors.keys() - self.sensors.keys()):

@@ -11,6 +11,7 @@ from simscen.model.costmaps import Costmap, LocalCostmap
 from simscen.model.guards import CollisionMonitor, Prediction, VelocitySmoother
 from simscen.model.latency import Latency
 from simscen.model.localizers import GroundTruth, Localizer
+from simscen.model.odometry import OdometryFilter
 from simscen.model.planners import Planner
 from simscen.model.profiles import PROFILES, Profile, apply_profile
 from simscen.model.recovery import Recovery
@@ -52,6 +53,8 @@ class StackSpec(InProcessStack):
     """Parameter file of Nav2, such as nav2_params.yaml; its values apply to all parameters that exist here."""
     localizer: Localizer = by_default()
     """Localizer, which estimates the pose of the robot."""
+    odometry: OdometryFilter = by_default()
+    """Source of the transform from odom to base."""
     costmap: Costmap = by_default()
     """Global costmap for planning; parameters that the local costmap does not set have the values given here."""
     local_costmap: LocalCostmap = by_default()
@@ -93,6 +96,10 @@ class StackSpec(InProcessStack):
             or (self.velocity_smoother.counter_turn_slip and self.localizer.fuses_odometry)
         )
         return ADVANCED_BUILDER if is_advanced else REFERENCE_BUILDER
+
+    def filters_odometry(self, has_imu: bool) -> bool:
+        """Return whether wheel odometry and IMU are fused by the odometry filter."""
+        return self.odometry.type == "ekf" and has_imu and not self.localizer.fuses_odometry
 
     @property
     def gets_ground_truth(self) -> bool:

@@ -44,7 +44,10 @@ class LaserScan(NamedTuple):
 
 
 class Odometry(NamedTuple):
-    """nav_msgs/msg/Odometry in the plane: the pose of `child` in `frame`, and its velocity in its own frame."""
+    """nav_msgs/msg/Odometry in the plane: the pose of `child` in `frame`, and its velocity in its own frame.
+
+    The covariances have 36 numbers each.
+    """
 
     stamp: Stamp
     frame: str
@@ -53,15 +56,19 @@ class Odometry(NamedTuple):
     vx: float
     vy: float
     wz: float
+    pose_covariance: tuple[float, ...]
+    twist_covariance: tuple[float, ...]
 
 
 class Imu(NamedTuple):
-    """sensor_msgs/msg/Imu: rad/s and m/s² about and along x, y, z."""
+    """sensor_msgs/msg/Imu: rad/s and m/s² about and along x, y, z. The covariances have nine numbers each."""
 
     stamp: Stamp
     frame: str
     angular_velocity: tuple[float, float, float]
     linear_acceleration: tuple[float, float, float]
+    angular_velocity_covariance: tuple[float, ...]
+    linear_acceleration_covariance: tuple[float, ...]
 
 
 class Image(NamedTuple):
@@ -135,18 +142,17 @@ def _laser_scan(reader: Reader) -> LaserScan:
 def _odometry(reader: Reader) -> Odometry:
     stamp, frame = _header(reader)
     child = reader.string()
-    pose = reader.take("7d")
-    reader.take("36d")
-    twist = reader.take("6d")
-    return Odometry(stamp, frame, child, _planar(pose), twist[0], twist[1], twist[5])
+    pose, pose_covariance = reader.take("7d"), reader.take("36d")
+    twist, twist_covariance = reader.take("6d"), reader.take("36d")
+    return Odometry(stamp, frame, child, _planar(pose), twist[0], twist[1], twist[5], pose_covariance, twist_covariance)
 
 
 def _imu(reader: Reader) -> Imu:
     stamp, frame = _header(reader)
     reader.take("13d")
-    turn = reader.take("3d")
-    reader.take("9d")
-    return Imu(stamp, frame, turn, reader.take("3d"))
+    turn, turn_covariance = reader.take("3d"), reader.take("9d")
+    force, force_covariance = reader.take("3d"), reader.take("9d")
+    return Imu(stamp, frame, turn, force, turn_covariance, force_covariance)
 
 
 def _image(reader: Reader) -> Image:
@@ -245,6 +251,17 @@ def pose_with_covariance(stamp: Stamp, pose: Sequence[float], covariance: Sequen
     return (
         Writer().put("iI", *stamp).string("map").put("7d", x, y, 0.0, *quaternion(yaw)).put("36d", *covariance).done()
     )
+
+
+def odometry(
+    stamp: Stamp, pose: Sequence[float], twist: Sequence[float], variances: Sequence[float] = (0.0, 0.0, 0.0)
+) -> bytes:
+    """Return a nav_msgs/msg/Odometry of base_link in the odom frame: x, y, yaw; vx, vy, wz and their variances."""
+    (x, y, yaw), (vx, vy, wz), twist_covariance = pose, twist, [0.0] * 36
+    twist_covariance[0], twist_covariance[7], twist_covariance[35] = variances
+    message = Writer().put("iI", *stamp).string("odom").string("base_link")
+    message.put("7d", x, y, 0.0, *quaternion(yaw)).put("36d", *[0.0] * 36)
+    return message.put("6d", vx, vy, 0.0, 0.0, 0.0, wz).put("36d", *twist_covariance).done()
 
 
 def path(stamp: Stamp, poses: Sequence[Sequence[float]]) -> bytes:

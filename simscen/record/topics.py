@@ -17,6 +17,8 @@ TF_STATIC = Topic("/tf_static", "tf2_msgs/msg/TFMessage", latched=True)
 MAP = Topic("/map", "nav_msgs/msg/OccupancyGrid", latched=True)
 ROBOT_DESCRIPTION = Topic("/robot_description", "std_msgs/msg/String", latched=True)
 TRUTH = Topic("/ground_truth/odom", "nav_msgs/msg/Odometry")
+FILTERED_ODOMETRY = Topic("/odometry/filtered", "nav_msgs/msg/Odometry")
+"""As robot_localization's ekf_node names it."""
 CLEARANCE = Topic("/simscen/clearance", "std_msgs/msg/Float64")
 BELIEF = Topic("/amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped")
 PARTICLES = Topic("/particle_cloud", "nav2_msgs/msg/ParticleCloud")

@@ -167,6 +167,7 @@ def _stack(
         speed_zones=tuple((world.regions[zone.region], zone.speed_limit) for zone in prepared.stack.speed_zones),
         masks=prepared.masks,
         lidars=tuple(name for name, sensor in prepared.robot.sensors.items() if sensor.localizes),
+        has_imu=prepared.robot.has_imu,
     )
     if isinstance(prepared.stack, ExternalStackSpec):
         return build_external_stack(prepared, prepared.stack, surroundings, seed, printed)

@@ -18,6 +18,7 @@ class ImuSensor:
     def __init__(self, spec: InertialUnit, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
         self._gyro_std, self._force_std = spec.gyro_noise, spec.accelerometer_noise
+        self._gyro_variance, self._force_variance = spec.gyro_noise**2, spec.accelerometer_noise**2
         self._seconds, self._view = setting.seconds, setting.view
         self._bias: list[float] = setting.chance.normal(0.0, spec.gyro_bias, 3).tolist()
         self._normals = NormalStream(setting.chance)
@@ -41,4 +42,6 @@ class ImuSensor:
             tick,
             (p + bp + gyro * np, q + bq + gyro * nq, r + br + gyro * nr),
             (x + force * nx, y + force * ny, z + force * nz),
+            self._gyro_variance,
+            self._force_variance,
         )

@@ -6,7 +6,7 @@ from operator import sub
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.sensor_data import Odometry
+from simscen.core.messages.sensor_data import UNKNOWN_POSE_COVARIANCE, Odometry
 from simscen.model.robot import Drive, Mecanum, Omnidirectional, SkidSteer, WheelOdometry
 from simscen.sensors.normal_stream import NormalStream
 from simscen.sensors.sensor import SensorSetting
@@ -15,6 +15,8 @@ EncoderIncrement = tuple[float, ...]
 """Difference of two values of `SensorView.encoders`."""
 Kinematics = Callable[[EncoderIncrement], Twist]
 """Function from encoder increments to the motion of the base in its own frame (m, m, rad)."""
+Variances = tuple[float, float, float]
+"""Variances of the errors of an increment: forward and lateral (m²), and turn (rad²)."""
 _new = tuple.__new__  # creates a named tuple without the call overhead of its class
 
 
@@ -22,40 +24,66 @@ class WheelOdometrySensor:
     """Dead reckoning; the origin of the odom frame is the initial pose of the robot.
 
     Errors of increments are independent, with variances proportional to the distance and the turn. They therefore do
-    not depend on the rate, and the standard deviation after one meter is that of the specification.
+    not depend on the rate, and the standard deviation after one meter is that of the specification. Readings carry the
+    covariances of these errors. The covariance of the pose grows along the way, to first order.
     """
 
     def __init__(self, spec: WheelOdometry, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
         self._seconds, self._view = setting.seconds, setting.view
-        self._position_std = spec.translation_noise
+        self._position_variance_per_m = spec.translation_noise**2
         self._heading_variance_per_rad = spec.rotation_noise**2
         self._heading_variance_per_m = spec.drift_noise**2
         self._normals = NormalStream(setting.chance)
         self._kinematics = kinematics_of(setting.drive)
         self._encoders = self._view.encoders()
-        self._pose = Pose2(0.0, 0.0, 0.0)
+        self._pose, self._covariance = Pose2(0.0, 0.0, 0.0), UNKNOWN_POSE_COVARIANCE
 
     def read(self, tick: int) -> Odometry:
         """Return the integrated pose and the mean velocity since the last reading."""
         encoders, before, seconds = self._view.encoders(), self._encoders, self._seconds
         self._encoders = encoders
-        step = self._add_noise(self._kinematics(tuple(map(sub, encoders, before))))
-        self._pose = pose = self._pose.compose(integrate_arc(step))
-        vx, vy, wz = step
-        return Odometry(self.name, tick, pose, _new(Twist, (vx / seconds, vy / seconds, wz / seconds)))
+        exact = self._kinematics(tuple(map(sub, encoders, before)))
+        forward, lateral, turn = variances = self._variances(exact)
+        step = self._add_noise(exact, variances) if forward or turn else exact
+        last, self._pose = self._pose, self._pose.compose(integrate_arc(step))
+        pose, (vx, vy, wz) = self._pose, step
+        if forward or turn:
+            self._grow_covariance(last, pose, variances)
+        twist = _new(Twist, (vx / seconds, vy / seconds, wz / seconds))
+        squared = seconds * seconds
+        twist_variance = forward / squared, lateral / squared, turn / squared
+        return Odometry(self.name, tick, pose, twist, twist_variance, self._covariance)
 
-    def _add_noise(self, step: Twist) -> Twist:
-        """Return the increment with noise (Thrun, Burgard and Fox, Probabilistic Robotics, table 5.6)."""
+    def _variances(self, step: Twist) -> Variances:
+        """Return the variances of the errors of an increment (Probabilistic Robotics, table 5.6)."""
         vx, vy, wz = step
-        distance, turn = math.hypot(vx, vy), abs(wz)
-        if distance == 0 and turn == 0:
-            return step
+        distance = math.hypot(vx, vy)
+        position = self._position_variance_per_m * distance
+        heading = self._heading_variance_per_rad * abs(wz) + self._heading_variance_per_m * distance
+        return position, position if vy else 0.0, heading
+
+    def _add_noise(self, step: Twist, variances: Variances) -> Twist:
         forward_draw, lateral_draw, turn_draw = self._normals.take(3)
-        position_std = self._position_std * math.sqrt(distance)
-        heading_std = math.sqrt(self._heading_variance_per_rad * turn + self._heading_variance_per_m * distance)
-        lateral_noise = position_std * lateral_draw if vy else 0.0
-        return _new(Twist, (vx + position_std * forward_draw, vy + lateral_noise, wz + heading_std * turn_draw))
+        (vx, vy, wz), (forward, lateral, turn) = step, variances
+        return _new(Twist, (
+            vx + math.sqrt(forward) * forward_draw, vy + math.sqrt(lateral) * lateral_draw,
+            wz + math.sqrt(turn) * turn_draw,
+        ))  # fmt: skip
+
+    def _grow_covariance(self, last: Pose2, pose: Pose2, variances: Variances) -> None:
+        """Propagate the covariance of the pose along an increment with errors of these variances."""
+        xx, xy, xa, _, yy, ya, _, _, aa = self._covariance
+        forward, lateral, turn = variances
+        dx, dy, heading = pose.x - last.x, pose.y - last.y, (pose.yaw + last.yaw) / 2
+        if abs(pose.yaw - last.yaw) > math.pi:
+            heading += math.pi
+        c, s = math.cos(heading), math.sin(heading)
+        xa_new, ya_new = xa - dy * aa, ya + dx * aa
+        xy += dx * xa - dy * ya_new + c * s * (forward - lateral)
+        xx += c * c * forward + s * s * lateral - dy * (xa + xa_new)
+        yy += s * s * forward + c * c * lateral + dx * (ya + ya_new)
+        self._covariance = xx, xy, xa_new, xy, yy, ya_new, xa_new, ya_new, aa + turn
 
 
 def integrate_arc(step: Twist) -> Pose2:

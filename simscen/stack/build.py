@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from simscen.core.clock import Clock
 from simscen.core.messages.goal_names import Mode
@@ -30,6 +30,9 @@ from simscen.stack.recovery import RoundRobin
 from simscen.stack.reference import ReferenceStack
 from simscen.stack.setting import Setting
 from simscen.stack.tasks import Task
+
+if TYPE_CHECKING:
+    from simscen.stack.odometry_filter import OdometryFilter
 
 
 def build_stack(
@@ -139,6 +142,7 @@ class StackBuilder:
             period,
             self.latency["localizer"],
             spec.localizer.fuses_odometry,
+            self.make_odometry_filter(),
         )
 
     def make_plan_manager(self, planner: Planner, costmaps: Costmaps, controller: Controller) -> PlanManager:
@@ -156,6 +160,14 @@ class StackBuilder:
     def plan_seed(self, number: int) -> int:
         """Return the seed of a plan by its number in the run."""
         return self.streams.integer(f"planner#{number}")
+
+    def make_odometry_filter(self) -> "OdometryFilter | None":
+        """Make the filter of wheel odometry and IMU; None to use the wheel odometry as it is."""
+        if not self.spec.filters_odometry(self.surroundings.has_imu):
+            return None
+        from simscen.stack.odometry_filter import OdometryFilter
+
+        return OdometryFilter(self.spec.odometry, self.surroundings.tick_rate)
 
     def make_clearing_policy(self) -> ClearingPolicy:
         """Make the policy for clearing the global costmap."""

@@ -289,7 +289,7 @@ class Surroundings:
     """Configuration of a stack by its scenario: robot, map (None for mapless navigation), and tick rate in Hz.
 
     `keepout` contains polygons that the robot must not enter, `speed_zones` polygons with a speed limit in m/s; `masks`
-    express the same by cells.
+    express the same by cells. `lidars` are the names of the lidars that localize; `has_imu` tells if there is an IMU.
     """
 
     robot: RobotModel
@@ -299,3 +299,4 @@ class Surroundings:
     speed_zones: tuple[tuple[Polygon, float], ...] = ()
     masks: FilterMasks = field(default_factory=FilterMasks)
     lidars: tuple[str, ...] = field(default=())
+    has_imu: bool = False

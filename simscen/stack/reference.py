@@ -1,7 +1,7 @@
 """The reference stack: Nav2 in miniature. Readings in, one command out."""
 
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
@@ -23,6 +23,9 @@ from simscen.stack.publishing import NO_UPDATES, Publisher, Updates
 from simscen.stack.speed_filter import SpeedFilter
 from simscen.stack.standstill import StandstillReporter
 from simscen.stack.tasks import Task
+
+if TYPE_CHECKING:
+    from simscen.stack.odometry_filter import OdometryFilter
 
 MOTION_READINGS = frozenset((Odometry, Imu, Bump))
 """Readings that only tell how the robot moves. They can wait until the next scan or the next controller period."""
@@ -49,10 +52,12 @@ class ReferenceStack:
         control_period: int,
         localizer_latency: int = 0,
         fuses_odometry: bool = False,
+        odometry_filter: "OdometryFilter | None" = None,
     ) -> None:
         """Combine the components. `control_period` and `localizer_latency` are in ticks.
 
         `fuses_odometry`: the localizer's belief is the odom frame, in place of the odometry of the wheels.
+        `odometry_filter`: filter of the wheel odometry; without one, it is used as it is.
         """
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
@@ -61,12 +66,13 @@ class ReferenceStack:
         self._tick_rate, self._lidars = surroundings.tick_rate, frozenset(surroundings.lidars)
         self._control_period = control_period
         self._publishing = Publisher(surroundings.tick_rate, localizer, controller, "map" if fuses_odometry else "odom")
-        self._fuses_odometry = fuses_odometry
+        self._fuses_odometry, self._odometry_filter = fuses_odometry, odometry_filter
+        self._filtered: list[Odometry] = []
         self._localizer_scans = LatencyQueue[Scan](localizer_latency)
         self._events: list[Event] = []
         self._tick = 0
         self._twist = STOP
-        self._odometry, self._has_wheel_odometry = odometry, False
+        self._odometry, self._wheel_sensor = odometry, ""
         self._zones: Zones | None = None
         self._standstill = StandstillReporter(surroundings.tick_rate)
         self._unchanged = Decision(STOP)
@@ -134,10 +140,11 @@ class ReferenceStack:
         if scanned or (tick >= self._publishing.belief_due and (readings or controls)):
             belief = self._publishing.belief(tick)
         sent = self._adjust_sent_command(self._commands.sent)
-        if belief is None and plan is None and local_plan is None and not costmaps and not self._events:
+        filtered = self._filtered
+        if belief is None and plan is None and local_plan is None and not (costmaps or self._events or filtered):
             return self._repeated_decision(sent)
-        events, self._events = tuple(self._events), []
-        return Decision(sent, belief, plan, local_plan, events, (), costmaps)
+        events, self._events, self._filtered = tuple(self._events), [], []
+        return Decision(sent, belief, plan, local_plan, events, (), costmaps, tuple(filtered))
 
     # Extension points -------------------------------------------------------------------------------------------------
 
@@ -195,9 +202,10 @@ class ReferenceStack:
         for reading in readings:
             match reading:
                 case Odometry():
-                    self._localizer.on_odometry(reading)
                     self._process_odometry(reading)
                 case Imu():
+                    if self._odometry_filter is not None:
+                        self._odometry_filter.on_imu(reading)
                     self._localizer.on_imu(reading)
                     self._on_motion(reading)
                 case Scan():
@@ -221,15 +229,39 @@ class ReferenceStack:
         self._costmaps.see(marking)
 
     def _process_odometry(self, reading: Odometry) -> None:
-        """Add a reading to the odometry history. The true pose counts only for robots without wheel odometry."""
-        if reading.sensor == TRUTH and self._has_wheel_odometry:
+        """Pass a reading to the localizer, filtered if there is a filter, and add it to the odometry history."""
+        if reading.sensor == TRUTH:
+            self._process_true_pose(reading)
             return
-        if reading.sensor != TRUTH and not self._has_wheel_odometry:
-            self._has_wheel_odometry = True
+        if not self._wheel_sensor:
+            self._wheel_sensor = reading.sensor
             self._odometry.clear()
-        pose = self._believed_pose() if self._fuses_odometry else reading.pose
+        odometry = self._filtered_odometry(reading)
+        if odometry is None:
+            return
+        self._localizer.on_odometry(odometry)
+        pose = self._believed_pose() if self._fuses_odometry else odometry.pose
         self._on_odometry_step(reading.pose, pose)
-        if is_plausible(reading.twist) and self._odometry.add(reading.tick, pose):
+        if is_plausible(odometry.twist) and self._odometry.add(reading.tick, pose):
+            self._twist = odometry.twist
+            self._on_motion(reading)
+
+    def _filtered_odometry(self, reading: Odometry) -> Odometry | None:
+        """Return the filtered odometry, or the reading itself without a filter; None if the filter cannot use it."""
+        if self._odometry_filter is None:
+            return reading
+        odometry = self._odometry_filter.fuse(reading) if reading.sensor == self._wheel_sensor else None
+        if odometry is not None:
+            self._filtered.append(odometry)
+        return odometry
+
+    def _process_true_pose(self, reading: Odometry) -> None:
+        """Pass the true pose to the localizer. For robots without wheel odometry, it is the odometry, too."""
+        self._localizer.on_odometry(reading)
+        if self._wheel_sensor:
+            return
+        self._on_odometry_step(reading.pose, reading.pose)
+        if is_plausible(reading.twist) and self._odometry.add(reading.tick, reading.pose):
             self._twist = reading.twist
             self._on_motion(reading)
 

@@ -65,8 +65,8 @@ class LogJudge:
     def judge_for_replay(self, log: Path) -> tuple[Log, RunResult]:
         """Return a log with all data for a replay, and its result. Raises InvalidInput."""
         if _may_be_own(log) and is_simscen_log(log):
-            read = read_run(log, looks=True)
-            return read, recorded_result(read, log) if self._criteria is None else self._judge_own_log(log).result
+            own = read_run(log, looks=True)
+            return own, recorded_result(own, log) if self._criteria is None else self._judge_own_log(log).result
         self.foreign += 1
         if self._criteria is None:
             foreign, case = read_foreign_log(log, self._wanted, looks=True), Case(Pose2(0.0, 0.0), ())

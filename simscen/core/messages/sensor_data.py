@@ -14,6 +14,10 @@ from simscen.core.geometry.kinematics import Twist
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+PoseCovariance = tuple[float, float, float, float, float, float, float, float, float]
+"""Covariance of x, y (m) and yaw (rad), row by row."""
+UNKNOWN_POSE_COVARIANCE: PoseCovariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Scan:
@@ -46,22 +50,33 @@ class Scan:
 
 @fast_dataclass()
 class Odometry:
-    """Dead reckoning from wheel encoders: `pose` in the odom frame, `twist` in the base frame."""
+    """Dead reckoning: `pose` in the odom frame, `twist` in the base frame.
+
+    `twist_variance` contains the variances of the errors of vx, vy and wz, which are independent. `pose_covariance` is
+    that of the accumulated error in the odom frame. As in ROS, zeros in all places mean that it is unknown.
+    """
 
     sensor: str
     tick: int
     pose: Pose2
     twist: Twist
+    twist_variance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    pose_covariance: PoseCovariance = UNKNOWN_POSE_COVARIANCE
 
 
 @fast_dataclass()
 class Imu:
-    """Angular velocity (rad/s) and specific force (m/s², including gravity) about x, y, z of the base frame."""
+    """Angular velocity (rad/s) and specific force (m/s², including gravity) about x, y, z of the base frame.
+
+    The variances are those of the white noise of each axis; a constant bias comes on top. 0 = unknown, as in ROS.
+    """
 
     sensor: str
     tick: int
     angular_velocity: tuple[float, float, float]
     linear_acceleration: tuple[float, float, float]
+    angular_velocity_variance: float = 0.0
+    linear_acceleration_variance: float = 0.0
 
 
 @fast_dataclass()

@@ -18,7 +18,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief, Path
-from simscen.core.messages.sensor_data import Readings
+from simscen.core.messages.sensor_data import Odometry, Readings
 from simscen.core.records.events import Event, EventKind
 
 if TYPE_CHECKING:
@@ -68,7 +68,10 @@ class CostGrid(NamedTuple):
 
 @fast_dataclass(eq=False)
 class Decision:
-    """What the stack made of a beat: its `command`, and what it would publish. None means: nothing new."""
+    """What the stack made of a beat: its `command`, and what it would publish. None means: nothing new.
+
+    `odometry` are the new readings of its odometry filter, if it has one.
+    """
 
     command: Twist
     belief: Belief | None = None
@@ -77,6 +80,7 @@ class Decision:
     events: tuple[Event, ...] = ()
     lines: tuple[LogLine, ...] = ()
     costmaps: tuple[CostGrid, ...] = ()
+    odometry: tuple[Odometry, ...] = ()
 
 
 @fast_dataclass(eq=False)

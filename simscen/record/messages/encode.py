@@ -1,7 +1,7 @@
 """ROS 2 messages of one size, laid out. `packer()` of a layout gives what packs its fields, which are named here.
 
-Definitions: ROS 2 Humble's common_interfaces. Covariances that nobody knows are zeros, as REP 145 and the message
-comments ask. A `stamp` is when something was measured, a `twist` and the poses of a belief are of the ground.
+Definitions: ROS 2 Humble's common_interfaces. Unknown covariances are zeros, as REP 145 and the message comments ask. A
+`stamp` is when something was measured, a `twist` and the poses of a belief are of the ground.
 """
 
 from collections.abc import Sequence
@@ -17,6 +17,8 @@ _TWIST = "2d24xd"
 """Six numbers, of which the ground knows vx, vy and wz."""
 _COVARIANCE = "2d24x3d24xd144x2d24xd"
 """36 numbers, of which the ground knows those of x, y and yaw."""
+_TWIST_VARIANCES = "d48xd216xd"
+"""36 numbers: a diagonal matrix with the variances of vx, vy and wz."""
 
 
 def clock() -> Template:
@@ -41,7 +43,10 @@ def twist() -> Template:
 
 
 def odometry(frame: str, child: str) -> Template:
-    """nav_msgs/msg/Odometry, where `child` is in `frame`, and its velocity in its own frame: stamp, pose, twist."""
+    """nav_msgs/msg/Odometry without covariances: stamp, pose, twist.
+
+    `child` is in `frame`, and its velocity in its own frame.
+    """
     message = _stamped(frame)
     message.string(child)
     message.slot("7d", "*pose")
@@ -51,15 +56,33 @@ def odometry(frame: str, child: str) -> Template:
     return message
 
 
+def odometry_with_covariance(frame: str, child: str) -> Template:
+    """nav_msgs/msg/Odometry: stamp, pose, covariance, twist, variances.
+
+    `covariance` contains the nine numbers over x, y, yaw; `variances` those of vx, vy, wz.
+    """
+    message = _stamped(frame)
+    message.string(child)
+    message.slot("7d", "*pose")
+    message.slot(_COVARIANCE, "*covariance")
+    message.slot(_TWIST, "*twist")
+    message.slot(_TWIST_VARIANCES, "*variances")
+    return message
+
+
 def imu(frame: str) -> Template:
-    """sensor_msgs/msg/Imu: stamp, turn, force. It has no heading; the first orientation covariance says so with -1."""
+    """sensor_msgs/msg/Imu: stamp, turn, turn_variance, force, force_variance, with the same variance for each axis.
+
+    It has no heading; the first orientation covariance says so with -1.
+    """
     message = _stamped(frame)
     message.put("4d", *_NO_ROTATION)
     message.put("9d", -1.0, *[0.0] * 8)
-    message.slot("3d", "*turn")
-    message.put("9d", *[0.0] * 9)
-    message.slot("3d", "*force")
-    message.put("9d", *[0.0] * 9)
+    for vector in ("turn", "force"):
+        message.slot("3d", f"*{vector}")
+        for _ in range(2):
+            message.slot("d24x", f"{vector}_variance")
+        message.slot("d", f"{vector}_variance")
     return message
 
 

@@ -79,6 +79,8 @@ class RobotPublisher:
             self._truth.write(now, tick, truth)
         if decision.belief is not None:
             self._sensors.correct(Pose3.planar(decision.belief.map_from_odom))
+        for odometry in decision.odometry:
+            self._sensors.write_filtered(now, odometry)
         self._sensors.write(now, moment.readings)
         self._stack.write(now, tick, decision)
         if moment.events or not self._scene.begun:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from simscen.core.geometry import Pose3
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readings, Scan
@@ -47,7 +47,8 @@ class SensorPublisher:
         self._topics: dict[tuple[str, str], Topic] = {}
         self._lines: dict[tuple[str, str], TopicWriter] = {}
         self._imus: dict[str, BatchWriter] = {}
-        self._owns: tuple[BatchWriter, BatchWriter] | None = None
+        self._with_transforms: _OdometryWriters | None = None
+        self._filtered: _OdometryWriters | None = None
         self._takers: dict[type, Callable[[int, Any], None]] = {
             Odometry: self._write_odometry,
             Scan: self._write_scan,
@@ -58,7 +59,7 @@ class SensorPublisher:
         self._plain: set[str] = set()
         self._scans: dict[str, LaserScanPacker] = {}
         self._names = names or frame_names.RobotFrames()
-        self._odometry = encode.odometry(self._names.odom, self._names.base).packer()
+        self._odometry = encode.odometry_with_covariance(self._names.odom, self._names.base).packer()
         self._transforms = TransformsPacker()
         self._mounts = dict(mounts)
         self._correction: Pose3 | None = None
@@ -68,6 +69,15 @@ class SensorPublisher:
     def correct(self, map_from_odom: Pose3) -> None:
         """What the localizer says: goes out on /tf with each odometry from now on."""
         self._correction = map_from_odom
+
+    def write_filtered(self, now: int, odometry: Odometry) -> None:
+        """Write the odometry of the stack's filter at `now` nanoseconds.
+
+        From now on the filter, and not the wheel odometry, defines the transform from odom to base on /tf.
+        """
+        if self._filtered is None:
+            self._filtered = self._odometry_writers(topics.FILTERED_ODOMETRY)
+        self._write_with_transforms(self._filtered, now, odometry)
 
     def write(self, now: int, readings: Readings) -> None:
         """Write the readings of a beat at `now` nanoseconds."""
@@ -84,23 +94,30 @@ class SensorPublisher:
         return [self._topic(sensor, *_DEFAULT_TOPICS[kind])] if kind in _DEFAULT_TOPICS else []
 
     def _write_odometry(self, now: int, odometry: Odometry) -> None:
-        stamp, pose = self._time.stamp(odometry.tick), Pose3.planar(odometry.pose)
-        if not self._thinning.keeps_odometry(odometry):
-            self._line("Odometry", odometry.sensor).write(now, self._odometry(stamp, pose, odometry.twist))
+        if not self._thinning.keeps_odometry(odometry) or self._filtered is not None:
+            self._line("Odometry", odometry.sensor).write(now, self._odometry(*self._odometry_fields(odometry)))
             return
-        alone, both = self._owns or self._own(odometry)
-        if self._correction is None:
-            alone.write(now, stamp, pose, odometry.twist)
-        else:
-            both.write(now, stamp, pose, odometry.twist, self._correction)
+        if self._with_transforms is None:
+            self._with_transforms = self._odometry_writers(self.topic_of(odometry))
+        self._write_with_transforms(self._with_transforms, now, odometry)
 
-    def _own(self, odometry: Odometry) -> tuple[BatchWriter, BatchWriter]:
-        """What writes the robot's own odometry, with what it says on /tf: alone, and with the correction."""
-        layout = self.topic_of(odometry), encode.odometry(self._names.odom, self._names.base)
-        links = (self._names.odom, self._names.base, "pose"), (frame_names.MAP, self._names.odom, "correction")
-        without, with_it = ((topics.TF, encode.transforms(those)) for those in (links[:1], links))
-        self._owns = self._out.together((layout, without)), self._out.together((layout, with_it))
-        return self._owns
+    def _odometry_fields(self, odometry: Odometry) -> tuple[Any, ...]:
+        stamp, pose = self._time.stamp(odometry.tick), Pose3.planar(odometry.pose)
+        return stamp, pose, odometry.pose_covariance, odometry.twist, odometry.twist_variance
+
+    def _write_with_transforms(self, writers: "_OdometryWriters", now: int, odometry: Odometry) -> None:
+        fields = self._odometry_fields(odometry)
+        if self._correction is None:
+            writers.uncorrected.write(now, *fields)
+        else:
+            writers.corrected.write(now, *fields, self._correction)
+
+    def _odometry_writers(self, topic: Topic) -> "_OdometryWriters":
+        odom, base = self._names.odom, self._names.base
+        layout = topic, encode.odometry_with_covariance(odom, base)
+        links = (odom, base, "pose"), (frame_names.MAP, odom, "correction")
+        uncorrected, corrected = ((topics.TF, encode.transforms(each)) for each in (links[:1], links))
+        return _OdometryWriters(self._out.together((layout, uncorrected)), self._out.together((layout, corrected)))
 
     def _write_scan(self, now: int, scan: Scan) -> None:
         packer = self._scans.get(scan.sensor)
@@ -116,7 +133,11 @@ class SensorPublisher:
         if together is None:
             topic = self._topic(imu.sensor, *_DEFAULT_TOPICS["Imu"])
             together = self._imus[imu.sensor] = self._out.together([(topic, encode.imu(self._names.base))])
-        together.write(now, self._time.stamp(imu.tick), imu.angular_velocity, imu.linear_acceleration)
+        together.write(
+            now, self._time.stamp(imu.tick),
+            imu.angular_velocity, imu.angular_velocity_variance,
+            imu.linear_acceleration, imu.linear_acceleration_variance,
+        )  # fmt: skip
 
     def _write_bump(self, now: int, bump: Bump) -> None:
         self._line("Bump", bump.sensor).write(now, _PRESSED if bump.pressed else _FREE)
@@ -148,6 +169,13 @@ class SensorPublisher:
             self._plain.add(plain)
             topic = self._topics[sensor, plain] = Topic(name, kind)
         return topic
+
+
+class _OdometryWriters(NamedTuple):
+    """Writers of odometry together with odom→base on /tf: without map→odom, and with it."""
+
+    uncorrected: BatchWriter
+    corrected: BatchWriter
 
 
 def _image_topics(sensor: str) -> list[tuple[Topic, bool]]:

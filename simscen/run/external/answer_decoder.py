@@ -15,6 +15,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief, Path
+from simscen.core.messages.sensor_data import Odometry
 from simscen.core.records.trace import CostGrid, LogLine
 from simscen.peer import wire
 from simscen.peer.cdr import Reader
@@ -23,7 +24,7 @@ from simscen.record import frame_names, topics
 from simscen.record.foreign import messages
 from simscen.record.foreign.messages import StampedPose
 from simscen.record.messages import decode
-from simscen.record.simtime import SimTime
+from simscen.record.simtime import NS_PER_SECOND, SimTime
 from simscen.record.trace_builder import to_planar
 from simscen.run.external.protocol import EXACT_SUFFIX, FLOAT64_ARRAY, POSE2D, STACK_TOPICS, ProtocolViolation
 
@@ -33,6 +34,10 @@ if TYPE_CHECKING:
 MAX_PARTICLES = 1_000_000
 _PLANAR_INDICES = (0, 1, 5, 6, 7, 11, 30, 31, 35)
 """Indices of the covariance over x, y, yaw in the 36 numbers of a message."""
+_PLANAR_DIAGONAL = (0, 7, 35)
+"""Indices of the variances of x, y, yaw in the 36 numbers of a message."""
+ODOMETRY_COLUMNS = 19
+"""Tick, pose, twist, variances of the twist, and covariance of the pose."""
 _TYPES = {topic.name: topic.type for topic in STACK_TOPICS}
 
 MessagesByTopic = dict[str, list[bytes]]
@@ -55,6 +60,7 @@ class Answer:
     events: tuple[dict[str, Any], ...] = ()
     lines: tuple[LogLine, ...] = field(default=())
     costmaps: tuple[CostGrid, ...] = ()
+    odometry: tuple[Odometry, ...] = ()
 
 
 def group_by_topic(said: Messages, answers: dict[int, str]) -> MessagesByTopic:
@@ -73,11 +79,14 @@ def decode_answer(
     """Decode the answer at `tick`.
 
     `correction` is the last transform from map to odom. If the stack never sent one, it is computed from the belief and
-    the odometry's pose `dead_reckoned`. Raises ProtocolViolation.
+    the pose of its filtered odometry, or `dead_reckoned`, that of the wheel odometry. Raises ProtocolViolation.
     """
     if len(said.get(topics.COMMAND.name, ())) > 1:
         raise ProtocolViolation("two commands in one answer")
     correction = _correction(said) or correction
+    odometry = tuple(_filtered_odometry(said, time, tick))
+    if odometry:
+        dead_reckoned = odometry[-1].pose
     return Answer(
         command=_last(said, topics.COMMAND.name, _twist),
         plan=_path(said, topics.PLAN.name, tick, time),
@@ -87,6 +96,7 @@ def decode_answer(
         events=tuple(_told(said, topics.EVENTS.name, _event)),
         lines=tuple(_told(said, topics.ROSOUT.name, _line)),
         costmaps=tuple(_costmaps(said)),
+        odometry=odometry,
     )
 
 
@@ -114,6 +124,36 @@ def _correction(said: MessagesByTopic) -> Pose2 | None:
     links = [link for part in _told(said, topics.TF.name, messages.transforms) for link in part]
     found = [link for link in links if (link.frame, link.child) == (frame_names.MAP, frame_names.ODOM)]
     return _ground(found[-1]) if found else None
+
+
+def _filtered_odometry(said: MessagesByTopic, time: SimTime, now: int) -> Iterator[Odometry]:
+    """Yield the readings of the stack's odometry filter."""
+    name = topics.FILTERED_ODOMETRY.name
+    exact = _last(said, name + EXACT_SUFFIX, lambda data: _table(data, ODOMETRY_COLUMNS))
+    if exact is not None:
+        rows = [(row[0], row[1:4], row[4:7], row[7:10], row[10:]) for row in exact.tolist()]
+    else:
+        messages = _told(said, name, partial(read, topics.ODOMETRY_TYPE))
+        if strange := next((told.frame for told in messages if told.frame not in (frame_names.ODOM, "")), None):
+            raise ProtocolViolation(f"odometry on {name} in the frame `{strange}` instead of `{frame_names.ODOM}`")
+        rows = [
+            (
+                time.tick(told.stamp[0] * NS_PER_SECOND + told.stamp[1]),
+                list(told.pose),
+                [told.vx, told.vy, told.wz],
+                [told.twist_covariance[i] for i in _PLANAR_DIAGONAL],
+                [told.pose_covariance[i] for i in _PLANAR_INDICES],
+            )
+            for told in messages
+        ]
+    for tick, pose, twist, variances, covariance in rows:
+        if not all(map(math.isfinite, (*pose, *twist, *variances, *covariance))):
+            raise ProtocolViolation(f"odometry on {name} that is not finite")
+        if not 0 <= tick <= now:
+            raise ProtocolViolation(f"odometry on {name} with a stamp that is not between the start and now")
+        vx, vy, wz = variances
+        a, b, c, d, e, f, g, h, i = covariance
+        yield Odometry("", int(tick), Pose2(*pose), Twist(*twist), (vx, vy, wz), (a, b, c, d, e, f, g, h, i))
 
 
 def _path(said: MessagesByTopic, name: str, tick: int, time: SimTime) -> Path | None:

@@ -27,6 +27,7 @@ STACK_TOPICS = (
     Topic(topics.PARTICLES.name + EXACT_SUFFIX, FLOAT64_ARRAY),
     Topic(topics.TF.name + EXACT_SUFFIX, POSE2D),
     *(topics.GLOBAL_COSTMAP, topics.LOCAL_COSTMAP),
+    *(topics.FILTERED_ODOMETRY, Topic(topics.FILTERED_ODOMETRY.name + EXACT_SUFFIX, FLOAT64_ARRAY)),
 )
 """Topics on which a stack may publish."""
 

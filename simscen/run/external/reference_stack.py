@@ -86,6 +86,7 @@ class ReferenceStackPeer(Peer):
                 speed if speed is None else SpeedLimits(speed, limits["percent"], limits["base"], limits["multiplier"]),
             ),
             lidars=tuple(hello["lidars"]),
+            has_imu=any(sensor["says"] == "Imu" for sensor in hello["sensors"].values()),
         )
         told, estimate = self._first, self._first["initial_estimate"]
         self._stack = build_stack(
@@ -119,10 +120,13 @@ class ReferenceStackPeer(Peer):
                     yield Scan(sensor, self._tick(scan.stamp), ranges, angle, step, least, most, Pose2(x, y, yaw))
                 case topics.ODOMETRY_TYPE:
                     odom = message.content
-                    yield Odometry(sensor, self._tick(odom.stamp), Pose2(*told), Twist(odom.vx, odom.vy, odom.wz))
+                    twist, covariance = Twist(odom.vx, odom.vy, odom.wz), odom.twist_covariance
+                    variance = covariance[0], covariance[7], covariance[35]
+                    yield Odometry(sensor, self._tick(odom.stamp), Pose2(*told), twist, variance)
                 case topics.IMU_TYPE:
                     imu = message.content
-                    yield Imu(sensor, self._tick(imu.stamp), imu.angular_velocity, imu.linear_acceleration)
+                    variances = imu.angular_velocity_covariance[0], imu.linear_acceleration_covariance[0]
+                    yield Imu(sensor, self._tick(imu.stamp), imu.angular_velocity, imu.linear_acceleration, *variances)
                 case topics.BUMPER_TYPE:
                     yield Bump(sensor, 0, message.content)
                 case topics.IMAGE_TYPE:
@@ -154,6 +158,12 @@ class ReferenceStackPeer(Peer):
         for costmap in decision.costmaps:
             topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
             step.publish(topic.name, encode_arrays.occupancy_grid(costmap.frame, step.stamp, costmap.grid))
+        if decision.odometry:
+            rows = [
+                (odom.tick, *odom.pose, *odom.twist, *odom.twist_variance, *odom.pose_covariance)
+                for odom in decision.odometry
+            ]
+            step.publish(topics.FILTERED_ODOMETRY.name + EXACT_SUFFIX, _numbers(np.array(rows)))
         for event in decision.events:
             if event.kind is EventKind.GOAL_ACCEPTED:
                 self._under_way = event.data["index"]

@@ -203,7 +203,9 @@ class ExternalStack:
         command = answer.command if answer.command is not None else self._held.command
         self._held = Decision(command)
         followed = answer.plan if answer.plan is not None and len(answer.plan.points) else None
-        return Decision(command, answer.belief, followed, answer.local_plan, events, answer.lines, answer.costmaps)
+        return Decision(
+            command, answer.belief, followed, answer.local_plan, events, answer.lines, answer.costmaps, answer.odometry
+        )
 
     def _interrupt(self, kind: int, content: dict[str, Any]) -> None:
         """Send an order that the stack answers at this beat."""

@@ -22,6 +22,8 @@ def import_components(prepared: PreparedScenario) -> None:
             import_module(module)
         if isinstance(part.stack, StackSpec):
             import_module(part.stack.builder.partition(":")[0])
+            if part.stack.filters_odometry(part.robot.has_imu):
+                import_module("simscen.stack.odometry_filter")
 
 
 def precompute(prepared: PreparedScenario) -> None:

@@ -6,7 +6,7 @@ from simscen.core.environment.costmap_filters import Zones
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief, Estimate, Goal, Path
-from simscen.core.messages.sensor_data import Readings
+from simscen.core.messages.sensor_data import Odometry, Readings
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import CostGrid, Decision
 from simscen.model.stack import InProcessStack
@@ -85,6 +85,9 @@ class InstalledStack(Watched):
             self.checked_path(decision.local_plan, "expects to drive")
         for costmap in decision.costmaps:
             self._look_at(costmap)
+        for odometry in decision.odometry:
+            if not isinstance(odometry, Odometry):
+                self.broke(f"published {type(odometry).__name__} instead of filtered Odometry")
         for event in decision.events:
             if not isinstance(event, Event) or not isinstance(event.kind, EventKind):
                 self.broke(f"told of {event!r}, which is no Event")

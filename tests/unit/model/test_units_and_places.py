@@ -73,6 +73,8 @@ PLAIN = {
     "MppiObstaclesCritic.collision_cost": "a cost",
     "Mppi.temperature": "of a softmax over costs without a dimension",
     "Mppi.gamma": "a weight of costs",
+    "OdometryFilter.process_noise_covariance": "variances, as in robot_localization",
+    "OdometryFilter.odom0_twist_rejection_threshold": "a number of standard deviations, as in robot_localization",
     "Smoothness.min_sparc": "spectral arc length, which has no dimension",
     "Smoothness.min_ldlj": "a logarithm of dimensionless jerk",
     "RobotSpec.arguments": "whatever the xacro file makes of it",

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.sensor_data import Imu, Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.peer import messages
 from simscen.peer.cdr import Reader
 from simscen.record.foreign.messages import path
@@ -67,18 +67,23 @@ def test_a_scan_is_read_as_it_was_packed(frame: str, ranges) -> None:
 
 @given(numbers, numbers, st.floats(-3, 3), names)
 def test_odometry_is_read_as_it_was_packed(x: float, y: float, yaw: float, frame: str) -> None:
-    packed = encode.odometry(frame, "base").packer()(STAMP, Pose3.planar(Pose2(x, y, yaw)), Twist(x, y, yaw))
+    pack = encode.odometry_with_covariance(frame, "base").packer()
+    covariance, variances = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0), (10.0, 11.0, 12.0)
+    packed = pack(STAMP, Pose3.planar(Pose2(x, y, yaw)), covariance, Twist(x, y, yaw), variances)
     read = messages.read("nav_msgs/msg/Odometry", packed)
+    assert tuple(read.pose_covariance[i] for i in (0, 1, 5, 6, 7, 11, 30, 31, 35)) == covariance
+    assert tuple(read.twist_covariance[i] for i in (0, 7, 35)) == variances
+    assert sum(read.pose_covariance) + sum(read.twist_covariance) == sum(covariance) + sum(variances)
     assert (read.stamp, read.frame, read.child, read.vx, read.vy, read.wz) == (STAMP, frame, "base", x, y, yaw)
     assert read.pose == pytest.approx((x, y, yaw))
 
 
 def test_an_imu_a_picture_and_a_map_are_read_as_they_were_packed() -> None:
-    imu = Imu("imu", 0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
-    read = messages.read(
-        "sensor_msgs/msg/Imu", encode.imu("base").packer()(STAMP, imu.angular_velocity, imu.linear_acceleration)
-    )
+    packed = encode.imu("base").packer()(STAMP, (1.0, 2.0, 3.0), 0.25, (4.0, 5.0, 6.0), 0.5)
+    read = messages.read("sensor_msgs/msg/Imu", packed)
     assert (read.angular_velocity, read.linear_acceleration) == ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
+    assert read.angular_velocity_covariance == (0.25, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.25)
+    assert read.linear_acceleration_covariance == (0.5, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.5)
     picture = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
     seen = messages.read("sensor_msgs/msg/Image", encode.image("eye", STAMP, picture))
     assert (seen.height, seen.width, seen.encoding, seen.step, seen.data) == (2, 4, "rgb8", 12, picture.tobytes())

@@ -263,7 +263,7 @@ def test_logs_of_others_among_several_say_that_they_need_criteria(simscen, tmp_p
     write_mcap(tmp_path / "b.mcap", drive(1.0))
     ended = simscen(".", "--truth", "/mocap")
     assert (ended.code, ended.err) == (3, "")
-    assert ended.out.count("say with --scenario what must hold") == 2
+    assert ended.out.count("set criteria with --scenario") == 2
 
 
 def test_metrics_that_a_log_does_not_tell_are_null_in_its_result(simscen, limits, tmp_path: Path) -> None:

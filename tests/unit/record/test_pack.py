@@ -89,6 +89,25 @@ def test_odometry_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, ch
     assert encode.odometry(frame, child).packer()(stamp, pose, twist) == serialized(expected)
 
 
+@given(seeds, stamps, names, names)
+def test_odometry_with_covariance_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, child: str) -> None:
+    rng = np.random.default_rng(seed)
+    pose, twist = pose3(rng), Twist(*rng.normal(size=3).tolist())
+    covariance, variances = rng.normal(size=(3, 3)), rng.normal(size=3)
+    of_pose, of_twist = np.zeros((6, 6)), np.zeros((6, 6))
+    of_pose[np.ix_([0, 1, 5], [0, 1, 5])] = covariance
+    of_twist[[0, 1, 5], [0, 1, 5]] = variances
+    expected = make(
+        "nav_msgs/Odometry",
+        header(stamp, frame),
+        child,
+        make("geometry_msgs/PoseWithCovariance", ros_pose(pose), of_pose.ravel()),
+        make("geometry_msgs/TwistWithCovariance", ros_twist(twist), of_twist.ravel()),
+    )
+    pack = encode.odometry_with_covariance(frame, child).packer()
+    assert pack(stamp, pose, covariance.ravel().tolist(), twist, variances.tolist()) == serialized(expected)
+
+
 @given(seeds, stamps, names)
 def test_imu_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str) -> None:
     rng = np.random.default_rng(seed)
@@ -101,11 +120,11 @@ def test_imu_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str) -> None
         make("geometry_msgs/Quaternion", 0.0, 0.0, 0.0, 1.0),
         unknown,
         vector(*turn),
-        np.zeros(9),
+        0.25 * np.eye(3).ravel(),
         vector(*force),
-        np.zeros(9),
+        0.5 * np.eye(3).ravel(),
     )
-    assert encode.imu(frame).packer()(stamp, turn, force) == serialized(expected)
+    assert encode.imu(frame).packer()(stamp, turn, 0.25, force, 0.5) == serialized(expected)
 
 
 @given(seeds, stamps, names)

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -213,3 +214,27 @@ def test_what_an_external_stack_was_stands_in_a_record_of_its_own_at_the_end() -
     ((name, end),) = records[2:]
     assert (name, end["tick"]) == ("simscen.end", "0")
     assert end["messages:/map"] == "1"
+
+
+def with_filter(run: list[Moment]) -> list[Moment]:
+    """The same run with a stack that filters the odometry: 1 m further ahead."""
+    found = []
+    for moment in run:
+        own = [each for each in moment.readings if isinstance(each, Odometry) and each.sensor == "wheels"]
+        filtered = tuple(replace(each, pose=Pose2(each.pose.x + 1.0, *each.pose[1:])) for each in own)
+        found.append(replace(moment, decision=replace(moment.decision, odometry=filtered)))
+    return found
+
+
+def test_the_filter_of_the_stack_defines_where_the_base_is_in_the_odom_frame(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(record(with_filter(RUN)))
+    with AnyReader([path], default_typestore=humble()) as reader:
+        messages = [(each.topic, reader.deserialize(data, each.msgtype)) for each, _, data in reader.messages()]
+    wheels, filtered = ([m for topic, m in messages if topic == name] for name in ("/odom", "/odometry/filtered"))
+    links = [t for topic, m in messages if topic == "/tf" for t in m.transforms if t.child_frame_id == "base_link"]
+    assert len(wheels) == len(filtered) == len(links)
+    for one, other, link in zip(wheels, filtered, links, strict=True):
+        assert (other.header.frame_id, other.child_frame_id) == ("odom", "base_link")
+        assert other.header.stamp == link.header.stamp
+        assert other.pose.pose.position.x == link.transform.translation.x == one.pose.pose.position.x + 1.0

@@ -22,6 +22,7 @@ from simscen.advanced.planners.spec import MedialAxisPlanner
 from simscen.model import checkers, costmaps, guards, localizers, planners
 from simscen.model import recovery as behaviors
 from simscen.model.latency import Latency
+from simscen.model.odometry import OdometryFilter
 from simscen.model.stack import StackSpec
 from simscen.model.stack_base import ControllerSpec, SpeedZone
 from simscen.spec.speed_mask import SpeedMask
@@ -202,6 +203,7 @@ ELSEWHERE = {
     "Recovery.retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",
     "VelocitySmoother.counter_turn_slip": "tests/unit/advanced/test_turn_slip.py",
     "ScanMatchingAmcl.sure_update_interval": "tests/unit/advanced/localizers/test_scan_matching_amcl.py",
+    **{f"OdometryFilter.{name}": "tests/unit/stack/test_odometry_filter.py" for name in OdometryFilter.model_fields},
     # Whoever makes goals reads these.
     "SimpleGoalChecker.xy_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",
     "SimpleGoalChecker.yaw_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",

@@ -32,6 +32,8 @@ EXAMPLES = {
     "/particle_cloud/exact": messages.float64_array([1, 2, 3, 4]),
     "/tf/exact": messages.pose2d(1, 2, 3),
     "/global_costmap/costmap": messages.occupancy_grid((1, 0), "map", 0.05, 2, (1, 2, 0), [0, 100, -1, 50]),
+    "/odometry/filtered": messages.odometry((1, 0), (1, 2, 3), (0.5, 0.0, 0.1), (0.1, 0.2, 0.3)),
+    "/odometry/filtered/exact": messages.float64_array([240, 1, 2, 3, *[0.5] * 15]),
     "/local_costmap/costmap": messages.occupancy_grid((1, 0), "odom", 0.05, 2, (1, 2, 0), [0, 100]),
 }
 
@@ -55,6 +57,28 @@ def test_bytes_gone_wrong_are_refused_or_understood(name: str, data) -> None:
     for garbage in (bytes(sound), bytes(sound[:cut]), HEADER + data.draw(st.binary(max_size=60))):
         with suppress(ProtocolViolation):
             understand(**{name: garbage}, **with_belief)
+
+
+def test_filtered_odometry_is_recorded_as_it_was_said() -> None:
+    (odometry,) = understand(**{"/odometry/filtered": EXAMPLES["/odometry/filtered"]}).odometry
+    assert odometry.pose == pytest.approx(Pose2(1, 2, 3))
+    assert (odometry.tick, odometry.twist) == (240, (0.5, 0.0, 0.1))
+    assert odometry.twist_variance == (0.1, 0.2, 0.3)
+    (exact,) = understand(**{"/odometry/filtered/exact": EXAMPLES["/odometry/filtered/exact"]}).odometry
+    assert (exact.tick, exact.pose, exact.pose_covariance) == (240, (1, 2, 3), (0.5,) * 9)
+
+
+def test_without_a_transform_the_correction_follows_from_the_filtered_odometry() -> None:
+    names = "/odometry/filtered", "/amcl_pose"
+    belief = understand(**{name: EXAMPLES[name] for name in names}).belief
+    assert belief is not None
+    assert belief.map_from_odom == pytest.approx(Pose2(0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("rows", [[241, *[0.5] * 18], [-1, *[0.5] * 18], [240, float("nan"), *[0.5] * 17], [240, 1]])
+def test_filtered_odometry_that_is_none_is_refused(rows: list[float]) -> None:
+    with pytest.raises(ProtocolViolation):
+        understand(**{"/odometry/filtered/exact": messages.float64_array(rows)})
 
 
 def test_a_costmap_is_recorded_as_it_was_said() -> None:

@@ -1,0 +1,183 @@
+"""Extended Kalman filter of wheel odometry and gyroscope for the odom frame, as robot_localization's ekf_node.
+
+Moore and Stouch, A Generalized Extended Kalman Filter Implementation for the Robot Operating System (IAS 2014), in its
+planar mode (`two_d_mode`). Prediction and update are those of filterpy's ExtendedKalmanFilter (Labbe).
+
+Import this module only where there is a filter: filterpy imports scipy.stats, which takes half a second.
+"""
+
+import math
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.sensor_data import Imu, Odometry
+from simscen.model import odometry as model
+from simscen.stack.odometry_history import is_plausible
+
+VX, VY, VYAW, BIAS = range(4)
+"""State: the velocity of the base in its own frame (m/s, m/s, rad/s) and the bias of the gyroscope (rad/s)."""
+MIN_VARIANCE = 1e-9
+"""Variance of a measurement without a covariance, in (m/s)² or (rad/s)²; the same as in robot_localization."""
+MAX_GYRO_GAP_S = 0.1
+"""Longest time between two gyroscope readings that are used together, and from a reading to the odometry."""
+MAX_YAW_RATE_RADPS = 100.0
+"""A gyroscope that measures more is broken."""
+
+_WHEELS = np.eye(3, 4)
+_WHEELS_AND_GYRO = np.vstack((_WHEELS, (0.0, 0.0, 1.0, 1.0)))
+_FORWARD_AND_GYRO = _WHEELS_AND_GYRO[[VX, VY, 3]]
+
+
+class OdometryFilter:
+    """Fuses wheel odometry and the yaw rate of a gyroscope.
+
+    For each odometry reading, filterpy predicts and updates the mean velocity since the previous one. It is measured by
+    the wheels and, plus a bias, by the gyroscope. The covariances are those of the messages. The pose is this velocity
+    integrated and is never corrected afterwards, so that the odom frame does not jump (REP 105). Its covariance is that
+    of the integrated errors, including those that the bias causes.
+    """
+
+    def __init__(self, spec: model.OdometryFilter, tick_rate: int) -> None:
+        """Take the parameters and the number of ticks per second."""
+        self._tick_rate = tick_rate
+        self._process_noise = np.diag([*spec.process_noise_covariance, spec.gyro_bias_walk**2])
+        self._rejection_threshold = spec.odom0_twist_rejection_threshold
+        self._gyro = GyroscopeIntegral(tick_rate)
+        self._filter = ExtendedKalmanFilter(dim_x=4, dim_z=4)
+        self._filter.predict_x = _keep_state
+        self._filter.x = np.zeros(4)
+        self._filter.P = np.diag([0.0, 0.0, 0.0, spec.gyro_bias**2])
+        self._pose_covariance = np.zeros((3, 3))
+        self._pose_velocity_covariance = np.zeros((3, 4))
+        self._pose = Pose2(0.0, 0.0)
+        self._last: Odometry | None = None
+        self._period = math.inf
+
+    def on_imu(self, imu: Imu) -> None:
+        """Integrate the yaw rate until the next odometry."""
+        self._gyro.add(imu.tick, imu.angular_velocity[2], imu.angular_velocity_variance)
+
+    def fuse(self, odometry: Odometry) -> Odometry | None:
+        """Return the filtered odometry at the tick of a reading; None if the reading is unusable.
+
+        The first reading is returned as it is: the odom frame is that of the wheel odometry.
+        """
+        last = self._last
+        if not is_plausible(odometry.pose) or (last is not None and odometry.tick <= last.tick):
+            return None
+        self._last = odometry
+        turned = self._gyro.turned_until(odometry.tick)
+        if last is None:
+            self._pose = odometry.pose
+            return odometry
+        seconds = (odometry.tick - last.tick) / self._tick_rate
+        self._period = min(self._period, seconds)
+        self._measure(mean_velocity(last.pose.between(odometry.pose), seconds), odometry, turned, seconds)
+        self._move(seconds)
+        vx, vy, wz, _ = self._filter.x.tolist()
+        variances = self._filter.P.diagonal().tolist()
+        covariance = tuple(self._pose_covariance.ravel().tolist())
+        return Odometry(
+            odometry.sensor, odometry.tick, self._pose, Twist(vx, vy, wz),
+            (variances[VX], variances[VY], variances[VYAW]), covariance,
+        )  # fmt: skip
+
+    def _measure(self, wheels: Twist, odometry: Odometry, turned: tuple[float, float] | None, seconds: float) -> None:
+        """Predict and update the mean velocity during the last `seconds`; `turned` is the gyroscope's measurement."""
+        self._filter.Q = self._process_noise * seconds
+        self._filter.predict()
+        # After lost messages, one increment contains the independent errors of several.
+        share = self._period / seconds
+        variances = [max(variance * share, MIN_VARIANCE) for variance in odometry.twist_variance]
+        if turned is None:
+            measurement, matrix = list(wheels), _WHEELS
+        else:
+            rate, variance = turned[0] / seconds, max(turned[1] / seconds**2, MIN_VARIANCE)
+            if self._slips(wheels.wz - rate, variances[VYAW] + variance):
+                measurement, matrix = [wheels.vx, wheels.vy, rate], _FORWARD_AND_GYRO
+                variances[VYAW] = variance
+            else:
+                measurement, matrix = [*wheels, rate], _WHEELS_AND_GYRO
+                variances.append(variance)
+        noise = np.zeros((len(variances), len(variances)))
+        noise.flat[:: len(variances) + 1] = variances
+        self._filter.update(np.array(measurement), lambda _: matrix, lambda state: matrix @ state, R=noise)
+        self._pose_velocity_covariance -= self._pose_velocity_covariance @ (self._filter.K @ matrix).T
+
+    def _slips(self, difference: float, variance: float) -> bool:
+        """Return whether wheels and gyroscope disagree about the yaw rate by more than their errors explain."""
+        difference += float(self._filter.x[BIAS])
+        limit = self._rejection_threshold**2 * (variance + float(self._filter.P[BIAS, BIAS]))
+        return difference**2 > limit
+
+    def _move(self, seconds: float) -> None:
+        """Move the pose by the velocity, at the mean heading of the step, and propagate its covariance."""
+        vx, vy, wz, _ = self._filter.x.tolist()
+        x, y, yaw = self._pose
+        heading = yaw + wz * seconds / 2
+        c, s = math.cos(heading) * seconds, math.sin(heading) * seconds
+        dx, dy, half = c * vx - s * vy, s * vx + c * vy, seconds / 2
+        self._pose = Pose2(x + dx, y + dy, wrap(yaw + wz * seconds))
+        by_pose = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])
+        by_velocity = np.array([[c, -s, -dy * half, 0.0], [s, c, dx * half, 0.0], [0.0, 0.0, seconds, 0.0]])
+        moved = by_pose @ self._pose_velocity_covariance
+        spread = by_velocity @ self._filter.P
+        crossed = moved @ by_velocity.T
+        self._pose_covariance = (
+            by_pose @ self._pose_covariance @ by_pose.T + crossed + crossed.T + spread @ by_velocity.T
+        )
+        self._pose_velocity_covariance = moved + spread
+
+
+class GyroscopeIntegral:
+    """Angle about the vertical axis by a gyroscope, between any two ticks: the trapezoidal rule.
+
+    Up to `MAX_GYRO_GAP_S` after the newest reading, the yaw rate is taken to stay as it is. The next readings replace
+    this assumption, so that its errors do not accumulate.
+    """
+
+    def __init__(self, tick_rate: int) -> None:
+        self._tick_rate, self._max_gap = tick_rate, MAX_GYRO_GAP_S * tick_rate
+        self._tick: int | None = None  # of the newest reading
+        self._rate, self._angle, self._variance = 0.0, 0.0, 0.0
+        self._read: tuple[int, float] | None = None  # tick and angle at the end of the last increment
+
+    def add(self, tick: int, rate: float, variance: float) -> None:
+        """Add a yaw rate (rad/s) with the variance of its noise. Unusable readings are ignored."""
+        if not abs(rate) < MAX_YAW_RATE_RADPS or (self._tick is not None and tick <= self._tick):
+            return
+        if self._tick is None or tick - self._tick > self._max_gap:
+            self._read = None
+        else:
+            seconds = (tick - self._tick) / self._tick_rate
+            self._angle += (self._rate + rate) / 2 * seconds
+            self._variance = variance * seconds
+        self._tick, self._rate = tick, rate
+
+    def turned_until(self, tick: int) -> tuple[float, float] | None:
+        """Return the angle turned since the last call (rad) and the variance of its noise (rad²).
+
+        None if readings are missing.
+        """
+        last, self._read = self._read, None
+        if self._tick is None or abs(tick - self._tick) > self._max_gap:
+            return None
+        angle = self._angle + self._rate * (tick - self._tick) / self._tick_rate
+        self._read = tick, angle
+        if last is None:
+            return None
+        return angle - last[1], self._variance * (tick - last[0]) / self._tick_rate
+
+
+def mean_velocity(step: Pose2, seconds: float) -> Twist:
+    """Return the constant velocity of a step along an arc, by its chord, which has half of the turn as its heading."""
+    x, y, turn = step
+    c, s = math.cos(turn / 2), math.sin(turn / 2)
+    return Twist((c * x + s * y) / seconds, (c * y - s * x) / seconds, turn / seconds)
+
+
+def _keep_state(_: object = 0) -> None:
+    """Predict that the state stays as it is, without the product that filterpy would compute."""
