@@ -15,16 +15,18 @@ from simscen.stack.checkers import ProgressChecker
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import CommandPipeline, VelocitySmoother
 from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.installed.behavior import InstalledBehavior
-from simscen.stack.installed.controller import InstalledController
-from simscen.stack.installed.goal_checker import InstalledGoalChecker
-from simscen.stack.installed.guarded_calls import made
-from simscen.stack.installed.localizer import InstalledLocalizer
-from simscen.stack.installed.planner import InstalledPlanner
-from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.navigator import ClearEntirely, ClearingPolicy, Navigator
 from simscen.stack.odometry_history import TRAIL_S, OdometryHistory
 from simscen.stack.plan_manager import PlanManager
+from simscen.stack.plugins.checked_components import (
+    CheckedBehavior,
+    CheckedController,
+    CheckedGoalChecker,
+    CheckedLocalizer,
+    CheckedPlanner,
+)
+from simscen.stack.plugins.checked_plugin import build_component
+from simscen.stack.plugins.checked_stack import CheckedStack
 from simscen.stack.protocols import Behavior, Controller, Localizer, Planner, Surroundings
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.reference import ReferenceStack
@@ -44,7 +46,7 @@ def build_stack(
     stop_on_failure: bool = True,
     wrap_localizer: Callable[[Localizer], Localizer] = lambda localizer: localizer,
     mode: Mode = "navigate_to_pose",
-) -> InstalledStack:
+) -> CheckedStack:
     """Build the stack of a specification, ready to `start`.
 
     `wrap_localizer` wraps the localizer that the rest of the stack uses, for example to inject faults. Raises
@@ -60,7 +62,7 @@ def build_stack(
         mode=mode,
         wrap_localizer=wrap_localizer,
     )
-    return InstalledStack(spec, setting)
+    return CheckedStack(spec, setting)
 
 
 def configured_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
@@ -99,7 +101,7 @@ class StackBuilder:
             resolution=spec.local_costmap.completed(spec.costmap).resolution,
             trail=odometry.trail,
         )
-        controller: Controller = made(InstalledController, spec.controller, driving)
+        controller: Controller = build_component(CheckedController, spec.controller, driving)
         costmaps = Costmaps(
             spec,
             self.surroundings,
@@ -111,12 +113,12 @@ class StackBuilder:
             driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around, limit_command=monitor.allow
         )
         planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
-        plans = self.make_plan_manager(InstalledPlanner(spec.planner, planning), costmaps, controller)
+        plans = self.make_plan_manager(CheckedPlanner(spec.planner, planning), costmaps, controller)
         navigator = Navigator(
             plans,
             controller,
             RoundRobin(_behaviors(spec.recovery, driving), spec.recovery),
-            made(InstalledGoalChecker, spec.goal_checker, driving.named("goal_checker")),
+            build_component(CheckedGoalChecker, spec.goal_checker, driving.named("goal_checker")),
             ProgressChecker(spec.progress_checker),
             costmaps,
             setting.control_period,
@@ -131,7 +133,7 @@ class StackBuilder:
         )
         return self.make_stack(
             self.surroundings,
-            setting.wrap_localizer(made(InstalledLocalizer, spec.localizer, driving.named("localizer"))),
+            setting.wrap_localizer(build_component(CheckedLocalizer, spec.localizer, driving.named("localizer"))),
             costmaps,
             controller,
             navigator,
@@ -187,6 +189,4 @@ def _latency_ticks(spec: StackSpec, clock: Clock) -> dict[str, int]:
 def _behaviors(spec: Recovery, shared: Setting) -> list[Behavior]:
     """Build the recovery behaviors that the robot can execute, each with its own random stream."""
     possible = [each for each in spec.chosen() if shared.robot.turning_radius == 0.0 or not each.turns_in_place]
-    return [
-        InstalledBehavior(each, shared.named(f"behavior#{number}")) for number, each in enumerate(possible, start=1)
-    ]
+    return [CheckedBehavior(each, shared.named(f"behavior#{number}")) for number, each in enumerate(possible, start=1)]

@@ -6,7 +6,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Goal, Path
-from simscen.stack.controllers.tracking import PathTracker
+from simscen.stack.controllers.path_handler import PathTracker
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import distances
 from simscen.stack.frames import Frames, transform_poses

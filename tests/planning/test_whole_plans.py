@@ -14,7 +14,7 @@ from simscen.stack.footprint import Footprint
 from simscen.stack.planners.build import ompl_planner
 from simscen.stack.planners.endpoints import find_endpoints
 from simscen.stack.planners.grid_planner import navfn, smac_2d
-from simscen.stack.planners.path_points import spaced
+from simscen.stack.planners.path_postprocessing import spaced
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, RobotModel
 from simscen.testing.flatland import box_robot, setting

@@ -11,7 +11,7 @@ from simscen.loading.scenario import load_scenario
 from simscen.run.lockstep import RobotUnderTest
 from simscen.run.preparation.scenario import prepare
 from simscen.run.simulate import simulate
-from simscen.stack.installed.stack import InstalledStack
+from simscen.stack.plugins.checked_stack import CheckedStack
 from simscen.stack.reference import ReferenceStack
 
 WORLDS = Path(__file__).parents[2] / "worlds"
@@ -36,7 +36,7 @@ class Compared:
     """At each scan: errors of what is told of people, and what is told to move and does not."""
 
     def __init__(self, agent: RobotUnderTest) -> None:
-        assert isinstance(agent.stack, InstalledStack) and isinstance(agent.stack.inner, ReferenceStack)
+        assert isinstance(agent.stack, CheckedStack) and isinstance(agent.stack.inner, ReferenceStack)
         (self.prediction,) = (part for name, part, _ in agent.stack.inner.components if name == "prediction")
         self.places: list[float] = []
         self.speeds: list[float] = []

@@ -10,12 +10,11 @@ from simscen.advanced.planners.straight_line import straight_on
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.stack.planners.build import state_space_for
-from simscen.stack.planners.corner_clearing import around_corners
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints
 from simscen.stack.planners.ompl_planner import FINE_CELLS
 from simscen.stack.planners.ompl_search import Point
-from simscen.stack.planners.path_points import SPACING_M, spaced, with_headings
-from simscen.stack.planners.planning_window import nearby
+from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, spaced, with_headings
+from simscen.stack.planners.planning_window import plan_in_windows
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
@@ -45,7 +44,7 @@ class MedialAxisPlanner:
         points = straight_on(costmap, start, goal, radius, lambda part, there: self._past(part, start, there, seed))
         if points is not None:
             return Path(with_headings(spaced(points, SPACING_M), goal))
-        return nearby(self._plan, costmap, start, goal, seed)
+        return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         costs = self._make_costs(costmap)
@@ -93,5 +92,5 @@ class MedialAxisPlanner:
 
 def _finished(costs: TraversalCosts, points: Array) -> Array | None:
     """Return the path refined and led around corners; None if it passes a blocked cell between two checks."""
-    path = around_corners(costs, spaced(refined(costs, points), SPACING_M))
-    return path if path is not None else around_corners(costs, spaced(points, SPACING_M))
+    path = avoid_cell_corners(costs, spaced(refined(costs, points), SPACING_M))
+    return path if path is not None else avoid_cell_corners(costs, spaced(points, SPACING_M))

@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.grid_graph import resample_polyline
-from simscen.stack.planners.path_points import smoothed
-from simscen.stack.planners.traversal_costs import STEP, TraversalCosts
+from simscen.stack.planners.path_postprocessing import smoothed
+from simscen.stack.planners.traversal_costs import SAMPLE_SPACING_CELLS, TraversalCosts
 
 ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
 """Meters between stations, meters to either side, points across."""
@@ -28,7 +28,7 @@ def refined(rates: TraversalCosts, points: Array) -> Array:
     points = _cut_short(rates, points)
     cost = rates.along(points)
     for station, side, across in ROUNDS:
-        for stride in (rates.stride, STEP * rates.resolution):
+        for stride in (rates.stride, SAMPLE_SPACING_CELLS * rates.resolution):
             other = _through(
                 rates, resample_polyline(points, station, LEAST_LEGS), np.linspace(-side, side, across), stride
             )

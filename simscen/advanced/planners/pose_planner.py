@@ -6,17 +6,17 @@ from simscen.advanced.planners.informed_set import InformedSet
 from simscen.core.geometry import Pose2
 from simscen.stack.planners.endpoints import Endpoints
 from simscen.stack.planners.pose_planner import CLEARANCE_M, LESS_CLEARANCE_M, Attempt, PosePlanner
-from simscen.stack.planners.pose_search import SPACING
+from simscen.stack.planners.pose_search import POSE_SPACING_M
 from simscen.stack.planners.traversal_costs import TraversalCosts
 
 ATTEMPTS = (
-    (0.15, CLEARANCE_M, 0.1, SPACING),
-    (0.3, CLEARANCE_M, 0.1, SPACING),
-    (0.15, LESS_CLEARANCE_M, 0.1, SPACING),
-    (0.3, LESS_CLEARANCE_M, 0.1, SPACING),
-    (0.3, 0.0, 0.2, SPACING),
-    (2.0, 0.0, 0.4, SPACING),
-    (2.0, 0.0, 0.4, SPACING / 10),
+    (0.15, CLEARANCE_M, 0.1, POSE_SPACING_M),
+    (0.3, CLEARANCE_M, 0.1, POSE_SPACING_M),
+    (0.15, LESS_CLEARANCE_M, 0.1, POSE_SPACING_M),
+    (0.3, LESS_CLEARANCE_M, 0.1, POSE_SPACING_M),
+    (0.3, 0.0, 0.2, POSE_SPACING_M),
+    (2.0, 0.0, 0.4, POSE_SPACING_M),
+    (2.0, 0.0, 0.4, POSE_SPACING_M / 10),
 )
 """Slack of the informed set as a ratio, clearance in m, share of the iterations, and spacing of checks in m.
 

@@ -12,7 +12,7 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model import recovery as model
 from simscen.stack.arcs import poses_along
-from simscen.stack.behaviors.motions import TIME_ALLOWANCE
+from simscen.stack.behaviors.motions import TIME_ALLOWANCE_S
 from simscen.stack.footprint import Mask, distance_at, lethal_near
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 from simscen.stack.setting import Setting
@@ -194,7 +194,7 @@ class Retrace:
             return None
         if back.driven >= self._spec.backup_dist and self._may_turn(pose, costmap):
             return None
-        if seconds > max(TIME_ALLOWANCE, SLOWLY * self._spec.retrace_dist / back.speed):
+        if seconds > max(TIME_ALLOWANCE_S, SLOWLY * self._spec.retrace_dist / back.speed):
             raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "driving back along the trail took too long")
         command = back.command(pose, costmap)
         if command is None and back.moved < costmap.resolution:

@@ -15,7 +15,7 @@ from simscen.core.random_streams import Streams
 from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.read import LocalizationLog
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
-from simscen.stack.installed.localizer import InstalledLocalizer
+from simscen.stack.plugins.checked_components import CheckedLocalizer
 from simscen.stack.protocols import Surroundings
 from simscen.stack.setting import Setting
 
@@ -81,7 +81,7 @@ def localize(
 
     The same arguments give the same beliefs, and those of a run of that seed: the localizer is begun as a stack does.
     """
-    localizer = InstalledLocalizer(spec.localizer, Setting(surroundings, "localizer", Streams(seed)))
+    localizer = CheckedLocalizer(spec.localizer, Setting(surroundings, "localizer", Streams(seed)))
     localizer.reset(estimate)
     times, poses, covariances, scans, cpu, slowest = [], [], [], 0, 0.0, 0.0
     for reading in sensed.readings:

@@ -21,7 +21,7 @@ from simscen.run.lockstep import RunSetup
 from simscen.run.preparation.scenario import PreparedScenario, lidar_height, prepare
 from simscen.run.simulate import GC_THRESHOLD, simulate
 from simscen.sim.bullet.baseline import PyBulletBaseline
-from simscen.stack.installed.stack import InstalledStack
+from simscen.stack.plugins.checked_stack import CheckedStack
 from simscen.stack.reference import ReferenceStack
 from simscen.worlds.geometry.triangulation import fuse, triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
@@ -131,7 +131,7 @@ def _watched(watch: Stopwatch, setup: RunSetup, own: Sequence[MomentSink]) -> Se
     watch.watch("truth and contacts", agent.robot, "truth", "sample", "collisions")
     watch.watch("truth and contacts", agent.robot.sampler, "compute_deferred")
     watch.watch("sensors", agent.sensors, "read")
-    if isinstance(agent.stack, InstalledStack) and isinstance(agent.stack.inner, ReferenceStack):
+    if isinstance(agent.stack, CheckedStack) and isinstance(agent.stack.inner, ReferenceStack):
         for name, component, methods in agent.stack.inner.components:
             watch.watch(name, component, *methods)
     watch.watch("navigator", agent.stack, "decide")

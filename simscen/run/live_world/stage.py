@@ -22,7 +22,7 @@ from simscen.run.live_world.pedestrians import PedestrianSimulation
 from simscen.sim.body.outline import outlines_in_band
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
-from simscen.stack.installed.stack import InstalledStack
+from simscen.stack.plugins.checked_stack import CheckedStack
 from simscen.stack.protocols import Stack
 from simscen.worlds.routes.shortest_paths import Z_RANGE
 
@@ -282,7 +282,7 @@ class LiveStage:
 
     def switch_zone(self, order: ZoneSwitch) -> str:
         """Switch a zone of a costmap filter; return why it is impossible, or ""."""
-        if not isinstance(self._stack, InstalledStack) or not self._stack.can_switch_zones:
+        if not isinstance(self._stack, CheckedStack) or not self._stack.can_switch_zones:
             return "the stack cannot be told of zones that are switched"
         if refused := self._filters.refused(order):
             return refused

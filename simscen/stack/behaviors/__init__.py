@@ -1,1 +1,1 @@
-"""What a robot does when it is stuck (nav2_behaviors)."""
+"""Recovery behaviors (nav2_behaviors)."""

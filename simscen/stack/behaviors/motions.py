@@ -10,9 +10,9 @@ from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 from simscen.stack.time_to_collision import time_to_collision
 
-TIME_ALLOWANCE = 10.0
+TIME_ALLOWANCE_S = 10.0
 """Nav2's default for every behavior, in seconds."""
-MIN_ROTATIONAL_VEL = 0.4
+MIN_ROTATIONAL_VEL_RAD_S = 0.4
 """nav2_behaviors: min_rotational_vel in rad/s."""
 
 
@@ -36,11 +36,13 @@ class Spin:
         left = abs(self._spec.spin_dist) - math.copysign(1.0, self._spec.spin_dist) * self._turned
         if left <= 0.01 or self._robot.turning_radius > 0.0:
             return None
-        if seconds > TIME_ALLOWANCE:
+        if seconds > TIME_ALLOWANCE_S:
             raise NavigationFailure(ErrorCode.SPIN_TIMEOUT, "spinning took too long")
         stopping = math.sqrt(2.0 * self._robot.angular_acceleration * left)
         fastest = min(self._spec.max_rotational_vel, self._robot.max_angular)
-        command = Twist(0.0, 0.0, math.copysign(min(max(stopping, MIN_ROTATIONAL_VEL), fastest), self._spec.spin_dist))
+        command = Twist(
+            0.0, 0.0, math.copysign(min(max(stopping, MIN_ROTATIONAL_VEL_RAD_S), fastest), self._spec.spin_dist)
+        )
         horizon = min(self._spec.simulate_ahead_time, left / abs(command.wz))
         if time_to_collision(self._footprint, costmap, pose, command, horizon) < horizon:
             raise NavigationFailure(ErrorCode.SPIN_COLLISION_AHEAD, "no room to spin")
@@ -75,7 +77,7 @@ class BackUp:
             return None
         if speed <= 0.0:
             raise NavigationFailure(ErrorCode.BACKUP_INVALID_INPUT, "the robot cannot drive backward")
-        if seconds > TIME_ALLOWANCE:
+        if seconds > TIME_ALLOWANCE_S:
             raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "backing up took too long")
         command = Twist(-speed, 0.0, 0.0)
         horizon = min(self._spec.simulate_ahead_time, left / speed)

@@ -1,1 +1,1 @@
-"""From a path to velocities."""
+"""Controllers: velocity commands that follow a path, as in Nav2's controller server."""

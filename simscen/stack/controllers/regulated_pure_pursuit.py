@@ -7,24 +7,23 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.controllers import RegulatedPurePursuit as RppSpec
 from simscen.stack.arcs import LOCAL_PLAN_TIMES_S, arc_poses
-from simscen.stack.controllers.following import PathFollower
-from simscen.stack.controllers.free_way import FreeWay
-from simscen.stack.controllers.goal_pose import GoalPose
-from simscen.stack.controllers.slowing import Slowing
-from simscen.stack.controllers.tracking import AT_CUSP, PathTracker
-from simscen.stack.controllers.turning import TurningRoom
+from simscen.stack.controllers.collision_checker import CollisionChecker, RotationClearance
+from simscen.stack.controllers.goal_rotation import GoalRotation
+from simscen.stack.controllers.path_follower import PathFollower
+from simscen.stack.controllers.path_handler import CUSP_REACHED_M, PathTracker
+from simscen.stack.controllers.speed_regulation import SpeedRegulation
 from simscen.stack.footprint import distance_at
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
-NO_CHORD = 0.001
+MIN_SQUARED_CHORD_M2 = 0.001
 """m²: nearer carrots are straight ahead (Nav2's calculateCurvature)."""
-BEND = 0.4
+CAR_LOOKAHEAD_RATIO = 0.4
 """Of its turning radius a car looks ahead at most: its plans go from full left to full right, and what a chord cuts off
 there it cannot make good again."""
-ASIDE = 0.1
+MIN_ROTATION_RAD = 0.1
 """rad. Carrots that lie less to the side than that are straight ahead: to turn to them changes nothing."""
-NEARER = (1.0, 0.7, 0.5, 0.35)
+LOOKAHEAD_RATIOS = (1.0, 0.7, 0.5, 0.35)
 """Parts of the look-ahead distance that are tried until the arc is free: an arc to a far carrot cuts the path's bends,
 shorter ones keep to it. nav2_graceful_controller goes through its targets likewise."""
 
@@ -35,9 +34,9 @@ class RegulatedPurePursuit(PathFollower):
     def __init__(self, spec: RppSpec, setting: Setting) -> None:
         robot, footprint, period = setting.robot, setting.footprint, setting.control_period
         super().__init__(spec.desired_linear_vel, robot)
-        self._spec, self._robot, self._free_way = spec, robot, FreeWay(footprint)
-        self._goal_pose = GoalPose(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)
-        self._turning, self._slowing = TurningRoom(footprint), Slowing(spec, setting)
+        self._spec, self._robot, self._free_way = spec, robot, CollisionChecker(footprint)
+        self._goal_pose = GoalRotation(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)
+        self._turning, self._slowing = RotationClearance(footprint), SpeedRegulation(spec, setting)
         self.arc: tuple[Pose2, Twist] | None = None
         """The pose and the velocity of its last command."""
 
@@ -67,7 +66,7 @@ class RegulatedPurePursuit(PathFollower):
         arcs: list[tuple[float, float, Twist]] = []
         turn: float | None = None
         aside: float | None = None
-        for part in NEARER:
+        for part in LOOKAHEAD_RATIOS:
             if part < 1.0 and part * reach < self._spec.min_lookahead_dist:
                 break
             carrot = _seen_from(pose, *track.carrot(pose, part * reach, beyond=self._robot.turning_radius > 0.0))
@@ -104,7 +103,7 @@ class RegulatedPurePursuit(PathFollower):
         round would come nearer to what it stands beside by turning.
         """
         angle = _bearing(carrot, backward)
-        if not self._spec.use_rotate_to_heading or self._robot.radius is None or abs(angle) < ASIDE:
+        if not self._spec.use_rotate_to_heading or self._robot.radius is None or abs(angle) < MIN_ROTATION_RAD:
             return False
         free, horizon = self._time_free(
             Twist(arc_poses.vx, 0.0, 0.0), Pose2(pose.x, pose.y, pose.yaw + angle), costmap, math.hypot(*carrot)
@@ -120,7 +119,7 @@ class RegulatedPurePursuit(PathFollower):
         """Meters for which the way must be free: to the carrot; of a car's, that may lie beyond where it stops."""
         assert self._track is not None
         away = math.hypot(*carrot)
-        return min(away, max(AT_CUSP, self._track.to_cusp())) if self._robot.turning_radius > 0.0 else away
+        return min(away, max(CUSP_REACHED_M, self._track.to_cusp())) if self._robot.turning_radius > 0.0 else away
 
     def _turn(self, angle: float, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
         """In place where there is room for all of the turn; else back out to where there is."""
@@ -137,7 +136,7 @@ class RegulatedPurePursuit(PathFollower):
             return spec.lookahead_dist
         reach = min(max(abs(speed) * spec.lookahead_time, spec.min_lookahead_dist), spec.max_lookahead_dist)
         if self._robot.turning_radius > 0.0:
-            reach = min(reach, max(spec.min_lookahead_dist, BEND * self._robot.turning_radius))
+            reach = min(reach, max(spec.min_lookahead_dist, CAR_LOOKAHEAD_RATIO * self._robot.turning_radius))
         return reach
 
     def _should_rotate(self, carrot: tuple[float, float], backward: bool) -> bool:
@@ -147,7 +146,7 @@ class RegulatedPurePursuit(PathFollower):
 
     def _drive(self, carrot: tuple[float, float], backward: bool, pose: Pose2, costmap: CostmapView) -> Twist:
         square = carrot[0] ** 2 + carrot[1] ** 2
-        curvature = 2.0 * carrot[1] / square if square > NO_CHORD else 0.0
+        curvature = 2.0 * carrot[1] / square if square > MIN_SQUARED_CHORD_M2 else 0.0
         if self._robot.turning_radius > 0.0:
             tightest = 1.0 / self._robot.turning_radius
             curvature = min(max(curvature, -tightest), tightest)

@@ -1,1 +1,1 @@
-"""What the robot believes to be in its way: nav2_costmap_2d's layers, vectorized."""
+"""Layered costmap of the robot (nav2_costmap_2d), vectorized."""

@@ -14,23 +14,30 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.denoise_layer import without_specks
-from simscen.stack.costmap.frame import Cells, Frame, Numbers
+from simscen.stack.costmap.grid_frame import (
+    Cells,
+    GridFrame,
+    Numbers,
+    clip_goal,
+    shift_layer,
+    should_roll,
+    window_around,
+)
 from simscen.stack.costmap.inflation_layer import Costs, Inflation, inflation, squared_distances
 from simscen.stack.costmap.live_layer import EVERYWHERE, NONE, LiveLayer, Window
-from simscen.stack.costmap.obstacle_layer import crossed
-from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
+from simscen.stack.costmap.obstacle_layer import crossed_cells
 from simscen.stack.costmap.static_layer import Mask, StaticLayer, empty_layer, free_layer, static_layer, walls_within
 from simscen.stack.distance_transform import MAX_REACH_CELLS, SquaredDistanceTransform
 from simscen.stack.localizers.beams import Plane
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 
-BEYOND_HULL = 0.5
+DISTANCE_MARGIN_M = 0.5
 """Meters beyond the hull up to which distances are told, or the inflation radius if that is more."""
-LOOK_AROUND = 5
+SCANS_PER_UNKNOWN_UPDATE = 5
 """Every which scan is asked what unknown cells it shows to be free: once a second at the default rate, Nav2's own for
 the global costmap. Nothing that drives waits for it, and of a map's outside there are many."""
-CHANGES = 16
+KEPT_REVISIONS = 16
 """The newest revisions of which it is known what changed."""
 
 
@@ -64,11 +71,11 @@ class Costmap:
         self._newest: dict[str, tuple[Pose2, Scan | Image]] = {}
         self._view: CostmapView | None = None
         self._changed: tuple[tuple[int, int], tuple[int, int]] | None = None
-        self._changes = deque[Numbers | None](maxlen=CHANGES)
+        self._changes = deque[Numbers | None](maxlen=KEPT_REVISIONS)
         self.moving = NO_MOVING_OBSTACLES
         """What moves, in its frame; shown with it."""
         layer = self._layer(Pose2(0.0, 0.0))
-        self._frame: Frame = layer.frame
+        self._frame: GridFrame = layer.frame
         self._live = LiveLayer(spec, self._inscribed, layer.frame)
         self._lay(layer)
         self._unknown = layer.unknown.copy()
@@ -117,7 +124,7 @@ class Costmap:
 
     def update(self, base: Pose2, seen: Scan | Image) -> None:
         """Clear what a sensor sees through, then mark what it sees, from the robot at `base`."""
-        if self._rolling and left_behind(self._frame, base, self._no_farther):
+        if self._rolling and should_roll(self._frame, base, self._no_farther):
             self._roll(base)
         self._newest[seen.sensor] = (base, seen)
         if isinstance(seen, Image):
@@ -129,7 +136,7 @@ class Costmap:
         if self._tracks:
             self._learn(base, seen)
 
-    def clear(self, within: float = math.inf, unseen: float = BEYOND_HULL) -> None:
+    def clear(self, clip_goal: float = math.inf, unseen: float = DISTANCE_MARGIN_M) -> None:
         """Forget every live obstacle `within` so many meters of the robot along x and y, but those that it sees now.
 
         Nav2's ClearEntireCostmap, or ClearCostmapAroundRobot. What is `unseen`, where no lidar looks, so many meters
@@ -140,8 +147,8 @@ class Costmap:
         scans = [(base, seen) for base, seen in newest if isinstance(seen, Scan)]
         blind = self._surroundings.robot.circumscribed_radius + unseen
         kept = self._live.out_of_view(scans[-1][0], blind, scans) if scans else None
-        if newest and math.isfinite(within):
-            self._live.forget_around(newest[-1][0], within)
+        if newest and math.isfinite(clip_goal):
+            self._live.forget_around(newest[-1][0], clip_goal)
         else:
             self._live.forget(self._frame)
         if kept is not None:
@@ -173,7 +180,7 @@ class Costmap:
 
     def aim(self, start: Pose2, goal: Pose2) -> Pose2:
         """Where to plan to: the goal, or when it is beyond a rolling window the nearest point to it inside."""
-        return within(self._frame, start, goal) if self._rolling else goal
+        return clip_goal(self._frame, start, goal) if self._rolling else goal
 
     def _roll(self, base: Pose2) -> None:
         """Follow the robot; what is new in the window is unknown, where that is tracked."""
@@ -183,13 +190,13 @@ class Costmap:
         self._frame = window  # where nothing is forbidden, the cells of one window are those of any other
         self._live.roll(window)
         if self._tracks:
-            self._unknown = carried(self._unknown, before, window, True)
+            self._unknown = shift_layer(self._unknown, before, window, True)
         self._touch(*self._whole)
 
     def _layer(self, center: Pose2) -> StaticLayer:
         return self._layer_in(window_around(center, self._size, self._spec.resolution))
 
-    def _layer_in(self, window: Frame) -> StaticLayer:
+    def _layer_in(self, window: GridFrame) -> StaticLayer:
         """What never changes but by an order; in this window, where there is no map."""
         grid, keepout, mask = self._surroundings.map, self._surroundings.keepout, self._surroundings.masks.keepout
         unknown = self._tracks
@@ -238,14 +245,14 @@ class Costmap:
     def _learn(self, base: Pose2, scan: Scan) -> None:
         """Unknown cells that the beams pass through are known from now on."""
         self._scans += 1
-        if self._scans % LOOK_AROUND != 1:
+        if self._scans % SCANS_PER_UNKNOWN_UPDATE != 1:
             return
         frame = self._frame
         around = self._live.around(base, math.hypot(scan.mount.x, scan.mount.y))
         cells = frame.within(around, np.flatnonzero(self._unknown[around]))
         if not len(cells):
             return
-        passed, _ = crossed(frame.points(cells), frame.resolution, scan, base, self._spec)
+        passed, _ = crossed_cells(frame.points(cells), frame.resolution, scan, base, self._spec)
         cells = cells[passed]
         if len(cells):
             self._unknown[np.divmod(cells, frame.shape[1])] = False
@@ -307,7 +314,7 @@ class Costmap:
 
 def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
     """How far in meters from obstacles distances are told."""
-    return max(spec.inflation_radius, robot.circumscribed_radius + BEYOND_HULL)
+    return max(spec.inflation_radius, robot.circumscribed_radius + DISTANCE_MARGIN_M)
 
 
 def ready(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:

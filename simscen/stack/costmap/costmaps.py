@@ -1,4 +1,4 @@
-"""The two costmaps of a stack, as in Nav2: a global one to plan on, and a local one to drive by."""
+"""Global costmap for planning and local costmap for control, as in Nav2."""
 
 import math
 from dataclasses import replace
@@ -8,15 +8,15 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmap import Costmap
-from simscen.stack.costmap.rolling import NO_FARTHER
+from simscen.stack.costmap.grid_frame import MAX_ROLL_OFFSET_M
 from simscen.stack.frames import Frames, transform_polygon
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
 
-SMALLEST = 3.0
+MIN_LOCAL_SIZE_M = 3.0
 """Meters: the edge of Nav2's local costmap, and the least of ours unless somebody asks for less."""
-ZONES_MOVED = 0.02
+ZONE_TOLERANCE_M = 0.02
 """Meters by which zones may lie beside where they belong in the odom frame before they are painted anew."""
 
 
@@ -32,10 +32,10 @@ class Costmaps:
         """`reach`: how far in meters the controller looks ahead; `latency`: ticks that an update takes."""
         self.wide = Costmap(spec.costmap, surroundings)
         near = spec.local_costmap.completed(spec.costmap)
-        edge = max(SMALLEST, 2.0 * (reach + surroundings.robot.circumscribed_radius + NO_FARTHER))
+        edge = max(MIN_LOCAL_SIZE_M, 2.0 * (reach + surroundings.robot.circumscribed_radius + MAX_ROLL_OFFSET_M))
         size = spec.local_costmap.width or edge, spec.local_costmap.height or edge
         bare = replace(surroundings, map=None, keepout=(), masks=replace(surroundings.masks, keepout=None))
-        self.near = Costmap(near, bare, size, NO_FARTHER)
+        self.near = Costmap(near, bare, size, MAX_ROLL_OFFSET_M)
         self._reach = max(size) / 2
         self._wide = _Rhythm(math.ceil(surroundings.tick_rate / spec.costmap.update_frequency), latency)
         self._near = _Rhythm(math.ceil(surroundings.tick_rate / near.update_frequency), latency)
@@ -96,7 +96,7 @@ class Costmaps:
         mask, known = self._zones.masks.keepout, self._odom_from_map
         if not self._zones.keepout and mask is None and not self._painted:
             return
-        if known is not None and frames.moved(known, self._reach) <= ZONES_MOVED:
+        if known is not None and frames.moved(known, self._reach) <= ZONE_TOLERANCE_M:
             return
         moved, self._painted = frames.odom_from_map, True
         self._odom_from_map = moved

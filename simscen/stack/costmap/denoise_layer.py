@@ -1,4 +1,4 @@
-"""Specks out of a costmap: nav2_costmap_2d's denoise layer."""
+"""Denoise layer: removes small groups of obstacle cells (nav2_costmap_2d)."""
 
 import numpy as np
 

@@ -1,7 +1,10 @@
-"""Obstacles that a depth camera sees above and below the plane of a lidar: Nav2's voxel layer, without its voxels.
+"""Obstacles seen by a depth camera (Nav2's voxel layer, without voxels), and detection of sloping ground.
 
-A cell remembers at what height something was seen in it. It is cleared when the camera sees through that very point,
-so that looking over a low box or under a table top clears neither.
+Each cell stores the height of the obstacle point. It is cleared when the camera sees through that point. Looking over
+a low box or below a table top therefore clears neither.
+
+In each image column, the ground is followed from the robot upward. Points that rise no steeper than the configured
+slope are ground; steeper faces and edges are obstacles.
 """
 
 import math
@@ -14,8 +17,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Image
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.costmap.frame import Cells, Frame
-from simscen.stack.costmap.ground import above_ground
+from simscen.stack.costmap.grid_frame import Cells, GridFrame
 from simscen.stack.costmap.static_layer import Mask
 
 Heights = npt.NDArray[np.float32]
@@ -29,7 +31,7 @@ class Shown(NamedTuple):
     ground: Cells
 
 
-def shown(image: Image, base: Pose2, frame: Frame, spec: CostmapSpec, known: Mask) -> Shown:
+def shown(image: Image, base: Pose2, frame: GridFrame, spec: CostmapSpec, known: Mask) -> Shown:
     """What the camera sees, from a robot at `base`; `known` are the cells that have been ground before."""
     across, up = _slopes(image.depth.shape, image.field_of_view)
     depth = image.depth.astype(np.float64)
@@ -50,7 +52,9 @@ def shown(image: Image, base: Pose2, frame: Frame, spec: CostmapSpec, known: Mas
     return Shown(cells[marked], heights.reshape(-1)[marked].astype(np.float32), cells[level.reshape(-1) & inside])
 
 
-def seen_through(cells: Cells, heights: Heights, frame: Frame, image: Image, base: Pose2, spec: CostmapSpec) -> Mask:
+def seen_through(
+    cells: Cells, heights: Heights, frame: GridFrame, image: Image, base: Pose2, spec: CostmapSpec
+) -> Mask:
     """Which of the cells (n, 2) the camera looks through at their heights (n,), to something farther away."""
     place = base.inverse().apply(frame.centers(cells))
     seen = image.mount.inverse().apply(np.column_stack((place, heights.astype(np.float64))))
@@ -79,3 +83,61 @@ def _slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Array]
     focal = _focal(columns, field_of_view)
     left, up = (columns / 2 - 0.5 - np.arange(columns)) / focal, (rows / 2 - 0.5 - np.arange(rows)) / focal
     return np.broadcast_to(left, shape), np.broadcast_to(up[:, None], shape)
+
+
+Pixels = npt.NDArray[np.bool_]
+GROUND_STEP_M = 0.05
+"""Meters that the ground has to go on for what follows to be measured from there."""
+MAX_RISE_RATIO = 1.0
+"""What rises by more than this for each meter is a face, and the point below it belongs to it."""
+SLOPE_ROWS_DIVISOR = 8
+"""The part of a picture's rows that tells how what is seen first rises."""
+
+
+def above_ground(away: Array, heights: Array, slope: float, low: float, known: Pixels) -> tuple[Array, Pixels]:
+    """How high points (rows, columns) are above the ground, in meters, and which of them are ground.
+
+    `away` are their distances along the plane from the camera, `heights` above the plane on which the robot stands,
+    from the top row down; nan where nothing is seen. Ground rises by no more than the angle `slope`. What is seen
+    first, lies higher by more than `low` than its own slope leads from the robot's feet, and is not `known` for ground,
+    stands on a step that the picture does not show.
+    """
+    steepest, upright = math.tan(slope), _upright(away, heights)
+    rows, columns = heights.shape
+    far, ground = np.zeros(columns), np.zeros(columns)
+    follows = ~_on_a_step(away, heights, upright, low) | known[_lowest(heights), np.arange(columns)]
+    above, level = np.full(heights.shape, np.nan), np.zeros(heights.shape, dtype=bool)
+    for row in range(rows - 1, -1, -1):
+        r, z = away[row], heights[row]
+        on = follows & (z - ground <= steepest * (r - far)) & ~upright[row]
+        over = z - ground * np.minimum(1.0, r / np.maximum(far, GROUND_STEP_M))
+        above[row], level[row] = np.where(on, np.minimum(over, 0.0), over), on
+        on &= r - far >= GROUND_STEP_M
+        far, ground = np.where(on, r, far), np.where(on, z, ground)
+    return above, level
+
+
+def _upright(away: Array, heights: Array) -> Pixels:
+    """Which points are of a face: what is seen in the next row, or in the one before, is straight above or below."""
+    steep: Pixels = np.diff(-heights, axis=0) > MAX_RISE_RATIO * np.maximum(np.diff(-away, axis=0), 0.0)
+    upright = np.zeros(heights.shape, dtype=bool)
+    upright[1:] = steep
+    upright[:-1] |= steep
+    return upright
+
+
+def _on_a_step(away: Array, heights: Array, upright: Pixels, low: float) -> Pixels:
+    """In which columns what is seen first is a face, or higher than the slope on which it lies can lead."""
+    rows, columns = heights.shape
+    every, first = np.arange(columns), _lowest(heights)
+    then = np.maximum(first - rows // SLOPE_ROWS_DIVISOR, 0)
+    r, z = away[first, every], heights[first, every]
+    rise = (heights[then, every] - z) / np.maximum(away[then, every] - r, GROUND_STEP_M)
+    step: Pixels = (z > low) & (upright[first, every] | ~(z - rise * r <= low))
+    return step
+
+
+def _lowest(heights: Array) -> npt.NDArray[np.intp]:
+    """The lowest row in which anything is seen, of each column; the last one where nothing is."""
+    rows: npt.NDArray[np.intp] = len(heights) - 1 - np.isfinite(heights)[::-1].argmax(axis=0)
+    return rows

@@ -1,6 +1,6 @@
-"""From distances to costs: nav2_costmap_2d's inflation layer.
+"""Inflation layer: costs from distances to obstacles (nav2_costmap_2d).
 
-Distances are kept as squared whole cells (uint16), so that distance in meters and cost are one table look-up each.
+Distances are squared numbers of cells (uint16), so that one table lookup gives the distance in m or the cost.
 """
 
 from functools import lru_cache
@@ -16,7 +16,7 @@ from simscen.stack.distance_transform import (
 )
 
 FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 255
-FAR = OUT_OF_REACH
+MAX_SQUARED_CELLS = OUT_OF_REACH
 """The largest squared distance kept: 256 cells, 12.8 m at 5 cm."""
 
 Squared = npt.NDArray[np.uint16]
@@ -26,12 +26,14 @@ Costs = npt.NDArray[np.uint8]
 def squared_distances(lethal: npt.NDArray[np.bool_], reach: int) -> Squared:
     """For each cell the exact squared distance in cells to the nearest lethal cell; more beyond `reach`."""
     if not lethal.any():
-        return np.full(lethal.shape, FAR, dtype=np.uint16)
+        return np.full(lethal.shape, MAX_SQUARED_CELLS, dtype=np.uint16)
     if reach <= MAX_REACH_CELLS:
         return squared_distances_within(lethal, reach)
     squared = np.empty(lethal.shape, dtype=np.uint16)
     for rows, distances in squared_distance_blocks(lethal):
-        squared[rows] = np.where(distances <= reach * reach, np.minimum(distances, FAR), FAR)
+        squared[rows] = np.where(
+            distances <= reach * reach, np.minimum(distances, MAX_SQUARED_CELLS), MAX_SQUARED_CELLS
+        )
     return squared
 
 
@@ -51,7 +53,7 @@ class Inflation:
     def __init__(
         self, resolution: float, inscribed: float, inflation_radius: float, scaling: float, reach: float
     ) -> None:
-        distance = np.sqrt(np.arange(FAR + 1)) * resolution
+        distance = np.sqrt(np.arange(MAX_SQUARED_CELLS + 1)) * resolution
         self.meters: npt.NDArray[np.float32] = np.minimum(distance, reach).astype(np.float32)
         decay = MAX_NON_OBSTACLE * np.exp(-scaling * np.maximum(distance - inscribed, 0.0))
         cost = np.where(distance <= inscribed, INSCRIBED, decay)

@@ -1,4 +1,4 @@
-"""What the sensors show on top of a map: cells that a lidar marked, and cells in which a depth camera saw something."""
+"""Live obstacles of a costmap: cells marked by lidars and by depth cameras."""
 
 import math
 
@@ -9,13 +9,12 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.depth_layer import Heights, seen_through, shown
-from simscen.stack.costmap.frame import Cells, Frame, Numbers
+from simscen.stack.costmap.grid_frame import Cell, Cells, GridFrame, Numbers, shift_layer
 from simscen.stack.costmap.inflation_layer import Squared
-from simscen.stack.costmap.obstacle_layer import crossed, hits, in_view
-from simscen.stack.costmap.rolling import Cell, carried
+from simscen.stack.costmap.obstacle_layer import crossed_cells, hit_points, in_view
 from simscen.stack.costmap.static_layer import Mask
 
-BESIDE_A_WALL = 2
+MAX_WALL_SQUARED_CELLS = 2
 """Hits within one cell (squared distance 2) of a mapped wall are the wall itself: marking them would tell nothing."""
 NONE: Numbers = np.zeros(0, dtype=np.int64)
 NOWHERE: Mask = np.zeros((0, 0), dtype=bool)
@@ -26,13 +25,13 @@ EVERYWHERE: Window = slice(None), slice(None)
 class LiveLayer:
     """Marks and clears; a lidar never clears what a camera saw above or below it, nor a camera what a lidar sees."""
 
-    def __init__(self, spec: CostmapSpec, inscribed: float, frame: Frame) -> None:
+    def __init__(self, spec: CostmapSpec, inscribed: float, frame: GridFrame) -> None:
         self._spec, self._inscribed = spec, inscribed
         self._walls: Squared | None = None
         self._off_walls: Mask = np.zeros(0, dtype=bool)
         self.forget(frame)
 
-    def forget(self, frame: Frame) -> None:
+    def forget(self, frame: GridFrame) -> None:
         """Begin with nothing, on these cells."""
         self._frame = frame
         self._scanned: Mask = np.zeros(frame.shape, dtype=bool)
@@ -63,14 +62,14 @@ class LiveLayer:
         _set(self._scanned, cells, True)
         self._marks = np.flatnonzero(self._scanned)
 
-    def roll(self, frame: Frame) -> None:
+    def roll(self, frame: GridFrame) -> None:
         """Go on in another window, with what lies in both."""
         before, self._frame = self._frame, frame
-        self._scanned = carried(self._scanned, before, frame, False)
+        self._scanned = shift_layer(self._scanned, before, frame, False)
         self._marks = np.flatnonzero(self._scanned)
         if self._heights is not None:
-            self._heights = carried(self._heights, before, frame, np.nan)
-            self._ground = carried(self._ground, before, frame, False)
+            self._heights = shift_layer(self._heights, before, frame, np.nan)
+            self._ground = shift_layer(self._ground, before, frame, False)
 
     def marked(self, window: Window = EVERYWHERE) -> Mask:
         """The cells in which something is."""
@@ -95,7 +94,7 @@ class LiveLayer:
         `walls` are distances to what the map shows; None where it shows nothing.
         """
         spec, frame, scanned = self._spec, self._frame, self._scanned.reshape(-1)
-        points, lidar = hits(scan, base, spec.obstacle_min_range, spec.obstacle_max_range)
+        points, lidar = hit_points(scan, base, spec.obstacle_min_range, spec.obstacle_max_range)
         seen = frame.numbers(points, lidar, spec.obstacle_max_range)
         if not len(self._marks):
             fresh, lost = self._off(walls, seen), NONE
@@ -113,7 +112,7 @@ class LiveLayer:
         if walls is None:
             return seen
         if walls is not self._walls:
-            self._walls, self._off_walls = walls, walls > BESIDE_A_WALL
+            self._walls, self._off_walls = walls, walls > MAX_WALL_SQUARED_CELLS
         off: Numbers = seen[self._off_walls.take(seen)]
         return off
 
@@ -121,7 +120,7 @@ class LiveLayer:
         """Clear what the beams pass through but those cells that were `seen` again; the cells that were marked."""
         marks, frame, scanned = self._marks, self._frame, self._scanned.reshape(-1)
         points = frame.points(marks)
-        gone, nearest = crossed(points, frame.resolution, scan, base, self._spec)
+        gone, nearest = crossed_cells(points, frame.resolution, scan, base, self._spec)
         beneath = nearest < self._inscribed + math.hypot(scan.mount.x, scan.mount.y)
         if not beneath and not len(gone):
             return NONE
@@ -149,7 +148,7 @@ class LiveLayer:
         _set(self._heights, marked[gone], np.nan)
         cells, heights, ground = shown(image, base, self._frame, self._spec, self._ground)
         _set(self._ground, ground, True)
-        fresh = (_get(walls, cells) > BESIDE_A_WALL) & ~self._under_robot(self._frame.centers(cells), base)
+        fresh = (_get(walls, cells) > MAX_WALL_SQUARED_CELLS) & ~self._under_robot(self._frame.centers(cells), base)
         cells = cells[fresh]
         self._heights[cells[:, 0], cells[:, 1]] = heights[fresh]
         return np.concatenate((marked[gone], cells))

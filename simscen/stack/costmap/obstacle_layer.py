@@ -15,10 +15,10 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.costmap.frame import Cells, Frame, Numbers
+from simscen.stack.costmap.grid_frame import Cells, GridFrame, Numbers
 from simscen.stack.localizers.beams import Plane, directions
 
-ROUNDING = 1e-9
+RANGE_TOLERANCE_M = 1e-9
 """Meters before the end of what a beam shows to be free, nearer to which it is asked exactly whether a cell is."""
 
 
@@ -29,7 +29,7 @@ class ScanAmongMoving(Scan):
     moving: npt.NDArray[np.bool_] = field(kw_only=True)
 
 
-def hits(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tuple[Plane, complex]:
+def hit_points(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tuple[Plane, complex]:
     """Map points x + iy (n,) of the beams that hit something that stands, `nearest` to `farthest` meters away.
 
     And where the lidar is.
@@ -68,7 +68,7 @@ def _shown_free(scan: Scan, farthest: float, inf_is_valid: bool) -> Array:
     return np.where(seen >= scan.range_min, np.minimum(seen, farthest), 0.0)
 
 
-def in_view(cells: Cells, frame: Frame, scan: Scan, base: Pose2) -> npt.NDArray[np.bool_]:
+def in_view(cells: Cells, frame: GridFrame, scan: Scan, base: Pose2) -> npt.NDArray[np.bool_]:
     """Which of the cells (n, 2) lie where the lidar looks, whatever it sees there."""
     lidar = base.compose(scan.mount)
     offset = frame.centers(cells) - np.array([lidar.x, lidar.y])
@@ -77,7 +77,9 @@ def in_view(cells: Cells, frame: Frame, scan: Scan, base: Pose2) -> npt.NDArray[
     return np.asarray(turned <= abs(scan.angle_increment) * len(scan.ranges))
 
 
-def crossed(points: Plane, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec) -> tuple[Numbers, float]:
+def crossed_cells(
+    points: Plane, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec
+) -> tuple[Numbers, float]:
     """Indices of those cells with these centers x + iy (n,) that a beam crosses before it hits anything.
 
     And how far the nearest of all centers, of which there is one, is from the lidar. A line crosses a square of
@@ -95,7 +97,7 @@ def crossed(points: Plane, resolution: float, scan: Scan, base: Pose2, spec: Cos
         return near, nearest
     distance, length = distance.take(near), free.take(near)
     wide = half / abs(math.sin(step / 2))  # nearer than this, beams lie so close that each cell is on one
-    if spec.raytrace_min_range == 0.0 and (distance <= np.minimum(length - (half + ROUNDING), wide)).all():
+    if spec.raytrace_min_range == 0.0 and (distance <= np.minimum(length - (half + RANGE_TOLERANCE_M), wide)).all():
         return near, nearest
     off = np.remainder(bearing[near] - beam[near] * step + math.pi, 2 * math.pi) - math.pi
     direction = first + bearing[near] - off

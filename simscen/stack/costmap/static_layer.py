@@ -1,4 +1,4 @@
-"""The map the robot was given, as an unrotated costmap, with keepout zones and masks painted in."""
+"""Static layer: the map as an unrotated grid, with keepout zones and masks."""
 
 from dataclasses import dataclass
 
@@ -10,11 +10,11 @@ from simscen.core.environment.costmap_filters import in_keepout_mask
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Array
-from simscen.stack.costmap.frame import Frame
+from simscen.stack.costmap.grid_frame import GridFrame
 from simscen.stack.costmap.inflation_layer import Squared, squared_distances
 
 Mask = npt.NDArray[np.bool_]
-OCCUPIED_FROM = 65
+OCCUPIED_THRESHOLD = 65
 """nav2's lethal_cost_threshold is 100 on a trinary map; 65 also reads maps that were loaded in scale mode."""
 
 
@@ -22,7 +22,7 @@ OCCUPIED_FROM = 65
 class StaticLayer:
     """What never changes: `lethal` and `unknown` cells (rows, columns) of `frame`."""
 
-    frame: Frame
+    frame: GridFrame
     lethal: Mask
     unknown: Mask
 
@@ -35,12 +35,12 @@ def static_layer(
     Where unknown space is not tracked (`unknown`), what the map does not know is free, as in Nav2.
     """
     if abs(grid.origin.yaw) < 1e-9:
-        frame = Frame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape)
+        frame = GridFrame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape)
         cells = grid.cells
     else:
         frame = _bounding_frame(grid)
         cells = grid.values_at(_all_centers(frame)).reshape(frame.shape)
-    lethal = np.ascontiguousarray(cells >= OCCUPIED_FROM) | _forbidden(frame, keepout, mask)
+    lethal = np.ascontiguousarray(cells >= OCCUPIED_THRESHOLD) | _forbidden(frame, keepout, mask)
     return StaticLayer(frame, lethal, (cells == UNKNOWN) & ~lethal & unknown)
 
 
@@ -57,13 +57,13 @@ def walls_within(grid: OccupancyGrid, reach: int) -> Squared:
 
 
 def empty_layer(
-    frame: Frame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, unknown: bool = False
+    frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, unknown: bool = False
 ) -> StaticLayer:
     """The layer of a robot without a map: nothing but keepout zones and masks; all of it `unknown`, or free."""
     return StaticLayer(frame, _forbidden(frame, keepout, mask), np.full(frame.shape, unknown))
 
 
-def _forbidden(frame: Frame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
+def _forbidden(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
     lethal = np.zeros(frame.shape, dtype=bool)
     for polygon in keepout:
         lethal |= inside_polygon(frame, polygon)
@@ -74,7 +74,7 @@ def _forbidden(frame: Frame, keepout: tuple[Polygon, ...], mask: OccupancyGrid |
     return lethal
 
 
-def inside_polygon(frame: Frame, polygon: Polygon) -> Mask:
+def inside_polygon(frame: GridFrame, polygon: Polygon) -> Mask:
     """The cells whose center lies inside the polygon (even-odd rule)."""
     points = _all_centers(frame)
     inside = np.zeros(len(points), dtype=bool)
@@ -86,15 +86,15 @@ def inside_polygon(frame: Frame, polygon: Polygon) -> Mask:
     return inside.reshape(frame.shape)
 
 
-def _all_centers(frame: Frame) -> Array:
+def _all_centers(frame: GridFrame) -> Array:
     rows, columns = np.indices(frame.shape)
     return frame.centers(np.column_stack((rows.ravel(), columns.ravel())))
 
 
-def _bounding_frame(grid: OccupancyGrid) -> Frame:
+def _bounding_frame(grid: OccupancyGrid) -> GridFrame:
     height, width = grid.shape
     corners = np.array([[0, 0], [width, 0], [0, height], [width, height]]) * grid.resolution
     corners = grid.origin.apply(corners)
     low, high = corners.min(axis=0), corners.max(axis=0)
     columns, rows = np.ceil((high - low) / grid.resolution).astype(int)
-    return Frame((float(low[0]), float(low[1])), grid.resolution, (int(rows), int(columns)))
+    return GridFrame((float(low[0]), float(low[1])), grid.resolution, (int(rows), int(columns)))

@@ -1,1 +1,1 @@
-"""Paths over the costmap, found by OMPL."""
+"""Planners: paths on the global costmap, found by OMPL or by a grid search."""

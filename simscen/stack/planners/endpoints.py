@@ -1,4 +1,4 @@
-"""Whether there can be a plan at all: start and goal are checked before any search, with Nav2's codes."""
+"""Check of start and goal before a search, with Nav2's error codes."""
 
 import math
 from collections.abc import Iterator
@@ -10,11 +10,11 @@ from scipy.ndimage import label
 
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import ErrorCode
-from simscen.stack.planners.path_points import spaced
+from simscen.stack.planners.path_postprocessing import spaced
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import NavigationFailure
 
-ESCAPE = 0.5
+MAX_ESCAPE_M = 0.5
 """How far in meters a robot that stands too near an obstacle may drive to where a plan can begin."""
 
 
@@ -40,9 +40,9 @@ def find_endpoints(rates: TraversalCosts, start: Pose2, goal: Pose2, tolerance: 
     _possible(rates, start, ErrorCode.START_OUTSIDE_MAP, ErrorCode.START_OCCUPIED, "start")
     _possible(rates, goal, ErrorCode.GOAL_OUTSIDE_MAP, ErrorCode.GOAL_OCCUPIED, "goal")
     free = rates.free
-    begin = next((place for place in near(rates, free, start, ESCAPE) if _open(rates, start, place)), None)
+    begin = next((place for place in near(rates, free, start, MAX_ESCAPE_M) if _open(rates, start, place)), None)
     if begin is None:
-        raise NavigationFailure(ErrorCode.START_OCCUPIED, f"no free place within {ESCAPE} m of the start")
+        raise NavigationFailure(ErrorCode.START_OCCUPIED, f"no free place within {MAX_ESCAPE_M} m of the start")
     if next(near(rates, free, goal, tolerance), None) is None:
         raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, f"no room for the robot within {tolerance} m of the goal")
     pieces, _ = label(free)

@@ -1,4 +1,4 @@
-"""Nav2's planners over cells, beside those of OMPL: the cheapest way there is on the grid, for a disc."""
+"""Grid planners: Nav2's NavFn and SmacPlanner2D, which find the cheapest path for a disc on the cells."""
 
 import numpy as np
 
@@ -6,17 +6,16 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.grid_graph import EIGHT_NEIGHBORS, SIXTEEN_NEIGHBORS, GridGraph
 from simscen.model.planners import Navfn, Smac2d
-from simscen.stack.planners.corner_clearing import around_corners
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints
-from simscen.stack.planners.path_points import SPACING_M, smoothed, spaced, with_headings
-from simscen.stack.planners.planning_window import nearby
+from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, smoothed, spaced, with_headings
+from simscen.stack.planners.planning_window import plan_in_windows
 from simscen.stack.planners.traversal_costs import MAX_NON_OBSTACLE, TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
 
 COST_FACTOR, COST_NEUTRAL = 0.8, 50
 """nav2_navfn_planner/navfn.hpp: a cell costs 50 + 0.8 times its cost."""
-BORDER = 2
+BORDER_CELLS = 2
 """Cells at the edge of a lattice that no way leads over: so many are laid around the costmap."""
 
 
@@ -55,7 +54,7 @@ class GridPlanner:
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """A path of poses in the map frame, 5 cm apart."""
-        return nearby(self._plan, costmap, start, goal, seed)
+        return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, _: int) -> Path:
         rates = TraversalCosts(costmap, self._robot, self._multiplier, self._allow_unknown)
@@ -67,20 +66,20 @@ class GridPlanner:
         """From start to goal over the cells, smoothed, if that leads through nothing."""
         way = np.vstack((ends.start, cells[1:-1], ends.goal))
         for points in (smoothed(rates, way), way) if self._smooth else (way,):
-            led = around_corners(rates, spaced(points, SPACING_M))
+            led = avoid_cell_corners(rates, spaced(points, SPACING_M))
             if led is not None:
                 return led
         return np.vstack((ends.start, cells, ends.goal))  # no move between middles of cells cuts a corner
 
     def _over(self, rates: TraversalCosts, ends: Endpoints) -> Array:
         """The middles (n, 2) of the cells of the cheapest way."""
-        lattice = GridGraph(np.pad(ends.reachable, BORDER), self._moves, np.pad(rates.rates, BORDER))
+        lattice = GridGraph(np.pad(ends.reachable, BORDER_CELLS), self._moves, np.pad(rates.rates, BORDER_CELLS))
         first, last = (
-            tuple(int((point[axis] - rates.origin[axis]) / rates.resolution) + BORDER for axis in (1, 0))
+            tuple(int((point[axis] - rates.origin[axis]) / rates.resolution) + BORDER_CELLS for axis in (1, 0))
             for point in (ends.start, ends.goal)
         )
         cells = lattice.way((first[0], first[1]), (last[0], last[1]))
         if cells is None:
             raise NavigationFailure(ErrorCode.NO_VALID_PATH, "no way over the cells of the costmap")
-        middles: Array = (cells[:, ::-1] - BORDER + 0.5) * rates.resolution + np.array(rates.origin)
+        middles: Array = (cells[:, ::-1] - BORDER_CELLS + 0.5) * rates.resolution + np.array(rates.origin)
         return middles

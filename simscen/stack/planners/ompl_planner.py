@@ -5,11 +5,10 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.planners import OmplPlanner as PlannerSpec
-from simscen.stack.planners.corner_clearing import around_corners
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints
 from simscen.stack.planners.ompl_search import OmplSearch, Problem
-from simscen.stack.planners.path_points import SPACING_M, spaced, with_headings
-from simscen.stack.planners.planning_window import nearby
+from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, spaced, with_headings
+from simscen.stack.planners.planning_window import plan_in_windows
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
@@ -27,7 +26,7 @@ class OmplPlanner:
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """Return a path of poses in the map frame, 5 cm apart. Raises NavigationFailure if there is none."""
-        return nearby(self._plan, costmap, start, goal, seed)
+        return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         costs = TraversalCosts(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
@@ -44,7 +43,7 @@ class OmplPlanner:
             points = search.solve(simplify=spec.simplify)
             if points is None:
                 continue
-            path = around_corners(costs, spaced(np.array(points), SPACING_M))
+            path = avoid_cell_corners(costs, spaced(np.array(points), SPACING_M))
             if path is not None:
                 return path
             costs.stride = FINE_CELLS * costs.resolution

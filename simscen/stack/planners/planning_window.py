@@ -1,4 +1,4 @@
-"""On a large map, a plan is looked for around its ends first: what lies beyond cannot make it shorter."""
+"""Planning on large maps: search a window around start and goal first, and enlarge it if needed."""
 
 import contextlib
 import math
@@ -9,22 +9,22 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Path
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
-LARGE = 1_000_000
+MAX_FULL_SEARCH_CELLS = 1_000_000
 """Cells of a costmap of which not all are looked at each time: 50 x 50 m at 5 cm."""
-MARGIN = 10.0
+WINDOW_MARGIN_M = 10.0
 """Meters around both ends that are looked at first, …"""
-SHARE = 1 / 3
+WINDOW_MARGIN_RATIO = 1 / 3
 """… or so much of the straight way between them, if that is more: then a way may be a fifth longer than straight."""
 
 Plan = Callable[[CostmapView, Pose2, Pose2, int], Path]
 
 
-def nearby(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+def plan_in_windows(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
     """What `plan` finds in a window around both ends, if no way that leaves the window can be shorter; else in larger
     ones, at last on the whole costmap. Raises NavigationFailure when that fails.
     """
-    margin = max(MARGIN, SHARE * start.distance(goal))
-    while costmap.costs.size > LARGE:
+    margin = max(WINDOW_MARGIN_M, WINDOW_MARGIN_RATIO * start.distance(goal))
+    while costmap.costs.size > MAX_FULL_SEARCH_CELLS:
         part = window(costmap, start, goal, margin)
         if part is None or 2 * part.costs.size > costmap.costs.size:
             break

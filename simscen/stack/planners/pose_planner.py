@@ -11,11 +11,9 @@ from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.planners import OmplParameters
 from simscen.stack.cusps import cusps
 from simscen.stack.footprint import Footprint
-from simscen.stack.planners.distance_lookup import Field
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints, near
-from simscen.stack.planners.escapes import escapes
 from simscen.stack.planners.ompl_planner import reachable_bounds
-from simscen.stack.planners.pose_search import SPACING, Space, Valid, search_poses
+from simscen.stack.planners.pose_search import POSE_SPACING_M, DistanceLookup, Space, Valid, escape_arcs, search_poses
 from simscen.stack.planners.traversal_costs import NO_INFORMATION, TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
@@ -64,7 +62,7 @@ class PosePlanner:
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """Return a path of poses in the map frame, 5 cm apart: the cheapest of a few searches."""
         costs = TraversalCosts(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
-        field = Field(costmap if self._spec.allow_unknown else self._shut(costmap))
+        field = DistanceLookup(costmap if self._spec.allow_unknown else self._shut(costmap))
         ends = find_endpoints(costs, start, goal, self._spec.tolerance)
         goal = self._fitting(costmap, goal, near(costs, ends.reachable, goal, self._spec.tolerance))
         away = self._led_away(costs, start)
@@ -103,10 +101,10 @@ class PosePlanner:
             return 0 <= row < rows and 0 <= column < columns and bool(reachable[row, column])
 
         for clearance, share, spacing in (
-            (CLEARANCE_M, 0.2, SPACING),
-            (LESS_CLEARANCE_M, 0.2, SPACING),
-            (0.0, 0.3, SPACING),
-            (0.0, 0.3, SPACING / 10),
+            (CLEARANCE_M, 0.2, POSE_SPACING_M),
+            (LESS_CLEARANCE_M, 0.2, POSE_SPACING_M),
+            (0.0, 0.3, POSE_SPACING_M),
+            (0.0, 0.3, POSE_SPACING_M / 10),
         ):
             yield Attempt(bounds, contains, clearance, share, spacing)
 
@@ -139,7 +137,7 @@ class PosePlanner:
         A start where it touches something is left on the shortest arc that leads no deeper.
         """
         costmap, best = costs.costmap, None
-        for arc in escapes(self._space, self._turning_radius, start):
+        for arc in escape_arcs(self._space, self._turning_radius, start):
             free = self._footprint.free(costmap, arc) & np.isfinite(costs.at(arc[:, :2]))
             clear = int(free.argmax())
             if not free[clear] or (best is not None and clear + 1 >= len(best)):
@@ -152,7 +150,7 @@ class PosePlanner:
             raise NavigationFailure(ErrorCode.START_OCCUPIED, message)
         return best
 
-    def _valid(self, field: Field, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> Valid:
+    def _valid(self, field: DistanceLookup, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> Valid:
         """Return whether a pose is in the region and clear of obstacles; near the ends without the extra clearance."""
         offsets = self._footprint.discs.offsets.tolist()
         roomy = self._footprint.discs.radius + attempt.clearance

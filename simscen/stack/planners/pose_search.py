@@ -1,26 +1,29 @@
-"""Search over poses: for a car that cannot turn in place, and for hulls whose heading decides where they fit."""
+"""OMPL search over poses, for cars and for hulls whose heading decides where they fit."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any, Literal
 
+import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
+from simscen.stack.planners.endpoints import MAX_ESCAPE_M
 from simscen.stack.planners.ompl_search import PLANNERS, stop_after
+from simscen.stack.protocols import CostmapView
 
 Space = Literal["se2", "dubins", "reeds_shepp"]
 Valid = Callable[[float, float, float], bool]
-SPACING = 0.05
+POSE_SPACING_M = 0.05
 """Meters between the states of an answer."""
-STRAIGHT = 0.995
-"""Of a way of `SPACING`, how much of it an arc of 0.2 m gets from its begin at least."""
-EXACT = 1e-4
+MIN_CHORD_RATIO = 0.995
+"""Of a way of `POSE_SPACING_M`, how much of it an arc of 0.2 m gets from its begin at least."""
+CUSP_TOLERANCE_M = 1e-4
 """Meters to which the place of a change of direction is told."""
-SHORTCUTS = 60
+SHORTCUT_ATTEMPTS = 60
 """Attempts to leave out states of the found path; counted, as OMPL's own simplify() stops by the clock."""
 
 
@@ -34,9 +37,11 @@ def search_poses(
     valid: Valid,
     seed: int,
     iterations: int,
-    looks: float = SPACING,
+    looks: float = POSE_SPACING_M,
 ) -> list[Pose2] | None:
-    """Poses from start to goal, `SPACING` apart, `valid` every `looks` meters; None if iterations did not suffice.
+    """Return poses from start to goal, `POSE_SPACING_M` apart; None if the iterations did not suffice.
+
+    `valid` is evaluated every `looks` meters.
 
     "dubins" drives forward only, "reeds_shepp" also backward, both on arcs of at least `turning_radius`; "se2" moves
     in any direction.
@@ -64,15 +69,15 @@ def search_poses(
     if not problem.hasExactSolution():
         return None
     path = problem.getSolutionPath()
-    og.PathSimplifier(information).reduceVertices(path, SHORTCUTS, SHORTCUTS, 0.5)
+    og.PathSimplifier(information).reduceVertices(path, SHORTCUT_ATTEMPTS, SHORTCUT_ATTEMPTS, 0.5)
     if space == "reeds_shepp":
         return _driven(states, path.getStates())
-    path.interpolate(max(2, math.ceil(path.length() / SPACING) + 1))
+    path.interpolate(max(2, math.ceil(path.length() / POSE_SPACING_M) + 1))
     return [_pose(state) for state in path.getStates()]
 
 
 def _driven(states: Any, stops: Any) -> list[Pose2]:
-    """The Reeds-Shepp paths from stop to stop, at most `SPACING` apart, and each pose where the direction changes.
+    """Return the Reeds-Shepp paths between stops, at most `POSE_SPACING_M` apart, with the poses of all cusps.
 
     Between two poses on both sides of such a change less way would be told than is driven. OMPL's bindings tell
     nothing of the arcs that a path is made of (2.0.1), but on one way between is shorter than way driven.
@@ -82,7 +87,7 @@ def _driven(states: Any, stops: Any) -> list[Pose2]:
         length = states.distance(first, last)
         if length == 0.0:
             continue
-        count = max(1, math.ceil(length / SPACING))
+        count = max(1, math.ceil(length / POSE_SPACING_M))
 
         def at(along: float, first: Any = first, last: Any = last, length: float = length) -> Pose2:
             states.interpolate(first, last, along / length, between)
@@ -98,10 +103,10 @@ def _driven(states: Any, stops: Any) -> list[Pose2]:
 def _cusps(at: Callable[[float], Pose2], low: float, high: float) -> list[float]:
     """How far along (m) the direction changes on a piece of way."""
     one, other = at(low), at(high)
-    if math.hypot(other.x - one.x, other.y - one.y) > STRAIGHT * (high - low):
+    if math.hypot(other.x - one.x, other.y - one.y) > MIN_CHORD_RATIO * (high - low):
         return []
     middle = 0.5 * (low + high)
-    if high - low < EXACT:
+    if high - low < CUSP_TOLERANCE_M:
         return [middle]
     return [*_cusps(at, low, middle), *_cusps(at, middle, high)] or [middle]
 
@@ -124,3 +129,55 @@ def _state(information: Any, pose: Pose2) -> Any:
     state.setY(pose.y)
     state.setYaw(-math.pi if pose.yaw >= math.pi else pose.yaw)  # OMPL's headings lie in [-π, π)
     return state
+
+
+ESCAPE_DIRECTIONS = 16
+"""A base that drives in any direction is tried in so many."""
+ESCAPE_CURVATURE_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
+"""Of a car's arcs, as shares of the tightest."""
+
+
+def escape_arcs(space: Space, turning_radius: float, start: Pose2) -> Iterator[Array]:
+    """Yield arcs as poses (n, 3) from the start on, `POSE_SPACING_M` apart and `MAX_ESCAPE_M` long.
+
+    "dubins" only drives forward.
+    """
+    along = np.linspace(0.0, MAX_ESCAPE_M, round(MAX_ESCAPE_M / POSE_SPACING_M) + 1)
+    if space == "se2":
+        for heading in np.arange(ESCAPE_DIRECTIONS) * (2.0 * math.pi / ESCAPE_DIRECTIONS):
+            yield _arc(start, along, 0.0, float(heading))
+        return
+    for signed in (along,) if space == "dubins" else (along, -along):
+        for share in ESCAPE_CURVATURE_RATIOS:
+            yield _arc(start, signed, share / turning_radius, 0.0)
+
+
+def _arc(start: Pose2, along: Array, curvature: float, heading: float) -> Array:
+    """Poses so many meters along an arc that begins at `heading` to the base's own."""
+    turned = curvature * along
+    chord = along * np.sinc(turned / (2.0 * math.pi))
+    towards = start.yaw + heading + 0.5 * turned
+    yaw = np.remainder(start.yaw + turned + math.pi, 2.0 * math.pi) - math.pi
+    yaw[0] = start.yaw
+    return np.column_stack((start.x + chord * np.cos(towards), start.y + chord * np.sin(towards), yaw))
+
+
+class DistanceLookup:
+    """Clearances of a costmap, by plain look-ups: a memoryview answers in a tenth of numpy's time for a scalar."""
+
+    def __init__(self, costmap: CostmapView) -> None:
+        self.costmap = costmap
+        self.resolution = costmap.resolution
+        self.height, self.width = costmap.distance.shape
+        self.origin = costmap.origin
+        self._per_meter = 1.0 / costmap.resolution
+        flat: Any = np.ascontiguousarray(costmap.distance).reshape(-1)
+        self._look: Any = memoryview(flat)
+
+    def at(self, x: float, y: float) -> float:
+        """Distance in meters to the nearest lethal cell; -1 off the map."""
+        column = math.floor((x - self.origin[0]) * self._per_meter)
+        row = math.floor((y - self.origin[1]) * self._per_meter)
+        if 0 <= row < self.height and 0 <= column < self.width:
+            return float(self._look[row * self.width + column])
+        return -1.0

@@ -1,4 +1,4 @@
-"""What a meter of way costs, wherever the robot can be: Nav2's costs as a planner counts them."""
+"""Cost per meter of path on a costmap, as Nav2's planners count it."""
 
 import math
 from typing import Any
@@ -12,11 +12,11 @@ from simscen.stack.protocols import CostmapView, RobotModel
 MAX_NON_OBSTACLE, NO_INFORMATION = 252, 255
 UNKNOWN_COSTS = 253
 """nav2_navfn_planner: what is not known costs as much as what is barely free."""
-CRAMPED = 4.0
+NO_ROTATION_COST_FACTOR = 4.0
 """Times that a meter costs more where a hull with corners fits, but could not turn in place: it may get stuck there."""
-STEP = 0.67
+SAMPLE_SPACING_CELLS = 0.67
 """Cells between two looks at what a path leads over."""
-STRIDE = 0.4
+SAMPLE_SPACING_RATIO = 0.4
 """Of the inscribed radius: between two looks at a motion of a search. Each obstacle blocks at least a disc of that
 radius, and between two looks no line comes deeper into one than 2 % of it."""
 
@@ -38,14 +38,14 @@ class TraversalCosts:
             table[NO_INFORMATION] = np.inf
         rates = table[costmap.costs]
         if robot.circumscribed_radius > robot.inscribed_radius:
-            rates[costmap.distance <= np.float32(robot.circumscribed_radius)] *= np.float32(CRAMPED)
+            rates[costmap.distance <= np.float32(robot.circumscribed_radius)] *= np.float32(NO_ROTATION_COST_FACTOR)
         rates[costmap.distance <= np.float32(robot.inscribed_radius)] = np.inf
         self.rates: npt.NDArray[np.float32] = rates
         self._per_meter = 1.0 / costmap.resolution
         padded: Any = np.append(rates.reshape(-1), np.full(self.width + 1, np.inf, dtype=np.float32))
         self._look: Any = memoryview(padded)  # answers in a tenth of numpy's time for a scalar
-        coarse = STRIDE * robot.inscribed_radius if allow_unknown else 0.0  # a single cell may be unknown
-        self.stride = max(STEP * costmap.resolution, coarse)
+        coarse = SAMPLE_SPACING_RATIO * robot.inscribed_radius if allow_unknown else 0.0  # a single cell may be unknown
+        self.stride = max(SAMPLE_SPACING_CELLS * costmap.resolution, coarse)
         self.kept: dict[object, Any] = {}
         """What was worked out of these costs, by what it is; where nothing has changed the next plan needs it again."""
         self._asked: tuple[float, float, float, float] | None = None
@@ -103,7 +103,7 @@ class TraversalCosts:
         """The cost of a polyline (n, 2); inf where the robot cannot go."""
         steps = np.diff(points, axis=0)
         lengths = np.hypot(steps[:, 0], steps[:, 1])
-        counts = np.ceil(lengths * self._per_meter / STEP).astype(np.int64)
+        counts = np.ceil(lengths * self._per_meter / SAMPLE_SPACING_CELLS).astype(np.int64)
         which = np.repeat(np.arange(len(steps)), counts)
         number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         part = (number + 0.5) / counts[which]

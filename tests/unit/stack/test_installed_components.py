@@ -390,7 +390,7 @@ def driven_setting():
 
 def test_a_failure_without_a_code_of_nav2_is_a_broken_promise(odd) -> None:
     from simscen.model.planners import OmplPlanner
-    from simscen.stack.installed.planner import InstalledPlanner
+    from simscen.stack.plugins.checked_components import CheckedPlanner
     from simscen.testing.flatland import setting
 
     class Own(OmplPlanner):
@@ -402,5 +402,5 @@ def test_a_failure_without_a_code_of_nav2_is_a_broken_promise(odd) -> None:
         raise NavigationFailure(208, "no way")  # type: ignore[arg-type]
 
     with pytest.raises(RunError, match="fails with 208, which is no ErrorCode"):
-        InstalledPlanner(Own(), setting(round_robot())).plan(None, Pose2(0, 0), Pose2(1, 1), 1)  # type: ignore[arg-type]
+        CheckedPlanner(Own(), setting(round_robot())).plan(None, Pose2(0, 0), Pose2(1, 1), 1)  # type: ignore[arg-type]
     assert ErrorCode.NO_VALID_PATH == 208

@@ -9,7 +9,7 @@ import pytest
 from simscen.core.errors import RunError
 from simscen.core.random_streams import Streams
 from simscen.plugin import STOP, CostGrid, Decision, InProcessStack, OccupancyGrid, Setting, Surroundings
-from simscen.stack.installed.stack import InstalledStack
+from simscen.stack.plugins.checked_stack import CheckedStack
 from simscen.testing.flatland import round_robot
 
 GRID = OccupancyGrid(np.zeros((3, 4), dtype=np.int8), 0.1)
@@ -34,7 +34,7 @@ def decided(*costmaps: Any) -> Decision:
             return lambda spec, setting: shows
 
     setting = Setting(Surroundings(round_robot(), None, 240), "stack", Streams(1), 0.1)
-    return InstalledStack(Shows(), setting).decide(0, ())
+    return CheckedStack(Shows(), setting).decide(0, ())
 
 
 def test_costmaps_go_through_as_they_are() -> None:

@@ -6,19 +6,17 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.controllers import DynamicWindow as DwbSpec
-from simscen.stack.controllers.dwb.critics import scores
-from simscen.stack.controllers.dwb.kinematics import kinematics_of, window
-from simscen.stack.controllers.dwb.oscillation import Oscillation
-from simscen.stack.controllers.dwb.room import Room
-from simscen.stack.controllers.dwb.rotate_to_goal import RotateToGoal
-from simscen.stack.controllers.dwb.trajectories import trajectories
-from simscen.stack.controllers.following import PathFollower
-from simscen.stack.controllers.goal_pose import GoalPose
-from simscen.stack.controllers.local_plan import local_plan
+from simscen.stack.controllers.dwb.critics import RotateToGoalCritic, score_trajectories
+from simscen.stack.controllers.dwb.obstacle_critic import ObstacleCritic
+from simscen.stack.controllers.dwb.oscillation_critic import OscillationCritic
+from simscen.stack.controllers.dwb.trajectory_generator import generate_trajectories, kinematics_of, velocity_window
+from simscen.stack.controllers.goal_rotation import GoalRotation
+from simscen.stack.controllers.path_follower import PathFollower
+from simscen.stack.controllers.path_handler import local_plan
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
-FURTHER, BEYOND = 1.2, 0.5
+PLAN_REACH_RATIO, PLAN_MARGIN_M = 1.2, 0.5
 """The plan is looked at so much further than the robot gets in `sim_time` as it drives now, and meters more: what ends
 nearer holds it back, and from what lies beyond a bend of the plan the straight way leads into a wall."""
 
@@ -32,10 +30,10 @@ class DynamicWindowController(PathFollower):
         self._spec, self._robot = spec, robot
         self._base = kinematics_of(spec, robot, self._fastest)
         self._samples = (spec.vx_samples, spec.vy_samples, spec.vtheta_samples)
-        self._goal_pose = GoalPose(robot, spec.max_vel_theta, robot.angular_acceleration, setting.control_period)
-        self._room = Room(setting.footprint)
-        self._rotate = RotateToGoal(spec.trans_stopped_velocity, spec.slowing_factor)
-        self._oscillation = Oscillation(
+        self._goal_pose = GoalRotation(robot, spec.max_vel_theta, robot.angular_acceleration, setting.control_period)
+        self._room = ObstacleCritic(setting.footprint)
+        self._rotate = RotateToGoalCritic(spec.trans_stopped_velocity, spec.slowing_factor)
+        self._oscillation = OscillationCritic(
             spec.oscillation_reset_dist, spec.oscillation_reset_angle, spec.x_only_threshold
         )
         self._best: Array | None = None
@@ -58,17 +56,17 @@ class DynamicWindowController(PathFollower):
         if there and self._robot.turning_radius > 0.0:
             return STOP
         spec, kinematics = self._spec, self._base.scaled(self._share)
-        velocities = window(kinematics, twist, spec.sim_time, self._samples)
+        velocities = velocity_window(kinematics, twist, spec.sim_time, self._samples)
         if not len(velocities):
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "the limits leave no velocity")
-        tried = trajectories(
+        tried = generate_trajectories(
             pose, twist, velocities, kinematics, spec.sim_time, spec.linear_granularity, spec.angular_granularity
         )
         ends = tried.ends
         driven = (abs(twist.vx) + abs(twist.vy)) * spec.sim_time
-        reach = max(spec.prune_distance, FURTHER * driven + BEYOND)
+        reach = max(spec.prune_distance, PLAN_REACH_RATIO * driven + PLAN_MARGIN_M)
         plan = local_plan(track, reach, costmap.resolution).points[:, :2]
-        found = scores(spec, costmap, pose, goal.pose, plan, velocities, ends)
+        found = score_trajectories(spec, costmap, pose, goal.pose, plan, velocities, ends)
         legal, total = self._oscillation.legal(velocities), found.total
         if there and spec.rotate_to_goal_scale > 0.0:
             off, allowed = self._rotate.scores(twist, goal.pose.yaw, velocities, ends[:, 2])

@@ -1,17 +1,24 @@
-"""What DWB's trajectories are judged by: the scores of dwb_critics, which see the end of a trajectory.
+"""Critics of DWB, which score the end of each trajectory (dwb_critics).
 
-Each raw score is counted in cells, costs, rad or rad/s, and weighs as much as its scale says; the scale of those that
-count cells is for half a meter, whatever the costmap's resolution.
+Raw scores are in cells, costs, rad or rad/s and are multiplied by the scale of the critic. As in Nav2, the scales of
+critics that count cells are multiplied by half the resolution. MapGridCritic propagates Manhattan distances through
+all cells, obstacles included; here, they are computed in closed form.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as DwbSpec
-from simscen.stack.controllers.dwb.map_grid import Cells, Mask, cells_of, manhattan, plan_cells
 from simscen.stack.protocols import CostmapView
+
+Cells = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+UNKNOWN = 255
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +38,7 @@ class Scores:
         return np.where(self.legal, total, np.inf)
 
 
-def scores(
+def score_trajectories(
     spec: DwbSpec, costmap: CostmapView, pose: Pose2, goal: Pose2, plan: Array, velocities: Array, ends: Array
 ) -> Scores:
     """Of trajectories that end at poses (n, 3), for a plan (m, 2) that lies on the costmap with at least one point."""
@@ -74,3 +81,50 @@ def _drawn_ahead(plan: Array, pose: Pose2, goal: Pose2, distance: float) -> Arra
     drawn = plan.copy()
     drawn[-1] += distance * np.array((np.cos(angle), np.sin(angle)))
     return np.asarray(drawn)
+
+
+def cells_of(costmap: CostmapView, points: Array) -> tuple[Cells, Mask]:
+    """Cells (n, 2) as (row, column) under points (n, 2), and which lie on the costmap."""
+    cells = np.floor((points[:, ::-1] - np.array(costmap.origin)[::-1]) / costmap.resolution).astype(np.int64)
+    on_map: Mask = np.asarray(((cells >= 0) & (cells < np.array(costmap.costs.shape))).all(axis=1))
+    return cells, on_map
+
+
+def plan_cells(costmap: CostmapView, plan: Array) -> Cells:
+    """The cells (m, 2) of the plan (n, 2) from where it enters the known part of the costmap to where it leaves it."""
+    cells, on_map = cells_of(costmap, plan)
+    known = on_map.copy()
+    known[on_map] = costmap.costs[cells[on_map, 0], cells[on_map, 1]] != UNKNOWN
+    if not known.any():
+        return cells[:0]
+    first = int(known.argmax())
+    gone = np.flatnonzero(~known[first:])
+    return cells[first : first + int(gone[0])] if len(gone) else cells[first:]
+
+
+def manhattan(cells: Cells, sources: Cells) -> Array:
+    """The least number of steps (n,) from cells (n, 2) to one of the sources (m, 2)."""
+    apart = np.abs(cells[:, None, 0] - sources[None, :, 0]) + np.abs(cells[:, None, 1] - sources[None, :, 1])
+    return np.asarray(apart.min(axis=1), dtype=np.float64)
+
+
+class RotateToGoalCritic:
+    """Demands that the robot slows down at the goal, then that it only turns; scores by how far off its heading is."""
+
+    def __init__(self, stopped: float, slowing: float) -> None:
+        self._stopped, self._slowing = stopped, slowing
+        self.reset()
+
+    def reset(self) -> None:
+        """A new path."""
+        self._rotating = False
+
+    def scores(self, now: Twist, goal_yaw: float, velocities: Array, end_yaws: Array) -> tuple[Array, Mask]:
+        """Scores (n,) at the goal and which velocities (n, 3) are legal there; end_yaws (n,) are where they lead."""
+        speed = math.hypot(now.vx, now.vy)
+        self._rotating |= speed <= self._stopped
+        square = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
+        off = np.abs((end_yaws - goal_yaw + np.pi) % (2.0 * np.pi) - np.pi)
+        if self._rotating:
+            return off, np.asarray(square == 0.0)
+        return np.asarray(square * self._slowing + off), np.asarray(square < speed**2)

@@ -14,26 +14,41 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.mppi import Mppi as MppiSpec
-from simscen.stack.controllers.following import PathFollower
-from simscen.stack.controllers.free_way import FreeWay
-from simscen.stack.controllers.goal_pose import GoalPose
-from simscen.stack.controllers.limits import Limits
-from simscen.stack.controllers.local_plan import LocalPlan, local_plan
-from simscen.stack.controllers.mppi.judgment import Judgment
-from simscen.stack.controllers.mppi.limits import in_order, mppi_limits
-from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ, Rollouts, delay, integrated, predicted
-from simscen.stack.controllers.mppi.scene import Scene
-from simscen.stack.controllers.mppi.sequence import PAST, later, smoothed, weights, within_limits
+from simscen.stack.controllers.collision_checker import CollisionChecker
+from simscen.stack.controllers.goal_rotation import GoalRotation
+from simscen.stack.controllers.mppi.control_sequence import (
+    PAST_COMMANDS,
+    apply_limits,
+    sample_weights,
+    shift_sequence,
+    smooth_sequence,
+)
+from simscen.stack.controllers.mppi.critic_data import CriticData
+from simscen.stack.controllers.mppi.critic_manager import CriticManager
+from simscen.stack.controllers.mppi.rollouts import (
+    VX,
+    VY,
+    WZ,
+    Rollouts,
+    apply_model_delay,
+    axis_order,
+    integrate_velocities,
+    mppi_limits,
+    predict_velocities,
+)
+from simscen.stack.controllers.path_follower import PathFollower
+from simscen.stack.controllers.path_handler import LocalPlan, local_plan
+from simscen.stack.controllers.velocity_limits import VelocityLimits
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 Floats = npt.NDArray[np.float32]
-SURE = 0.5
+COMMAND_FREE_TIME_S = 0.5
 """Seconds that the command itself must be free of collisions for."""
-LEAST, BEYOND = 2.0, 1.0
+MIN_PLAN_LENGTH_M, PLAN_MARGIN_M = 2.0, 1.0
 """Meters of plan that it looks at, at least, which is Nav2's prune_distance; and beyond what the rollouts
 reach, for the critics that look at points further on."""
-SPREAD = 0.5
+SPEED_STD_RATIO = 0.5
 """Standard deviation of the sampled speeds, of the greatest. What draws the speed up grows with its square, what holds
 it back (gamma) with the speed: Nav2's 0.2 m/s comes to rest at about 0.5 m/s, whatever the limit."""
 
@@ -48,22 +63,26 @@ class MppiController(PathFollower):
         self._base = mppi_limits(spec, robot, self._fastest)
         model = spec.motion_model or ("Omni" if self._base.high[1] > 0.0 else "DiffDrive")
         self._axes = 3 if model == "Omni" else 2
-        deviations = (spec.vx_std or SPREAD * self._fastest, spec.wz_std, spec.vy_std or SPREAD * self._base.high[1])
+        deviations = (
+            spec.vx_std or SPEED_STD_RATIO * self._fastest,
+            spec.wz_std,
+            spec.vy_std or SPEED_STD_RATIO * self._base.high[1],
+        )
         self._std = np.array(deviations[: self._axes], np.float32)
         late = (spec.model_delay_vx, spec.model_delay_wz, spec.model_delay_vy)
         self._delays = tuple(math.floor(each / spec.model_dt + 0.5) for each in late[: self._axes])
-        self._judgment = Judgment(spec, omni=model == "Omni")
+        self._judgment = CriticManager(spec, omni=model == "Omni")
         self._period, self._shift = setting.control_period, setting.control_period / spec.model_dt
-        self._goal_pose = GoalPose(robot, spec.wz_max, robot.angular_acceleration, setting.control_period)
-        self._free_way = FreeWay(setting.footprint)
-        self._reach = max(LEAST, self._fastest * spec.time_steps * spec.model_dt + BEYOND)
+        self._goal_pose = GoalRotation(robot, spec.wz_max, robot.angular_acceleration, setting.control_period)
+        self._free_way = CollisionChecker(setting.footprint)
+        self._reach = max(MIN_PLAN_LENGTH_M, self._fastest * spec.time_steps * spec.model_dt + PLAN_MARGIN_M)
         self._forget()
 
     def _forget(self) -> None:
         """Begin with nothing, and with other noise: what was found leads nowhere."""
         axes, steps = self._axes, self._spec.time_steps
         self._sequence = np.zeros((axes, steps), np.float32)
-        self._sent = np.zeros((axes, max(PAST, *self._delays)), np.float32)
+        self._sent = np.zeros((axes, max(PAST_COMMANDS, *self._delays)), np.float32)
         self._draw()
         self._driven: Rollouts | None = None
         self._pose, self._from = Pose2(0.0, 0.0), Pose2(0.0, 0.0)
@@ -77,7 +96,7 @@ class MppiController(PathFollower):
         self._goal_pose.reset()
 
     @property
-    def _limits(self) -> Limits:
+    def _limits(self) -> VelocityLimits:
         return self._base.scaled(self._share)
 
     @property
@@ -94,23 +113,23 @@ class MppiController(PathFollower):
         else:
             plan = local_plan(track, self._reach)
             command = self._optimized(twist, lambda rolled: self._scene(rolled, plan, costmap, goal))
-        free = self._free_way.seconds(costmap, pose, command, SURE)
-        return self._free_way.within(command, free, SURE, SURE)
+        free = self._free_way.seconds(costmap, pose, command, COMMAND_FREE_TIME_S)
+        return self._free_way.within(command, free, COMMAND_FREE_TIME_S, COMMAND_FREE_TIME_S)
 
-    def _scene(self, rolled: Rollouts, plan: LocalPlan, costmap: CostmapView, goal: Goal) -> Scene:
-        return Scene(
+    def _scene(self, rolled: Rollouts, plan: LocalPlan, costmap: CostmapView, goal: Goal) -> CriticData:
+        return CriticData(
             rolled, plan, self._pose, goal.pose.yaw, costmap, self._footprint, self._limits, self._spec.model_dt,
             goal.xy_tolerance,
         )  # fmt: skip
 
-    def _optimized(self, twist: Twist, seen: Callable[[Rollouts], Scene]) -> Twist:
+    def _optimized(self, twist: Twist, seen: Callable[[Rollouts], CriticData]) -> Twist:
         """Improve the sequence; what hits something is forgotten, and begun anew as often as is allowed."""
         for _ in range(1 + self._spec.retry_attempt_limit):
             now = self._velocity(twist)
             free = False
             for _ in range(self._spec.iteration_count):
                 free = self._improve(now, seen)
-            rolled = integrated(self._sequence[:, :, None], self._pose.yaw, self._spec.model_dt)
+            rolled = integrate_velocities(self._sequence[:, :, None], self._pose.yaw, self._spec.model_dt)
             if free and self._valid(seen(rolled)):
                 self._driven, self._from = rolled, self._pose
                 return self._next()
@@ -123,27 +142,29 @@ class MppiController(PathFollower):
         if self._spec.open_loop:
             return self._sent[:, -1]
         measured = np.array((twist.vx, twist.wz, twist.vy))[: self._axes]
-        change = (in_order(limits.deceleration) * self._period, in_order(limits.acceleration) * self._period)
+        change = (axis_order(limits.deceleration) * self._period, axis_order(limits.acceleration) * self._period)
         near = np.clip(sent, measured + change[0][: self._axes], measured + change[1][: self._axes])
         return near.astype(np.float32)
 
-    def _improve(self, now: Floats, seen: Callable[[Rollouts], Scene]) -> bool:
+    def _improve(self, now: Floats, seen: Callable[[Rollouts], CriticData]) -> bool:
         """One iteration; whether any rollout hits nothing."""
         spec, limits, dt = self._spec, self._limits, self._spec.model_dt
         self._sequence[:, 0] = now
         if spec.regenerate_noises:
             self._draw()
         controls = self._sequence[:, :, None] + self._noise
-        velocities = predicted(now, controls, limits, dt)
-        delay(velocities, self._sent, self._delays)
-        costs, all_hit = self._judgment.costs(seen(integrated(velocities, self._pose.yaw, dt)))
+        velocities = predict_velocities(now, controls, limits, dt)
+        apply_model_delay(velocities, self._sent, self._delays)
+        costs, all_hit = self._judgment.costs(seen(integrate_velocities(velocities, self._pose.yaw, dt)))
         deviations: list[float] = self._std.tolist()
-        average = controls @ weights(costs, self._sequence, self._noise, deviations, spec.gamma, spec.temperature)
-        average = smoothed(average, self._sent[:, -PAST:], spec.sgf_order)
-        self._sequence = within_limits(average, now, limits, dt)
+        average = controls @ sample_weights(
+            costs, self._sequence, self._noise, deviations, spec.gamma, spec.temperature
+        )
+        average = smooth_sequence(average, self._sent[:, -PAST_COMMANDS:], spec.sgf_order)
+        self._sequence = apply_limits(average, now, limits, dt)
         return not all_hit
 
-    def _valid(self, scene: Scene) -> bool:
+    def _valid(self, scene: CriticData) -> bool:
         """nav2_mppi_controller's DefaultOptimalTrajectoryValidator."""
         spec, rolled = self._spec.TrajectoryValidator, scene.rolled
         steps = min(round(spec.collision_lookahead_time / scene.dt), len(rolled.x))
@@ -155,7 +176,7 @@ class MppiController(PathFollower):
 
     def _next(self) -> Twist:
         """What the sequence says of the end of this period; then the sequence moves on by a period."""
-        self._sequence = later(self._sequence, self._shift)
+        self._sequence = shift_sequence(self._sequence, self._shift)
         first = self._sequence[:, :1]
         self._sent = np.concatenate((self._sent[:, 1:], first), axis=1)
         vx, wz = float(first[VX, 0]), float(first[WZ, 0])

@@ -1,21 +1,25 @@
-"""What MPPI's rollouts are judged by: the critics of nav2_mppi_controller but for those that look at the plan.
+"""Critics of MPPI, which score the rollouts (nav2_mppi_controller).
 
-A critic takes its part of the specification and the scene, and returns what it measures (n,) times its weight.
+A critic takes its parameters and the critic data, and returns one weighted cost per rollout (n,).
 """
 
 import numpy as np
 import numpy.typing as npt
 
 from simscen.model import mppi as model
+from simscen.stack.controllers.cumulative_sum import accumulate_rows
+from simscen.stack.controllers.mppi.critic_data import CriticData, Mask, distances_in_place
 from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ
-from simscen.stack.controllers.mppi.scene import Mask, Scene, apart
 
 Floats = npt.NDArray[np.float32]
-ALMOST_STRAIGHT = np.float32(1e-6)
+MIN_TURN_RATE_RAD_S = np.float32(1e-6)
 """rad/s below which a car is not asked for its turning radius."""
 
 
-def constraint(spec: model.MppiConstraintCritic, scene: Scene) -> Floats:
+HALF_TURN = np.float32(np.pi)
+
+
+def constraint(spec: model.MppiConstraintCritic, scene: CriticData) -> Floats:
     """m/s too many over the seconds; of a car also meters by which it turns too tightly."""
     velocities, limits = scene.rolled.velocities, scene.limits
     vx, (low, *_), (high, left, _) = velocities[VX], limits.low, limits.high
@@ -24,12 +28,12 @@ def constraint(spec: model.MppiConstraintCritic, scene: Scene) -> Floats:
     if len(velocities) > VY:
         excess += np.maximum(np.abs(velocities[VY]) - np.float32(left), 0)
     if limits.turning_radius > 0.0:
-        turn = np.maximum(np.abs(velocities[WZ]), ALMOST_STRAIGHT)
+        turn = np.maximum(np.abs(velocities[WZ]), MIN_TURN_RATE_RAD_S)
         excess += np.maximum(np.float32(limits.turning_radius) - np.abs(vx) / turn, 0)
     return np.asarray(spec.cost_weight * scene.dt * excess.sum(axis=0))
 
 
-def cost(spec: model.MppiCostCritic, scene: Scene) -> tuple[Floats, Mask]:
+def cost(spec: model.MppiCostCritic, scene: CriticData) -> tuple[Floats, Mask]:
     """The mean cost of the costmap along each rollout; and which rollouts hit something."""
     part = slice(None, None, spec.trajectory_point_step)
     x, y, yaw = scene.rolled.x[part], scene.rolled.y[part], scene.rolled.yaw[part]
@@ -45,7 +49,7 @@ def cost(spec: model.MppiCostCritic, scene: Scene) -> tuple[Floats, Mask]:
     return np.asarray(spec.cost_weight / 254.0 / len(x) * total), hit
 
 
-def obstacles(spec: model.MppiObstaclesCritic, scene: Scene) -> tuple[Floats, Mask]:
+def obstacles(spec: model.MppiObstaclesCritic, scene: CriticData) -> tuple[Floats, Mask]:
     """Nearness within the margin, and within the inflation radius compared with the best; and which hit something."""
     x, y, yaw = scene.rolled.x, scene.rolled.y, scene.rolled.yaw
     whole = spec.consider_footprint is not False
@@ -65,31 +69,33 @@ def obstacles(spec: model.MppiObstaclesCritic, scene: Scene) -> tuple[Floats, Ma
     return np.asarray(total), hit
 
 
-def goal(spec: model.MppiGoalCritic, scene: Scene) -> Floats:
+def goal(spec: model.MppiGoalCritic, scene: CriticData) -> Floats:
     """The mean distance to the plan's end, once that is near."""
     x, y, _ = scene.path
-    return np.asarray(spec.cost_weight * apart(scene.rolled.x - x[-1], scene.rolled.y - y[-1]).mean(axis=0))
+    return np.asarray(
+        spec.cost_weight * distances_in_place(scene.rolled.x - x[-1], scene.rolled.y - y[-1]).mean(axis=0)
+    )
 
 
-def goal_angle(spec: model.MppiGoalAngleCritic, scene: Scene) -> Floats:
+def goal_angle(spec: model.MppiGoalAngleCritic, scene: CriticData) -> Floats:
     """The mean angle to the goal's heading, once the plan's end is near."""
-    off = wrapped(scene.rolled.yaw - np.float32(scene.goal_yaw))
+    off = absolute_angles(scene.rolled.yaw - np.float32(scene.goal_yaw))
     if spec.symmetric_yaw_tolerance:
         off = np.minimum(off, np.float32(np.pi) - off)
     return np.asarray(spec.cost_weight * off.mean(axis=0))
 
 
-def prefer_forward(spec: model.MppiPreferForwardCritic, scene: Scene) -> Floats:
+def prefer_forward(spec: model.MppiPreferForwardCritic, scene: CriticData) -> Floats:
     """Meters driven backward."""
     return np.asarray(spec.cost_weight * scene.dt * -np.minimum(scene.rolled.velocities[VX], 0).sum(axis=0))
 
 
-def twirling(spec: model.MppiTwirlingCritic, scene: Scene) -> Floats:
+def twirling(spec: model.MppiTwirlingCritic, scene: CriticData) -> Floats:
     """The mean turn rate."""
     return np.asarray(spec.cost_weight * np.abs(scene.rolled.velocities[WZ]).mean(axis=0))
 
 
-def velocity_deadband(spec: model.MppiVelocityDeadbandCritic, scene: Scene) -> Floats:
+def velocity_deadband(spec: model.MppiVelocityDeadbandCritic, scene: CriticData) -> Floats:
     """What the velocities fall short of those that move the base, over the seconds."""
     ahead, sideways, turn = spec.deadband_velocities
     least = {VX: ahead, WZ: turn, VY: sideways}
@@ -99,6 +105,70 @@ def velocity_deadband(spec: model.MppiVelocityDeadbandCritic, scene: Scene) -> F
     return np.asarray(spec.cost_weight * scene.dt * short.sum(axis=0))
 
 
-def wrapped(angles: Floats) -> Floats:
+def absolute_angles(angles: Floats) -> Floats:
     """Angles between two directions: 0 … π."""
     return np.asarray(np.abs((angles + np.float32(np.pi)) % np.float32(2 * np.pi) - np.float32(np.pi)))
+
+
+def path_align(spec: model.MppiPathAlignCritic, scene: CriticData) -> Floats | None:
+    """The mean distance from each pose to the point of the plan that is as many meters from the start.
+
+    None where the critic is silent: before the robot has got going, and where the plan is blocked.
+    """
+    count = scene.furthest
+    if count < max(1, spec.offset_from_furthest):
+        return None
+    free = scene.free_points[:count]
+    blocked = count - int(np.count_nonzero(free))
+    if blocked > 2 and blocked / count > spec.max_path_occupancy_ratio:
+        return None
+    part = slice(None, None, spec.trajectory_point_step)
+    x, y = scene.rolled.x[part], scene.rolled.y[part]
+    along = accumulate_rows(distances_in_place(x[1:] - x[:-1], y[1:] - y[:-1]))
+    along /= np.float32(scene.plan.spacing)
+    along += np.float32(0.5)
+    point = np.minimum(along.astype(np.int32), count - 1)
+    px, py, yaw = scene.path
+    off = distances_in_place(px.take(point) - x[1:], py.take(point) - y[1:])
+    if spec.use_path_orientations:
+        off = distances_in_place(off, absolute_angles(yaw.take(point) - scene.rolled.yaw[part][1:]))
+    if not blocked:
+        return np.asarray(spec.cost_weight * off.mean(axis=0))
+    looked_at = free.take(point)
+    counted = np.maximum(looked_at.sum(axis=0), 1)
+    return np.asarray(spec.cost_weight * (off * looked_at).sum(axis=0) / counted)
+
+
+def path_follow(spec: model.MppiPathFollowCritic, scene: CriticData) -> Floats:
+    """The distance from the end of each rollout to a free point beyond the furthest that any reaches."""
+    px, py, _ = scene.path
+    last = len(px) - 1
+    index = min(scene.furthest + spec.offset_from_furthest, last)
+    while index < last - 1 and not scene.free_points[index]:
+        index += 1
+    return np.asarray(spec.cost_weight * np.hypot(scene.rolled.x[-1] - px[index], scene.rolled.y[-1] - py[index]))
+
+
+def path_angle(spec: model.MppiPathAngleCritic, scene: CriticData) -> Floats | None:
+    """The angle between the heading at the end of each rollout and the way from there to a point of the plan.
+
+    None where the robot looks there already, but for `max_angle_to_furthest`.
+    """
+    px, py, yaws = scene.path
+    index = min(scene.furthest + spec.offset_from_furthest, len(px) - 1)
+    x, y, yaw = px[index], py[index], yaws[index]
+    forward_only = spec.mode == 0 or (spec.mode == 1 and scene.limits.low[0] == 0.0)
+    off = float(absolute_angles(np.arctan2(y, x) - np.float32(scene.pose.yaw)))
+    if spec.mode == 2 and absolute_angles(np.arctan2(y, x) - yaw) > HALF_TURN / 2:
+        off = np.pi - off
+    elif not forward_only and spec.mode == 1:
+        off = min(off, np.pi - off)
+    if off < spec.max_angle_to_furthest:
+        return None
+    bearing = np.arctan2(y - scene.rolled.y[-1], x - scene.rolled.x[-1])
+    angles = absolute_angles(bearing - scene.rolled.yaw[-1])
+    if spec.mode == 2:
+        angles = np.where(absolute_angles(bearing - yaw) < HALF_TURN / 2, angles, HALF_TURN - angles)
+    elif not forward_only:
+        angles = np.minimum(angles, HALF_TURN - angles)
+    return np.asarray(spec.cost_weight * angles)

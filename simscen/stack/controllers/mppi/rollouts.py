@@ -9,9 +9,12 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from simscen.stack.controllers.limits import Limits
-from simscen.stack.controllers.mppi.limits import in_order
-from simscen.stack.controllers.sums import add_up
+from simscen.core.geometry import Array
+from simscen.model.mppi import Mppi as MppiSpec
+from simscen.stack.controllers.cumulative_sum import accumulate_rows
+from simscen.stack.controllers.path_follower import DEFAULT_SPEED_M_S
+from simscen.stack.controllers.velocity_limits import Axes, VelocityLimits, velocity_limits
+from simscen.stack.protocols import RobotModel
 
 Floats = npt.NDArray[np.float32]
 VX, WZ, VY = 0, 1, 2
@@ -34,14 +37,14 @@ class Rollouts:
         return np.asarray(np.hypot(self.velocities[VX], self.velocities[VY]))
 
 
-def predicted(now: Floats, controls: Floats, limits: Limits, dt: float) -> Floats:
+def predict_velocities(now: Floats, controls: Floats, limits: VelocityLimits, dt: float) -> Floats:
     """Velocities that follow: the one of `now` (axes,), then each after the control of the step before it.
 
     Bounded by the accelerations but, as in Nav2, not by the speeds: those are ConstraintCritic's.
     """
     velocities = np.empty_like(controls)
     velocities[:, 0] = now[:, None]
-    faster, slower = in_order(limits.acceleration) * dt, in_order(limits.deceleration) * dt
+    faster, slower = axis_order(limits.acceleration) * dt, axis_order(limits.deceleration) * dt
     changes = zip(faster.astype(np.float32), slower.astype(np.float32), strict=True)
     for here, asked, (up, down) in zip(velocities, controls, changes, strict=False):
         if down == -up:
@@ -71,12 +74,12 @@ def _followed_braking(velocities: Floats, asked: Floats, up: np.float32, down: n
         np.minimum(here, bound, out=here)
 
 
-def integrated(velocities: Floats, yaw: float, dt: float) -> Rollouts:
+def integrate_velocities(velocities: Floats, yaw: float, dt: float) -> Rollouts:
     """Where these velocities lead from a heading; each step keeps the heading it begins with."""
     step, (steps, count) = np.float32(dt), velocities.shape[1:]
     headings = np.empty((steps + 1, count), np.float32)
     headings[0], turned = 0.0, headings[1:]
-    add_up(np.multiply(velocities[WZ], step, out=turned))
+    accumulate_rows(np.multiply(velocities[WZ], step, out=turned))
     headings += np.float32(yaw)
     cosine, sine = np.cos(headings[:-1]), np.sin(headings[:-1])
     dx, dy = velocities[VX] * cosine, velocities[VX] * sine
@@ -85,12 +88,31 @@ def integrated(velocities: Floats, yaw: float, dt: float) -> Rollouts:
         dy += velocities[VY] * cosine
     dx *= step
     dy *= step
-    return Rollouts(add_up(dx), add_up(dy), turned, velocities)
+    return Rollouts(accumulate_rows(dx), accumulate_rows(dy), turned, velocities)
 
 
-def delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) -> None:
+def apply_model_delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) -> None:
     """Let each axis answer so many steps late, in place: first comes what was `sent` (axes, m) and is under way."""
     for here, was, late in zip(velocities, sent, steps, strict=False):
         if late:
             here[late:] = here[1 : len(here) - late + 1].copy()
             here[1:late] = was[-late:][1 : len(here), None]
+
+
+def mppi_limits(spec: MppiSpec, robot: RobotModel, fastest: float) -> VelocityLimits:
+    """What the specification asks for, or leaves to the robot, and no more than that can do."""
+    sideways = DEFAULT_SPEED_M_S if spec.vy_max is None else spec.vy_max
+    return velocity_limits(
+        robot,
+        low=(spec.vx_min, -sideways, -spec.wz_max),
+        high=(fastest, sideways, spec.wz_max),
+        acceleration=(spec.ax_max, spec.ay_max, spec.az_max),
+        deceleration=(spec.ax_min, spec.ay_min, None if spec.az_max is None else -spec.az_max),
+        turning_radius=spec.min_turning_r,
+    )
+
+
+def axis_order(axes: Axes) -> Array:
+    """The three in the order of a control sequence: vx, wz, vy."""
+    vx, vy, wz = axes
+    return np.array((vx, wz, vy))

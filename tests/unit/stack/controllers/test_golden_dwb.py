@@ -10,11 +10,14 @@ import yaml
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as Spec
-from simscen.stack.controllers.dwb.critics import scores
-from simscen.stack.controllers.dwb.kinematics import Kinematics, samples, window
-from simscen.stack.controllers.dwb.oscillation import Oscillation
-from simscen.stack.controllers.dwb.rotate_to_goal import RotateToGoal
-from simscen.stack.controllers.dwb.trajectories import trajectories
+from simscen.stack.controllers.dwb.critics import RotateToGoalCritic, score_trajectories
+from simscen.stack.controllers.dwb.oscillation_critic import OscillationCritic
+from simscen.stack.controllers.dwb.trajectory_generator import (
+    Kinematics,
+    generate_trajectories,
+    velocity_samples,
+    velocity_window,
+)
 from simscen.stack.protocols import CostmapView
 
 ALL = yaml.safe_load((Path(__file__).parent / "golden/dwb.yaml").read_text(encoding="utf-8"))
@@ -37,13 +40,13 @@ def kinematics(acceleration: float = AT_ONCE, deceleration: float = -AT_ONCE, **
 
 @of("samples")
 def test_the_velocities_that_are_tried(case: dict[str, Any]) -> None:
-    assert samples(**case["given"]) == pytest.approx(case["expect"], abs=1e-9)
+    assert velocity_samples(**case["given"]) == pytest.approx(case["expect"], abs=1e-9)
 
 
 @of("window")
 def test_the_combinations_that_are_tried(case: dict[str, Any]) -> None:
     given = dict(case["given"])
-    found = window(kinematics(**given), Twist(), 1.7, given["counts"])
+    found = velocity_window(kinematics(**given), Twist(), 1.7, given["counts"])
     assert found == pytest.approx(np.array(case["expect"]), abs=1e-9)
 
 
@@ -53,7 +56,7 @@ def test_where_a_velocity_leads(case: dict[str, Any]) -> None:
     base = kinematics(given.get("acceleration", AT_ONCE), given.get("deceleration", -AT_ONCE))
     pose, now = Pose2(*given.get("pose", (0, 0, 0))), Twist(*given.get("now", (0, 0, 0)))
     velocities = np.array([given["velocity"]])
-    found = trajectories(pose, now, velocities, base, given["seconds"], given["meters"], given["radians"])
+    found = generate_trajectories(pose, now, velocities, base, given["seconds"], given["meters"], given["radians"])
     assert found.poses(np.array([0]))[:, 0] == pytest.approx(np.array(case["expect"]), abs=1e-9)
 
 
@@ -71,7 +74,7 @@ def test_what_the_critics_say(case: dict[str, Any]) -> None:
     plan = np.column_stack((0.05 + 0.1 * columns, np.full(len(columns), 0.05 + 0.1 * given["plan_row"])))
     pose, goal = Pose2(*given.get("pose", (0.05, 0.55, 0.0))), Pose2(*plan[-1].tolist())
     spec = Spec(type="dwb", **given.get("options", {}))
-    found = scores(spec, view, pose, goal, plan, np.array([given["velocity"]]), np.array([given["end"]]))
+    found = score_trajectories(spec, view, pose, goal, plan, np.array([given["velocity"]]), np.array([given["end"]]))
     assert bool(found.legal[0]) is expect.pop("legal", True)
     if "total" in expect:
         assert found.total[0] == pytest.approx(expect.pop("total"), abs=1e-9)
@@ -81,7 +84,7 @@ def test_what_the_critics_say(case: dict[str, Any]) -> None:
 @of("rotate")
 def test_how_it_comes_to_rest_and_turns_at_the_goal(case: dict[str, Any]) -> None:
     given, expect = case["given"], case["expect"]
-    critic = RotateToGoal(stopped=0.25, slowing=5.0)
+    critic = RotateToGoalCritic(stopped=0.25, slowing=5.0)
     found, legal = critic.scores(
         Twist(*given["now"]), given["goal_yaw"], np.array(given["velocities"]), np.array(given["end_yaws"])
     )
@@ -91,7 +94,7 @@ def test_how_it_comes_to_rest_and_turns_at_the_goal(case: dict[str, Any]) -> Non
 
 @of("oscillation")
 def test_what_may_not_turn_round_again(case: dict[str, Any]) -> None:
-    critic = Oscillation(0.05, 0.2, 0.05)
+    critic = OscillationCritic(0.05, 0.2, 0.05)
     for command, moved in zip(case["given"]["commands"], case["given"]["moved"], strict=True):
         critic.debrief(Pose2(moved, 0.0), Twist(*command))
     tried = {"forward": (0.2, 0, 0), "backward": (-0.2, 0, 0), "left": (0, 0, 0.3), "right": (0, 0, -0.3)}
@@ -100,7 +103,7 @@ def test_what_may_not_turn_round_again(case: dict[str, Any]) -> None:
 
 
 def test_once_it_turns_at_the_goal_it_goes_on_turning_though_it_is_pushed() -> None:
-    critic = RotateToGoal(0.25, 5.0)
+    critic = RotateToGoalCritic(0.25, 5.0)
     turn, drive = np.array([[0.0, 0.0, 0.5]]), np.array([[0.3, 0.0, 0.0]])
     critic.scores(Twist(0.1), 0.0, turn, np.zeros(1))
     assert critic.scores(Twist(0.5), 0.0, turn, np.zeros(1))[1].all()

@@ -10,12 +10,12 @@ import yaml
 
 from simscen.core.geometry import Pose2
 from simscen.model.mppi import Mppi
-from simscen.stack.controllers.limits import Limits
-from simscen.stack.controllers.local_plan import LocalPlan
-from simscen.stack.controllers.mppi.judgment import Judgment
-from simscen.stack.controllers.mppi.rollouts import integrated, predicted
-from simscen.stack.controllers.mppi.scene import Scene
-from simscen.stack.controllers.mppi.sequence import smoothed, weights, within_limits
+from simscen.stack.controllers.mppi.control_sequence import apply_limits, sample_weights, smooth_sequence
+from simscen.stack.controllers.mppi.critic_data import CriticData
+from simscen.stack.controllers.mppi.critic_manager import CriticManager
+from simscen.stack.controllers.mppi.rollouts import integrate_velocities, predict_velocities
+from simscen.stack.controllers.path_handler import LocalPlan
+from simscen.stack.controllers.velocity_limits import VelocityLimits
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView
 from simscen.testing.flatland import round_robot
@@ -31,8 +31,8 @@ def controls(axes: int) -> np.ndarray:
     return (mean + swing * np.sin(0.37 * step * (axis + 1) + 1.1 * sample + 0.5 * axis)).astype(np.float32)
 
 
-def scene(given: dict[str, Any], sampled: np.ndarray, limits: Limits) -> Scene:
-    rolled = integrated(predicted(NOW[: len(sampled)], sampled, limits, DT), given["yaw"], DT)
+def scene(given: dict[str, Any], sampled: np.ndarray, limits: VelocityLimits) -> CriticData:
+    rolled = integrate_velocities(predict_velocities(NOW[: len(sampled)], sampled, limits, DT), given["yaw"], DT)
     rows, columns = np.mgrid[0:160, 0:160]
     costs = ((7 * rows + 13 * columns) % 200).astype(np.uint8)
     if "block" in given:
@@ -43,13 +43,13 @@ def scene(given: dict[str, Any], sampled: np.ndarray, limits: Limits) -> Scene:
     points = np.column_stack((along * math.cos(angle), along * math.sin(angle), np.full_like(along, angle)))
     plan = LocalPlan(points, 0.05, float(along[-1]))
     footprint = Footprint(round_robot(), 0.05)
-    return Scene(rolled, plan, Pose2(0.0, 0.0, given["yaw"]), given["goal"], view, footprint, limits, DT, 0.25)
+    return CriticData(rolled, plan, Pose2(0.0, 0.0, given["yaw"]), given["goal"], view, footprint, limits, DT, 0.25)
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
 def test_rollouts_critics_weights_and_the_sequence_that_comes_out_are_those_of_the_loops(case: dict[str, Any]) -> None:
     given, axes = case["given"], case["given"]["axes"]
-    limits = Limits((-0.2, -0.3, -1.5), (0.5, 0.3, 1.5), (1.2, 0.9, 2.0), (-1.8, -0.9, -2.0), given["radius"])
+    limits = VelocityLimits((-0.2, -0.3, -1.5), (0.5, 0.3, 1.5), (1.2, 0.9, 2.0), (-1.8, -0.9, -2.0), given["radius"])
     sampled = controls(axes)
     seen = scene(given, sampled, limits)
     ends = np.stack((seen.rolled.x[-1], seen.rolled.y[-1], seen.rolled.yaw[-1]), axis=-1)
@@ -65,14 +65,16 @@ def test_rollouts_critics_weights_and_the_sequence_that_comes_out_are_those_of_t
     parts = {name: {"cost_power": given.get("power", 1), **own.get(name, {})} for name in names}
     total = np.zeros(3)
     for name in names:
-        said, _ = Judgment(Mppi.model_validate({"type": "mppi", "critics": [name], **parts}), axes == 3).costs(seen)
+        said, _ = CriticManager(Mppi.model_validate({"type": "mppi", "critics": [name], **parts}), axes == 3).costs(
+            seen
+        )
         assert said == pytest.approx(np.array(case["costs"].get(name, [0.0] * 3)), rel=2e-4, abs=2e-5), name
         total += said
     mean = sampled.mean(axis=2)
     mean[:, 0] = NOW[:axes]
     noise = sampled - mean[:, :, None]
-    shares = weights(total, mean, noise, (0.2, 0.4, 0.2)[:axes], 0.015, 0.3)
+    shares = sample_weights(total, mean, noise, (0.2, 0.4, 0.2)[:axes], 0.015, 0.3)
     assert shares == pytest.approx(np.array(case["weights"]), abs=2e-4)
     past = (0.01 * np.multiply.outer(np.arange(1, axes + 1), np.arange(4))).astype(np.float32)
-    found = within_limits(smoothed(sampled @ shares, past, 2), NOW[:axes], limits, DT)
+    found = apply_limits(smooth_sequence(sampled @ shares, past, 2), NOW[:axes], limits, DT)
     assert found[:, [1, 2, 7, 20]] == pytest.approx(np.array(case["sequence"]), abs=2e-4)

@@ -13,20 +13,25 @@ from simscen.core.messages.navigation import Goal, Path
 from simscen.model import mppi as model
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.arcs import poses_along
-from simscen.stack.controllers.limits import Limits
-from simscen.stack.controllers.local_plan import LocalPlan
-from simscen.stack.controllers.mppi import critics, path_critics
+from simscen.stack.controllers.mppi import critics
+from simscen.stack.controllers.mppi.control_sequence import apply_limits, shift_sequence, smooth_sequence
 from simscen.stack.controllers.mppi.controller import MppiController
-from simscen.stack.controllers.mppi.rollouts import Rollouts, delay, integrated, predicted
-from simscen.stack.controllers.mppi.scene import Scene
-from simscen.stack.controllers.mppi.sequence import later, smoothed, within_limits
+from simscen.stack.controllers.mppi.critic_data import CriticData
+from simscen.stack.controllers.mppi.rollouts import (
+    Rollouts,
+    apply_model_delay,
+    integrate_velocities,
+    predict_velocities,
+)
+from simscen.stack.controllers.path_handler import LocalPlan
+from simscen.stack.controllers.velocity_limits import VelocityLimits
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
 PERIOD = 0.05
-LIMITS = Limits((-0.35, -0.5, -1.9), (0.5, 0.5, 1.9), (3.0, 3.0, 3.5), (-3.0, -3.0, -3.5), 0.0)
+LIMITS = VelocityLimits((-0.35, -0.5, -1.9), (0.5, 0.5, 1.9), (3.0, 3.0, 3.5), (-3.0, -3.0, -3.5), 0.0)
 
 
 def view_of(*boxes: tuple[float, float, float, float], length: float = 12.0) -> CostmapView:
@@ -72,22 +77,22 @@ def test_its_commands_keep_to_the_accelerations_of_the_base() -> None:
 
 def test_velocities_follow_the_control_of_the_step_before_as_fast_as_accelerations_allow() -> None:
     controls = np.array([[1.0, 1.0, -1.0, 0.0], [0.1, -5.0, 0.0, 0.0]], np.float32)[:, :, None]
-    velocities = predicted(np.array([0.0, 0.0], np.float32), controls, LIMITS, 0.1)[:, :, 0]
+    velocities = predict_velocities(np.array([0.0, 0.0], np.float32), controls, LIMITS, 0.1)[:, :, 0]
     assert velocities[0] == pytest.approx([0.0, 0.3, 0.6, 0.3], abs=1e-6)
     assert velocities[1] == pytest.approx([0.0, 0.1, -0.25, 0.0], abs=1e-6)
 
 
 def test_braking_is_bounded_by_the_deceleration_whichever_way_it_goes() -> None:
-    limits = Limits((-2.0, 0.0, -1.0), (2.0, 0.0, 1.0), (1.0, 1.0, 1.0), (-3.0, -3.0, -1.0), 0.0)
+    limits = VelocityLimits((-2.0, 0.0, -1.0), (2.0, 0.0, 1.0), (1.0, 1.0, 1.0), (-3.0, -3.0, -1.0), 0.0)
     for sign in (1.0, -1.0):
         controls = np.zeros((2, 3, 1), np.float32)
-        velocities = predicted(np.array([sign, 0.0], np.float32), controls, limits, 0.1)
+        velocities = predict_velocities(np.array([sign, 0.0], np.float32), controls, limits, 0.1)
         assert sign * velocities[0, :, 0] == pytest.approx([1.0, 0.7, 0.4], abs=1e-6)
 
 
 def test_a_step_keeps_the_heading_that_it_begins_with() -> None:
     velocities = np.array([[1.0, 1.0], [math.pi, 0.0], [0.0, 0.5]], np.float32)[:, :, None]
-    rolled = integrated(velocities, 0.0, 0.5)
+    rolled = integrate_velocities(velocities, 0.0, 0.5)
     assert rolled.yaw[:, 0] == pytest.approx([math.pi / 2, math.pi / 2], abs=1e-6)
     assert rolled.x[:, 0] == pytest.approx([0.5, 0.5 - 0.25], abs=1e-6)
     assert rolled.y[:, 0] == pytest.approx([0.0, 0.5], abs=1e-6)
@@ -95,7 +100,7 @@ def test_a_step_keeps_the_heading_that_it_begins_with() -> None:
 
 def test_what_was_sent_and_is_under_way_comes_before_what_is_being_chosen() -> None:
     velocities = np.arange(10, dtype=np.float32).reshape(2, 5, 1)
-    delay(velocities, np.tile(np.array([6.0, 7.0, 8.0, 9.0], np.float32), (2, 1)), (3, 0))
+    apply_model_delay(velocities, np.tile(np.array([6.0, 7.0, 8.0, 9.0], np.float32), (2, 1)), (3, 0))
     assert velocities[0, :, 0].tolist() == [0.0, 8.0, 9.0, 1.0, 2.0]
     assert velocities[1, :, 0].tolist() == [5.0, 6.0, 7.0, 8.0, 9.0]
 
@@ -103,40 +108,40 @@ def test_what_was_sent_and_is_under_way_comes_before_what_is_being_chosen() -> N
 def test_the_filter_keeps_parabolas_and_flattens_noise() -> None:
     steps = np.arange(-4.0, 30.0)
     parabola = (0.01 * steps**2).astype(np.float32)
-    kept = smoothed(parabola[None, 4:], parabola[None, :4], 2)
+    kept = smooth_sequence(parabola[None, 4:], parabola[None, :4], 2)
     assert kept[0, :25] == pytest.approx(parabola[4:29], abs=1e-5)
     spike = np.zeros((1, 30), np.float32)
     spike[0, 10] = 1.0
     past = np.zeros((1, 4), np.float32)
-    assert smoothed(spike, past, 2)[0, 10] == pytest.approx(59 / 231)
-    assert smoothed(spike, past, 1)[0, 6:15] == pytest.approx(np.full(9, 1 / 9))
+    assert smooth_sequence(spike, past, 2)[0, 10] == pytest.approx(59 / 231)
+    assert smooth_sequence(spike, past, 1)[0, 6:15] == pytest.approx(np.full(9, 1 / 9))
 
 
 def test_a_sequence_too_short_to_smooth_stays_as_it_is() -> None:
     spike = np.eye(1, 20, dtype=np.float32)
-    assert smoothed(spike, np.zeros((1, 4), np.float32), 2) is spike
+    assert smooth_sequence(spike, np.zeros((1, 4), np.float32), 2) is spike
 
 
 def test_a_car_never_turns_tighter_than_its_radius() -> None:
-    car = Limits((-1.0, 0.0, -5.0), (1.0, 0.0, 5.0), (3.0, 3.0, 9.0), (-3.0, -3.0, -9.0), 2.0)
+    car = VelocityLimits((-1.0, 0.0, -5.0), (1.0, 0.0, 5.0), (3.0, 3.0, 9.0), (-3.0, -3.0, -9.0), 2.0)
     sequence = np.array([[0.5, 0.5, 0.5], [3.0, 3.0, -3.0]], np.float32)
-    kept = within_limits(sequence, np.array([0.5, 0.0], np.float32), car, 0.05)
+    kept = apply_limits(sequence, np.array([0.5, 0.0], np.float32), car, 0.05)
     assert (np.abs(kept[1]) <= np.abs(kept[0]) / 2.0 + 1e-6).all()
 
 
 def test_a_sequence_moves_on_by_parts_of_a_step() -> None:
     sequence = np.array([[0.0, 1.0, 3.0]], np.float32)
-    assert later(sequence, 1.0)[0].tolist() == [1.0, 3.0, 3.0]
-    assert later(sequence, 0.5)[0].tolist() == [0.5, 2.0, 3.0]
+    assert shift_sequence(sequence, 1.0)[0].tolist() == [1.0, 3.0, 3.0]
+    assert shift_sequence(sequence, 0.5)[0].tolist() == [0.5, 2.0, 3.0]
 
 
-def scene(velocities: np.ndarray, view: CostmapView | None = None, length: float = 3.0, **more: Any) -> Scene:
+def scene(velocities: np.ndarray, view: CostmapView | None = None, length: float = 3.0, **more: Any) -> CriticData:
     """Rollouts (axes, steps, n) at 0.1 s from the origin, and a plan along x with points 5 cm apart."""
     robot = round_robot()
     plan = LocalPlan(straight(length), 0.05, length)
-    rolled = integrated(velocities.astype(np.float32), 0.0, 0.1)
+    rolled = integrate_velocities(velocities.astype(np.float32), 0.0, 0.1)
     told = {"pose": Pose2(0.0, 0.0), "goal_yaw": 0.0, "limits": LIMITS, "dt": 0.1, "tolerance": 0.25, **more}
-    return Scene(rolled, plan, costmap=view or view_of(), footprint=Footprint(robot, 0.05), **told)
+    return CriticData(rolled, plan, costmap=view or view_of(), footprint=Footprint(robot, 0.05), **told)
 
 
 def along(*speeds: float, steps: int = 10, turn: float = 0.0) -> np.ndarray:
@@ -220,11 +225,11 @@ def test_the_furthest_point_of_the_plan_is_the_nearest_to_the_end_of_a_rollout()
 def test_path_align_critic_compares_with_the_plan_after_as_many_meters() -> None:
     beside = along(1.0, steps=17, turn=0.0)
     seen = scene(beside)
-    offset = Scene(
+    offset = CriticData(
         Rollouts(seen.rolled.x, seen.rolled.y + np.float32(0.3), seen.rolled.yaw, seen.rolled.velocities),
         *(getattr(seen, name) for name in ("plan", "pose", "goal_yaw", "costmap", "footprint", "limits", "dt")), 0.25,
     )  # fmt: skip
-    said = path_critics.path_align(model.MppiPathAlignCritic(), offset)
+    said = critics.path_align(model.MppiPathAlignCritic(), offset)
     # Meters are counted from the first pose looked at, 0.1 m from the plan's first point: so it is 0.1 m ahead, too;
     # the last is compared with the point before the furthest.
     mean = (3 * math.hypot(0.3, 0.1) + math.hypot(0.3, 0.15)) / 4
@@ -232,23 +237,22 @@ def test_path_align_critic_compares_with_the_plan_after_as_many_meters() -> None
 
 
 def test_path_align_critic_is_silent_before_the_robot_has_got_going_and_where_the_plan_is_blocked() -> None:
-    assert path_critics.path_align(model.MppiPathAlignCritic(), scene(along(0.1))) is None
+    assert critics.path_align(model.MppiPathAlignCritic(), scene(along(0.1))) is None
     blocked = scene(along(1.5), view_of((0.9, -0.1, 1.1, 0.1)))
-    assert path_critics.path_align(model.MppiPathAlignCritic(), blocked) is None
+    assert critics.path_align(model.MppiPathAlignCritic(), blocked) is None
 
 
 def test_path_follow_critic_is_the_distance_to_a_free_point_beyond_the_furthest() -> None:
-    said = path_critics.path_follow(model.MppiPathFollowCritic(), scene(along(0.5, 0.2)))
+    said = critics.path_follow(model.MppiPathFollowCritic(), scene(along(0.5, 0.2)))
     assert said == pytest.approx([5.0 * (0.45 + 0.25 - 0.5), 5.0 * (0.70 - 0.2)], rel=1e-3)
 
 
 @pytest.mark.parametrize(("mode", "weighed"), [(0, math.pi), (1, None), (2, math.pi)])
 def test_path_angle_critic_lets_a_robot_that_may_reverse_look_back(mode: int, weighed: float | None) -> None:
     turned = scene(along(0.0), pose=Pose2(0.0, 0.0, math.pi))
-    back = integrated(along(0.0).astype(np.float32), math.pi, 0.1)
-    turned = Scene(back, *(getattr(turned, n) for n in ("plan", "pose", "goal_yaw", "costmap", "footprint", "limits",
-                   "dt", "tolerance")))  # fmt: skip
-    said = path_critics.path_angle(model.MppiPathAngleCritic(mode=mode), turned)
+    back = integrate_velocities(along(0.0).astype(np.float32), math.pi, 0.1)
+    turned = replace(turned, rolled=back)
+    said = critics.path_angle(model.MppiPathAngleCritic(mode=mode), turned)
     assert said is None if weighed is None else said == pytest.approx([2.0 * weighed], rel=1e-5)
 
 

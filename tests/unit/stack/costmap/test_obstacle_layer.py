@@ -7,10 +7,10 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap import costmaps
-from simscen.stack.costmap.frame import Frame
-from simscen.stack.costmap.obstacle_layer import crossed, hits
+from simscen.stack.costmap.grid_frame import GridFrame
+from simscen.stack.costmap.obstacle_layer import crossed_cells, hit_points
 
-FRAME = Frame((-4.0, -4.0), 0.05, (160, 160))
+FRAME = GridFrame((-4.0, -4.0), 0.05, (160, 160))
 
 
 def walked(scan: Scan, base: Pose2, spec: Spec) -> set[tuple[int, int]]:
@@ -31,9 +31,9 @@ def test_crossed_cells_are_those_a_walk_along_the_beams_comes_through(beams: int
     scan = Scan("l", 0, 2.0 + np.sin(3 * np.arange(beams) * step), -math.pi, step, 0.05, 12.0, Pose2(0.1, 0.05, 0.2))
     cells = np.argwhere(np.ones(FRAME.shape, dtype=bool))
     centers = FRAME.points(np.arange(len(cells)))
-    found = {tuple(cell) for cell in cells[crossed(centers, FRAME.resolution, scan, base, spec)[0]].tolist()}
+    found = {tuple(cell) for cell in cells[crossed_cells(centers, FRAME.resolution, scan, base, spec)[0]].tolist()}
     truth = walked(scan, base, spec)
-    points, _ = hits(scan, base, 0.0, 99.0)
+    points, _ = hit_points(scan, base, 0.0, 99.0)
     ends = {tuple(cell) for cell in FRAME.cells(np.column_stack((points.real, points.imag))).tolist()}
     # Cells at a beam's end may go either way: marking comes after clearing. Near the lidar many beams share a cell.
     lidar = base.compose(scan.mount)
@@ -46,7 +46,7 @@ def test_crossed_cells_are_those_a_walk_along_the_beams_comes_through(beams: int
 def test_hits_are_points_in_the_map() -> None:
     ranges = np.array([1.0, np.inf, np.nan, 2.0, 9.0, -np.inf])
     scan = Scan("l", 0, ranges, 0.0, math.pi / 2, 0.05, 12.0, Pose2(0.1, 0, 0))
-    points, _ = hits(scan, Pose2(1.0, 1.0, math.pi / 2), 0.0, 2.5)
+    points, _ = hit_points(scan, Pose2(1.0, 1.0, math.pi / 2), 0.0, 2.5)
     assert points == pytest.approx(np.array([1.0 + 2.1j, 3.0 + 1.1j]))
 
 

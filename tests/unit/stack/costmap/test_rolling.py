@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
+from simscen.stack.costmap.grid_frame import clip_goal, shift_layer, should_roll, window_around
 
 
 def test_windows_around_different_points_share_their_cells() -> None:
@@ -14,8 +14,8 @@ def test_windows_around_different_points_share_their_cells() -> None:
 
 def test_the_window_follows_a_robot_that_is_an_eighth_of_its_size_off_the_middle() -> None:
     frame = window_around(Pose2(0, 0), (8.0, 8.0), 0.05)
-    assert not left_behind(frame, Pose2(0.9, -0.9))
-    assert left_behind(frame, Pose2(0.0, 1.1))
+    assert not should_roll(frame, Pose2(0.9, -0.9))
+    assert should_roll(frame, Pose2(0.0, 1.1))
 
 
 def test_marks_stay_where_they_are_in_the_plane_and_are_lost_outside() -> None:
@@ -23,14 +23,14 @@ def test_marks_stay_where_they_are_in_the_plane_and_are_lost_outside() -> None:
     marks = np.zeros(before.shape, dtype=bool)
     cells = before.cells(np.array([[2.0, 1.0], [-3.0, 0.0]]))
     marks[cells[:, 0], cells[:, 1]] = True
-    found = now.centers(np.argwhere(carried(marks, before, now, False)))
+    found = now.centers(np.argwhere(shift_layer(marks, before, now, False)))
     assert found == pytest.approx(before.centers(cells[:1]))
 
 
 @pytest.mark.parametrize("to", [Pose2(9, 0), Pose2(-9, 0), Pose2(0, 20), Pose2(-8, -8)])
 def test_of_a_window_that_shares_nothing_with_the_next_nothing_is_kept(to: Pose2) -> None:
     before, now = window_around(Pose2(0, 0), (8.0, 8.0), 0.05), window_around(to, (8.0, 8.0), 0.05)
-    assert np.isnan(carried(np.ones(before.shape), before, now, np.nan)).all()
+    assert np.isnan(shift_layer(np.ones(before.shape), before, now, np.nan)).all()
 
 
 @pytest.mark.parametrize(
@@ -39,4 +39,4 @@ def test_of_a_window_that_shares_nothing_with_the_next_nothing_is_kept(to: Pose2
 )
 def test_a_goal_beyond_the_window_is_aimed_at_from_inside(goal: tuple[float, float], aim: tuple[float, float]) -> None:
     frame = window_around(Pose2(0, 0), (8.0, 8.0), 0.05)
-    assert within(frame, Pose2(0, 0), Pose2(*goal))[:2] == pytest.approx(aim)
+    assert clip_goal(frame, Pose2(0, 0), Pose2(*goal))[:2] == pytest.approx(aim)

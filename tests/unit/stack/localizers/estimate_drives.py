@@ -19,7 +19,7 @@ from simscen.loading.files.worldfile import load_world_file
 from simscen.model.localizers import Amcl
 from simscen.model.world import WorldSpec
 from simscen.run.preparation.loaders import world_from_file
-from simscen.stack.installed.localizer import InstalledLocalizer
+from simscen.stack.plugins.checked_components import CheckedLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
 from simscen.stack.setting import Setting
 from simscen.testing.synthetic_room import ROBOT, TICK_RATE
@@ -213,7 +213,7 @@ class Case:
         """The localizer at its start."""
         told = Surroundings(ROBOT, self.map, TICK_RATE)
         setting = Setting(told, "localizer", Streams(self.seed), estimate=self.estimate)
-        return InstalledLocalizer(self.spec, setting)
+        return CheckedLocalizer(self.spec, setting)
 
 
 def case(name: str, circumstance: str, model: str, seed: int) -> Case:

@@ -13,7 +13,7 @@ from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.planners.ompl_search import OmplSearch
-from simscen.stack.planners.path_points import SPACING_M, spaced
+from simscen.stack.planners.path_postprocessing import SPACING_M, spaced
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot

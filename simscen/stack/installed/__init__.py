@@ -1,1 +1,0 @@
-"""The door through which components come into a stack, and what watches them there."""

@@ -1,0 +1,106 @@
+"""Wrapper that checks the decisions of an installed navigation stack."""
+
+import numpy as np
+
+from simscen.core.environment.costmap_filters import Zones
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Belief, Estimate, Goal, Path
+from simscen.core.messages.sensor_data import Odometry, Readings
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import CostGrid, Decision
+from simscen.model.stack import InProcessStack
+from simscen.stack.plugins.checked_components import checked_belief
+from simscen.stack.plugins.checked_plugin import CheckedPlugin
+from simscen.stack.protocols import Stack
+from simscen.stack.setting import Setting
+
+
+class CheckedStack(CheckedPlugin):
+    """Asks the stack, and looks at each new decision before anybody acts on it."""
+
+    may_fail = False
+
+    def __init__(self, spec: InProcessStack, setting: Setting) -> None:
+        super().__init__("stack", spec, setting, Stack)
+        self._last: Decision | None = None
+        self._belief: Belief | None = None
+        self._command: Twist | None = None
+
+    def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
+        """Localize at the estimate, then drive to the goals in order."""
+        self.ask(self.inner.start, estimate, goals)
+
+    def preempt(self, tick: int, goal: Goal) -> None:
+        """Drive to this goal first."""
+        self.ask(self.inner.preempt, tick, goal)
+
+    def cancel(self, tick: int) -> None:
+        """Cancel the current goal and all after it."""
+        self.ask(self.inner.cancel, tick)
+
+    @property
+    def can_switch_zones(self) -> bool:
+        """Whether it is a SwitchesZones."""
+        return callable(getattr(self.inner, "set_zones", None))
+
+    def set_zones(self, tick: int, zones: Zones) -> None:
+        """From the next update of its costmap on these zones hold, and no others."""
+        self.ask(self.inner.set_zones, tick, zones)
+
+    def decide(self, tick: int, readings: Readings) -> Decision:
+        """The stack's decision. Raises RunError when it is none."""
+        try:
+            decision = self.inner.decide(tick, readings)
+        except Exception as error:  # as in `ask`, and it is asked at every beat
+            self.raised(error)
+        if self._last is None or decision is not self._last:  # a stack that repeats itself does so with the same object
+            self._last = self._checked(decision, tick)
+        return self._last
+
+    @property
+    def plan(self) -> Path | None:
+        """The plan being followed."""
+        plan = self.ask(lambda: self.inner.plan)
+        return None if plan is None else self.checked_path(plan, "follows")
+
+    @property
+    def goal(self) -> Goal | None:
+        """The goal being driven to; None when the task has ended."""
+        goal = self.ask(lambda: self.inner.goal)
+        if goal is not None and not isinstance(goal, Goal):
+            self.broke(f"drives to {goal!r}, which is no Goal")
+        return goal
+
+    def _checked(self, decision: object, tick: int) -> Decision:
+        if not isinstance(decision, Decision):
+            self.broke(f"decided {type(decision).__name__} instead of a Decision")
+        if decision.command is not self._command:
+            self._command = self.checked_twist(decision.command)
+        if decision.belief is not None:
+            self._belief = checked_belief(self, decision.belief, self._belief)
+        if decision.plan is not None:
+            self.checked_path(decision.plan, "planned")
+        if decision.local_plan is not None:
+            self.checked_path(decision.local_plan, "expects to drive")
+        for costmap in decision.costmaps:
+            self._look_at(costmap)
+        for odometry in decision.odometry:
+            if not isinstance(odometry, Odometry):
+                self.broke(f"published {type(odometry).__name__} instead of filtered Odometry")
+        for event in decision.events:
+            if not isinstance(event, Event) or not isinstance(event.kind, EventKind):
+                self.broke(f"told of {event!r}, which is no Event")
+            if event.tick != tick:
+                self.broke(f"told at tick {tick} of `{event.kind}` at tick {event.tick}")
+        return decision
+
+    def _look_at(self, costmap: object) -> None:
+        """A log takes a costmap of a known name in a known frame, whose cells are bytes."""
+        if not isinstance(costmap, CostGrid) or not isinstance(costmap.grid, OccupancyGrid):
+            self.broke(f"published {type(costmap).__name__} instead of a CostGrid")
+        if costmap.name not in ("global", "local") or costmap.frame not in ("map", "odom"):
+            self.broke(f"published a costmap {costmap.name!r} in frame {costmap.frame!r}")
+        cells = costmap.grid.cells
+        if not isinstance(cells, np.ndarray) or cells.dtype != np.int8 or cells.ndim != 2:
+            self.broke(f"published a {costmap.name} costmap whose cells are no (height, width) of int8")

@@ -1,0 +1,46 @@
+"""Turning in place to a heading: it comes to rest there."""
+
+from collections import deque
+
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Goal
+from simscen.stack.controllers.goal_rotation import GoalRotation
+from simscen.testing.flatland import round_robot
+
+PERIOD = 0.05
+
+
+def turned(angle: float, seconds: float, late: int) -> tuple[list[float], list[float]]:
+    """Angles that are left and turn rates of a base that does what it was told so many periods ago."""
+    pose = GoalRotation(round_robot(), 1.9, 3.2, PERIOD)
+    under_way, rate = deque([0.0] * late), 0.0
+    left, rates = [angle], [0.0]
+    for _ in range(round(seconds / PERIOD)):
+        under_way.append(pose.turn(left[-1], Twist(0.0, 0.0, rate)).wz)
+        rate = under_way.popleft()
+        left.append(left[-1] - rate * PERIOD)
+        rates.append(rate)
+    return left, rates
+
+
+@pytest.mark.parametrize(("angle", "late"), [(2.0, 0), (-0.3, 0), (0.004, 0), (-0.3, 1), (0.004, 1)])
+def test_a_base_comes_to_rest_at_the_heading_that_it_turns_to(angle: float, late: int) -> None:
+    left, rates = turned(angle, 4.0, late)
+    assert max(map(abs, rates[-20:])) < 0.01
+    assert abs(left[-1]) < 0.01
+
+
+def test_it_brakes_no_sooner_for_that() -> None:
+    left, _ = turned(2.0, 4.0, 0)
+    assert next(step for step, angle in enumerate(left) if angle < 0.125) * PERIOD < 1.75
+
+
+def test_a_goal_that_is_left_is_approached_anew() -> None:
+    pose, goal = GoalRotation(round_robot(), 1.9, 3.2, PERIOD), Goal("g", Pose2(0.0, 0.0), xy_tolerance=0.2)
+    assert pose.reached(Pose2(0.05, 0.0), Twist(), goal, 0.05)
+    assert pose.reached(Pose2(0.15, 0.0), Twist(0.2), goal, 0.5)
+    assert not pose.reached(Pose2(0.25, 0.0), Twist(0.2), goal, 0.5)
+    assert not pose.reached(Pose2(0.15, 0.0), Twist(0.2), goal, 0.5)

@@ -1,0 +1,60 @@
+import math
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.messages.navigation import Path
+from simscen.stack.controllers.path_handler import PathTracker
+
+
+def straight(length: float = 4.0) -> Path:
+    x = np.arange(0.0, length + 1e-9, 0.05)
+    return Path(np.column_stack((x, np.zeros_like(x), np.zeros_like(x))))
+
+
+def there_and_back() -> Path:
+    """Forward 1 m along x, then backward 0.5 m."""
+    x = np.concatenate((np.arange(0.0, 1.001, 0.05), np.arange(0.95, 0.49, -0.05)))
+    return Path(np.column_stack((x, np.zeros_like(x), np.zeros_like(x))))
+
+
+def test_the_carrot_is_on_the_circle_around_the_robot_and_on_the_path() -> None:
+    track = PathTracker(straight())
+    pose = Pose2(1.013, 0.2, 0.0)
+    track.locate(pose)
+    x, y = track.carrot(pose, 0.5)
+    assert (x, y) == pytest.approx((1.013 + math.sqrt(0.25 - 0.04), 0.0), abs=1e-9)
+
+
+def test_at_the_end_the_carrot_is_the_end_or_beyond_it_if_asked() -> None:
+    track = PathTracker(straight())
+    pose = Pose2(3.8, 0.0, 0.0)
+    track.locate(Pose2(1.4, 0.0))
+    track.locate(Pose2(2.8, 0.0))
+    track.locate(pose)
+    assert track.carrot(pose, 0.5) == pytest.approx((4.0, 0.0))
+    assert track.carrot(pose, 0.5, beyond=True) == pytest.approx((4.3, 0.0))
+
+
+def test_the_place_never_moves_back() -> None:
+    track = PathTracker(straight())
+    track.locate(Pose2(1.0, 0.0))
+    track.locate(Pose2(0.2, 0.0))
+    assert track.remaining() == pytest.approx(3.0)
+
+
+def test_a_path_that_crosses_itself_is_followed_in_its_order() -> None:
+    t = np.linspace(0, 2 * math.pi, 400)
+    circle = np.column_stack((np.sin(t), 1 - np.cos(t), t))
+    track = PathTracker(Path(circle))
+    track.locate(Pose2(0.0, 0.0))
+    assert track.remaining() == pytest.approx(2 * math.pi, abs=0.01)
+
+
+def test_nothing_beyond_a_cusp_is_looked_at_before_the_robot_is_there() -> None:
+    track = PathTracker(there_and_back())
+    track.locate(Pose2(0.8, 0.0))
+    assert track.forward
+    assert track.carrot(Pose2(0.8, 0.0), 0.5) == pytest.approx((1.0, 0.0))
+    assert track.to_cusp() == pytest.approx(0.2)

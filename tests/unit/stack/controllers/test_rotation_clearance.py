@@ -1,0 +1,73 @@
+"""Where a hull with corners may turn, against what the clearance of the world itself says."""
+
+import math
+
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.model.costmaps import Costmap as CostmapSpec
+from simscen.stack.controllers.collision_checker import RotationClearance
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.footprint import Footprint
+from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
+from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot
+
+LONG = box_robot(0.8, 0.4)
+ROUND = round_robot()
+HERE = Pose2(0.0, 0.0, 0.0)
+SLOT = Flatland([(-0.6, 0.3, 2.0, 0.5), (-0.6, -0.5, 2.0, -0.3)])
+"""Two walls, 10 cm from either side of the long robot, that end 60 cm behind its middle."""
+
+
+def seen(world: Flatland, robot: RobotModel) -> CostmapView:
+    return Costmap(CostmapSpec(), Surroundings(robot, world.grid((-3.0, -3.0, 3.0, 3.0)), RATE)).view
+
+
+def room_of(robot: RobotModel) -> RotationClearance:
+    return RotationClearance(Footprint(robot, 0.05))
+
+
+@pytest.mark.parametrize(("gap", "room"), [(0.02, False), (0.20, True)])
+def test_a_turn_needs_room_for_the_corners_all_the_way_round(gap: float, room: bool) -> None:
+    corner = math.hypot(0.4, 0.2)
+    beside = seen(Flatland(discs=[(0.0, corner + gap + 0.1, 0.1)]), LONG)
+    assert room_of(LONG).has_room(0.5 * math.pi, HERE, beside) == room
+
+
+def test_a_short_turn_away_from_an_obstacle_is_allowed_beside_it() -> None:
+    beside_the_front_corner = seen(Flatland(discs=[(0.354, 0.354, 0.05)]), LONG)
+    assert not room_of(LONG).has_room(0.5, HERE, beside_the_front_corner)
+    assert room_of(LONG).has_room(-0.3, HERE, beside_the_front_corner)
+
+
+def test_a_robot_that_touches_something_turns_away_from_it_and_not_into_it() -> None:
+    at_the_front_left = seen(Flatland(discs=[(0.34, 0.22, 0.05)]), LONG)
+    assert not room_of(LONG).has_room(0.5, HERE, at_the_front_left)
+    assert room_of(LONG).has_room(-0.3, HERE, at_the_front_left)
+
+
+def test_a_long_robot_in_a_slot_backs_out_of_it() -> None:
+    turning, view = room_of(LONG), seen(SLOT, LONG)
+    assert not turning.has_room(0.5 * math.pi, HERE, view)
+    back = turning.back_out(HERE, view)
+    assert back is not None
+    assert back.vx == pytest.approx(-0.15)
+    outside = Pose2(-1.2, 0.0, 0.0)
+    assert turning.has_room(0.5 * math.pi, outside, view)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_robot_that_is_blocked_behind_on_one_side_backs_out_in_a_bend_round_it(side: int) -> None:
+    back = room_of(LONG).back_out(HERE, seen(Flatland(discs=[(-0.5, side * 0.2, 0.05)]), LONG))
+    assert back is not None
+    assert back.vx < 0.0
+    assert side * back.wz > 0.0
+
+
+def test_a_robot_with_its_back_to_the_wall_does_not_back_out() -> None:
+    closed = Flatland([*SLOT.boxes, (-0.6, -0.5, -0.5, 0.5)])
+    assert room_of(LONG).back_out(HERE, seen(closed, LONG)) is None
+
+
+def test_a_round_robot_can_always_turn() -> None:
+    assert room_of(ROUND).has_room(3.0, HERE, seen(SLOT, ROUND))

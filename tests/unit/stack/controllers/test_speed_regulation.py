@@ -1,0 +1,90 @@
+"""Who is slow in gaps and bends has slowed down before them: a robot that brakes as it can, driven towards one."""
+
+import math
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import Goal, Path
+from simscen.model.controllers import RegulatedPurePursuit as Spec
+from simscen.model.costmaps import Costmap as CostmapSpec
+from simscen.stack.controllers.path_handler import PathTracker
+from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.footprint import distance_at
+from simscen.stack.protocols import CostmapView, Surroundings
+from simscen.testing.flatland import RATE, Flatland, round_robot, setting
+
+PERIOD, BRAKES = 0.05, 3.0
+ROBOT = round_robot(0.21, speed=2.0, linear_deceleration=BRAKES)
+FAR = Goal("far", Pose2(8.0, 0.0, 0.0))
+
+
+def view_of(*boxes: tuple[float, float, float, float]) -> CostmapView:
+    grid = Flatland(list(boxes)).grid((-3.0, -4.0, 9.0, 4.0))
+    return Costmap(CostmapSpec(), Surroundings(ROBOT, grid, RATE)).view
+
+
+def bent(radius: float, straight: float = 3.0) -> np.ndarray:
+    """Along x, then a quarter of a circle to the left, then along y."""
+    x, turn = np.arange(0.0, straight, 0.05), np.arange(0.0, math.pi / 2, 0.05 / radius)
+    y = np.arange(0.05, 3.0, 0.05)
+    return np.vstack((
+        np.column_stack((x, 0 * x, 0 * x)),
+        np.column_stack((straight + radius * np.sin(turn), radius * (1 - np.cos(turn)), turn)),
+        np.column_stack((np.full_like(y, straight + radius), radius + y, np.full_like(y, math.pi / 2))),
+    ))  # fmt: skip
+
+
+def speeds(view: CostmapView, path: np.ndarray, end: float, **options: object) -> list[tuple[float, float]]:
+    """(x, speed) of a robot that drives along x at 2 m/s and does as it is told, as far as its brakes let it."""
+    controller = RegulatedPurePursuit(Spec(desired_linear_vel=2.0, **options), setting(ROBOT))
+    controller.set_path(Path(path))
+    x, speed, came = 0.0, 2.0, list[tuple[float, float]]()
+    while x < end:
+        wanted = controller.command(Pose2(x, 0.0, 0.0), Twist(speed), view, FAR).vx
+        speed = max(min(wanted, 2.0), speed - BRAKES * PERIOD)
+        x += speed * PERIOD
+        came.append((x, speed))
+    return came
+
+
+@pytest.mark.parametrize("half", [0.27, 0.32])
+def test_a_gap_is_entered_no_faster_than_the_room_beside_the_hull_asks_for(half: float) -> None:
+    view = view_of((2.0, half, 2.4, 3.0), (2.0, -3.0, 2.4, -half))
+    near = distance_at(view, 2.2, 0.0)
+    slow = min(2.0 * near / 0.6, 0.25 + 10.0 * (near - 0.21))
+    line = np.column_stack((np.arange(0.0, 8.0, 0.05), np.zeros((160, 2))))
+    entered = [speed for x, speed in speeds(view, line, 2.3) if x > 2.0]
+    assert max(entered) == pytest.approx(slow, abs=0.1)
+    late = [speed for x, speed in speeds(view, line, 2.3, slow_down_ahead=False) if x > 2.0]
+    assert max(late) > max(entered) + 0.03
+    assert all(speed == 2.0 for x, speed in speeds(view, line, 1.0) if x < 0.8)
+
+
+def test_before_a_bend_it_is_as_slow_as_in_it() -> None:
+    path, open_ground = bent(0.6), view_of()
+    options: dict[str, object] = {"regulated_linear_scaling_min_radius": 1.2}
+    assert speeds(open_ground, path, 3.0, **options)[-1][1] == pytest.approx(1.0, abs=0.2)
+    assert speeds(open_ground, path, 2.0, slow_down_ahead=False, **options)[-1][1] == 2.0
+
+
+@pytest.mark.parametrize("radius", [0.5, 0.8, 2.0])
+def test_the_bend_of_a_circle_is_that_of_its_radius(radius: float) -> None:
+    track = PathTracker(Path(bent(radius)))
+    track.locate(Pose2(0.0, 0.0, 0.0))
+    track.index = int(np.searchsorted(track.along, 3.2))
+    meters, places, bends = zip(*track.stations(0.1, radius * math.pi / 2 - 0.6), strict=True)
+    assert bends == pytest.approx([1.0 / radius] * len(bends), rel=0.03)
+    assert np.diff(meters) == pytest.approx(0.1, abs=0.051)
+    assert [abs(place - complex(3.0, radius)) for place in places] == pytest.approx([radius] * len(places))
+
+
+def test_on_a_straight_way_there_is_no_bend_and_beyond_a_piece_nothing() -> None:
+    x = np.concatenate((np.arange(0.0, 1.001, 0.05), np.arange(0.95, 0.19, -0.05)))
+    track = PathTracker(Path(np.column_stack((x, np.zeros((len(x), 2))))))
+    stations = list(track.stations(0.1, 5.0))
+    assert stations[-1][0] == pytest.approx(1.0)
+    assert all(bend == 0.0 for _, _, bend in stations)

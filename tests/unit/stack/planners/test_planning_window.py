@@ -1,0 +1,89 @@
+"""On large costmaps planners look around their ends first, and farther where that cannot suffice."""
+
+import numpy as np
+import pytest
+
+from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner
+from simscen.advanced.planners.spec import MedialAxisPlanner as PlannerSpec
+from simscen.core.geometry import Pose2
+from simscen.core.messages.navigation import ErrorCode, Path
+from simscen.stack.planners.planning_window import MAX_FULL_SEARCH_CELLS, plan_in_windows
+from simscen.stack.protocols import CostmapView, NavigationFailure
+from simscen.testing.flatland import round_robot
+
+EDGE = 1200
+START, GOAL = Pose2(20.0, 30.0, 0.0), Pose2(26.0, 30.0, 0.0)
+
+
+def hall(wall: int = 0) -> CostmapView:
+    """60 x 60 m that are free but for a wall between START and GOAL, `wall` cells to either side of them."""
+    costs, distance = np.zeros((EDGE, EDGE), dtype=np.uint8), np.full((EDGE, EDGE), 5.0, dtype=np.float32)
+    if wall:
+        costs[600 - wall : 600 + wall, 455:465], distance[600 - wall : 600 + wall, 455:465] = 254, 0.0
+    return CostmapView(costs, distance, 0.05, (0.0, 0.0))
+
+
+class Asked:
+    """Remembers what of a costmap it was asked to plan on, and answers with ways of these lengths, or with none."""
+
+    def __init__(self, *lengths: float | None) -> None:
+        self.lengths, self.views = list(lengths), list[CostmapView]()
+
+    def plan(self, view: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        self.views.append(view)
+        length = self.lengths.pop(0)
+        if length is None:
+            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "none")
+        return Path(np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0]]))
+
+
+def test_a_small_costmap_is_looked_at_whole():
+    costs = np.zeros((1000, MAX_FULL_SEARCH_CELLS // 1000), dtype=np.uint8)
+    small, asked = CostmapView(costs, costs.astype(np.float32), 0.05, (0.0, 0.0)), Asked(7.0)
+    plan_in_windows(asked.plan, small, START, GOAL, 1)
+    assert asked.views == [small]
+
+
+def test_a_way_that_is_shorter_than_any_that_leaves_the_window_is_taken():
+    asked = Asked(20.0)
+    assert plan_in_windows(asked.plan, hall(), START, GOAL, 1).length() == 20.0
+    (view,) = asked.views
+    assert view.origin == pytest.approx((10.0, 20.0))
+    assert view.costs.shape == view.distance.shape == (400, 520)
+
+
+@pytest.mark.parametrize("first", [20.95, None])
+def test_a_longer_one_or_none_is_looked_for_in_a_larger_window_and_at_last_everywhere(first):
+    """Over the window's upper side the shortest way is 2 · 10 m up and down, 6 m along: 20.88 m."""
+    asked = Asked(first, 50.0, 50.0)
+    assert plan_in_windows(asked.plan, hall(), START, GOAL, 1).length() == 50.0
+    assert [view.costs.size for view in asked.views] == [400 * 520, EDGE * EDGE]
+
+
+def test_over_the_edge_of_the_map_no_way_leaves():
+    """From the corner the window's upper side is the nearest that can be crossed: 7 + 10 m up and down again."""
+    asked = Asked(19.9)
+    assert plan_in_windows(asked.plan, hall(), Pose2(1.0, 1.0, 0.0), Pose2(1.0, 4.0, 0.0), 1).length() == 19.9
+    assert asked.views[0].origin == (0.0, 0.0)
+
+
+def test_what_the_whole_costmap_has_no_way_for_fails_as_ever():
+    with pytest.raises(NavigationFailure) as failure:
+        plan_in_windows(Asked(None, None, None).plan, hall(), START, GOAL, 1)
+    assert failure.value.code == ErrorCode.NO_VALID_PATH
+
+
+def test_an_end_off_the_map_is_told_by_the_planner():
+    asked = Asked(None)
+    with pytest.raises(NavigationFailure):
+        plan_in_windows(asked.plan, hall(), START, Pose2(-3.0, 0.0, 0.0), 1)
+    assert len(asked.views) == 1
+
+
+@pytest.mark.parametrize("wall", [60, 300])
+def test_the_way_around_a_wall_is_found_wherever_its_end_is(wall):
+    """3 m to either side, within the window; 15 m, beyond it."""
+    planner = MedialAxisPlanner(PlannerSpec(type="medial_axis"), round_robot())
+    path = planner.plan(hall(wall), START, GOAL, seed=1)
+    around = 2 * np.hypot(wall * 0.05, 3.0)
+    assert around - 0.1 < path.length() < around + 1.0
