@@ -17,6 +17,8 @@ MAX_REACH_CELLS = 180
 """Longest distance for which the sum of two squares fits into 16 bits."""
 OUT_OF_REACH = 65535
 """A value larger than any squared distance in 16 bits."""
+MAX_COMPARED_CELLS = 60
+"""Longest distance up to which comparing neighbors is faster than scipy's transform."""
 BLOCK_SIZE = 150_000
 """Number of values that are compared at once: about the size of a processor cache."""
 
@@ -40,22 +42,33 @@ class SquaredDistanceTransform:
 
     def __init__(self, shape: tuple[int, ...], reach: int, reuse: bool = True) -> None:
         """Allocate buffers for grids of a shape (rows, columns). `reuse`: optimize for more than one grid."""
+        self._reach, self._beyond = reach, reach * reach + 1
+        if reach > MAX_COMPARED_CELLS:
+            return
         height, width = shape
         rows, columns = (max(1, min(one, BLOCK_SIZE // (reach * other))) for one, other in (shape, shape[::-1]))
         buffer = np.empty(reach * max(rows * width, columns * height), dtype=np.uint16)
-        self._beyond = reach * reach + 1
         self._along = _AxisPass(width, height, reach, buffer[: reach * columns * height], reuse)
         self._across = _AxisPass(height, width, reach, buffer[: reach * rows * width], reuse)
         self._squared: Squares = np.empty((height, width), dtype=np.uint16)
 
     def of(self, marked: npt.NDArray[np.bool_]) -> Squares:
         """Return the squared distances (rows, columns) of a grid; valid until the next call."""
+        if self._reach > MAX_COMPARED_CELLS:
+            return self._by_scipy(marked)
         cells = self._along.values
         cells.fill(self._beyond)
         np.copyto(cells, np.uint16(0), where=marked.T)
         self._along.run(self._across.values.T)
         self._across.run(self._squared)
         return self._squared
+
+    def _by_scipy(self, marked: npt.NDArray[np.bool_]) -> Squares:
+        result: Squares = np.full(marked.shape, self._beyond, np.uint16)
+        if marked.any():
+            for rows, squared in squared_distance_blocks(marked):
+                result[rows] = np.minimum(squared, self._beyond)
+        return result
 
 
 class _AxisPass:
