@@ -11,9 +11,9 @@ from simscen.stack.setting import Setting
 from simscen.stack.time_to_collision import time_to_collision
 
 TIME_ALLOWANCE_S = 10.0
-"""Nav2's default for every behavior, in seconds."""
+"""Nav2's default time_allowance of every behavior."""
 MIN_ROTATIONAL_VEL_RAD_S = 0.4
-"""nav2_behaviors: min_rotational_vel in rad/s."""
+"""Nav2's default of min_rotational_vel."""
 
 
 class Spin:
@@ -30,7 +30,7 @@ class Spin:
         self._turned, self._yaw = 0.0, pose.yaw
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Turn on; None when turned far enough. Raises SPIN_COLLISION_AHEAD, SPIN_TIMEOUT."""
+        """Return the command to turn on; None when done. Raises SPIN_COLLISION_AHEAD, SPIN_TIMEOUT."""
         self._turned += wrap(pose.yaw - self._yaw)
         self._yaw = pose.yaw
         left = abs(self._spec.spin_dist) - math.copysign(1.0, self._spec.spin_dist) * self._turned
@@ -67,7 +67,7 @@ class BackUp:
         self._from = pose
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Back on; None when far enough.
+        """Return the command to back up; None when done.
 
         Raises BACKUP_COLLISION_AHEAD when there is not even a cell of room, BACKUP_TIMEOUT, BACKUP_INVALID_INPUT.
         """
@@ -90,7 +90,7 @@ class BackUp:
 
 
 class Wait:
-    """Stand still for `wait_duration`: what is in the way may go by itself."""
+    """Stand still for `wait_duration`, so that an obstacle can leave by itself."""
 
     name = "wait"
 
@@ -98,15 +98,15 @@ class Wait:
         self._duration = spec.wait_duration
 
     def start(self, pose: Pose2) -> None:
-        """Begin."""
+        """Do nothing."""
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Stand; None when the time is over."""
+        """Return the stop command; None when the time is over."""
         return STOP if seconds < self._duration else None
 
 
 class ClearCostmap:
-    """Forget live obstacles that are not seen any more: around the robot, or, with `clear_entirely`, everywhere.
+    """Clear live obstacles that are no longer seen: around the robot, or everywhere with `clear_entirely`.
 
     Far from the robot nothing keeps a controller from driving, and a planner that fails has had all of the global
     costmap cleared already.
@@ -118,9 +118,9 @@ class ClearCostmap:
         self._clear = setting.clear_costmap if spec.clear_entirely else setting.clear_around
 
     def start(self, pose: Pose2) -> None:
-        """Clear."""
+        """Clear the costmaps."""
         self._clear()
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Done at once."""
+        """Return None, since clearing is done at once."""
         return None

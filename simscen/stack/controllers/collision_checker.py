@@ -14,27 +14,27 @@ from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.time_to_collision import time_to_collision
 
 MIN_SPEED_M_S = 0.1
-"""m/s. When only slower than this would keep the time to collision, the way is blocked."""
+"""Speed below which a command is not slowed further: the path counts as blocked."""
 SPEED_FACTORS = (1.0, 0.75, 0.5, 0.25, 0.0)
-"""Parts of a command at which it may let things pass that move."""
+"""Factors by which a command is slowed to let moving obstacles pass."""
 MAX_TIME_STEP_S, UNCERTAINTY_SIGMAS = 0.1, 0.5
-"""Seconds at most between two moments at which they are compared, and standard deviations by which they count wider."""
+"""Largest time between two collision checks, and standard deviations by which obstacles are enlarged."""
 APPROACH_TOLERANCE_M = 1e-4
-"""Meters: whom one is too near already is met by coming nearer."""
+"""Decrease of the distance from which a robot that is already too near counts as approaching."""
 
 
 class CollisionChecker:
-    """Looks along the arc of a command, and slows the command down where the arc is not free for long enough."""
+    """Checks the arc of a command for collisions, and slows the command down if a collision is too near."""
 
     def __init__(self, footprint: Footprint) -> None:
         self._footprint = footprint
 
     def seconds(self, costmap: CostmapView, pose: Pose2, command: Twist, horizon: float) -> float:
-        """For how long the command can be driven; `horizon` if for all of it. Of what stands."""
+        """Return how long the command can be driven without touching a static obstacle, in s, at most `horizon`."""
         return horizon if command == STOP else time_to_collision(self._footprint, costmap, pose, command, horizon)
 
     def within(self, command: Twist, free: float, horizon: float, demanded: float) -> Twist:
-        """The command, so slow that what is free now lasts for the seconds demanded. Raises NO_VALID_CONTROL.
+        """Return the command, slowed so that the free time becomes `demanded` s. Raises NO_VALID_CONTROL.
 
         Nav2 fails at once; slowing first lets the planner find a way round before the robot stands before a wall.
         """
@@ -46,7 +46,7 @@ class CollisionChecker:
         return Twist(command.vx * scale, command.vy * scale, command.wz * scale)
 
     def letting_pass(self, command: Twist, costmap: CostmapView, pose: Pose2, horizon: float) -> Twist:
-        """The command at the greatest part of it that meets nothing which moves, or if all do, meets it last.
+        """Return the fastest fraction of the command that hits no moving obstacle, or the one that hits it last.
 
         Both on their ways: who crosses and will have gone is no reason to slow down, and before who will be there the
         robot slows, or stands. That is no failure, for what moves goes on.
@@ -74,13 +74,13 @@ ROTATION_CLEARANCE_CELLS = 1.01
 """Cells between the hull and the nearest lethal cell's center that a turn must keep: cells stand for obstacles that
 may reach half a cell nearer, and behind the robot no scan corrects them."""
 BACKUP_SPEED_M_S, BACKUP_FREE_TIME_S = 0.15, 1.0
-"""m/s of backing out, Nav2's backup_speed, and seconds of free way that it needs."""
+"""Speed of backing up (Nav2's backup_speed), and time for which the way back must be free."""
 BACKUP_TURN_RATES_RAD_S = (0.0, 0.3, -0.3, 0.6, -0.6)
-"""Turn rates in rad/s that are tried in this order: one that drove in on a bend cannot leave straight."""
+"""Turn rates tried in this order: a robot that entered on a curve may not be able to leave straight."""
 
 
 class RotationClearance:
-    """Finds out whether a robot can turn where it is.
+    """Checks whether a hull with corners can rotate in place where it is.
 
     A turn that is begun without room for all of it wedges the robot: its corners come nearer to obstacles with every
     step, until it can neither turn nor leave.
@@ -90,7 +90,7 @@ class RotationClearance:
         self._footprint = footprint
 
     def has_room(self, angle: float, pose: Pose2, costmap: CostmapView) -> bool:
-        """Whether the hull keeps its room, or all that it has now, throughout a turn by `angle` rad."""
+        """Return whether a rotation by `angle` rad keeps the required clearance, or all that there is now."""
         reach = self._footprint.reach
         if reach == 0.0 or distance_at(costmap, pose.x, pose.y) > reach + 2.0 * costmap.resolution:
             return True
@@ -100,7 +100,7 @@ class RotationClearance:
         return bool((room >= min(ROTATION_CLEARANCE_CELLS * costmap.resolution, float(room[0]))).all())
 
     def back_out(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
-        """Back, where the robot came from, as straight as is free; None when all bends are blocked, too."""
+        """Return a command that backs up as straight as possible; None if every curvature is blocked."""
         backs = (Twist(-BACKUP_SPEED_M_S, 0.0, rate) for rate in BACKUP_TURN_RATES_RAD_S)
         return next(
             (

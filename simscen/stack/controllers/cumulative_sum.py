@@ -1,4 +1,4 @@
-"""Sums along trajectories."""
+"""Cumulative sums along trajectories."""
 
 from itertools import pairwise
 from typing import TypeVar
@@ -10,7 +10,7 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 
 def accumulate_rows(rows: npt.NDArray[Real]) -> npt.NDArray[Real]:
-    """Sums of the rows (m, n) so far, in place: row by row, for numpy's cumsum takes three to five times as long."""
+    """Replace the rows (m, n) by their cumulative sums, in place. Faster than np.cumsum by a factor of 3 to 5."""
     for before, here in pairwise(rows):
         np.add(before, here, out=here)
     return rows

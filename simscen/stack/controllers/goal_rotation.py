@@ -8,21 +8,21 @@ from simscen.core.messages.navigation import Goal
 from simscen.stack.protocols import RobotModel
 
 REACHED_TOLERANCE_RATIO, PASSED_TOLERANCE_RATIO = 0.45, 0.8
-"""Parts of the goal's xy tolerance: so near, stop driving; so near with the goal behind, too."""
+"""Fractions of the xy tolerance at which driving stops; the second one if the goal lies behind the robot."""
 
 STOPPED_SPEED_M_S = 0.01
-"""m/s. A controller that has come to rest inside the tolerance is as near as it gets."""
+"""Speed below which a robot inside the tolerance counts as arrived."""
 
 SETTLING_PERIODS = 2.0
 """Periods that the last of a turn takes at least: what turns further in one period than is left goes to and fro for
 ever, and one that stands off the middle of its goal has to be at rest to have reached it."""
 
 CAR_PATH_END_M = 0.03
-"""Meters of path that a car may leave out: its last arc is what gives it its heading."""
+"""Remaining path at which a car has arrived: the last arc gives it its heading."""
 
 
 class GoalRotation:
-    """Remembers that the position is reached, so that turning does not start another approach."""
+    """Rotates to the heading of the goal, and remembers that the position is reached."""
 
     def __init__(self, robot: RobotModel, fastest: float, acceleration: float, period: float) -> None:
         self._can_turn = robot.turning_radius == 0.0
@@ -31,11 +31,11 @@ class GoalRotation:
         self._there = False
 
     def reset(self) -> None:
-        """A new path."""
+        """Forget that the position was reached, for a new path."""
         self._there = False
 
     def reached(self, pose: Pose2, twist: Twist, goal: Goal, remaining: float) -> bool:
-        """Whether to stop driving and to turn to the goal's heading; `remaining` meters of path are left."""
+        """Return whether to stop driving and to rotate; `remaining` is the length of the path that is left, in m."""
         distance = goal.pose.distance(pose)
         if not self._can_turn:
             return distance <= goal.xy_tolerance and remaining < CAR_PATH_END_M
@@ -60,7 +60,7 @@ class GoalRotation:
         return Twist(0.0, 0.0, min(max(speed, twist.wz - change), twist.wz + change))
 
     def turn_to_goal(self, pose: Pose2, goal: Goal, twist: Twist) -> Twist:
-        """Turn to the goal's heading; a car stands, as it has come with the heading it has."""
+        """Return the command that rotates to the heading of the goal; a car stops with the heading it has."""
         if not self._can_turn:
             return STOP
         return self.turn(wrap(goal.pose.yaw - pose.yaw), twist)

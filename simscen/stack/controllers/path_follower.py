@@ -6,13 +6,13 @@ from simscen.stack.controllers.path_handler import PathTracker
 from simscen.stack.protocols import NavigationFailure, RobotModel
 
 DEFAULT_SPEED_M_S = 0.5
-"""m/s: Nav2's desired_linear_vel, and vx_max of MPPI."""
+"""Nav2's default of desired_linear_vel and of MPPI's vx_max."""
 SAME_GOAL_M = 0.1
-"""Meters by which corrections of the localizer may move the end of the path that is being followed."""
+"""Distance by which a localization correction may move the goal without a reset of the controller."""
 
 
 class PathFollower:
-    """Follows a path at a speed that can be limited; a controller says how, in `command`."""
+    """Base class of a controller that follows a path at a limited speed. Subclasses implement `command`."""
 
     def __init__(self, wanted: float | None, robot: RobotModel) -> None:
         self._fastest = min(wanted or DEFAULT_SPEED_M_S, robot.max_linear)
@@ -30,11 +30,11 @@ class PathFollower:
         self._end, self._track = end, PathTracker(path)
 
     def begin(self) -> None:
-        """Forget what held for the way to another end; a new path to the same one may be the rest of the old."""
+        """Reset the state for a path to another goal. A new path to the same goal does not reset it."""
 
     @property
     def full_speed(self) -> float:
-        """What it drives at in m/s where nothing limits it."""
+        """Speed in m/s without a speed limit."""
         return self._fastest
 
     def set_speed_limit(self, limit: float | None) -> None:
@@ -43,16 +43,16 @@ class PathFollower:
 
     @property
     def _speed(self) -> float:
-        """The greatest speed now in m/s."""
+        """Maximum speed now, in m/s."""
         return self._fastest if self._limit is None else min(self._fastest, self._limit)
 
     @property
     def _share(self) -> float:
-        """Of all its velocities under the limit: Nav2's DWB and MPPI scale sideways and turning, too."""
+        """Ratio by which the speed limit scales all velocities, as in Nav2's DWB and MPPI."""
         return self._speed / self._fastest
 
     def _located(self, pose: Pose2) -> PathTracker:
-        """The path, and where the robot is on it."""
+        """Return the path, updated with the position of the robot on it."""
         if self._track is None:
             raise NavigationFailure(ErrorCode.INVALID_PATH, "there is no path to follow")
         self._track.locate(pose)

@@ -153,7 +153,7 @@ class PathTracker:
         return _on_circle(before.real - pose.x, before.imag - pose.y, x - pose.x, y - pose.y, distance, pose)
 
     def _leaving(self, pose: Pose2, distance: float, far: float) -> int | None:
-        """The first point of the piece, up to the first that is `far` along the path, no nearer to the robot."""
+        """Return the first point of the piece, at most `far` m along the path, that is at least `distance` m away."""
         places, meters, most, here = self._places, self._meters, self._most, complex(pose.x, pose.y)
         index, end = self.index, self._ends[0]
         while index <= end and (index == 0 or meters[index - 1] <= far):
@@ -170,7 +170,7 @@ class PathTracker:
 
 
 def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, center: Pose2) -> tuple[float, float]:
-    """The point between a (inside) and b (outside) on the circle around the origin, moved to `center`."""
+    """Return the intersection of segment a (inside) to b (outside) with a circle, in the frame of `center`."""
     dx, dy = bx - ax, by - ay
     a, b, c = dx * dx + dy * dy, ax * dx + ay * dy, ax * ax + ay * ay - radius * radius
     t = (-b + math.sqrt(max(0.0, b * b - a * c))) / a if a > 0 else 1.0
@@ -200,7 +200,7 @@ class LocalPlan:
 
 
 def local_plan(track: PathTracker, meters: float, spacing: float = LOCAL_PLAN_SPACING_M) -> LocalPlan:
-    """The next `meters` of the path, its points at most `spacing` meters apart."""
+    """Return the next `meters` of the path with points at most `spacing` m apart."""
     points, along = track.ahead(meters)
     length = float(min(meters, along[-1]))
     steps = max(1, math.ceil(length / spacing - 1e-9))

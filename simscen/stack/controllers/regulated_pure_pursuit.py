@@ -50,7 +50,7 @@ class RegulatedPurePursuit(PathFollower):
         return None if self.arc is None else Path(arc_poses(*self.arc, LOCAL_PLAN_TIMES_S))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """The velocity to drive now. Raises NO_VALID_CONTROL when the arc to the carrot is blocked."""
+        """Return the velocity to drive now. Raises NO_VALID_CONTROL when the arc to the carrot is blocked."""
         track, steered = self._located(pose), self._robot.turning_radius > 0.0
         there = self._goal_pose.reached(pose, twist, goal, track.remaining())
         if there and (steered or self._spec.use_rotate_to_heading):
@@ -111,7 +111,7 @@ class RegulatedPurePursuit(PathFollower):
         return free >= horizon
 
     def _bend(self, track: PathTracker, pose: Pose2) -> tuple[float, float]:
-        """The point that the curvature is taken from, where that is not the carrot (use_fixed_curvature_lookahead)."""
+        """Return the point that determines the curvature with use_fixed_curvature_lookahead."""
         beyond = self._spec.interpolate_curvature_after_goal
         return _seen_from(pose, *track.carrot(pose, self._spec.curvature_lookahead_dist, beyond=beyond))
 
@@ -187,7 +187,7 @@ class RegulatedPurePursuit(PathFollower):
         return self._free_way.seconds(costmap, pose, command, horizon), horizon
 
     def _letting_pass(self, command: Twist, pose: Pose2, costmap: CostmapView, horizon: float) -> Twist:
-        """The command, slowed where somebody will be on its arc by then."""
+        """Return the command, slowed where it would hit a moving obstacle."""
         if not self._spec.use_collision_detection:
             return command
         return self._free_way.letting_pass(command, costmap, pose, horizon)
@@ -200,6 +200,6 @@ def _bearing(carrot: tuple[float, float], backward: bool) -> float:
 
 
 def _seen_from(pose: Pose2, x: float, y: float) -> tuple[float, float]:
-    """A point of the map in the robot's frame."""
+    """Return a point of the map in the frame of the robot."""
     cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
     return cosine * (x - pose.x) + sine * (y - pose.y), cosine * (y - pose.y) - sine * (x - pose.x)

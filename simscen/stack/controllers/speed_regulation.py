@@ -12,22 +12,22 @@ from simscen.stack.protocols import CostmapView
 from simscen.stack.setting import Setting
 
 DECELERATION_RATIO, REACTION_TIME_S = 0.9, 0.1
-"""Part of the base's deceleration that is counted on, and seconds for which it drives on as it did."""
+"""Fraction of the maximum deceleration used for planning, and delay before braking starts."""
 STATION_SPACING_M = 0.1
-"""Meters of path between two places that are looked at."""
+"""Distance along the path between the places that are checked."""
 SPEED_PER_CLEARANCE_1_S = 10.0
-"""1/s. Beside the hull it needs the way of a tenth of a second: who comes off the middle of a gap has to notice it."""
+"""Speed allowed per meter of clearance beside the hull, to react when the robot leaves the center of a gap."""
 
 
 class SpeedRegulation:
-    """Knows how slow to be at a place, and how slow before it. Speeds in m/s."""
+    """Computes the speed at a place of the path, and the braking before it. Speeds are in m/s."""
 
     def __init__(self, spec: RppSpec, setting: Setting) -> None:
         self._spec, self._inscribed = spec, setting.footprint.inscribed
         self._brakes = 2.0 * DECELERATION_RATIO * setting.robot.linear_deceleration
 
     def beside(self, speed: float, distance: float) -> float:
-        """The speed where the nearest obstacle is `distance` meters from the base: Nav2's, less in a gap."""
+        """Return the speed with an obstacle `distance` m from the base: Nav2's, and less in narrow passages."""
         spec = self._spec
         if not spec.use_cost_regulated_linear_velocity_scaling or distance >= spec.cost_scaling_dist:
             return speed
@@ -38,12 +38,12 @@ class SpeedRegulation:
         return min(scaled, spec.regulated_linear_scaling_min_speed + SPEED_PER_CLEARANCE_1_S * room)
 
     def within(self, speed: float, curvature: float) -> float:
-        """The speed in a bend."""
+        """Return the speed in a bend of this curvature in 1/m."""
         radii = abs(curvature) * self._spec.regulated_linear_scaling_min_radius
         return speed / radii if self._spec.use_regulated_linear_velocity_scaling and radii > 1.0 else speed
 
     def before(self, speed: float, slow: float, track: PathTracker, costmap: CostmapView) -> float:
-        """What is left of the speed `slow` here, so that the brakes suffice for all that is ahead on the path."""
+        """Return the speed at most `slow` from which the robot can brake for everything ahead on the path."""
         if not self._spec.slow_down_ahead:
             return slow
         for meters, place, bend in track.stations(STATION_SPACING_M, slow * (slow / self._brakes + REACTION_TIME_S)):

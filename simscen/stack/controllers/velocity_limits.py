@@ -25,7 +25,7 @@ class VelocityLimits:
     turning_radius: float
 
     def scaled(self: Own, share: float) -> Own:
-        """Under a speed limit, all greatest velocities by the same share."""
+        """Return the limits with all velocities scaled by a speed limit."""
         if share >= 1.0:
             return self
         (a, b, c), (d, e, f) = self.low, self.high
@@ -40,7 +40,7 @@ def velocity_limits(
     deceleration: Asked,
     turning_radius: float | None = None,
 ) -> VelocityLimits:
-    """What is asked for, within what the robot can do; None leaves it to the robot."""
+    """Return the requested limits, bounded by those of the robot; None means the limit of the robot."""
     forward, sideways, turn = robot.max_linear, robot.max_lateral, robot.max_angular
     faster, slower = robot.linear_acceleration, -robot.linear_deceleration
     round_ = robot.angular_acceleration

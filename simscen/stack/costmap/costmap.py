@@ -197,7 +197,7 @@ class Costmap:
         return self._layer_in(window_around(center, self._size, self._spec.resolution))
 
     def _layer_in(self, window: GridFrame) -> StaticLayer:
-        """What never changes but by an order; in this window, where there is no map."""
+        """Return the static layer in this window, or on the map if there is one."""
         grid, keepout, mask = self._surroundings.map, self._surroundings.keepout, self._surroundings.masks.keepout
         unknown = self._tracks
         if grid is None:
@@ -259,7 +259,7 @@ class Costmap:
             self._touch(*frame.extent(cells), NONE)
 
     def _touch_cells(self, cells: Cells) -> None:
-        """These cells (n, 2) have changed."""
+        """Mark these cells (n, 2) as changed."""
         if len(cells):
             (top, left), (bottom, right) = cells.min(axis=0).tolist(), cells.max(axis=0).tolist()
             self._touch((top, left), (bottom, right))
@@ -302,7 +302,7 @@ class Costmap:
         return SquaredDistanceTransform(self._frame.shape, self._margin)
 
     def _refresh_all(self) -> None:
-        """The same for all of it."""
+        """Compute the distances and costs of all cells again."""
         obstacles = self._obstacles(EVERYWHERE)
         squared = self._around.of(obstacles) if self._small else squared_distances(obstacles, self._margin)
         if self._walled:
@@ -325,7 +325,7 @@ def ready(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:
 
 @cached_on_instance
 def _costs(grid: OccupancyGrid, tables: Inflation, margin: int, tracks: bool) -> Costs:
-    """What cells of a map cost before anything is seen, where nothing is forbidden: once for all its runs."""
+    """Return the costs of the cells of a map without zones and readings, computed once for all runs."""
     return tables.costs(walls_within(grid, margin), free_layer(grid, tracks).unknown if tracks else None)
 
 

@@ -46,7 +46,7 @@ class Costmaps:
         """The tick before which an update has nothing to do."""
 
     def see(self, seen: Scan | Image) -> None:
-        """A reading, to be taken in with the next update."""
+        """Store a reading for the next update."""
         for rhythm in (self._wide, self._near):
             rhythm.seen[seen.sensor] = seen
 
@@ -76,7 +76,7 @@ class Costmaps:
         self.clear_local()
 
     def clear_around(self) -> None:
-        """The same as far from the robot as the local costmap reaches (Nav2's ClearCostmapAroundRobot).
+        """Clear both costmaps as far as the local costmap reaches (Nav2's ClearCostmapAroundRobot).
 
         What lies farther off is in no controller's way, and who forgets a dead end drives into it again.
         """
@@ -84,7 +84,7 @@ class Costmaps:
         self.clear_local()
 
     def clear_local(self) -> None:
-        """The same in the local costmap alone; all of what no lidar looks at stays: by that one the robot backs out."""
+        """Clear the local costmap, except for cells that no lidar sees: the robot backs up by this costmap."""
         self.near.clear(unseen=self._reach)
 
     def clear_global(self, *, entirely: bool) -> None:
@@ -119,7 +119,7 @@ class _Rhythm:
         return tick - self._updated >= self._period
 
     def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list["_View"]:
-        """What has been taken in by now; without any reading an update waits for one. The robot is at `base` now."""
+        """Return the readings to be processed by now, for a robot at `base`. An update waits for a first reading."""
         if self.seen and self.due(tick):
             self._updated = tick
             for one in self.seen.values():

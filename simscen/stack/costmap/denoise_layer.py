@@ -7,7 +7,7 @@ from simscen.stack.costmap.static_layer import Mask
 
 
 def without_specks(marked: Mask, walls: Mask, spec: DenoiseLayer) -> Mask:
-    """The marked cells (rows, columns) but those of groups smaller than `minimal_group_size`.
+    """Return the marked cells (rows, columns) without groups smaller than `minimal_group_size`.
 
     Cells of walls, which are no noise, count as members of a group and stay what they are.
     """

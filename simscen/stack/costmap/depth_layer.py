@@ -32,7 +32,7 @@ class Shown(NamedTuple):
 
 
 def shown(image: Image, base: Pose2, frame: GridFrame, spec: CostmapSpec, known: Mask) -> Shown:
-    """What the camera sees, from a robot at `base`; `known` are the cells that have been ground before."""
+    """Return what the camera sees from a robot at `base`; `known` are cells already detected as ground."""
     across, up = _slopes(image.depth.shape, image.field_of_view)
     depth = image.depth.astype(np.float64)
     depth[~((depth <= spec.obstacle_max_range) & (depth > 0.0))] = np.nan
@@ -138,6 +138,6 @@ def _on_a_step(away: Array, heights: Array, upright: Pixels, low: float) -> Pixe
 
 
 def _lowest(heights: Array) -> npt.NDArray[np.intp]:
-    """The lowest row in which anything is seen, of each column; the last one where nothing is."""
+    """Return the lowest row of each column in which anything is seen, or the last row."""
     rows: npt.NDArray[np.intp] = len(heights) - 1 - np.isfinite(heights)[::-1].argmax(axis=0)
     return rows

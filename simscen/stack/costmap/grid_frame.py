@@ -50,7 +50,7 @@ class GridFrame:
         return (rows >= 0) & (columns >= 0) & (rows < self.shape[0]) & (columns < self.shape[1])
 
     def numbers(self, points: Plane, center: complex, reach: float) -> Numbers:
-        """The cells under those of the points (n,) that lie on the grid; all lie within `reach` of the `center`.
+        """Return the cells under those points (n,) that lie on the grid; all are within `reach` of `center`.
 
         Where all of that is on the grid, nobody is asked.
         """
@@ -78,7 +78,7 @@ class GridFrame:
         return np.array((1, self.shape[1]))
 
     def points(self, numbers: Numbers) -> Plane:
-        """The centers (n,) of cells."""
+        """Return the centers (n,) of cells."""
         corner, (rows, columns) = complex(*self.origin), self.shape
         if rows * columns > MAX_CACHED_CELLS:
             return _middles(numbers, columns, self.resolution, corner)
@@ -87,7 +87,7 @@ class GridFrame:
         return points
 
     def extent(self, numbers: Numbers) -> tuple[tuple[int, int], tuple[int, int]]:
-        """The lowest and the highest row and column of cells, of which there is one."""
+        """Return the lowest and the highest row and column of at least one cell."""
         width = self.shape[1]
         first, last, columns = int(_least(numbers)), int(_most(numbers)), numbers % width
         return (first // width, int(_least(columns))), (last // width, int(_most(columns)))
@@ -105,7 +105,7 @@ class GridFrame:
         return cells
 
     def window(self, low: tuple[int, int], high: tuple[int, int], margin: int) -> tuple[slice, slice]:
-        """The cells from `low` to `high` (inclusive) and `margin` more on each side, cut off at the grid's edge."""
+        """Return the cells from `low` to `high` (inclusive) with `margin` more on each side, clipped to the grid."""
         return (
             slice(max(0, low[0] - margin), max(0, min(self.shape[0], high[0] + 1 + margin))),
             slice(max(0, low[1] - margin), max(0, min(self.shape[1], high[1] + 1 + margin))),
@@ -113,7 +113,7 @@ class GridFrame:
 
 
 def _middles(numbers: Numbers, columns: int, edge: float, corner: complex = 0j) -> Plane:
-    """The centers x + iy (n,) of cells of a grid with this corner."""
+    """Return the centers x + iy (n,) of cells of a grid with this corner."""
     up, across = np.divmod(numbers, columns)
     middles: Plane = up * (1j * edge) + (across * edge + (corner + (0.5 + 0.5j) * edge))
     return middles
@@ -121,7 +121,7 @@ def _middles(numbers: Numbers, columns: int, edge: float, corner: complex = 0j) 
 
 @lru_cache(maxsize=8)
 def _centers(shape: tuple[int, int], edge: float) -> Plane:
-    """The same of all cells of a grid, from its corner."""
+    """Return the centers of all cells of a grid, relative to its corner."""
     return _middles(np.arange(shape[0] * shape[1]), shape[1], edge)
 
 
@@ -136,7 +136,7 @@ MAX_ROLL_OFFSET_M = 0.25
 
 
 def window_around(center: Pose2, size: tuple[float, float], resolution: float) -> GridFrame:
-    """A window of so many meters along x and y around a point; its cells are always the same ones of the plane."""
+    """Return a window of this size in m around a point, aligned with a fixed grid in the plane."""
     columns, rows = (math.ceil(edge / resolution) for edge in size)
     column, row = round(center.x / resolution) - columns // 2, round(center.y / resolution) - rows // 2
     return GridFrame((column * resolution, row * resolution), resolution, (rows, columns))
@@ -151,7 +151,7 @@ def should_roll(frame: GridFrame, base: Pose2, no_farther: float = math.inf) -> 
 
 
 def shift_layer(layer: npt.NDArray[Cell], before: GridFrame, now: GridFrame, new: float) -> npt.NDArray[Cell]:
-    """The cells of a window in an equal one elsewhere in the plane; `new` where it had none."""
+    """Return the layer copied to another window of the same size; cells without a source get the value `new`."""
     moved = np.full(now.shape, new, dtype=layer.dtype)
     steps = [round((now.origin[axis] - before.origin[axis]) / now.resolution) for axis in (1, 0)]
     kept = [_kept(step, cells) for step, cells in zip(steps, before.shape, strict=True)]
@@ -161,13 +161,13 @@ def shift_layer(layer: npt.NDArray[Cell], before: GridFrame, now: GridFrame, new
 
 
 def _kept(step: int, cells: int) -> tuple[int, int]:
-    """The first and one past the last of so many cells in a row that are still among them after a step."""
+    """Return the first and one past the last of the cells in a row that remain after a shift by `step`."""
     first = min(max(0, step), cells)
     return first, max(first, min(cells, cells + step))
 
 
 def clip_goal(frame: GridFrame, start: Pose2, goal: Pose2) -> Pose2:
-    """The goal itself; or, when it is beyond the window, the point of the straight way to it just inside."""
+    """Return the goal; if it is beyond the window, the point of the straight line to it just inside the edge."""
     if frame.covers(goal.x, goal.y):
         return goal
     across, up = frame.shape[1] * frame.resolution, frame.shape[0] * frame.resolution

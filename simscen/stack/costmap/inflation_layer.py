@@ -39,7 +39,7 @@ def squared_distances(lethal: npt.NDArray[np.bool_], reach: int) -> Squared:
 
 @lru_cache(maxsize=8)
 def inflation(resolution: float, inscribed: float, radius: float, scaling: float, reach: float) -> "Inflation":
-    """The tables for these, which both costmaps of a robot and all its runs have in common."""
+    """Return the lookup tables, which both costmaps of a robot and all its runs share."""
     return Inflation(resolution, inscribed, radius, scaling, reach)
 
 

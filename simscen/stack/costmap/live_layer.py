@@ -49,7 +49,7 @@ class LiveLayer:
             self._heights[window] = np.nan
 
     def out_of_view(self, base: Pose2, meters: float, scans: list[tuple[Pose2, Scan]]) -> Cells:
-        """The cells so near to the robot that are marked by a lidar and that none looked at in these scans."""
+        """Return the cells near the robot that are marked by a lidar but not visible in these scans."""
         here = self._frame.cell(base.x, base.y)
         window = self._frame.window(here, here, math.ceil(meters / self._frame.resolution))
         cells: Cells = np.argwhere(self._scanned[window]) + np.array((window[0].start, window[1].start))
@@ -58,7 +58,7 @@ class LiveLayer:
         return cells
 
     def mark(self, cells: Cells) -> None:
-        """A lidar has seen something here."""
+        """Mark cells as obstacles seen by a lidar."""
         _set(self._scanned, cells, True)
         self._marks = np.flatnonzero(self._scanned)
 
@@ -72,7 +72,7 @@ class LiveLayer:
             self._ground = shift_layer(self._ground, before, frame, False)
 
     def marked(self, window: Window = EVERYWHERE) -> Mask:
-        """The cells in which something is."""
+        """Return the cells with a live obstacle."""
         if self._heights is None:
             return self._scanned[window]
         both: Mask = self._scanned[window] | ~np.isnan(self._heights[window])
@@ -154,7 +154,7 @@ class LiveLayer:
         return np.concatenate((marked[gone], cells))
 
     def around(self, base: Pose2, mount: float) -> Window:
-        """The cells that a sensor `mount` meters from the base can reach."""
+        """Return the cells in reach of a sensor `mount` m from the base."""
         here = self._frame.cell(base.x, base.y)
         far = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + mount
         return self._frame.window(here, here, math.ceil(far / self._frame.resolution) + 1)

@@ -42,7 +42,7 @@ def hit_points(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tupl
 
 @lru_cache(maxsize=2)
 def _ends(scan: Scan, nearest: float, farthest: float) -> Plane:
-    """The same from the lidar, unturned: two costmaps take in each scan."""
+    """Return the hits x + iy in the frame of the lidar, unrotated. Cached, since two costmaps use each scan."""
     ranges = scan.ranges
     use = (ranges >= max(scan.range_min, nearest)) & (ranges <= min(scan.range_max, farthest))
     if isinstance(scan, ScanAmongMoving):
@@ -80,7 +80,7 @@ def in_view(cells: Cells, frame: GridFrame, scan: Scan, base: Pose2) -> npt.NDAr
 def crossed_cells(
     points: Plane, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec
 ) -> tuple[Numbers, float]:
-    """Indices of those cells with these centers x + iy (n,) that a beam crosses before it hits anything.
+    """Return the indices of the cells with centers x + iy (n,) that a beam crosses before it hits anything.
 
     And how far the nearest of all centers, of which there is one, is from the lidar. A line crosses a square of
     half-width h when its distance from the center is at most h (|cos| + |sin|); each cell is tested against the beam
@@ -108,8 +108,9 @@ def crossed_cells(
 
 
 def _nearest_beams(bearing: Array, scan: Scan, told: Array) -> tuple[Numbers, Array]:
-    """The beams nearest to directions (n,) that are counted from the first beam, and what is `told` of each; nan where
-    there is none.
+    """Return the beams nearest to directions (n,) relative to the first beam, and their values of `told`.
+
+    The value is nan where there is no beam.
     """
     step, count = scan.angle_increment, len(told)
     turn = round(2 * math.pi / abs(step))

@@ -30,7 +30,7 @@ class StaticLayer:
 def static_layer(
     grid: OccupancyGrid, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, unknown: bool = True
 ) -> StaticLayer:
-    """The layer of a map; a map with a turned origin is sampled into an unrotated frame of the same resolution.
+    """Return the layer of a map; a rotated map is sampled into an unrotated frame of the same resolution.
 
     Where unknown space is not tracked (`unknown`), what the map does not know is free, as in Nav2.
     """
@@ -46,7 +46,7 @@ def static_layer(
 
 @cached_on_instance
 def free_layer(grid: OccupancyGrid, unknown: bool) -> StaticLayer:
-    """The layer of a map in which nothing is forbidden: once for all its runs, which write into copies."""
+    """Return the layer of a map without zones, computed once for all runs, which write into copies."""
     return static_layer(grid, (), unknown=unknown)
 
 
@@ -59,7 +59,7 @@ def walls_within(grid: OccupancyGrid, reach: int) -> Squared:
 def empty_layer(
     frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, unknown: bool = False
 ) -> StaticLayer:
-    """The layer of a robot without a map: nothing but keepout zones and masks; all of it `unknown`, or free."""
+    """Return the layer of a robot without a map: only keepout zones and masks; the rest is `unknown` or free."""
     return StaticLayer(frame, _forbidden(frame, keepout, mask), np.full(frame.shape, unknown))
 
 
@@ -75,7 +75,7 @@ def _forbidden(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGr
 
 
 def inside_polygon(frame: GridFrame, polygon: Polygon) -> Mask:
-    """The cells whose center lies inside the polygon (even-odd rule)."""
+    """Return the cells whose center lies inside the polygon (even-odd rule)."""
     points = _all_centers(frame)
     inside = np.zeros(len(points), dtype=bool)
     for (ax, ay), (bx, by) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):

@@ -31,7 +31,7 @@ class Endpoints:
 
 
 def find_endpoints(rates: TraversalCosts, start: Pose2, goal: Pose2, tolerance: float) -> Endpoints:
-    """The ends of a search.
+    """Return the start and goal of the search.
 
     A start where the robot is too near an obstacle is moved to the nearest free place that nothing is in front of (it
     is there already). A goal is moved to the nearest place within `tolerance` that can be reached. Raises
@@ -71,7 +71,7 @@ def _cell(rates: TraversalCosts, point: tuple[float, float]) -> tuple[int, int]:
 def near(
     rates: TraversalCosts, free: npt.NDArray[np.bool_], pose: Pose2, within: float
 ) -> Iterator[tuple[float, float]]:
-    """The point itself if its cell is free, then the centers of free cells at most `within` away, nearest first."""
+    """Yield the point itself if its cell is free, then centers of free cells at most `within` m away."""
     row, column = _cell(rates, (pose.x, pose.y))
     if free[row, column]:
         yield pose.x, pose.y

@@ -20,13 +20,13 @@ BORDER_CELLS = 2
 
 
 def navfn(spec: Navfn, setting: Setting) -> Planner:
-    """Moves in 16 directions, in place of the descent along navfn's potential."""
+    """Build NavFn, with moves in 16 directions instead of the gradient descent on its potential."""
     multiplier = COST_FACTOR * MAX_NON_OBSTACLE / COST_NEUTRAL
     return GridPlanner(spec.tolerance, multiplier, spec.allow_unknown, SIXTEEN_NEIGHBORS, True, setting.robot)
 
 
 def smac_2d(spec: Smac2d, setting: Setting) -> Planner:
-    """Moves to the eight neighbors, as SmacPlanner2D's Moore neighborhood."""
+    """Build SmacPlanner2D, with moves to the eight neighbors (Moore neighborhood)."""
     return GridPlanner(
         spec.tolerance,
         spec.cost_travel_multiplier,
@@ -53,7 +53,7 @@ class GridPlanner:
         self._moves, self._smooth, self._robot = moves, smooth, robot
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """A path of poses in the map frame, 5 cm apart."""
+        """Return a path of poses in the map frame, 5 cm apart."""
         return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, _: int) -> Path:
@@ -72,7 +72,7 @@ class GridPlanner:
         return np.vstack((ends.start, cells, ends.goal))  # no move between middles of cells cuts a corner
 
     def _over(self, rates: TraversalCosts, ends: Endpoints) -> Array:
-        """The middles (n, 2) of the cells of the cheapest way."""
+        """Return the centers (n, 2) of the cells of the cheapest path."""
         lattice = GridGraph(np.pad(ends.reachable, BORDER_CELLS), self._moves, np.pad(rates.rates, BORDER_CELLS))
         first, last = (
             tuple(int((point[axis] - rates.origin[axis]) / rates.resolution) + BORDER_CELLS for axis in (1, 0))

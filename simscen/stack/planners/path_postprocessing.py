@@ -54,7 +54,7 @@ CORNER_OFFSET_CELLS = 0.02
 
 
 def avoid_cell_corners(rates: TraversalCosts, points: Array) -> Array | None:
-    """The path (n, 2) led around each corner that it cut; None where more than a corner is in its way.
+    """Return the path (n, 2) led around each blocked corner that it cut; None if more than a corner blocks it.
 
     The points of a path that cut any are then no further apart than the cells are wide.
     """
@@ -81,7 +81,7 @@ def avoid_cell_corners(rates: TraversalCosts, points: Array) -> Array | None:
 
 
 def _mixed(one: Array, other: Array) -> tuple[Array, Array]:
-    """The columns of the one with the rows of the other, and the other way round."""
+    """Return the columns of the first with the rows of the second array, and the other way round."""
     return np.column_stack((one[:, 0], other[:, 1])), np.column_stack((other[:, 0], one[:, 1]))
 
 

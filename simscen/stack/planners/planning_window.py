@@ -10,18 +10,19 @@ from simscen.core.messages.navigation import Path
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 MAX_FULL_SEARCH_CELLS = 1_000_000
-"""Cells of a costmap of which not all are looked at each time: 50 x 50 m at 5 cm."""
+"""Size of the costmaps that are always searched as a whole: 50 x 50 m at 5 cm."""
 WINDOW_MARGIN_M = 10.0
-"""Meters around both ends that are looked at first, …"""
+"""Margin of the first window around both ends."""
 WINDOW_MARGIN_RATIO = 1 / 3
-"""… or so much of the straight way between them, if that is more: then a way may be a fifth longer than straight."""
+"""Margin as a fraction of the distance between the ends, if that is more."""
 
 Plan = Callable[[CostmapView, Pose2, Pose2, int], Path]
 
 
 def plan_in_windows(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-    """What `plan` finds in a window around both ends, if no way that leaves the window can be shorter; else in larger
-    ones, at last on the whole costmap. Raises NavigationFailure when that fails.
+    """Plan in a window around both ends, then in larger ones, and at last on the whole costmap.
+
+    A path from a window is returned if no path that leaves the window can be shorter. Raises NavigationFailure.
     """
     margin = max(WINDOW_MARGIN_M, WINDOW_MARGIN_RATIO * start.distance(goal))
     while costmap.costs.size > MAX_FULL_SEARCH_CELLS:
@@ -37,7 +38,7 @@ def plan_in_windows(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2,
 
 
 def window(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> CostmapView | None:
-    """The costmap within `margin` meters of both ends along x and y; None where an end is off the map."""
+    """Return the costmap within `margin` m of both ends along x and y; None if an end is off the map."""
     (rows, columns), size = costmap.costs.shape, costmap.resolution
     low, high = [], []
     for ends, corner, cells in (
@@ -54,7 +55,7 @@ def window(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> Co
 
 
 def _around(costmap: CostmapView, part: CostmapView, start: Pose2, goal: Pose2) -> float:
-    """The length in meters of the shortest way from start to goal that leaves a part of the costmap; inf without one.
+    """Return the length in m of the shortest path that leaves a part of the costmap; inf if none can.
 
     It is that to the goal's image in one of the part's sides; those that are the map's own cannot be crossed.
     """
@@ -73,6 +74,6 @@ def _around(costmap: CostmapView, part: CostmapView, start: Pose2, goal: Pose2) 
 
 
 def _sides(costmap: CostmapView, axis: int) -> tuple[float, float]:
-    """The least and the greatest x (axis 0) or y (1) of a costmap, in meters."""
+    """Return the least and the greatest x (axis 0) or y (axis 1) of a costmap, in m."""
     begin = costmap.origin[axis]
     return begin, begin + costmap.costs.shape[1 - axis] * costmap.resolution

@@ -52,7 +52,7 @@ class TraversalCosts:
         self._answer = 0.0
 
     def after(self, before: "TraversalCosts | None") -> "TraversalCosts":
-        """These, with what was worked out of those of the last plan where they are the same."""
+        """Return these costs; if they equal those of the last plan, with the values cached for it."""
         if before is not None and np.array_equal(before.rates, self.rates):
             self.kept = before.kept
         return self
@@ -73,7 +73,7 @@ class TraversalCosts:
         return rates
 
     def between(self, ax: float, ay: float, bx: float, by: float) -> float:
-        """The cost of going straight from a to b, both on the map; inf where the robot cannot.
+        """Return the cost of the straight motion from a to b, both on the map; inf if it is blocked.
 
         OMPL asks for cost and validity of a motion one after the other: the second answer is the first.
         """
@@ -100,7 +100,7 @@ class TraversalCosts:
         return total
 
     def along(self, points: Array) -> float:
-        """The cost of a polyline (n, 2); inf where the robot cannot go."""
+        """Return the cost of a polyline (n, 2); inf if it is blocked."""
         steps = np.diff(points, axis=0)
         lengths = np.hypot(steps[:, 0], steps[:, 1])
         counts = np.ceil(lengths * self._per_meter / SAMPLE_SPACING_CELLS).astype(np.int64)

@@ -19,18 +19,18 @@ from simscen.stack.protocols import LETHAL, Behavior, Controller, CostmapView, G
 from simscen.stack.setting import Setting
 
 START_TOLERANCE_M = 0.05
-"""Meters between the start that was asked for and the first point of a path, at most."""
+"""Largest distance between the requested start and the first point of a path."""
 
 
 class CheckedPlanner(CheckedPlugin):
-    """Asks the planner, and looks at its path before anybody follows it."""
+    """Calls the planner and checks its path."""
 
     def __init__(self, spec: PlannerSpec, setting: Setting) -> None:
         super().__init__("planner", spec, setting, Planner)
         self._reach = setting.robot.circumscribed_radius
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """The planner's path. Raises RunError when it is none, or leads through an obstacle."""
+        """Return the planner's path. Raises RunError when it is invalid or leads through an obstacle."""
         path = self.checked_path(self.ask(self.inner.plan, costmap, start, goal, seed), "returned")
         points = path.points
         if not len(points):
@@ -44,7 +44,7 @@ class CheckedPlanner(CheckedPlugin):
 
 
 def lethal(costmap: CostmapView, points: Array) -> npt.NDArray[np.bool_]:
-    """Which of the points (n, …) lie on a lethal cell; those off the costmap do not."""
+    """Return which of the points (n, …) lie on a lethal cell; points off the costmap do not."""
     cells = np.floor((points[:, :2] - costmap.origin) / costmap.resolution)[:, ::-1]
     inside: npt.NDArray[np.bool_] = np.all((cells >= 0) & (cells < costmap.costs.shape), axis=1)
     rows, columns = np.where(inside[:, None], cells, 0).astype(np.int64).T
@@ -57,7 +57,7 @@ def _at(point: Array) -> str:
 
 
 class CheckedController(CheckedPlugin):
-    """Asks the controller, and looks at its commands before anybody obeys them."""
+    """Calls the controller and checks its commands."""
 
     def __init__(self, spec: ControllerSpec, setting: Setting) -> None:
         super().__init__("controller", spec, setting, Controller)
@@ -68,7 +68,7 @@ class CheckedController(CheckedPlugin):
 
     @property
     def full_speed(self) -> float:
-        """What it drives at in m/s where nothing limits it."""
+        """Speed in m/s without a speed limit."""
         speed = self.ask(lambda: self.inner.full_speed)
         if not isinstance(speed, float | int) or not math.isfinite(speed) or speed < 0:
             self.broke(f"says that its full speed is {speed!r}")
@@ -79,18 +79,18 @@ class CheckedController(CheckedPlugin):
         self.ask(self.inner.set_speed_limit, limit)
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """The controller's command. Raises RunError when it is none."""
+        """Return the controller's command. Raises RunError when it is invalid."""
         return self.checked_twist(self.ask(self.inner.command, pose, twist, costmap, goal))
 
     @property
     def local_plan(self) -> Path | None:
-        """The arc it expects to drive, for the log."""
+        """Trajectory that the controller expects to drive, for the log."""
         plan = self.ask(lambda: self.inner.local_plan)
         return None if plan is None else self.checked_path(plan, "expects to drive")
 
 
 class CheckedGoalChecker(CheckedPlugin):
-    """Asks the goal checker, and takes nothing but yes or no for an answer."""
+    """Calls the goal checker and accepts only a boolean answer."""
 
     may_fail = False
 
@@ -98,11 +98,11 @@ class CheckedGoalChecker(CheckedPlugin):
         super().__init__("goal_checker", spec, setting, GoalChecker)
 
     def reset(self) -> None:
-        """A new goal."""
+        """Reset the goal checker for a new goal."""
         self.ask(self.inner.reset)
 
     def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
-        """Whether the goal is reached. Raises RunError when the answer is neither yes nor no."""
+        """Return whether the goal is reached. Raises RunError when the answer is not a boolean."""
         reached = self.ask(self.inner.reached, goal, pose, twist)
         if reached not in (True, False):
             self.broke(f"answered {reached!r} to whether a goal is reached")
@@ -110,7 +110,7 @@ class CheckedGoalChecker(CheckedPlugin):
 
 
 class CheckedBehavior(CheckedPlugin):
-    """Asks the behavior, and looks at its commands before anybody obeys them. Its name is that of its type."""
+    """Calls the behavior and checks its commands. Its name is that of its type."""
 
     def __init__(self, spec: BehaviorSpec, setting: Setting) -> None:
         super().__init__("behavior", spec, setting, Behavior)
@@ -121,13 +121,13 @@ class CheckedBehavior(CheckedPlugin):
         self.ask(self.inner.start, pose)
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """The behavior's command; None when it is done. Raises RunError when it is none of them."""
+        """Return the behavior's command; None when it is done. Raises RunError when it is invalid."""
         command = self.ask(self.inner.step, pose, costmap, seconds)
         return None if command is None else self.checked_twist(command)
 
 
 class CheckedLocalizer(CheckedPlugin):
-    """Hands readings on, and looks at each new belief before anybody trusts it."""
+    """Passes readings to the localizer and checks each new belief."""
 
     may_fail = False
 
@@ -140,20 +140,20 @@ class CheckedLocalizer(CheckedPlugin):
         self.ask(self.inner.reset, estimate)
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Take a step of dead reckoning."""
+        """Pass an odometry reading."""
         self.ask(self.inner.on_odometry, odometry)
 
     def on_scan(self, scan: Scan) -> None:
-        """Correct with a lidar scan."""
+        """Pass a lidar scan."""
         self.ask(self.inner.on_scan, scan)
 
     def on_imu(self, imu: Imu) -> None:
-        """Take a turn rate."""
+        """Pass an IMU reading."""
         self.ask(self.inner.on_imu, imu)
 
     @property
     def belief(self) -> Belief:
-        """The localizer's belief. Raises RunError when it is none."""
+        """Belief of the localizer. Raises RunError when it is invalid."""
         try:
             belief = self.inner.belief
         except Exception as error:  # as in `ask`, and it is asked at every beat
@@ -164,7 +164,7 @@ class CheckedLocalizer(CheckedPlugin):
 
 
 def checked_belief(watched: CheckedPlugin, belief: object, before: Belief | None = None) -> Belief:
-    """A belief of finite numbers in the right shapes; what it has of the one `before` is not looked at again."""
+    """Return the belief if it is finite and well shaped. Parts shared with `before` are not checked again."""
     if not isinstance(belief, Belief):
         watched.broke(f"believes {type(belief).__name__} instead of a Belief")
     watched.checked_pose(belief.pose, "believes to be at")

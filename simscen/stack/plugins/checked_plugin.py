@@ -23,7 +23,7 @@ S = TypeVar("S", bound=Component)
 
 
 def build_component(door: Callable[[S, Setting], T], spec: S, setting: Setting) -> T:
-    """A component: behind its door when it is of a package of others, by itself when it ships.
+    """Build a component: with checks if it comes from another package, without if it ships with simscen.
 
     A stack of shipped parts has one door, its own, which looks at what is decided rather than at every answer.
     """
@@ -32,7 +32,7 @@ def build_component(door: Callable[[S, Setting], T], spec: S, setting: Setting) 
 
 
 class CheckedPlugin:
-    """A component that was built from its specification; `role` is what it is in a stack.
+    """Base class of the wrappers of installed components; `role` is their role in a stack.
 
     An exception that is no NavigationFailure is the component's own fault, and an answer that is none (not finite, not
     of its shape) is found where it comes from rather than three components later. Neither says anything of a scenario,
@@ -40,7 +40,7 @@ class CheckedPlugin:
     """
 
     may_fail: ClassVar[bool] = True
-    """Whether a NavigationFailure is an answer of this role."""
+    """Whether a component of this role may raise NavigationFailure."""
 
     def __init__(self, role: str, spec: Component, setting: Setting, protocol: type) -> None:
         self.role, self._spec = role, spec
@@ -51,19 +51,19 @@ class CheckedPlugin:
 
     @property
     def who(self) -> str:
-        """What it is called in a message, e.g. "planner `theta_star` (theta_star.planner:ThetaStar)"."""
+        """Name in messages, e.g. "planner `theta_star` (theta_star.planner:ThetaStar)"."""
         kind = getattr(self._spec, "type", "")
         return f"{self.role} `{kind}` ({self._spec.component})" if kind else f"{self.role} ({self._spec.component})"
 
     def ask(self, method: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call it; a failure to do what was asked passes, everything else is its own fault."""
+        """Call a method. A NavigationFailure passes; any other exception is an error of the component."""
         try:
             return method(*args, **kwargs)
         except Exception as error:  # the boundary to code of others, which can raise anything
             self.raised(error)
 
     def raised(self, error: Exception) -> NoReturn:
-        """Raise what comes of an exception of the component."""
+        """Raise the error that corresponds to an exception of the component."""
         if isinstance(error, RunError | MemoryError):
             raise error
         if isinstance(error, NavigationFailure) and self.may_fail:
@@ -73,11 +73,11 @@ class CheckedPlugin:
         raise RunError("crashed", f"{self.who}: {type(error).__name__}: {error} ({self._place(error)})") from error
 
     def broke(self, what: str) -> NoReturn:
-        """End the run: it answered with something that is no answer."""
+        """End the run, because the component returned an invalid answer."""
         raise RunError(BROKEN_COMPONENT, f"{self.who} {what}")
 
     def checked_path(self, path: object, what: str) -> Path:
-        """A path of finite poses (n, 3)."""
+        """Return the path if it consists of finite poses (n, 3)."""
         if not isinstance(path, Path):
             self.broke(f"{what} {type(path).__name__} instead of a Path")
         points = path.points
@@ -88,7 +88,7 @@ class CheckedPlugin:
         return path
 
     def checked_twist(self, command: object) -> Twist:
-        """A velocity of three finite numbers."""
+        """Return the velocity if it consists of three finite numbers."""
         if not isinstance(command, Twist):
             self.broke(f"commanded {type(command).__name__} instead of a Twist")
         if not are_numbers(command):
@@ -96,13 +96,13 @@ class CheckedPlugin:
         return command
 
     def checked_pose(self, pose: object, what: str) -> Pose2:
-        """A pose of three finite numbers."""
+        """Return the pose if it consists of three finite numbers."""
         if not isinstance(pose, Pose2) or not are_numbers(pose):
             self.broke(f"{what} {pose!r}, which is no finite pose")
         return pose
 
     def _place(self, error: Exception) -> str:
-        """The innermost line of its own package; where that is not among them, the innermost of all."""
+        """Return the innermost line of the traceback in the component's package, or the innermost of all."""
         package = self._spec.component.partition(":")[0].partition(".")[0]
         frames = list(traceback.walk_tb(error.__traceback__))
         own = [at for at in frames if str(at[0].f_globals.get("__name__", "")).partition(".")[0] == package]
@@ -111,12 +111,12 @@ class CheckedPlugin:
 
 
 def promised(protocol: type) -> list[str]:
-    """The methods of a protocol; what it has besides may come to be when it is used."""
+    """Return the names of the methods of a protocol."""
     return [name for name, what in vars(protocol).items() if callable(what) and not name.startswith("_")]
 
 
 def are_numbers(values: Iterable[object]) -> bool:
-    """Whether these are real numbers, and none of them nan or infinite."""
+    """Return whether these are real, finite numbers."""
     try:
         return math.isfinite(math.hypot(*values))  # type: ignore[arg-type]  # what is none raises
     except TypeError:
@@ -124,7 +124,7 @@ def are_numbers(values: Iterable[object]) -> bool:
 
 
 def all_finite(values: Array) -> bool:
-    """Whether no number of an array is nan or infinite: then the sum of their squares is neither, or too large."""
+    """Return whether all numbers of an array are finite. A finite sum of squares proves it quickly."""
     return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
 
 

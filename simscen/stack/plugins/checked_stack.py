@@ -17,7 +17,7 @@ from simscen.stack.setting import Setting
 
 
 class CheckedStack(CheckedPlugin):
-    """Asks the stack, and looks at each new decision before anybody acts on it."""
+    """Calls the stack and checks each new decision."""
 
     may_fail = False
 
@@ -41,15 +41,15 @@ class CheckedStack(CheckedPlugin):
 
     @property
     def can_switch_zones(self) -> bool:
-        """Whether it is a SwitchesZones."""
+        """Whether the stack implements SwitchesZones."""
         return callable(getattr(self.inner, "set_zones", None))
 
     def set_zones(self, tick: int, zones: Zones) -> None:
-        """From the next update of its costmap on these zones hold, and no others."""
+        """Apply these zones, and no others, from the next update of the costmap on."""
         self.ask(self.inner.set_zones, tick, zones)
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """The stack's decision. Raises RunError when it is none."""
+        """Return the stack's decision. Raises RunError when it is invalid."""
         try:
             decision = self.inner.decide(tick, readings)
         except Exception as error:  # as in `ask`, and it is asked at every beat
@@ -96,7 +96,7 @@ class CheckedStack(CheckedPlugin):
         return decision
 
     def _look_at(self, costmap: object) -> None:
-        """A log takes a costmap of a known name in a known frame, whose cells are bytes."""
+        """Check the name, frame and cell type (int8) of a published costmap."""
         if not isinstance(costmap, CostGrid) or not isinstance(costmap.grid, OccupancyGrid):
             self.broke(f"published {type(costmap).__name__} instead of a CostGrid")
         if costmap.name not in ("global", "local") or costmap.frame not in ("map", "odom"):

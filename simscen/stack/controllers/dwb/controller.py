@@ -50,7 +50,7 @@ class DynamicWindowController(PathFollower):
         return None if self._best is None else Path(self._best)
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """The velocity to drive now. Raises NO_VALID_CONTROL when every trajectory hits something."""
+        """Return the velocity to drive now. Raises NO_VALID_CONTROL when every trajectory is in collision."""
         track = self._located(pose)
         there = self._goal_pose.reached(pose, twist, goal, track.remaining())
         if there and self._robot.turning_radius > 0.0:

@@ -76,7 +76,7 @@ def _apart(cells: Cells, sources: Cells) -> Array:
 
 
 def _drawn_ahead(plan: Array, pose: Pose2, goal: Pose2, distance: float) -> Array:
-    """The plan with its end moved on, as seen from the robot: it is the robot's nose that GoalAlign draws there."""
+    """Return the plan with its end moved beyond the goal, as seen from the robot, for the GoalAlign critic."""
     angle = np.arctan2(goal.y - pose.y, goal.x - pose.x)
     drawn = plan.copy()
     drawn[-1] += distance * np.array((np.cos(angle), np.sin(angle)))
@@ -91,7 +91,7 @@ def cells_of(costmap: CostmapView, points: Array) -> tuple[Cells, Mask]:
 
 
 def plan_cells(costmap: CostmapView, plan: Array) -> Cells:
-    """The cells (m, 2) of the plan (n, 2) from where it enters the known part of the costmap to where it leaves it."""
+    """Return the cells (m, 2) of the plan (n, 2) from where it enters the known costmap to where it leaves it."""
     cells, on_map = cells_of(costmap, plan)
     known = on_map.copy()
     known[on_map] = costmap.costs[cells[on_map, 0], cells[on_map, 1]] != UNKNOWN
@@ -103,7 +103,7 @@ def plan_cells(costmap: CostmapView, plan: Array) -> Cells:
 
 
 def manhattan(cells: Cells, sources: Cells) -> Array:
-    """The least number of steps (n,) from cells (n, 2) to one of the sources (m, 2)."""
+    """Return the Manhattan distance (n,) in cells from cells (n, 2) to the nearest of the sources (m, 2)."""
     apart = np.abs(cells[:, None, 0] - sources[None, :, 0]) + np.abs(cells[:, None, 1] - sources[None, :, 1])
     return np.asarray(apart.min(axis=1), dtype=np.float64)
 
@@ -116,7 +116,7 @@ class RotateToGoalCritic:
         self.reset()
 
     def reset(self) -> None:
-        """A new path."""
+        """Forget the state of the previous goal."""
         self._rotating = False
 
     def scores(self, now: Twist, goal_yaw: float, velocities: Array, end_yaws: Array) -> tuple[Array, Mask]:

@@ -25,7 +25,7 @@ class ObstacleCritic:
     def first_free(
         self, costmap: CostmapView, pose: Pose2, tried: Trajectories, order: npt.NDArray[np.intp]
     ) -> int | None:
-        """The first of the trajectories in this order, the best coming first, that keeps ROOM; else that hits nothing.
+        """Return the first trajectory in this order (best first) that keeps the preferred clearance, or that is free.
 
         From a collision, the first that leads out of it. Among things that move, first come those that meet none of
         them, and then those that meet them last.

@@ -22,7 +22,7 @@ class Trend:
         """1 or -1: the only sign it may have; 0: any."""
 
     def update(self, velocity: float) -> bool:
-        """A command; whether it turned round."""
+        """Record a command; return whether it reversed the direction."""
         if velocity == 0.0:
             return False
         sign = math.copysign(1.0, velocity)
@@ -42,7 +42,7 @@ class OscillationCritic:
         self._since = Pose2(0.0, 0.0)
 
     def reset(self) -> None:
-        """A new path."""
+        """Forget the directions of the previous path."""
         for trend in self._trends:
             trend.reset()
 
@@ -54,7 +54,7 @@ class OscillationCritic:
         return legal
 
     def debrief(self, pose: Pose2, command: Twist) -> None:
-        """What was commanded, at this pose. Sideways and turning count only where it hardly drives forward."""
+        """Record the command given at this pose. Lateral and angular reversals only count at low forward speed."""
         x, y, theta = self._trends
         turned = x.update(command.vx)
         if abs(command.vx) <= self._x_only:

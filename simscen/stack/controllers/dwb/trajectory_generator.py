@@ -49,7 +49,7 @@ class Kinematics(VelocityLimits):
 
 
 def kinematics_of(spec: DwbSpec, robot: RobotModel, fastest: float) -> Kinematics:
-    """What the specification asks for, or leaves to the robot, and no more than that can do."""
+    """Return the limits of the specification, bounded by those of the robot."""
     left = fastest if spec.max_vel_y is None else spec.max_vel_y
     limits = velocity_limits(
         robot,
@@ -67,7 +67,7 @@ def kinematics_of(spec: DwbSpec, robot: RobotModel, fastest: float) -> Kinematic
 
 
 def project_velocity(now: float, acceleration: float, deceleration: float, seconds: float, target: float) -> float:
-    """The velocity after so many seconds on the way to the target (dwb_plugins' projectVelocity)."""
+    """Return the velocity after so many seconds on the way to the target (dwb_plugins' projectVelocity)."""
     if now < target:
         return min(target, now + acceleration * seconds)
     return max(target, now + deceleration * seconds)
@@ -161,7 +161,7 @@ def generate_trajectories(
 
 
 def _changing(target: Array, start: float, up: float, down: float, passed: Array) -> Array:
-    """The velocities (steps, n) on the way from `start` to the targets (n,), after so many seconds."""
+    """Return the velocities (steps, n) on the way from `start` to the targets (n,) at the given times in s."""
     velocities = passed * np.where(start < target, up, down)
     velocities += start
     np.maximum(velocities, np.minimum(start, target), out=velocities)

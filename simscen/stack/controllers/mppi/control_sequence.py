@@ -24,7 +24,7 @@ PAST_COMMANDS = 4
 def sample_weights(
     costs: Array, sequence: Floats, noise: Floats, deviations: Sequence[float], gamma: float, temperature: float
 ) -> Floats:
-    """What the samples (n,) weigh in their average: exp(-cost / temperature), the energy of their controls included.
+    """Return the weights of the samples (n,): exp(-cost / temperature), including the control cost.
 
     `noise` (axes, steps, n) of these standard deviations lies about the sequence; what it draws it away from is dear.
     """
@@ -37,7 +37,7 @@ def sample_weights(
 
 
 def smooth_sequence(sequence: Floats, past: Floats, order: int) -> Floats:
-    """The sequence after the filter, all but its last step; `past` (axes, 4) are the commands before it."""
+    """Return the filtered sequence, all but its last step; `past` (axes, 4) are the commands before it."""
     if sequence.shape[1] < MIN_SMOOTHED_STEPS:
         return sequence
     wide = np.concatenate((past, sequence, np.repeat(sequence[:, -1:], PAST_COMMANDS, axis=1)), axis=1)
@@ -48,7 +48,7 @@ def smooth_sequence(sequence: Floats, past: Floats, order: int) -> Floats:
 
 
 def apply_limits(sequence: Floats, now: Floats, limits: VelocityLimits, dt: float) -> Floats:
-    """The nearest that the base can drive, from the velocity of `now` (axes,), which is the first of the sequence."""
+    """Return the nearest sequence that the base can drive from the velocity `now` (axes,), which is its first step."""
     low, high = axis_order(limits.low).tolist(), axis_order(limits.high).tolist()
     faster, slower = (axis_order(limits.acceleration) * dt).tolist(), (axis_order(limits.deceleration) * dt).tolist()
     _keep_to_curve(sequence, limits)
@@ -83,6 +83,6 @@ def _keep_to_curve(sequence: Floats, limits: VelocityLimits) -> None:
 
 
 def shift_sequence(sequence: Floats, steps: float) -> Floats:
-    """The sequence from so many steps on, its end repeated: it was made for then, and this is now."""
+    """Return the sequence shifted forward by so many steps, with its last value repeated."""
     here = np.arange(sequence.shape[1], dtype=np.float64)
     return np.stack([np.interp(here + steps, here, row) for row in sequence]).astype(np.float32)

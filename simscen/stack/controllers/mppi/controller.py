@@ -105,7 +105,7 @@ class MppiController(PathFollower):
         return None if self._driven is None else Path(self._poses(self._driven))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """The velocity to drive now. Raises NO_VALID_CONTROL when every rollout, or the average, hits something."""
+        """Return the velocity to drive now. Raises NO_VALID_CONTROL when all rollouts, or their average, collide."""
         track, self._pose = self._located(pose), pose
         if self._goal_pose.reached(pose, twist, goal, track.remaining()):
             self._forget()
@@ -137,7 +137,7 @@ class MppiController(PathFollower):
         raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "all that the optimizer finds hits something")
 
     def _velocity(self, twist: Twist) -> Floats:
-        """The velocity (axes,) when this command takes effect: on the way to the last command, as far as it can be."""
+        """Return the velocity (axes,) when the command takes effect: between the measured and the last sent one."""
         sent, limits = self._sent[:, -1].astype(np.float64), self._limits
         if self._spec.open_loop:
             return self._sent[:, -1]
@@ -175,7 +175,7 @@ class MppiController(PathFollower):
         return not scene.hit(gap, whole).any()
 
     def _next(self) -> Twist:
-        """What the sequence says of the end of this period; then the sequence moves on by a period."""
+        """Return the command for the end of this control period, and shift the sequence by one period."""
         self._sequence = shift_sequence(self._sequence, self._shift)
         first = self._sequence[:, :1]
         self._sent = np.concatenate((self._sent[:, 1:], first), axis=1)

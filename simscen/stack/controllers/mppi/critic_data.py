@@ -121,7 +121,7 @@ class CriticData:
         return self.costmap.distance.ravel()
 
     def spots(self, x: Floats, y: Floats) -> CellLookup:
-        """The cells under points (…,)."""
+        """Return the cells below points (…,)."""
         view = self.costmap
         scale, (height, width) = np.float32(1.0 / view.resolution), view.costs.shape
         across, up = x + np.float32(self.pose.x - view.origin[0]), y + np.float32(self.pose.y - view.origin[1])

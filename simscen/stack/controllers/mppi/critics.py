@@ -34,7 +34,7 @@ def constraint(spec: model.MppiConstraintCritic, scene: CriticData) -> Floats:
 
 
 def cost(spec: model.MppiCostCritic, scene: CriticData) -> tuple[Floats, Mask]:
-    """The mean cost of the costmap along each rollout; and which rollouts hit something."""
+    """Return the mean costmap cost along each rollout, and which rollouts collide."""
     part = slice(None, None, spec.trajectory_point_step)
     x, y, yaw = scene.rolled.x[part], scene.rolled.y[part], scene.rolled.yaw[part]
     spots, whole = scene.spots(x, y), spec.consider_footprint is not False
@@ -70,7 +70,7 @@ def obstacles(spec: model.MppiObstaclesCritic, scene: CriticData) -> tuple[Float
 
 
 def goal(spec: model.MppiGoalCritic, scene: CriticData) -> Floats:
-    """The mean distance to the plan's end, once that is near."""
+    """Return the mean distance to the end of the plan."""
     x, y, _ = scene.path
     return np.asarray(
         spec.cost_weight * distances_in_place(scene.rolled.x - x[-1], scene.rolled.y - y[-1]).mean(axis=0)
@@ -78,7 +78,7 @@ def goal(spec: model.MppiGoalCritic, scene: CriticData) -> Floats:
 
 
 def goal_angle(spec: model.MppiGoalAngleCritic, scene: CriticData) -> Floats:
-    """The mean angle to the goal's heading, once the plan's end is near."""
+    """Return the mean angle to the heading of the goal."""
     off = absolute_angles(scene.rolled.yaw - np.float32(scene.goal_yaw))
     if spec.symmetric_yaw_tolerance:
         off = np.minimum(off, np.float32(np.pi) - off)
@@ -91,12 +91,12 @@ def prefer_forward(spec: model.MppiPreferForwardCritic, scene: CriticData) -> Fl
 
 
 def twirling(spec: model.MppiTwirlingCritic, scene: CriticData) -> Floats:
-    """The mean turn rate."""
+    """Return the mean turn rate."""
     return np.asarray(spec.cost_weight * np.abs(scene.rolled.velocities[WZ]).mean(axis=0))
 
 
 def velocity_deadband(spec: model.MppiVelocityDeadbandCritic, scene: CriticData) -> Floats:
-    """What the velocities fall short of those that move the base, over the seconds."""
+    """Return by how much velocities are below the deadband, integrated over time."""
     ahead, sideways, turn = spec.deadband_velocities
     least = {VX: ahead, WZ: turn, VY: sideways}
     short = np.zeros_like(scene.rolled.velocities[VX])
@@ -111,7 +111,7 @@ def absolute_angles(angles: Floats) -> Floats:
 
 
 def path_align(spec: model.MppiPathAlignCritic, scene: CriticData) -> Floats | None:
-    """The mean distance from each pose to the point of the plan that is as many meters from the start.
+    """Return the mean distance between each pose and the plan at the same path length.
 
     None where the critic is silent: before the robot has got going, and where the plan is blocked.
     """
@@ -140,7 +140,7 @@ def path_align(spec: model.MppiPathAlignCritic, scene: CriticData) -> Floats | N
 
 
 def path_follow(spec: model.MppiPathFollowCritic, scene: CriticData) -> Floats:
-    """The distance from the end of each rollout to a free point beyond the furthest that any reaches."""
+    """Return the distance from the end of each rollout to a free point beyond the furthest reached one."""
     px, py, _ = scene.path
     last = len(px) - 1
     index = min(scene.furthest + spec.offset_from_furthest, last)
@@ -150,7 +150,7 @@ def path_follow(spec: model.MppiPathFollowCritic, scene: CriticData) -> Floats:
 
 
 def path_angle(spec: model.MppiPathAngleCritic, scene: CriticData) -> Floats | None:
-    """The angle between the heading at the end of each rollout and the way from there to a point of the plan.
+    """Return the angle between the final heading of each rollout and the direction to a point of the plan.
 
     None where the robot looks there already, but for `max_angle_to_furthest`.
     """

@@ -63,7 +63,7 @@ def _followed(velocities: Floats, asked: Floats, change: np.float32) -> None:
 
 
 def _followed_braking(velocities: Floats, asked: Floats, up: np.float32, down: np.float32) -> None:
-    """The same where the base brakes otherwise than it speeds up: which bound holds is looked up by the sign."""
+    """Limit the changes of one axis whose deceleration differs from its acceleration, in place."""
     bound, forward = np.empty_like(velocities[0]), np.empty(velocities[0].shape, np.bool_)
     at_least, at_most = np.array((-up, down)), np.array((-down, up))
     for (last, here), wanted in zip(pairwise(velocities), asked, strict=False):
@@ -100,7 +100,7 @@ def apply_model_delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) 
 
 
 def mppi_limits(spec: MppiSpec, robot: RobotModel, fastest: float) -> VelocityLimits:
-    """What the specification asks for, or leaves to the robot, and no more than that can do."""
+    """Return the limits of the specification, bounded by those of the robot."""
     sideways = DEFAULT_SPEED_M_S if spec.vy_max is None else spec.vy_max
     return velocity_limits(
         robot,
@@ -113,6 +113,6 @@ def mppi_limits(spec: MppiSpec, robot: RobotModel, fastest: float) -> VelocityLi
 
 
 def axis_order(axes: Axes) -> Array:
-    """The three in the order of a control sequence: vx, wz, vy."""
+    """Return the values of the axes in the order of a control sequence: vx, wz, vy."""
     vx, vy, wz = axes
     return np.array((vx, wz, vy))
