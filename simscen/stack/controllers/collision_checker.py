@@ -36,7 +36,7 @@ class CollisionChecker:
     def within(self, command: Twist, free: float, horizon: float, demanded: float) -> Twist:
         """Return the command, slowed so that the free time becomes `demanded` s. Raises NO_VALID_CONTROL.
 
-        Nav2 fails at once; slowing first lets the planner find a way round before the robot stands before a wall.
+        Nav2 fails at once. Slowing down first gives the planner time to find a way around the obstacle.
         """
         if free >= horizon:
             return command
@@ -48,8 +48,8 @@ class CollisionChecker:
     def letting_pass(self, command: Twist, costmap: CostmapView, pose: Pose2, horizon: float) -> Twist:
         """Return the fastest fraction of the command that hits no moving obstacle, or the one that hits it last.
 
-        Both on their ways: who crosses and will have gone is no reason to slow down, and before who will be there the
-        robot slows, or stands. That is no failure, for what moves goes on.
+        Robot and obstacles are compared at equal times: the robot does not slow down for one that will have left
+        by then. Stopping is no failure, because a moving obstacle goes on.
         """
         if not costmap.moving.things or command == STOP:
             return command

@@ -14,13 +14,13 @@ from simscen.core.messages.navigation import Path
 from simscen.stack.cusps import changes, forward_steps
 
 SEARCH_AHEAD_M = 1.5
-"""Meters of path beyond the last place that are searched for the nearest point, so that a path may cross itself."""
+"""Length of path beyond the last position that is searched for the nearest point, so that a path may cross itself."""
 CUSP_REACHED_M = 0.03
-"""Meters before a change of direction at which it counts as reached."""
+"""Distance to a change of direction at which it counts as reached."""
 CURVATURE_SPAN_M = 0.3
-"""Meters to both sides of a point over which the path's bend there is told."""
+"""Distance to both sides of a point over which the curvature of the path is measured."""
 LENGTH_TOLERANCE_M = 1e-9
-"""Meters: sums of lengths are not exact."""
+"""Rounding error allowed for sums of lengths."""
 
 
 class PathTracker:
@@ -42,7 +42,7 @@ class PathTracker:
         self._meters: list[float] = self.along.tolist()
         self._places: list[complex] = (self.points[:, 0] + 1j * self.points[:, 1]).tolist()
         self.longest = float(lengths.max(initial=0.0))
-        """Meters of the longest step."""
+        """Length of the longest step in m."""
         self._most = 1.0 / (self.longest + LENGTH_TOLERANCE_M)
         """Points for each meter, at least."""
         ahead = forward_steps(self.points)
@@ -57,7 +57,7 @@ class PathTracker:
 
     @property
     def has_cusps(self) -> bool:
-        """Whether there is another piece behind this one."""
+        """Whether the path has another piece after this one."""
         return len(self._ends) > 1
 
     @property
@@ -116,21 +116,21 @@ class PathTracker:
         return 2.0 * abs(turn) / (meters[after] - meters[before])
 
     def remaining(self) -> float:
-        """Meters of path from the nearest point to the end."""
+        """Return the length of path from the nearest point to the end, in m."""
         return self._meters[-1] - self._meters[self.index]
 
     def to_cusp(self) -> float:
-        """Meters of path to the end of this piece."""
+        """Return the length of path to the end of this piece, in m."""
         return self._meters[self._ends[0]] - self._meters[self.index]
 
     @property
     def piece_end(self) -> tuple[float, float]:
-        """Where this piece ends."""
+        """End point of this piece."""
         end = self._places[self._ends[0]]
         return end.real, end.imag
 
     def carrot(self, pose: Pose2, distance: float, beyond: bool = False) -> tuple[float, float]:
-        """Where the piece leaves the circle of `distance` around the robot; its end if it does not leave.
+        """Return where the piece leaves the circle of `distance` around the robot, or its end if it does not.
 
         Interpolated between points, so that the carrot glides (RPP's circleSegmentIntersection). `beyond` prolongs
         the piece in the direction it ends in, so that the robot comes in straight (interpolate_curvature_after_goal).
@@ -179,7 +179,7 @@ def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, center
 
 Floats = npt.NDArray[np.float32]
 LOCAL_PLAN_SPACING_M = 0.05
-"""Meters between points: Nav2's planners put one into each cell of a costmap, and its critics count points."""
+"""Distance between points: Nav2's planners return one per costmap cell, and its critics count points."""
 
 
 @dataclass(frozen=True, eq=False)

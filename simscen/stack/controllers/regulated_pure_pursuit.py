@@ -97,7 +97,7 @@ class RegulatedPurePursuit(PathFollower):
     def _straight_is_free(
         self, carrot: tuple[float, float], backward: bool, arc_poses: Twist, pose: Pose2, costmap: CostmapView
     ) -> bool:
-        """Whether the robot, turned to the carrot first, could drive to it, where the arc there swings into something.
+        """Return whether the robot could drive straight to the carrot after a rotation, where the arc collides.
 
         Out of a tight place that is often the only way; nav2_regulated_pure_pursuit fails there. A hull that is not
         round would come nearer to what it stands beside by turning.
@@ -116,7 +116,7 @@ class RegulatedPurePursuit(PathFollower):
         return _seen_from(pose, *track.carrot(pose, self._spec.curvature_lookahead_dist, beyond=beyond))
 
     def _as_far_as(self, carrot: tuple[float, float]) -> float:
-        """Meters for which the way must be free: to the carrot; of a car's, that may lie beyond where it stops."""
+        """Return the distance in m that must be free: to the carrot, or for a car to where it stops."""
         assert self._track is not None
         away = math.hypot(*carrot)
         return min(away, max(CUSP_REACHED_M, self._track.to_cusp())) if self._robot.turning_radius > 0.0 else away

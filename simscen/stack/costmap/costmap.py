@@ -33,7 +33,7 @@ from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 
 DISTANCE_MARGIN_M = 0.5
-"""Meters beyond the hull up to which distances are told, or the inflation radius if that is more."""
+"""Margin beyond the hull up to which distances are computed; the inflation radius if that is larger."""
 SCANS_PER_UNKNOWN_UPDATE = 5
 """Every which scan is asked what unknown cells it shows to be free: once a second at the default rate, Nav2's own for
 the global costmap. Nothing that drives waits for it, and of a map's outside there are many."""
@@ -73,7 +73,7 @@ class Costmap:
         self._changed: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._changes = deque[Numbers | None](maxlen=KEPT_REVISIONS)
         self.moving = NO_MOVING_OBSTACLES
-        """What moves, in its frame; shown with it."""
+        """Moving obstacles in the frame of the costmap, included in the view."""
         layer = self._layer(Pose2(0.0, 0.0))
         self._frame: GridFrame = layer.frame
         self._live = LiveLayer(spec, self._inscribed, layer.frame)
@@ -103,7 +103,7 @@ class Costmap:
         return self._revision
 
     def changed_near(self, revision: int, places: Plane, meters: float) -> bool:
-        """Whether since that revision something may have come to, or gone from, within so many meters of a place.
+        """Return whether obstacles may have changed within so many meters of a position since that revision.
 
         `places` are x + iy (n,). Where it says no, the view need not be looked at for how far obstacles are from these.
         """
@@ -169,7 +169,7 @@ class Costmap:
         return int(np.count_nonzero(self._static_squared == 0))
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
-        """Whether the pose is off the walls of the map and the robot's inscribed circle fits somewhere so near it."""
+        """Return whether the pose is off mapped walls and the inscribed circle fits within the tolerance."""
         here = self._frame.cell(pose.x, pose.y)
         if self._static_squared[here] == 0:
             return False
@@ -179,7 +179,7 @@ class Costmap:
         return bool((np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y) <= tolerance).any())
 
     def aim(self, start: Pose2, goal: Pose2) -> Pose2:
-        """Where to plan to: the goal, or when it is beyond a rolling window the nearest point to it inside."""
+        """Return the goal, or if it is beyond a rolling window, the nearest point to it inside."""
         return clip_goal(self._frame, start, goal) if self._rolling else goal
 
     def _roll(self, base: Pose2) -> None:
@@ -208,7 +208,7 @@ class Costmap:
 
     @property
     def _forbidding(self) -> bool:
-        """Whether zones or a mask say where not to go."""
+        """Whether keepout zones or a keepout mask apply."""
         return bool(self._surroundings.keepout) or self._surroundings.masks.keepout is not None
 
     def _lay(self, layer: StaticLayer) -> None:
@@ -298,7 +298,7 @@ class Costmap:
 
     @cached_property
     def _around(self) -> SquaredDistanceTransform:
-        """What tells distances in a small window."""
+        """Distance transform for small windows."""
         return SquaredDistanceTransform(self._frame.shape, self._margin)
 
     def _refresh_all(self) -> None:
@@ -313,7 +313,7 @@ class Costmap:
 
 
 def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
-    """How far in meters from obstacles distances are told."""
+    """Return the largest distance from obstacles that is computed, in m."""
     return max(spec.inflation_radius, robot.circumscribed_radius + DISTANCE_MARGIN_M)
 
 

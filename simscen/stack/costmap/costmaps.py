@@ -15,9 +15,9 @@ from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
 
 MIN_LOCAL_SIZE_M = 3.0
-"""Meters: the edge of Nav2's local costmap, and the least of ours unless somebody asks for less."""
+"""Size of Nav2's local costmap, and the default minimum size of this one."""
 ZONE_TOLERANCE_M = 0.02
-"""Meters by which zones may lie beside where they belong in the odom frame before they are painted anew."""
+"""Displacement of zones in the odom frame from which they are drawn again."""
 
 
 class Costmaps:
@@ -51,7 +51,7 @@ class Costmaps:
             rhythm.seen[seen.sensor] = seen
 
     def due(self, tick: int) -> bool:
-        """Whether it is time for an update of the global costmap."""
+        """Return whether it is time for an update of the global costmap."""
         return self._wide.due(tick)
 
     def set_zones(self, zones: Zones) -> None:
@@ -140,4 +140,4 @@ def _blind(scan: Scan) -> bool:
 
 
 _View = tuple[Pose2, Scan | Image, Frames]
-"""Where the robot was at a reading, the reading, and where it was when the update began."""
+"""Pose of the robot at a reading, the reading, and the frames when the update began."""

@@ -24,7 +24,7 @@ Heights = npt.NDArray[np.float32]
 
 
 class Shown(NamedTuple):
-    """What a picture shows: cells (n, 2) with something that is no ground, at what height (n,), and where ground is."""
+    """Content of a depth image: obstacle cells (n, 2), their heights (n,), and ground cells."""
 
     cells: Cells
     heights: Heights
@@ -87,9 +87,9 @@ def _slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Array]
 
 Pixels = npt.NDArray[np.bool_]
 GROUND_STEP_M = 0.05
-"""Meters that the ground has to go on for what follows to be measured from there."""
+"""Length of ground needed before the slope is measured from the new point."""
 MAX_RISE_RATIO = 1.0
-"""What rises by more than this for each meter is a face, and the point below it belongs to it."""
+"""Rise per meter above which points belong to an upright face."""
 SLOPE_ROWS_DIVISOR = 8
 """The part of a picture's rows that tells how what is seen first rises."""
 

@@ -67,14 +67,14 @@ class GridFrame:
         return numbers
 
     def _holds(self, center: complex, reach: float) -> bool:
-        """Whether all that is within `reach` meters of a point lies on the grid."""
+        """Return whether the circle of radius `reach` m around a point lies on the grid."""
         (left, low), (rows, columns), x, y = self.origin, self.shape, center.real, center.imag
         wide, high = columns * self.resolution, rows * self.resolution
         return left + reach <= x <= left + wide - reach and low + reach <= y <= low + high - reach
 
     @cached_property
     def _steps(self) -> Numbers:
-        """What makes a cell's number of its column and row."""
+        """Factors that turn the column and row of a cell into its number."""
         return np.array((1, self.shape[1]))
 
     def points(self, numbers: Numbers) -> Plane:
@@ -93,7 +93,7 @@ class GridFrame:
         return (first // width, int(_least(columns))), (last // width, int(_most(columns)))
 
     def covers(self, x: float, y: float) -> bool:
-        """Whether the point lies on the grid."""
+        """Return whether the point lies on the grid."""
         column, row = (x - self.origin[0]) / self.resolution, (y - self.origin[1]) / self.resolution
         return 0 <= row < self.shape[0] and 0 <= column < self.shape[1]
 
@@ -128,7 +128,7 @@ def _centers(shape: tuple[int, int], edge: float) -> Plane:
 Cell = TypeVar("Cell", bound=np.generic)
 
 GOAL_EDGE_MARGIN_M = 0.6
-"""Meters inside the window's edge where a goal beyond it is aimed at."""
+"""Distance inside the edge of the window of the intermediate goal for a goal beyond it."""
 ROLL_RATIO = 1 / 8
 """The window is moved when the robot is this part of its size away from its middle, …"""
 MAX_ROLL_OFFSET_M = 0.25
@@ -143,7 +143,7 @@ def window_around(center: Pose2, size: tuple[float, float], resolution: float) -
 
 
 def should_roll(frame: GridFrame, base: Pose2, no_farther: float = math.inf) -> bool:
-    """Whether the robot has come so far from the middle that the window should follow."""
+    """Return whether the robot is so far from the center that the window should follow."""
     rows, columns = frame.shape
     across, up = columns * frame.resolution, rows * frame.resolution
     off = abs(base.x - frame.origin[0] - across / 2), abs(base.y - frame.origin[1] - up / 2)

@@ -80,7 +80,7 @@ class LiveLayer:
 
     @property
     def cells(self) -> Numbers:
-        """The same by number."""
+        """Numbers of the cells with a live obstacle."""
         return self._marks if self._heights is None else np.flatnonzero(self.marked())
 
     @property

@@ -19,7 +19,7 @@ from simscen.stack.costmap.grid_frame import Cells, GridFrame, Numbers
 from simscen.stack.localizers.beams import Plane, directions
 
 RANGE_TOLERANCE_M = 1e-9
-"""Meters before the end of what a beam shows to be free, nearer to which it is asked exactly whether a cell is."""
+"""Margin before the end of the free part of a beam, within which cells are tested exactly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class ScanAmongMoving(Scan):
 
 
 def hit_points(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tuple[Plane, complex]:
-    """Map points x + iy (n,) of the beams that hit something that stands, `nearest` to `farthest` meters away.
+    """Return the points x + iy (n,) where beams hit static things `nearest` to `farthest` m away.
 
     And where the lidar is.
     """
@@ -53,7 +53,7 @@ def _ends(scan: Scan, nearest: float, farthest: float) -> Plane:
 
 
 def _place(scan: Scan, base: Pose2) -> complex:
-    """Where the lidar is in the map, x + iy."""
+    """Return the position of the lidar in the map, x + iy."""
     return complex(base.x, base.y) + cmath.rect(1.0, base.yaw) * complex(scan.mount.x, scan.mount.y)
 
 
@@ -107,18 +107,18 @@ def crossed_cells(
     return near[passed], nearest
 
 
-def _nearest_beams(bearing: Array, scan: Scan, told: Array) -> tuple[Numbers, Array]:
-    """Return the beams nearest to directions (n,) relative to the first beam, and their values of `told`.
+def _nearest_beams(bearing: Array, scan: Scan, values: Array) -> tuple[Numbers, Array]:
+    """Return the beams nearest to directions (n,) relative to the first beam, and their values of `values`.
 
     The value is nan where there is no beam.
     """
-    step, count = scan.angle_increment, len(told)
+    step, count = scan.angle_increment, len(values)
     turn = round(2 * math.pi / abs(step))
     even = abs(turn * abs(step) - 2 * math.pi) < 1e-6
     if even and turn == count:
         beam = np.rint(bearing / step).astype(np.int64)
-        return beam, told.take(beam, mode="wrap")
+        return beam, values.take(beam, mode="wrap")
     beam = np.rint((bearing % (2 * math.pi)) / step).astype(np.int64)
     if even:
         beam %= turn
-    return beam, np.where((beam >= 0) & (beam < count), told.take(beam, mode="clip"), np.nan)
+    return beam, np.where((beam >= 0) & (beam < count), values.take(beam, mode="clip"), np.nan)

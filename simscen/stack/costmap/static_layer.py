@@ -20,7 +20,7 @@ OCCUPIED_THRESHOLD = 65
 
 @dataclass(frozen=True, eq=False)
 class StaticLayer:
-    """What never changes: `lethal` and `unknown` cells (rows, columns) of `frame`."""
+    """Static part of a costmap: `lethal` and `unknown` cells (rows, columns) of `frame`."""
 
     frame: GridFrame
     lethal: Mask

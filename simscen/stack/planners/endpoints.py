@@ -15,7 +15,7 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import NavigationFailure
 
 MAX_ESCAPE_M = 0.5
-"""How far in meters a robot that stands too near an obstacle may drive to where a plan can begin."""
+"""Distance that a robot too near to an obstacle may drive to the start of a plan."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ def near(
 
 
 def _open(rates: TraversalCosts, start: Pose2, place: tuple[float, float]) -> bool:
-    """Whether no obstacle is between the start and this place."""
+    """Return whether no obstacle is between the start and this position."""
     way = spaced(np.array([(start.x, start.y), place]), 0.5 * rates.resolution)
     columns, rows = np.floor((way - rates.origin) / rates.resolution).astype(np.int64).T
     return bool((rates.costmap.distance[rows, columns] > 0.0).all())

@@ -86,6 +86,6 @@ def _mixed(one: Array, other: Array) -> tuple[Array, Array]:
 
 
 def _free(rates: TraversalCosts, cells: Array) -> npt.NDArray[np.bool_]:
-    """Whether the robot can be in cells (n, 2), columns first."""
+    """Return whether the robot can be in cells (n, 2), given as (column, row)."""
     columns, rows = cells.astype(np.int64).T
     return np.asarray(np.isfinite(rates.rates[rows, columns]))

@@ -18,11 +18,11 @@ from simscen.stack.protocols import CostmapView
 Space = Literal["se2", "dubins", "reeds_shepp"]
 Valid = Callable[[float, float, float], bool]
 POSE_SPACING_M = 0.05
-"""Meters between the states of an answer."""
+"""Distance between the poses of a path."""
 MIN_CHORD_RATIO = 0.995
-"""Of a way of `POSE_SPACING_M`, how much of it an arc of 0.2 m gets from its begin at least."""
+"""Least ratio of chord to length of a step on an arc of 0.2 m radius; cusps have a smaller one."""
 CUSP_TOLERANCE_M = 1e-4
-"""Meters to which the place of a change of direction is told."""
+"""Accuracy of the position of a cusp."""
 SHORTCUT_ATTEMPTS = 60
 """Attempts to leave out states of the found path; counted, as OMPL's own simplify() stops by the clock."""
 
@@ -134,7 +134,7 @@ def _state(information: Any, pose: Pose2) -> Any:
 ESCAPE_DIRECTIONS = 16
 """A base that drives in any direction is tried in so many."""
 ESCAPE_CURVATURE_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
-"""Of a car's arcs, as shares of the tightest."""
+"""Curvatures of a car's escape arcs, relative to its tightest one."""
 
 
 def escape_arcs(space: Space, turning_radius: float, start: Pose2) -> Iterator[Array]:

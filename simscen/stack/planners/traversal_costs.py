@@ -47,7 +47,7 @@ class TraversalCosts:
         coarse = SAMPLE_SPACING_RATIO * robot.inscribed_radius if allow_unknown else 0.0  # a single cell may be unknown
         self.stride = max(SAMPLE_SPACING_CELLS * costmap.resolution, coarse)
         self.kept: dict[object, Any] = {}
-        """What was worked out of these costs, by what it is; where nothing has changed the next plan needs it again."""
+        """Cached results derived from these costs, reused by the next plan if the costs have not changed."""
         self._asked: tuple[float, float, float, float] | None = None
         self._answer = 0.0
 
@@ -59,7 +59,7 @@ class TraversalCosts:
 
     @property
     def free(self) -> npt.NDArray[np.bool_]:
-        """Where (height, width) the robot can be."""
+        """Cells (height, width) where the robot can be."""
         return np.isfinite(self.rates)
 
     def at(self, points: Array) -> npt.NDArray[np.float32]:

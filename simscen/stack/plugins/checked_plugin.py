@@ -50,7 +50,7 @@ class CheckedPlugin:
                 self.broke(f"{type(self.inner).__name__} has no `{name}`, which every {role} has")
 
     @property
-    def who(self) -> str:
+    def label(self) -> str:
         """Name in messages, e.g. "planner `theta_star` (theta_star.planner:ThetaStar)"."""
         kind = getattr(self._spec, "type", "")
         return f"{self.role} `{kind}` ({self._spec.component})" if kind else f"{self.role} ({self._spec.component})"
@@ -70,11 +70,11 @@ class CheckedPlugin:
             if not isinstance(error.code, ErrorCode):
                 self.broke(f"fails with {error.code!r}, which is no ErrorCode")
             raise error
-        raise RunError("crashed", f"{self.who}: {type(error).__name__}: {error} ({self._place(error)})") from error
+        raise RunError("crashed", f"{self.label}: {type(error).__name__}: {error} ({self._place(error)})") from error
 
     def broke(self, what: str) -> NoReturn:
         """End the run, because the component returned an invalid answer."""
-        raise RunError(BROKEN_COMPONENT, f"{self.who} {what}")
+        raise RunError(BROKEN_COMPONENT, f"{self.label} {what}")
 
     def checked_path(self, path: object, what: str) -> Path:
         """Return the path if it consists of finite poses (n, 3)."""

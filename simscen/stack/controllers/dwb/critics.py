@@ -41,7 +41,7 @@ class Scores:
 def score_trajectories(
     spec: DwbSpec, costmap: CostmapView, pose: Pose2, goal: Pose2, plan: Array, velocities: Array, ends: Array
 ) -> Scores:
-    """Of trajectories that end at poses (n, 3), for a plan (m, 2) that lies on the costmap with at least one point."""
+    """Return the scores of trajectories with these end poses (n, 3); the plan (m, 2) has at least one point."""
     ahead = spec.forward_point_distance
     nose = ends[:, :2] + ahead * np.column_stack((np.cos(ends[:, 2]), np.sin(ends[:, 2])))
     last, on_map = cells_of(costmap, ends[:, :2])

@@ -11,7 +11,7 @@ from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView
 
 PREFERRED_CLEARANCE_M = 0.05
-"""Meters that trajectories keep off obstacles where any can."""
+"""Clearance that trajectories keep wherever one of them can."""
 BATCH_TRAJECTORIES = 50
 """Trajectories that are looked at together: mostly one of the best is free, and the others need no look."""
 

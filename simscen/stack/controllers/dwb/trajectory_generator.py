@@ -19,7 +19,7 @@ from simscen.stack.protocols import RobotModel
 SAME_VELOCITY_M_S = 1e-5
 """Nav2's EPSILON: ends of a window no further apart than this are one velocity."""
 SQUARED_SPEED_TOLERANCE = float(np.finfo(np.float32).eps)
-"""What squares of speeds may exceed their bounds by."""
+"""Rounding error allowed for squared speeds."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class Trajectories:
 def generate_trajectories(
     pose: Pose2, now: Twist, velocities: Array, kinematics: Kinematics, seconds: float, meters: float, radians: float
 ) -> Trajectories:
-    """Of a base that changes to each of the velocities (n, 3).
+    """Return the trajectories of a base that changes to each of the velocities (n, 3).
 
     A trajectory has as many steps as it takes for none to be longer than `meters` or to turn by more than `radians`
     at its velocity; those with fewer than others stay at their end. Each step keeps the heading it begins with.
@@ -169,7 +169,7 @@ def _changing(target: Array, start: float, up: float, down: float, passed: Array
 
 
 def _from(start: float, steps: Array) -> Array:
-    """Where steps (m, n) lead from a start: (m + 1, n)."""
+    """Return the positions (m + 1, n) reached from a start by steps (m, n)."""
     places = np.empty((len(steps) + 1, steps.shape[1]))
     places[0], places[1:] = 0.0, steps
     accumulate_rows(places[1:])

@@ -101,7 +101,7 @@ class MppiController(PathFollower):
 
     @property
     def local_plan(self) -> Path | None:
-        """What the control sequence would do."""
+        """Trajectory of the control sequence."""
         return None if self._driven is None else Path(self._poses(self._driven))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:

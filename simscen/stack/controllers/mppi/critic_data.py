@@ -19,11 +19,11 @@ Floats = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
 INSCRIBED, UNKNOWN = 253, 255
 MOVING_CLEARANCE_M = 0.25
-"""Meters that rollouts keep off what moves, and a standard deviation of where it will be."""
+"""Clearance of rollouts from moving obstacles, and standard deviation of the predicted positions."""
 COLLISION_DECAY_S = 1.2
 """Seconds in which what may happen counts e times less."""
 ESCAPE_TOLERANCE_M = 0.01
-"""Meters: a robot in collision may go where it is no more than so much nearer to the obstacle."""
+"""Distance by which a robot that is in collision may come nearer to the obstacle."""
 
 
 class CellLookup(NamedTuple):
@@ -80,7 +80,7 @@ class CriticData:
 
     @cached_property
     def moving(self) -> MovingObstacles:
-        """What moves and may come near to a rollout, in the frame of the rollouts."""
+        """Moving obstacles that may come near a rollout, in the frame of the rollouts."""
         rolled, moving = self.rolled, self.costmap.moving
         if not len(moving):
             return moving
@@ -97,7 +97,7 @@ class CriticData:
 
     @cached_property
     def meeting(self) -> tuple[Floats, Floats]:
-        """What each rollout (n,) comes too near to that moves: the mean nearness, and 1 for a hit.
+        """Mean nearness of each rollout (n,) to moving obstacles, and 1 for a collision.
 
         Both count less the later it is, for what moves may have turned by then.
         """
@@ -151,13 +151,13 @@ class CriticData:
 
     @cached_property
     def _here(self) -> tuple[float, float]:
-        """Meters between what is nearest and the inscribed circle, and the hull, where the robot is."""
+        """Distance in m of the nearest obstacle from the inscribed circle, and from the hull, at the robot's pose."""
         origin, yaw = np.zeros((1, 1), np.float32), np.full((1, 1), self.pose.yaw, np.float32)
         spots = self.spots(origin, origin)
         return float(self.gap(spots, yaw, False)[0, 0]), float(self.gap(spots, yaw, True)[0, 0])
 
     def gap(self, spots: CellLookup, yaw: Floats, whole: bool) -> Floats:
-        """Meters (…,) between the hull, or its inscribed circle, and the nearest obstacle."""
+        """Return the distance (…,) in m between the hull, or its inscribed circle, and the nearest obstacle."""
         discs: CoveringDiscs = self.footprint.discs
         if not whole:
             return np.asarray(self._distance(spots) - np.float32(self.footprint.inscribed))

@@ -86,7 +86,7 @@ def goal_angle(spec: model.MppiGoalAngleCritic, scene: CriticData) -> Floats:
 
 
 def prefer_forward(spec: model.MppiPreferForwardCritic, scene: CriticData) -> Floats:
-    """Meters driven backward."""
+    """Return the distance driven backward, in m."""
     return np.asarray(spec.cost_weight * scene.dt * -np.minimum(scene.rolled.velocities[VX], 0).sum(axis=0))
 
 

@@ -1,4 +1,4 @@
-"""What the base would do under thousands of control sequences: nav2_mppi_controller's motion models.
+"""Motion models of MPPI: rollouts of many control sequences (nav2_mppi_controller).
 
 Controls and velocities are arrays (axes, steps, n) of float32, the axes being vx, wz and, of a base that strafes, vy.
 """
@@ -75,7 +75,7 @@ def _followed_braking(velocities: Floats, asked: Floats, up: np.float32, down: n
 
 
 def integrate_velocities(velocities: Floats, yaw: float, dt: float) -> Rollouts:
-    """Where these velocities lead from a heading; each step keeps the heading it begins with."""
+    """Return the rollouts of these velocities from a heading; each step keeps its initial heading."""
     step, (steps, count) = np.float32(dt), velocities.shape[1:]
     headings = np.empty((steps + 1, count), np.float32)
     headings[0], turned = 0.0, headings[1:]
