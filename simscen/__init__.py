@@ -27,12 +27,22 @@ def simulate(
 ) -> Run:
     """Run a scenario file in this process and judge it: `simscen.simulate("goal.scenario.yaml", seed=7).passed`.
 
-    `seed` (1 … 2³²-1) defaults to the scenario's own. `log` is where the MCAP log is written, if anywhere. `root` and
-    `world_path` mean what --root and --world-path mean on the command line; `stack` is the NAME=VALUE of --stack, and
-    `variation` says which one of a scenario that has some (see `variations`). The same scenario and seed give the same
-    run to the last bit, as often as it is called and whatever ran before. Raises simscen.core.errors.InvalidInput for
-    files that cannot be used, UsageError for a stack or a variation that cannot, and RunError for a run that cannot be
-    completed; an engine that crashes takes the process along, which is why the command line gives each run its own.
+    Args:
+        scenario: Path of the scenario file.
+        seed: Seed (1 … 2³²-1); default: the seed in the scenario.
+        log: Path of the MCAP log to write; default: no log.
+        root: Root folder, like --root on the command line.
+        world_path: Additional folders with worlds and models, like --world-path.
+        stack: Stack to use instead of the scenario's own, as NAME=VALUE like --stack.
+        variation: Name of one of the scenario's variations; see `variations`.
+
+    The same scenario and seed give the same run bit for bit. If the physics engine crashes, it ends this process; the
+    command line therefore gives each run its own process.
+
+    Raises:
+        simscen.core.errors.InvalidInput: A file is invalid.
+        simscen.core.errors.UsageError: The stack or the variation is invalid.
+        simscen.core.errors.RunError: The run could not be completed.
     """
     from pathlib import Path
 
@@ -51,10 +61,10 @@ def variations(
     root: str | PathLike[str] | None = None,
     world_path: Sequence[str | PathLike[str]] = (),
 ) -> list[str]:
-    """The names of a scenario's variations, in order, for `simulate(…, variation=NAME)`; `[""]` where it has none.
+    """Return the names of a scenario's variations, in order, for `simulate(…, variation=NAME)`; `[""]` without any.
 
     In a test: `@pytest.mark.parametrize("variation", simscen.variations("speeds.scenario.yaml"))`. Raises
-    simscen.core.errors.InvalidInput for files that cannot be used.
+    simscen.core.errors.InvalidInput for invalid files.
     """
     from pathlib import Path
 

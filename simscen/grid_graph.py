@@ -11,15 +11,15 @@ from simscen.core.geometry import Array
 CellMask = npt.NDArray[np.bool_]
 CellIndices = npt.NDArray[np.int64]
 EIGHT_NEIGHBORS = tuple((a, b) for a in range(-1, 2) for b in range(-1, 2) if (a, b) != (0, 0))
-"""(rows, columns) to the eight neighbors: at most 8.2 % longer than the straight line."""
+"""Moves (rows, columns) to the eight neighbors: paths are at most 8.2 % longer than a straight line."""
 SIXTEEN_NEIGHBORS = tuple((a, b) for a in range(-2, 3) for b in range(-2, 3) if math.gcd(a, b) == 1)
-"""These and a knight's move away: at most 2.8 % longer."""
+"""These and knight's moves: paths are at most 2.8 % longer than a straight line."""
 
 
 class GridGraph:
-    """The free cells of a grid and the moves between them; the outermost two rows and columns are never free.
+    """Graph of the free cells of a grid and the moves between them. The two outermost rows and columns are never free.
 
-    A move costs its length in cells, times the mean of the `prices` (rows, columns) of its two ends.
+    A move costs its length in cells times the mean of the `prices` (rows, columns) of its ends.
     """
 
     def __init__(
@@ -28,6 +28,7 @@ class GridGraph:
         moves: Sequence[tuple[int, int]] = SIXTEEN_NEIGHBORS,
         prices: npt.NDArray[np.floating] | None = None,
     ) -> None:
+        """Build the graph of the `free` cells (rows, columns)."""
         from scipy.sparse import csr_array
 
         inner = np.zeros_like(free)
@@ -53,7 +54,7 @@ class GridGraph:
         self._graph = csr_array((data, targets[possible], begins), shape=(len(self._cells),) * 2)
 
     def way(self, start: tuple[int, int], goal: tuple[int, int]) -> CellIndices | None:
-        """The cells (n, 2) of a shortest way between two free cells (row, column), ends included; None if none."""
+        """Return the cells (n, 2) of a shortest path between two free cells (row, column), or None."""
         from scipy.sparse.csgraph import dijkstra
 
         first, last = self._index(start), self._index(goal)
@@ -68,7 +69,7 @@ class GridGraph:
         return np.column_stack(np.divmod(self._cells[way[::-1]], self._width))
 
     def joined(self, cells: Sequence[tuple[int, int] | None]) -> CellIndices:
-        """The free cells (n, 2) that a way joins with one of `cells`."""
+        """Return the free cells (n, 2) that are connected with one of `cells`."""
         from scipy.sparse.csgraph import connected_components
 
         _, labels = connected_components(self._graph, directed=False)
@@ -76,7 +77,7 @@ class GridGraph:
         return np.column_stack(np.divmod(self._cells[np.isin(labels, wanted)], self._width))
 
     def is_free(self, cells: CellIndices) -> CellMask:
-        """Which of the cells (n, 2) of the grid are free."""
+        """Return which of the cells (n, 2) are free."""
         free: CellMask = self._number[cells[:, 0] * self._width + cells[:, 1]] >= 0
         return free
 
@@ -88,7 +89,7 @@ class GridGraph:
 
 
 def _passed(move: tuple[int, int]) -> list[tuple[int, int]]:
-    """The cells that a move runs between or over besides its ends."""
+    """Return the cells that a move crosses besides its ends."""
     a, b = move
     if abs(a) == 2:
         return [(a // 2, 0), (a // 2, b)]
@@ -98,7 +99,7 @@ def _passed(move: tuple[int, int]) -> list[tuple[int, int]]:
 
 
 def resample_polyline(way: Array, spacing: float, least: int = 1) -> Array:
-    """The way (n, 2) with points evenly spaced, at most `spacing` meters apart, in at least so many legs."""
+    """Return a polyline (n, 2) with evenly spaced points, at most `spacing` m apart, in at least `least` segments."""
     along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
     wanted = np.linspace(0.0, along[-1], max(least, math.ceil(along[-1] / spacing)) + 1)
     return np.column_stack((np.interp(wanted, along, way[:, 0]), np.interp(wanted, along, way[:, 1])))

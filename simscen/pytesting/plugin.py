@@ -22,12 +22,12 @@ SUFFIXES = (".scenario.yaml", ".scenario.yml")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options, and what the configuration may say instead."""
+    """Add the options and their configuration settings."""
     group = parser.getgroup("simscen")
     group.addoption(
         "--simscen",
         action="store_true",
-        help="collect the *.scenario.yaml below the given paths: an item for each run, as `simscen run` would make it",
+        help="collect the *.scenario.yaml files below the given paths, with one item per run as in `simscen run`",
     )
     group.addoption(
         "--simscen-seed",
@@ -43,28 +43,28 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="run scenarios with this stack instead of their own, as --stack of `simscen run`; repeatable "
+        help="run scenarios with this stack instead of their own, like --stack of `simscen run`; repeatable "
         "(ini: simscen_stack)",
     )
     group.addoption(
         "--simscen-out",
         metavar="DIR",
-        help="folder in which each session leaves its logs and pictures (ini: simscen_out; default: simscen-out)",
+        help="output folder for logs and pictures of each session (ini: simscen_out; default: simscen-out)",
     )
     parser.addini("simscen_paths", "folders and files whose scenarios are collected without --simscen", "paths", [])
-    parser.addini("simscen_seed", "as --simscen-seed", default="")
-    parser.addini("simscen_stack", "as --simscen-stack, one in a line", "linelist", [])
-    parser.addini("simscen_world_path", "folders with worlds and models, as --world-path", "paths", [])
-    parser.addini(OUT_OPTION, "as --simscen-out", default="")
+    parser.addini("simscen_seed", "like --simscen-seed", default="")
+    parser.addini("simscen_stack", "like --simscen-stack, one per line", "linelist", [])
+    parser.addini("simscen_world_path", "folders with worlds and models, like --world-path", "paths", [])
+    parser.addini(OUT_OPTION, "like --simscen-out", default="")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Tell of the marker that all scenarios have."""
-    config.addinivalue_line("markers", "simscen: every run of a scenario; its tags are markers, too")
+    """Register the marker that all scenario items have."""
+    config.addinivalue_line("markers", "simscen: all runs of scenarios; their tags are markers as well")
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """A scenario's file, where somebody asks for it."""
+    """Collect a scenario file if it was requested."""
     if not file_path.name.endswith(SUFFIXES) or not _asked(file_path, parent):
         return None
     from simscen.pytesting.scenario_items import ScenarioFile
@@ -82,7 +82,7 @@ def _asked(file: Path, parent: pytest.Collector) -> bool:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
-    """With xdist: all workers leave their logs in one folder."""
+    """Give all workers of xdist the same output folder."""
     from simscen.pytesting.runner import runner_of
 
     node.workerinput[OUT_OPTION] = str(runner_of(node.config).folder)
@@ -90,7 +90,7 @@ def pytest_configure_node(node: Any) -> None:
 
 @pytest.fixture
 def simscen(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Simscen]:
-    """`simscen("goal.scenario.yaml", seed=7)` runs a scenario here and now: a Run with result, metrics and trace."""
+    """Provide `simscen("goal.scenario.yaml", seed=7)`, which runs a scenario and returns its Run."""
     from simscen.pytesting.runner import Simscen
 
     yield Simscen(request.path.parent, tmp_path)

@@ -1,4 +1,4 @@
-"""Runs scenarios for pytest: one warm process for each worker, and a folder for each session."""
+"""Runner of scenarios for pytest: one warm process per worker, and one output folder per session."""
 
 import secrets
 from contextlib import ExitStack
@@ -22,20 +22,21 @@ from simscen.run.sessions.results import finished_run
 
 WARM_PROCESS = ("-m", "simscen.cli.session.warm_process")
 WALL_LIMIT_S = 300.0
-"""Seconds that one run may take, as with `simscen run`."""
+"""Wall-clock limit of a run, as in `simscen run`."""
 
 
 class Runner:
-    """Runs one after the other, each in a process of its own, and leaves their files in `folder`."""
+    """Runs scenarios one after the other, each in its own process, and writes their files to `folder`."""
 
     def __init__(self, folder: Path) -> None:
+        """Create a runner that writes to a folder."""
         self.folder = folder
         self._numbers = count()
         self._standbys: dict[tuple[str, ...], OnDemandRunner] = {}
         self._closing = ExitStack()
 
     def run(self, scenario: LoadedScenario, seed: int) -> RunFinished:
-        """The answer to a run."""
+        """Run a scenario and return its result."""
         key = scenario.key(seed)
         job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT_S, ReplayMode.FAILED)
         told = plugin_path_arguments(plugins_of(scenario))
@@ -52,7 +53,7 @@ _RUNNER: pytest.StashKey[Runner] = pytest.StashKey()
 
 
 def runner_of(config: pytest.Config) -> Runner:
-    """That of this process, until pytest ends; a worker of xdist is told its folder."""
+    """Return the runner of this process. A worker of xdist gets its folder from the controller."""
     if (known := config.stash.get(_RUNNER, None)) is None:
         known = config.stash[_RUNNER] = Runner(_folder(config))
         config.add_cleanup(known.close)
@@ -67,25 +68,25 @@ def _folder(config: pytest.Config) -> Path:
     return home / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}-pytest"
 
 
-# MERGED: What the fixture `simscen` gives to a test.
 class Simscen:
-    """Runs scenarios in the test's own process, with `simscen.simulate()`. Files are relative to the test's folder.
+    """Value of the fixture `simscen`: runs scenarios in the process of the test with `simscen.simulate()`.
 
-    Each run leaves its log among the test's temporary files: `run.log`.
+    Paths are relative to the folder of the test. The log of each run, `run.log`, is in the test's temporary folder.
     """
 
     def __init__(self, folder: Path, out: Path) -> None:
+        """Take the folder of the test and the folder for logs."""
         self._folder, self._out = folder, out
         self._runs = 0
 
     def __call__(
         self, scenario: str | Path, seed: int | None = None, *, stack: str | None = None, variation: str = ""
     ) -> Run:
-        """Run it; the arguments are those of `simscen.simulate`."""
+        """Run a scenario; the arguments are those of `simscen.simulate`."""
         self._runs += 1
         log = self._out / f"run-{self._runs}.mcap"
         return simscen.simulate(self._folder / scenario, seed, log=log, stack=stack, variation=variation)
 
     def variations(self, scenario: str | Path) -> list[str]:
-        """The names of a scenario's variations; `[""]` where it has none."""
+        """Return the names of a scenario's variations; `[""]` without any."""
         return simscen.variations(self._folder / scenario)

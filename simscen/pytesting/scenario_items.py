@@ -1,4 +1,4 @@
-"""A scenario's file as pytest collects it: an item for each of its runs, named as the command line names it."""
+"""Collection of scenario files by pytest: one item per run, named as on the command line."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ if TYPE_CHECKING:
 PYTEST_MARKERS = frozenset(
     {"skip", "skipif", "xfail", "usefixtures", "filterwarnings", "parametrize", "tryfirst", "trylast"}
 )
-"""Markers that pytest obeys: a tag of such a name is no marker."""
+"""Built-in markers of pytest. Tags with these names do not become markers."""
 
 
 class ScenarioFile(pytest.File):
-    """The runs of a scenario. A file that is wrong is an error of the collection, told as `simscen validate` would."""
+    """Scenario file. An invalid file is a collection error with the messages of `simscen validate`."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """An item for each variation, seed and stack."""
+        """Yield an item for each variation, seed, and stack."""
         try:
             yield from self._items()
         except InvalidInput as error:
@@ -63,15 +63,16 @@ class ScenarioFile(pytest.File):
 
 
 class ScenarioRun(pytest.Item):
-    """One run of a scenario. It passes, fails with simscen's own reasons, or is expected to fail or skipped."""
+    """One run of a scenario: passed, failed with the reported reasons, expected to fail, or skipped."""
 
     def __init__(self, *, scenario: LoadedScenario, seed: int, **kwargs: Any) -> None:
+        """Take the scenario, the seed, and pytest's arguments."""
         super().__init__(**kwargs)
         self._scenario, self._seed = scenario, seed
 
     @classmethod
     def made(cls, parent: ScenarioFile, scenario: LoadedScenario, seed: int, every_seed: bool) -> ScenarioRun:
-        """The item, with its tags as markers."""
+        """Create an item with the scenario's tags as markers."""
         folder = scenario.id.rpartition("/")[0]
         name = short_run_name(scenario.key(seed), every_seed, f"{folder}/" if folder else "")
         item: ScenarioRun = cls.from_parent(parent, name=name, scenario=scenario, seed=seed)
@@ -84,7 +85,7 @@ class ScenarioRun(pytest.Item):
         return item
 
     def runtest(self) -> None:
-        """Run it, in a process of its own."""
+        """Run the scenario in its own process."""
         _raise_errors(checked(self._scenario))
         run = runner_of(self.config).run(self._scenario, self._seed)
         self.user_properties += _properties(run)
@@ -94,7 +95,7 @@ class ScenarioRun(pytest.Item):
             raise ScenarioFailed(run)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """What was violated, where and when, in place of a traceback."""
+        """Return the violated criteria with place and time instead of a traceback."""
         if isinstance(excinfo.value, ScenarioFailed):
             return failure_representation(excinfo.value.run)
         if isinstance(excinfo.value, InvalidInput):
@@ -102,18 +103,18 @@ class ScenarioRun(pytest.Item):
         return super().repr_failure(excinfo)
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
-        """Where it is written."""
+        """Return file, line, and name."""
         return self.path, 0, self.name
 
 
 def _raise_errors(problems: list[Problem]) -> None:
-    """Raise InvalidInput for errors; warnings are what `simscen validate` is for."""
+    """Raise InvalidInput for errors. Warnings are only reported by `simscen validate`."""
     if errors := [problem for problem in problems if problem.severity == "error"]:
         raise InvalidInput(errors)
 
 
 def _seed(config: pytest.Config) -> int | None:
-    """That of the command line, or of the configuration. Raises UsageError."""
+    """Return the seed from the command line or the configuration. Raises UsageError."""
     given = config.getoption("--simscen-seed")
     written = config.getini("simscen_seed")
     if given is not None or not written:
@@ -124,25 +125,25 @@ def _seed(config: pytest.Config) -> int | None:
 
 
 def _properties(run: RunFinished) -> list[tuple[str, object]]:
-    """What junit.xml says of it."""
+    """Return the properties of a run for junit.xml."""
     files = {"log": run.artifacts.mcap, "picture": run.artifacts.picture}
     facts = {"seed": run.key.seed, "simulated_seconds": f"{run.result.simulated:.3f}", "again": run.again, **files}
     return [(name, value) for name, value in facts.items() if value]
 
 
-# MERGED: A run that did not pass, as pytest shows it: here, in the summary, in junit.xml and from a worker of xdist.
 class ScenarioFailed(AssertionError):
-    """A run that did not pass, and was not expected to fail; or that could not be completed."""
+    """A run failed unexpectedly or could not be completed."""
 
     def __init__(self, run: RunFinished) -> None:
+        """Take the finished run."""
         self.run = run
         super().__init__(_cause(run))
 
 
 def failure_representation(run: RunFinished) -> Any:
-    """What the command line prints below such a run.
+    """Return what the command line prints below a failed run.
 
-    pytest passes a failure on from worker to controller only in this form, which has no public name.
+    This is the only form in which xdist transfers a failure from worker to controller; it is not public in pytest.
     """
     lines = [f"{plain_text(line).removeprefix('      ')}\n" for line in violation_lines(run)]
     first = next((complaint.line for complaint in reported_violations(run) if not complaint.warning), 0)
@@ -151,7 +152,7 @@ def failure_representation(run: RunFinished) -> Any:
 
 
 def _cause(run: RunFinished) -> str:
-    """The first reason, in a line."""
+    """Return the first reason in one line."""
     if run.outcome is Outcome.ERROR:
         return error_summary(run)
     return next((complaint.message for complaint in reported_violations(run) if not complaint.warning), "failed")

@@ -32,7 +32,7 @@ class Lockstep:
     """The simulation waits for the stack."""
 
     def __init__(self, graph: Graph, barrier: NodeBarrier, rounds: int, wait_s: float) -> None:
-        """`rounds` limits the additional rounds without a command; 0 = one per node."""
+        """Take the graph, the barrier, and the limit of additional rounds without a command (0 = one per node)."""
         self._graph, self._barrier = graph, barrier
         self._extra_rounds, self._wait = rounds, wait_s
         self.counters: Dict[str, Any] = {"beats": 0, "without_command": 0, "late_commands": 0}

@@ -43,4 +43,4 @@ def test_nothing_is_measured_when_there_is_nothing_to_compare_with(tmp_path: Pat
     (tmp_path / "none.json").write_text("{}")
     done = bench("--compare", str(tmp_path / "none.json"))
     assert (done.returncode, done.stdout) == (2, "")
-    assert "none.json is no result of `simscen bench --format json`" in done.stderr
+    assert "none.json is not a result of `simscen bench --format json`" in done.stderr

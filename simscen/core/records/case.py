@@ -20,10 +20,10 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Passage:
-    """A line across the shortest way to a goal, from one fixed solid to another, in the world frame.
+    """A narrow place on the shortest path to a goal: a line between two static solids, in the world frame.
 
-    Who takes that way has to cross the line, so what stands on it is in the way. `between` are the names of the two
-    solids; "" for one without a name.
+    A robot on this path must cross the line, so that an obstacle on the line blocks it. `between` contains the names of
+    the solids; "" for a solid without a name.
     """
 
     goal: str
@@ -32,40 +32,40 @@ class Passage:
 
     @property
     def width(self) -> float:
-        """Meters from solid to solid."""
+        """Distance between the solids in m."""
         return math.dist(*self.ends)
 
     @property
     def middle(self) -> Point:
-        """The point halfway."""
+        """Center of the line."""
         (ax, ay), (bx, by) = self.ends
         return (ax + bx) / 2, (ay + by) / 2
 
     @property
     def told(self) -> str:
-        """In words: "the passage of 0.90 m between `wall 3` and `wall 4` at (9.00, 5.75)"."""
+        """Description such as "the passage of 0.90 m between `wall 3` and `wall 4` at (9.00, 5.75)"."""
         one, other = self.between
         between = f" between `{one}` and `{other}`" if one and other and one != other else ""
         return f"the passage of {self.width:.2f} m{between} at ({self.middle[0]:.2f}, {self.middle[1]:.2f})"
 
 
 CLEARANCE_RANGE = 2.0
-"""Meters around the robot's hull in which clearance is always measured."""
+"""Distance in m around the robot within which clearance is always measured."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """The parts of a scenario that judging needs; travels in the log, so that a log alone can be judged.
+    """The parts of a scenario that judging needs. They are stored in the log, so that it can be judged alone.
 
-    `shortest` maps a goal's name to the length in meters of the shortest way that a disc of the robot's inscribed
-    radius has from the goal before it (the start for the first) through the static world; inf when there is none.
-    `sent` are the goals that events may send on the way.
-    `expected` maps the name of a goal at which the robot is to fail to how: "failed", or the name of an error code.
-    `clearance_range` is how far around the hull clearance was searched, in meters: a clearance that is not below it was
-    cut off, and is at least that.
-    `passages` are what these ways lead through, goal by goal, each in the direction of its way.
-    `disturbances` are what has to happen: the scenario's events, then its faults.
-    `masks` are the filter masks that criteria name, by their files as written.
+    Attributes:
+        shortest: For each goal name, the length in m of the shortest path from the previous goal (or the start) through
+            the static world for a disc of the robot's inscribed radius; inf if there is none.
+        clearance_range: Distance in m around the robot within which clearance was measured. Larger values are cut off.
+        disturbances: The events and then the faults of the scenario.
+        sent: Goals that events can send.
+        passages: Narrow places on the shortest paths, goal by goal, in driving direction.
+        masks: Filter masks that criteria refer to, by file name.
+        expected: For each goal that is expected to fail, "failed" or the name of an error code.
     """
 
     start: Pose2
@@ -84,17 +84,19 @@ class Case:
 
     @property
     def every_goal(self) -> tuple[Goal, ...]:
-        """The goals in order, then those that events may send."""
+        """The goals in order, followed by those that events can send."""
         return *self.goals, *self.sent
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """A run: its `result` (outcome, verdicts, metrics), the `trace` it was judged from, the `case` it was judged by.
+    """A run: its `result` (outcome, verdicts, metrics), and the `trace` and `case` from which it was judged.
 
-    `log` is the MCAP file that holds all of it; None when none was asked for. `stack` is what an external stack said of
-    itself; empty for one in the engine. `robots` is what came of each of several robots by name, as if it had been the
-    only one, e.g. `run.robots["left"].trace`; `trace`, `case` and `stack` are then those of the first.
+    Attributes:
+        log: MCAP file of the run; None if none was requested.
+        stack: Description that an external stack gave of itself; empty for the reference stack.
+        robots: The run of each of several robots by name, e.g. `run.robots["left"].trace`; `trace`, `case`, and `stack`
+            are then those of the first robot.
     """
 
     result: RunResult
@@ -105,7 +107,7 @@ class Run:
     robots: Mapping[str, "Run"] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        """What it is and why it did not pass, so that `assert run.passed` says it."""
+        """Return a description with the reasons of a failure, which `assert run.passed` shows."""
         broken = [(v.id, v.tightest) for v in self.result.verdicts if v.status is not Status.PASS]
         why = [f"{name} {finding.measured} ({finding.limit})" for name, finding in broken if finding is not None]
         told = f"<Run of {self.result.key.test}, seed {self.result.key.seed}: {self.result.outcome.value}"
@@ -113,17 +115,17 @@ class Run:
 
     @property
     def passed(self) -> bool:
-        """Whether everything held; a run that could not be completed never passed."""
+        """Whether all criteria passed; never for a run that could not be completed."""
         return self.result.outcome is Outcome.PASSED
 
     @property
     def as_expected(self) -> bool:
-        """Whether it passed, or failed as its scenario says it does."""
+        """Whether the run passed, or failed as its scenario expects."""
         return self.result.outcome.good
 
     def verdict(self, name: str) -> Verdict:
-        """The verdict of the criterion with this id, e.g. `run.verdict("path_length").status`. Raises KeyError."""
+        """Return the verdict of a criterion by id, e.g. `run.verdict("path_length").status`. Raises KeyError."""
         found = {verdict.id: verdict for verdict in self.result.verdicts}
         if name not in found:
-            raise KeyError(f"no criterion is called {name!r}; there are: {', '.join(found)}")
+            raise KeyError(f"no criterion has the id {name!r}; there are: {', '.join(found)}")
         return found[name]

@@ -1,4 +1,4 @@
-"""What came of one run: the one record that reports, journals, studies and people read."""
+"""Result of a run: the record that all reports are based on."""
 
 import shlex
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from simscen.core.records.verdict import Verdict
 
 
 class Outcome(str, Enum):
-    """How a run came out: `error` means that it could not be completed, which is never a verdict on the robot."""
+    """Outcome of a run. `error` means that it could not be completed, which says nothing about the robot."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -21,23 +21,23 @@ class Outcome(str, Enum):
 
     @property
     def good(self) -> bool:
-        """Whether it is as the scenario says: passed, failed as expected, or skipped."""
+        """Whether the outcome is as intended: passed, failed as expected, or skipped."""
         return self not in (Outcome.FAILED, Outcome.ERROR)
 
 
 REPEAT_SUFFIX = "again"
-"""What the second of two runs is called that must be equal; no stack may be called so."""
+"""Suffix of the second of two runs that must be equal; not allowed as the name of a stack."""
 _SEPARATOR = "@"
-"""Stands between a variation and a stack in a folder's name; neither of their names may hold it."""
+"""Separator of variation and stack in folder names; not allowed in their names."""
 
 
 @total_ordering
 @dataclass(frozen=True)
 class RunKey:
-    """Names one run: the scenario's id, the seed, the scenario's variation, and the stack where there are several.
+    """Identity of a run: scenario id, seed, variation ("" if there is none), and stack name if there are several.
 
-    `variation` is "" where the scenario has none. `stack_name` has `.again` behind it for the second of two runs that
-    must be equal. Keys are in the order of scenario, variation, seed and stack.
+    `stack_name` ends with `.again` for the second of two runs that must be equal. Keys are ordered by scenario,
+    variation, seed, and stack.
     """
 
     scenario: str
@@ -54,44 +54,44 @@ class RunKey:
 
     @property
     def test(self) -> str:
-        """What is run, as -k sees it: the scenario's id, with its variation as pytest writes parameters."""
+        """Name for `-k`: the scenario id, with the variation in brackets like a pytest parameter."""
         return scenario_title(self.scenario, self.variation)
 
     @property
     def folder(self) -> str:
-        """The run's folder inside its scenario's, e.g. "seed-7", "seed-7-slow" or "seed-7-speed=0.5@slow"."""
+        """Folder of the run within that of its scenario, e.g. "seed-7", "seed-7-slow", or "seed-7-speed=0.5@slow"."""
         label = _SEPARATOR.join(part for part in (self.variation, self.stack_name) if part)
         return "-".join(part for part in (f"seed-{self.seed}", label) if part)
 
     @property
     def twin(self) -> "RunKey":
-        """The second of two runs that must be equal."""
+        """Key of the second of two runs that must be equal."""
         return replace(self, stack_name=".".join(part for part in (self.stack_name, REPEAT_SUFFIX) if part))
 
     @property
     def first(self) -> "RunKey":
-        """The first of two runs that must be equal; itself where it is no second one."""
+        """Key of the first of two runs that must be equal; the key itself for any other run."""
         return (
             replace(self, stack_name=self.stack_name[: -len(REPEAT_SUFFIX)].removesuffix(".")) if self.repeats else self
         )
 
     @property
     def repeats(self) -> bool:
-        """Whether it is a second run, there only to be compared with the first."""
+        """Whether this is a second run that is only compared with the first."""
         return self.stack_name == REPEAT_SUFFIX or self.stack_name.endswith(f".{REPEAT_SUFFIX}")
 
 
 def scenario_title(scenario: str, variation: str) -> str:
-    """What a scenario, or a variation of it, is called: "navigation/speeds[speed=0.5]"."""
+    """Return the title of a scenario or variation, such as "navigation/speeds[speed=0.5]"."""
     return f"{scenario}[{variation}]" if variation else scenario
 
 
 @dataclass(frozen=True)
 class RunFailure:
-    """Why a run could not be completed.
+    """Reason why a run could not be completed.
 
-    `kind` is JUnit's error type: crashed, timeout, out-of-memory, invalid, interrupted, not-run, internal. `tail` is
-    the end of the worker's log: text from outside, to be shown literally.
+    `kind` is the error type in JUnit: crashed, timeout, out-of-memory, invalid, interrupted, not-run, or internal.
+    `tail` is the end of the worker's output, which must be shown literally.
     """
 
     kind: str
@@ -101,15 +101,21 @@ class RunFailure:
 
 @dataclass(frozen=True)
 class RunResult:
-    """All that a run says about itself; nothing in it depends on the machine, the clock or the working folder.
+    """Result of a run. It does not depend on the machine, the clock, or the working folder.
 
-    `path` is the scenario's file relative to the root, `lines` the line of each verdict in it, in the order of
-    `verdicts` (empty or 0 = unknown). `undefined` says of each metric that is None why. `events` counts what happened,
-    by kind. `disturbances` is what became of each event and fault of the scenario; each that had to happen and did not
-    has a verdict of its own, before those of the criteria. `ended` is why the simulation stopped, `simulated` is in
-    seconds, `tick_rate` turns the findings' ticks into seconds. `error` is set exactly when the outcome is ERROR.
-    `stack` is the NAME=VALUE of the --stack that it ran with, files seen from the root; "" = the scenario's own stack.
-    `reason` is the scenario's, where it is expected to fail or skipped.
+    Attributes:
+        path: Scenario file relative to the root.
+        verdicts: Verdicts of required events and faults that did not happen, then those of the criteria.
+        lines: Line of each verdict in the scenario file, in the same order; empty or 0 if unknown.
+        undefined: Reason for each metric that is None.
+        events: Number of events by kind.
+        disturbances: Outcome of each event and fault of the scenario.
+        ended: Reason why the simulation stopped.
+        simulated: Simulated time in s.
+        tick_rate: Ticks per second of the findings.
+        error: Failure of a run that could not be completed; set exactly if the outcome is ERROR.
+        stack: NAME=VALUE of the --stack that was used, with files relative to the root; "" for the scenario's own.
+        reason: Reason in the scenario for an expected failure or for skipping it.
     """
 
     key: RunKey
@@ -134,17 +140,17 @@ class RunResult:
 
     @property
     def again(self) -> str:
-        """The command that repeats the run, from the scenario's root."""
+        """Command that repeats the run, from the root of the scenario."""
         varied = ["--variation", self.key.variation] if self.key.variation else []
         chosen = ["--stack", self.stack] if self.stack else []
         return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed), *varied, *chosen])
 
 
 def skipped_result(key: RunKey, path: str, reason: str, stack: str = "") -> RunResult:
-    """The result of a run that its scenario says is not to be run."""
+    """Return the result of a skipped run."""
     return RunResult(key, path, Outcome.SKIPPED, stack=stack, reason=reason)
 
 
 def error_result(key: RunKey, path: str, failure: RunFailure, stack: str = "") -> RunResult:
-    """The result of a run that could not be completed."""
+    """Return the result of a run that could not be completed."""
     return RunResult(key, path, Outcome.ERROR, error=failure, stack=stack)

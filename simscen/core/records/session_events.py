@@ -9,7 +9,7 @@ from simscen.core.records.run_result import Outcome, RunKey, RunResult
 
 @dataclass(frozen=True)
 class OutcomeCounts:
-    """How many runs came out how."""
+    """Number of runs by outcome."""
 
     passed: int = 0
     failed: int = 0
@@ -17,13 +17,13 @@ class OutcomeCounts:
 
     @property
     def decided(self) -> int:
-        """The runs that say something about the robot: an error says nothing."""
+        """Number of completed runs."""
         return self.passed + self.failed
 
 
 @dataclass(frozen=True)
 class Flip:
-    """A seed of a scenario that passes with one of two stacks and fails with the other; `why` is what it failed of."""
+    """A scenario and seed that passes with only one of two stacks; `why` is the failed criterion."""
 
     scenario: str
     seed: int
@@ -34,10 +34,10 @@ class Flip:
 
 @dataclass(frozen=True)
 class MetricDifference:
-    """A metric of a stack minus that of the baseline, over the `pairs` of runs that can be compared.
+    """Difference of a metric between a stack and the baseline, over the `pairs` of runs that can be compared.
 
-    `baseline` and `value` are the means of these runs, `interval` that of the mean difference with 95 %, None for too
-    few pairs. `lower`, `equal` and `higher` count pairs; `p` is the sign test of lower and higher.
+    `baseline` and `value` are means; `interval` is the 95 % confidence interval of their difference, None for too few
+    pairs. `lower`, `equal`, and `higher` count pairs; `p` is the p-value of the sign test.
     """
 
     metric: str
@@ -55,11 +55,11 @@ class MetricDifference:
 
 @dataclass(frozen=True)
 class BaselineComparison:
-    """One stack against the baseline: the `pairs` of runs that both came to an end, and what was left out.
+    """Comparison of one stack with the baseline, over the `pairs` of completed runs.
 
-    `broken` pairs have a run that could not be completed, `alone` runs have no partner at all. `parted` are the pairs
-    of which only one reached the last goal: how they drove is compared in nothing but collisions. `p` is the sign test
-    of the flips.
+    `broken` pairs contain a run that could not be completed, `alone` runs have no partner. `parted` counts the pairs of
+    which only one reached the last goal; only their collisions are compared. `p` is the p-value of the sign test of the
+    flips.
     """
 
     stack: str
@@ -74,9 +74,9 @@ class BaselineComparison:
 
 @dataclass(frozen=True)
 class Comparison:
-    """`stacks` maps names to what was given as --stack, in that order; the first is the baseline of the others.
+    """Comparison of several stacks: `stacks` maps names to the values of --stack; the first one is the baseline.
 
-    `outcomes` are for each scenario those of each stack, by name.
+    `outcomes` contains for each scenario the outcomes of each stack by name.
     """
 
     stacks: Mapping[str, str]
@@ -85,18 +85,18 @@ class Comparison:
 
     @property
     def baseline(self) -> str:
-        """What the others are compared with."""
+        """Name of the baseline stack."""
         return next(iter(self.stacks))
 
     def total(self, stack: str) -> OutcomeCounts:
-        """All scenarios together."""
+        """Return the outcomes of a stack over all scenarios."""
         counts = [row[stack] for row in self.outcomes.values()]
         return OutcomeCounts(*(sum(getattr(one, name) for one in counts) for name in ("passed", "failed", "errors")))
 
 
 @dataclass(frozen=True)
 class Artifacts:
-    """Where a run left its files, as paths to print; "" = not written."""
+    """Paths of the files of a run, for printing; "" = not written."""
 
     folder: str = ""
     mcap: str = ""
@@ -107,10 +107,10 @@ class Artifacts:
 
 @dataclass(frozen=True)
 class SessionStarted:
-    """The first event: `total` runs of `scenarios` files will be spread over `workers` processes.
+    """First event of a session: `total` runs of `scenarios` files on `workers` processes.
 
-    `ids` are the scenarios' ids, each of its variations for itself where it has some; `stacks` are the NAME=VALUE of
-    those that take the place of the scenarios' own. `twice` = each run has a second one that must be equal.
+    `ids` contains the titles of scenarios and variations, `stacks` the values of --stack. `twice`: each run has
+    a second one that must be equal.
     """
 
     version: str
@@ -126,7 +126,7 @@ class SessionStarted:
 def session_started(
     version: str, runs: Sequence[RunKey], workers: int, folder: Path, stacks: tuple[str, ...]
 ) -> SessionStarted:
-    """The first event of a session of these runs."""
+    """Return the first event of a session with these runs."""
     ids = tuple(sorted({key.test for key in runs}))
     scenarios = len({key.scenario for key in runs})
     twice = any(key.repeats for key in runs)
@@ -135,7 +135,7 @@ def session_started(
 
 @dataclass(frozen=True)
 class RunStarted:
-    """A worker has begun a run of the scenario file `path` (as the user would write it)."""
+    """A worker has started a run of the scenario file `path`."""
 
     key: RunKey
     path: str
@@ -144,7 +144,7 @@ class RunStarted:
 
 @dataclass(frozen=True)
 class RunProgress:
-    """A run has got this far: simulated seconds, and what the robot is doing, e.g. "goal shelf"."""
+    """Progress of a run: simulated time in s, and the current activity, e.g. "goal shelf"."""
 
     key: RunKey
     simulated: float
@@ -153,11 +153,11 @@ class RunProgress:
 
 @dataclass(frozen=True)
 class RunFinished:
-    """A run is over: its result, and what only this session knows of it.
+    """A run has finished: its result and data of this session.
 
-    `wall` is in seconds. `again` is the command that repeats the run from the working folder, and `file` the scenario
-    as seen from there, for people to open; "" = the result's own. `tags` are the scenario's.
-    `warnings` are those of the external stack. `resumed`: --resume kept it from the session before.
+    `wall` is the wall time in s. `again` is the command that repeats the run, and `file` the path of the scenario, both
+    from the working folder; "" = that of the result. `warnings` are those of the external stack. `resumed`: the result
+    was kept from an earlier session by --resume.
     """
 
     result: RunResult
@@ -171,21 +171,21 @@ class RunFinished:
 
     @property
     def key(self) -> RunKey:
-        """Which run it is."""
+        """Key of the run."""
         return self.result.key
 
     @property
     def outcome(self) -> Outcome:
-        """How it came out."""
+        """Outcome of the run."""
         return self.result.outcome
 
 
 @dataclass(frozen=True)
 class SessionFinished:
-    """The last event: counts, simulated and wall seconds of the whole session, and where the reports are.
+    """Last event of a session: number of runs by outcome, simulated and wall time in s, and paths of the reports.
 
-    `expected` failed as their scenarios say, `skipped` were not run. `comparison` is what several stacks on the same
-    scenarios say about each other. `page` is the page that shows the session.
+    `expected` counts runs that failed as expected, `skipped` those that were not run. `comparison` compares several
+    stacks. `page` is the report page.
     """
 
     passed: int

@@ -1,7 +1,7 @@
-"""The recorded run on the lockstep clock: one Moment per control step, and sampled signals.
+"""Recorded run on the lockstep clock: one Moment per beat, and sampled signals.
 
-The MCAP recorder and the TraceBuilder take the same moments, and a replayed log gives the same Trace, so that a run can
-be judged later without a simulator.
+The MCAP recorder and the TraceBuilder process the same moments, and reading a log gives the same Trace. A run can
+therefore be judged later without a simulation.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ else:
 
 
 class Truth(NamedTuple):
-    """The robot as it really is: `pose` of its base in the world, `twist` in its own frame.
+    """True state of the robot: `pose` of its base in the world frame, `twist` in the base frame.
 
-    `clearance` is the distance in meters from the robot's hull to the nearest obstacle surface (negative when they
-    overlap, at most the range that was searched). `objects` are the poses of things that move.
+    `clearance` is the distance in m from the robot to the nearest obstacle, negative if they overlap, and at most the
+    range that was searched. `objects` are the poses of movable objects.
     """
 
     pose: Pose3
@@ -43,15 +43,15 @@ class Truth(NamedTuple):
 
 
 class DeferredTruth(Protocol):
-    """A sample of the truth that is worked out when somebody asks for it."""
+    """Sample of the ground truth that is computed on demand."""
 
     def truth(self) -> Truth:
-        """All of it."""
+        """Return the ground truth."""
         ...
 
 
 class LogLine(NamedTuple):
-    """A line that a stack would write to /rosout: its severity in rcl_interfaces' numbers, who says it, and what."""
+    """Log message of a stack for /rosout: severity as in rcl_interfaces, name of the logger, and text."""
 
     level: int
     name: str
@@ -59,7 +59,7 @@ class LogLine(NamedTuple):
 
 
 class CostGrid(NamedTuple):
-    """A costmap as a stack publishes it: "global" or "local", the frame it is in, and Nav2's costs as 0 … 100, -1."""
+    """Published costmap: "global" or "local", its frame, and costs as occupancy 0 … 100 or -1, as in Nav2."""
 
     name: str
     frame: str
@@ -68,9 +68,9 @@ class CostGrid(NamedTuple):
 
 @fast_dataclass(eq=False)
 class Decision:
-    """What the stack made of a beat: its `command`, and what it would publish. None means: nothing new.
+    """Output of the stack for a beat: its `command`, and what it publishes; None if there is nothing new.
 
-    `odometry` are the new readings of its odometry filter, if it has one.
+    `odometry` contains the new output of its odometry filter, if it has one.
     """
 
     command: Twist
@@ -85,10 +85,10 @@ class Decision:
 
 @fast_dataclass(eq=False)
 class Moment:
-    """One beat of the lockstep: truth, what the robot was told (faults applied), what it decided, what happened.
+    """One beat of the lockstep: ground truth, readings with faults applied, decision of the stack, and events.
 
-    `sample` is None on beats between two truth samples. `events` are the world's and the scenario's; the stack's own
-    stay in `decision.events`. A trace holds both, in that order.
+    `sample` is None on beats between two samples of the ground truth. `events` are those of the world and the scenario;
+    `decision.events` are those of the stack. A trace contains both, in this order.
     """
 
     tick: int
@@ -99,22 +99,22 @@ class Moment:
 
     @property
     def truth(self) -> Truth | None:
-        """How the robot really is; None on beats between two samples."""
+        """The true state of the robot; None on beats between two samples."""
         sample = self.sample
         return sample if sample is None or isinstance(sample, Truth) else sample.truth()
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """A whole run. A sample's tick is the beat it came with, even when a reading was measured earlier.
+    """Complete run. The tick of a sample is the beat at which it arrived, even if it was measured earlier.
 
     truth:      x, y, yaw in the world              (m, m, rad)
     velocity:   vx, vy, wz in the base frame        (m/s, m/s, rad/s), at truth's ticks
     clearance:  hull to nearest obstacle            (m), at truth's ticks
     belief:     x, y, yaw in the map and the upper triangle of its covariance: xx, xy, xyaw, yy, yyaw, yawyaw
-    odometry:   x, y, yaw in the odom frame, of the first odometry sensor that spoke
-    command:    vx, vy, wz as sent to the wheels, when it changes and at least 20 times a second
-    objects:    name → x, y, yaw of moving things, when it changes and at least once a second
+    odometry:   x, y, yaw in the odom frame, of the first odometry sensor
+    command:    vx, vy, wz as sent to the wheels, on changes and at least 20 times per second
+    objects:    name → x, y, yaw of movable objects, on changes and at least once per second
     scans:      ticks at which the stack received a scan
     """
 
@@ -132,22 +132,22 @@ class Trace:
     end: int
 
     def seconds(self, tick: int) -> float:
-        """The simulated time of `tick` in seconds."""
+        """Return the simulated time of a tick in s."""
         return tick / self.tick_rate
 
     def of_kind(self, *kinds: EventKind) -> tuple[Event, ...]:
-        """The events of these kinds, in order."""
+        """Return the events of these kinds, in order."""
         return tuple(event for event in self.events if event.kind in kinds)
 
     def place(self, tick: int) -> tuple[float, float]:
-        """Where the robot really was at `tick`."""
+        """Return the true position of the robot at a tick."""
         x, y, _ = self.truth.at(np.array([tick]))[0]
         return float(x), float(y)
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A signal: `ticks` (n,) ascending, `values` (n, k)."""
+    """Sampled signal: `ticks` (n,) in ascending order, and `values` (n, k)."""
 
     ticks: Ticks
     values: Array
@@ -156,5 +156,5 @@ class Samples:
         return len(self.ticks)
 
     def at(self, ticks: Ticks) -> Array:
-        """The newest value at each of `ticks` (sample and hold); the first value before the first sample."""
+        """Return the latest value at each of `ticks` (sample and hold); before the first sample, the first value."""
         return self.values[np.maximum(np.searchsorted(self.ticks, ticks, side="right") - 1, 0)]

@@ -20,7 +20,7 @@ class LiveRayCaster(RayCaster):
     """Casts rays of a robot against the static world and all objects that move, at their current poses."""
 
     def __init__(self, scene: RayScene, robot: Robot, without: frozenset[str] = frozenset()) -> None:
-        """The rays ignore the moving objects named in `without`."""
+        """Cast rays for a robot, ignoring the moving objects named in `without`."""
         self._scene, self._robot, self._without = scene, robot, without
         self._bodies: Mapping[str, Body] | None = None
         self._meshes: dict[str, TriangleMesh] = {}

@@ -46,7 +46,7 @@ class LiveStage:
         streams: Streams,
         fellows: "dict[str, LiveStage]",
     ) -> None:
-        """`filters` are the costmap filters of the robot's stack, `goals` the goals that events can send.
+        """Take the parts of a run: `filters` are the costmap filters of the stack, `goals` those that events can send.
 
         The stage adds itself to `fellows`, the stages of all robots by name.
         """
