@@ -85,7 +85,7 @@ class _WalkSettings(Spec):
             pose=pose,
             goals=goals,
             repeat=self.repeat,
-            speed=self.speed or _draw_speed(stage.chance(f"{_stream_owner(name, group)}, speed")),
+            speed=self.speed or _draw_speed(stage.rng(f"{_stream_owner(name, group)}, speed")),
             radius=self.radius,
             height=self.height,
             behavior=self.behavior,
@@ -171,7 +171,7 @@ class Crowd(_WalkSettings, WorldAction):
 
     def _draw_start(self, stage: Stage, index: int, group_start: Point | None) -> Point | None:
         """Return a free point of the start region, near the first of the group if given; None if none was found."""
-        rng, corners = stage.chance(f"person {self.names[index]}, start"), stage.region(self.start)
+        rng, corners = stage.rng(f"person {self.names[index]}, start"), stage.region(self.start)
         if group_start is None:
             box = _bounding_box(corners)
         else:
@@ -186,7 +186,7 @@ class Crowd(_WalkSettings, WorldAction):
         name, group = self.names[index], None
         if self.group_size > 1:
             group = f"{self.name} group {index // self.group_size + 1}"
-        rng = stage.chance(f"{_stream_owner(name, group)}, goals")
+        rng = stage.rng(f"{_stream_owner(name, group)}, goals")
         drawn = [_draw_goal(stage, rng, stage.region(region), self.radius) for region in self.goals]
         goals = tuple(goal for goal in drawn if goal is not None)
         if len(goals) < len(drawn):

@@ -55,7 +55,7 @@ class AnyAction(Choice):
         return action.perform(stage) if self.narrow is None else perform_checked(action, stage, self.added_by)
 
 
-_QUERIES = frozenset({*dir(Situation), "room", "chance", "door", "motion", "mass"})
+_QUERIES = frozenset({*dir(Situation), "room", "rng", "door", "motion", "mass"})
 """Members of a stage that only return information; all others change the run."""
 
 

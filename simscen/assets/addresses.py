@@ -49,7 +49,7 @@ class Fuel:
 
 
 def fuel(uri: str) -> Fuel | None:
-    """The Fuel address that a uri is, if it is one."""
+    """Return the Fuel address of a URI, or None if it is not one."""
     match = _FUEL.fullmatch(uri.rstrip("/"))
     if match is None:
         return None
@@ -58,7 +58,7 @@ def fuel(uri: str) -> Fuel | None:
 
 
 def standard(uri: str) -> str | None:
-    """The name of the model that every Gazebo brings along, if the uri means one: `sun` or `ground_plane`."""
+    """Return the name of a built-in model of Gazebo (`sun` or `ground_plane`) that a URI refers to, or None."""
     address = fuel(uri)
     if address is None:
         name = uri.removeprefix("model://").strip("/") if uri.startswith("model://") else ""

@@ -50,14 +50,14 @@ class Folders:
         return self.roots[1:]
 
     def shown(self, path: Path) -> str:
-        """The name of a file for users: relative to the root, elsewhere absolute."""
+        """Return the path of a file for messages: relative to the root if it is below it, otherwise absolute."""
         return path.relative_to(self.roots[0]).as_posix() if path.is_relative_to(self.roots[0]) else str(path)
 
     def find(self, uri: str, beside: Path, *, absolute: bool = False) -> Path:
-        """The real path of what a uri or a path means in a file in the folder `beside`, see addresses.places.
+        """Return the real path of a URI or path in a file in the folder `beside`; see addresses.places.
 
-        `absolute` paths are read only where they need not be the author's own: what xacro made of `$(find package)`,
-        and in worlds, which Gazebo saves with them. Raises Trouble, and Absent of it.
+        `absolute`: accept absolute paths, which xacro creates from `$(find package)` and which Gazebo saves in worlds.
+        Raises Trouble, or Absent if the file does not exist.
         """
         if not uri or not uri.isprintable():
             raise Trouble("control character in the uri" if uri else "the uri is empty")
@@ -82,11 +82,11 @@ class Folders:
 
     @staticmethod
     def named(path: Path) -> Path:
-        """A file as the user named it: links in its folder are the user's, only the file itself must not lead out."""
+        """Return the path of a file without resolving links of its folder; the file itself must not lead out."""
         return Path(os.path.realpath(path.parent)) / path.name
 
     def package(self, name: str, near: Path) -> Path:
-        """The folder of a ROS package for a file in the folder `near`; raises Trouble, and Absent of it."""
+        """Return the folder of a ROS package for a file in the folder `near`; raises Trouble or Absent."""
         if name in self.packages:
             return self.packages[name]
         if not is_package_name(name):
@@ -99,7 +99,7 @@ class Folders:
         raise Absent(f"there is no package {name!r}", hint + f"`packages: {{{name}: path}}` in the *.robot.yaml")
 
     def resolve(self, path: Path) -> Path:
-        """The real path of something that exists inside the folders; raises Trouble, and Absent of it."""
+        """Return the real path of an existing file or folder inside the allowed folders; raises Trouble or Absent."""
         if len(str(path)) > LONGEST_PATH or "\0" in str(path):
             raise Trouble("not a usable path")
         # First by the letters alone, so that nothing outside is even asked whether it exists.
@@ -112,9 +112,9 @@ class Folders:
         return real
 
     def check(self, path: Path, limit: int) -> Path:
-        """The real path of a regular file of at most `limit` bytes; raises Trouble.
+        """Return the real path of a regular file of at most `limit` bytes; raises Trouble.
 
-        Bullet aborts on a folder and waits forever for a pipe.
+        Bullet would abort on a folder and wait forever for a pipe.
         """
         real = self.resolve(path)
         try:
@@ -128,7 +128,7 @@ class Folders:
         return real
 
     def open(self, path: Path, limit: int) -> tuple[Path, bytes]:
-        """The real path and the bytes of a regular file of at most `limit` bytes; raises Trouble."""
+        """Return the real path and the content of a regular file of at most `limit` bytes; raises Trouble."""
         real = self.check(path, limit)
         record_read_file(real)
         try:

@@ -42,7 +42,7 @@ class Source:
         return cls(name, folder, tuple(data.split(b"\n")))
 
     def line(self, number: int) -> str:
-        """The text of a line for a caret; empty when it is too long to show."""
+        """Return the text of a line for a message with a caret; empty if it is too long."""
         text = self.lines[number - 1] if 0 < number <= len(self.lines) else b""
         return text.decode("utf-8", "replace").rstrip("\r") if len(text) <= LONGEST_SHOWN_LINE else ""
 
@@ -66,11 +66,11 @@ class Element:
         return self.attributes.get("name", "")
 
     def child(self, tag: str) -> Self | None:
-        """The first child of that kind."""
+        """Return the first child with this tag, or None."""
         return next(self.all(tag), None)
 
     def all(self, *tags: str) -> Iterator[Self]:
-        """The children of these kinds, in document order."""
+        """Yield the children with these tags, in document order."""
         return (child for child in self.children if child.tag in tags)
 
 
@@ -83,7 +83,7 @@ def refuse_doctype(data: bytes) -> None:
 
 
 def parse(data: bytes, source: Source, kind: type[E]) -> E:
-    """The root of an XML text, made of elements of this kind; raises Broken."""
+    """Parse an XML text into elements of a class, and return the root; raises Broken."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
     root: list[E] = []

@@ -6,9 +6,9 @@ MESHES = (".dae", ".stl", ".obj")
 
 
 def neighbor(folder: Path, path: Path) -> str | None:
-    """The file or folder below `folder` that `path` probably means, relative to it; None when nothing comes near.
+    """Return the file or folder below `folder` that `path` probably means, relative to it, or None.
 
-    Symbolic links are not followed: they may lead to where nobody is to be told what there is.
+    Symbolic links are not followed, so that messages do not reveal names outside the folder.
     """
     here, parts = folder, path.relative_to(folder).parts if path.is_relative_to(folder) else ("..",)
     for part in parts:
@@ -20,7 +20,7 @@ def neighbor(folder: Path, path: Path) -> str | None:
 
 
 def _spelled(folder: Path, name: str) -> str | None:
-    """The entry of a folder with this name; else in another case, else the mesh of this name in another format."""
+    """Return the entry of a folder with this name, or with other capitalization, or the mesh in another format."""
     try:
         entries = sorted(entry.name for entry in folder.iterdir())
     except OSError:

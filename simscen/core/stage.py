@@ -123,7 +123,7 @@ class Stage(Situation, Protocol):
         """Return whether a pedestrian of `radius` m fits there without touching walls, objects, people or robots."""
         ...
 
-    def chance(self, name: str) -> np.random.Generator:
+    def rng(self, name: str) -> np.random.Generator:
         """Return a new generator of the random stream with this name."""
         ...
 

@@ -18,7 +18,7 @@ _DRAWS_PER_BATCH = 1 << 20
 
 
 def bootstrap_mean_interval(
-    differences: Sequence[float], chance: np.random.Generator, weights: Sequence[float] | None = None
+    differences: Sequence[float], rng: np.random.Generator, weights: Sequence[float] | None = None
 ) -> tuple[float, float] | None:
     """Return the 95 % interval of the mean difference, optionally weighted; None for less than MIN_PAIRS pairs.
 
@@ -33,8 +33,7 @@ def bootstrap_mean_interval(
     resamples = max(RESAMPLES // 10, min(RESAMPLES, MAX_DRAWS // len(values)))
     rows = max(1, _DRAWS_PER_BATCH // len(values))
     draws = (
-        chance.integers(0, len(values), (min(rows, resamples - done), len(values)))
-        for done in range(0, resamples, rows)
+        rng.integers(0, len(values), (min(rows, resamples - done), len(values))) for done in range(0, resamples, rows)
     )
     means = np.concatenate([values[drawn].sum(axis=1) / counts[drawn].sum(axis=1) for drawn in draws])
     low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])

@@ -50,7 +50,7 @@ class Clearance(Spec, Criterion):
         return frozenset({Evidence.CLEARANCE})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """The tightest moment. Space that is free as far as was searched may be infinite; nan may not."""
+        """Return the finding for the smallest clearance. An infinite clearance is valid; nan is not."""
         distances = clearance(trace).values[:, 0]
         if not len(distances):
             return [undecided("clearance", "no clearance was recorded", f"≥ {self.min:.2f} m")]
@@ -92,7 +92,7 @@ class PersonalSpace(Spec, Criterion):
         return POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """The nearest moment."""
+        """Return the finding for the smallest distance."""
         limit = f"≥ {self.min:.2f} m"
         try:
             gaps = pedestrian_gap(trace, case)

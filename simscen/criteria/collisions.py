@@ -63,7 +63,7 @@ class Collisions(Spec, Criterion):
         return frozenset({Evidence.CONTACTS, *speed_needed, *people_needed})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """The count, then the hardest contact."""
+        """Return findings for the number of collisions and for the largest impulse."""
         if not len(trace.truth) and not trace.of_kind(EventKind.COLLISION_STARTED):
             return [undecided("collisions", "neither the robot's way nor what it touched was recorded")]
         hits = [event for event in trace.of_kind(EventKind.COLLISION_STARTED) if self.object in (None, event.name)]

@@ -134,7 +134,7 @@ class PathLength(Spec, Criterion):
         return frozenset({Evidence.TRUTH})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """The length, then the ratio; both in meters of margin."""
+        """Return findings for the length and for the ratio, both with margins in m."""
         way = drive(trace)
         findings = [] if self.max is None else [_bound(trace, way, "path_length", self.max)]
         if self.max_ratio is not None:
@@ -159,7 +159,7 @@ class PathLength(Spec, Criterion):
 
 
 def shortest_way(trace: Trace, case: Case) -> tuple[float, str]:
-    """The length in meters of the shortest way through all goals; or nan, and why there is none to compare with."""
+    """Return the length in m of the shortest path through all goals, or nan and the reason why there is none."""
     names = [goal.name for goal in case.goals if goal.name not in case.expected]
     twice = sorted({name for name in names if names.count(name) > 1})
     without = [name for name in names if not math.isfinite(case.shortest.get(name, math.nan))]

@@ -30,9 +30,10 @@ def at_most(
     context: str = "",
     detail: Sequence[str] = (),
 ) -> Finding:
-    """Holds when `value` <= `limit`; `at` is where it was tightest, `context` follows the limit ("after lidar.off").
+    """Return a finding that holds if `value` <= `limit`.
 
-    Raises InvalidTrace when `value` is nan: a comparison with nan is false either way, which could pass for a verdict.
+    `at` is the tick of the smallest margin, `context` the text after the limit ("after lidar.off"). Raises InvalidTrace
+    if `value` is nan, because comparisons with nan are meaningless.
     """
     return _bound(what, value, limit, unit, limit - value, "≤", at, context, detail)
 
@@ -47,7 +48,7 @@ def at_least(
     context: str = "",
     detail: Sequence[str] = (),
 ) -> Finding:
-    """Holds when `value` >= `limit`; otherwise as `at_most`."""
+    """Return a finding that holds if `value` >= `limit`; otherwise like `at_most`."""
     return _bound(what, value, limit, unit, value - limit, "≥", at, context, detail)
 
 
@@ -89,17 +90,17 @@ def undecided(what: str, because: str, limit: str = "", detail: Sequence[str] = 
 def missed(
     what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None, detail: Sequence[str] = ()
 ) -> Finding:
-    """A failure that no number measures."""
+    """Return a failed finding without a number."""
     return Finding(Status.FAIL, what, measured, limit, None, "", None, *_spot(at), detail=tuple(detail))
 
 
 def held(what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None) -> Finding:
-    """A pass that no number measures."""
+    """Return a passed finding without a number."""
     return Finding(Status.PASS, what, measured, limit, None, "", None, *_spot(at))
 
 
 def quantity(value: float, unit: str, digits: int = 2) -> str:
-    """A number as a report shows it, e.g. "0.84 s"."""
+    """Format a number for reports, e.g. "0.84 s"."""
     return f"{value:.{digits}f} {unit}".rstrip()
 
 

@@ -189,7 +189,7 @@ Code = Annotated[ErrorCode, PlainValidator(parse), _Documented()]
 
 
 def code_of(event: Event) -> str:
-    """The code an event carries, by name where Nav2 has one for it, else "NONE" or the number."""
+    """Return the error code of an event: its name in Nav2, or the number, or "NONE"."""
     name, number = event.data.get("error_name"), event.data.get("error_code")
     if isinstance(name, str) and name:
         return name

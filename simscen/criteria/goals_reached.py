@@ -93,7 +93,7 @@ class GoalsReached(Spec, Criterion):
         return findings
 
     def _untold(self, trace: Trace, case: Case, told: set[str]) -> list[Finding]:
-        """What there is to say of goals that are asked for by name and have no outcome."""
+        """Return findings for goals that the criterion names and that have no outcome."""
         names = [goal.name for goal in case.every_goal]
         findings = []
         for name in dict.fromkeys(self.goals or ()):

@@ -79,7 +79,7 @@ class Keepout(Spec, Criterion):
         return POSITION | {Evidence.FOOTPRINT, *switched}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """The nearest moment."""
+        """Return the finding for the smallest distance."""
         what, limit = f"keepout {self.region or self.mask}", f"≥ {self.distance:.2f} m"
         away = self._away(case)
         if isinstance(away, str):
@@ -118,10 +118,10 @@ class Keepout(Spec, Criterion):
 
 
 def _nearest(trace: Trace, poses: Samples, case: Case, away: Away) -> tuple[float, int]:
-    """The smallest signed distance on the way, and its tick; being set down elsewhere is no way.
+    """Return the smallest signed distance along the driven path, and its tick. Teleportation is not part of the path.
 
-    While the robot moves by m (its furthest point does), a distance changes by no more than m: stretches that cannot
-    lead nearer than the nearest known moment by FINE are left out, the others halved.
+    If no point of the robot moves by more than m, the distance changes by at most m. Intervals that cannot improve the
+    smallest known distance by FINE are skipped, the others are bisected.
     """
     reach = max(math.hypot(x, y) for x, y in case.footprint or POINT)
     yaw = np.unwrap(poses.values[:, 2])

@@ -59,7 +59,7 @@ class LocalizationConsistency(Spec, Criterion):
         return POSITION | {Evidence.BELIEF, Evidence.COVARIANCE}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """The average against its upper bound, and with `both_sides` against its lower."""
+        """Return findings for the average and its upper bound, and with `both_sides` also for its lower bound."""
         samples = self._sampled(trace)
         if samples is None:
             return [undecided("localization_consistency", "the belief has no covariance")]
@@ -83,7 +83,7 @@ class LocalizationConsistency(Spec, Criterion):
         return None, chi2_quantile(self.probability, DIMENSIONS * count) / count
 
     def _sampled(self, trace: Trace) -> Samples | None:
-        """The newest NEES at `after` and every so often from there to the last belief."""
+        """Return the NEES sampled at regular times from `after` to the last belief."""
         every = nees_samples(trace)
         if not len(every):
             return None

@@ -92,7 +92,7 @@ class LocalizationError(Spec, Criterion):
 
 
 def _of_a_whole_run(trace: Trace, finding: Finding) -> Finding:
-    """A log that was cut off might have ended better than it was until then."""
+    """Return an inconclusive finding if the log is truncated, because the final error is unknown."""
     if has_ended(trace):
         return finding
     return undecided(finding.what, f"{finding.measured} so far", finding.limit)

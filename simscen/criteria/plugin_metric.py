@@ -29,7 +29,7 @@ class Measure(ABC):
 
     @abstractmethod
     def measure(self, trace: Trace, case: Case) -> float | str:
-        """The number, finite and in SI units; or in words why this run has none."""
+        """Return the value, finite and in SI units, or the reason why this run has none."""
 
 
 class AnyMeasure(Choice):

@@ -71,7 +71,7 @@ class AnyCriterion(Choice):
 
 
 def verdict_names(criteria: Sequence[AnyCriterion]) -> list[str]:
-    """What the verdict of each criterion is called; an id that is given twice gets a number: speed, speed#2."""
+    """Return the name of each criterion's verdict. Repeated ids get a number: speed, speed#2."""
     seen: dict[str, int] = {}
     names = []
     for entry in criteria:

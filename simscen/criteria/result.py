@@ -174,9 +174,9 @@ def _names(case: Case) -> set[str]:
 
 
 def _success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Finding | None:
-    """What is wrong with the k-th end of navigation: it answers for the goals since the one before it.
+    """Return a failed finding if the k-th end of navigation does not match its goals, otherwise None.
 
-    The first answers for all goals of the scenario, which its task held, accepted by then or not.
+    It covers the goals since the previous end. The first one covers all goals of the scenario, accepted or not.
     """
     end = ended[k]
     if end.name != "SUCCEEDED":

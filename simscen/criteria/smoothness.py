@@ -96,7 +96,7 @@ def _mean_jerk(trace: Trace, case: Case, limit: float) -> Finding:
 
 
 def _read(trace: Trace, case: Case, name: SignalName) -> Array | str:
-    """The signal, or why there is none."""
+    """Return the signal, or the reason why there is none."""
     try:
         return read_signal(name, trace, case, {})
     except SignalUnavailable as why:

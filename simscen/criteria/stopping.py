@@ -119,7 +119,7 @@ def _stood(trace: Trace, rest: Flags, tick: int) -> bool:
 
 
 def _explained(trace: Trace, start: int, end: int) -> list[str]:
-    """What the robot did between the two ticks."""
+    """Describe the motion of the robot between two ticks."""
     way, fast = drive(trace), speed(trace)
     length, seconds = way.until(end) - way.until(start), trace.seconds(end - start)
     seen = trace.scans[trace.scans <= end]
@@ -154,7 +154,7 @@ class Stuck(Spec, Criterion):
         return frozenset({Evidence.TRUTH, Evidence.NAVIGATION})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """The longest stay over all goals."""
+        """Return the finding for the longest standstill over all goals."""
         poses = truth(trace)
         ways = [
             (outcome.accepted, trace.end if outcome.end is None else outcome.end.tick)

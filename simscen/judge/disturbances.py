@@ -19,7 +19,7 @@ WHAT = "disturbance did not happen"
 
 
 def disturbance_outcomes(trace: Trace, case: Case) -> tuple[DisturbanceOutcome, ...]:
-    """What became of each disturbance of the scenario, in its order: events, then faults."""
+    """Return the outcome of each disturbance of the scenario in order: events, then faults."""
     return tuple(
         _event(trace, case, ordered, entry) if ordered.kind == "event" else _fault(trace, ordered, entry)
         for entry, ordered in _numbered(case.disturbances)
@@ -29,11 +29,10 @@ def disturbance_outcomes(trace: Trace, case: Case) -> tuple[DisturbanceOutcome, 
 def missing_disturbances(
     trace: Trace, happened: Sequence[DisturbanceOutcome], others: Sequence[Verdict] = ()
 ) -> tuple[tuple[Verdict, int], ...]:
-    """A verdict for each required disturbance that did not happen, and the line it is written in.
+    """Return a verdict for each required disturbance that did not happen, with its line in the scenario.
 
-    It is inconclusive where the log was cut off: it might have happened later. Of a story the step that was waited for
-    answers for those after it. An id that one of the `others` has, or
-    one before it, gets a number.
+    It is inconclusive if the log is truncated, because the disturbance might have happened later. Of a sequence, only
+    the first missing step gets a verdict. A name that is already used, also by `others`, gets a number.
     """
     lacking = [one for one in happened if one.missing and not _excused(one, happened)]
     seen = Counter(verdict.id for verdict in others)

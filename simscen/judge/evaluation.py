@@ -156,11 +156,11 @@ EXPECTED = "expected"
 def apply_expectation(
     expected: ExpectedFailure | None, verdicts: Sequence[Verdict], came_out: Outcome, whole: bool
 ) -> tuple[Outcome, Verdict | None]:
-    """The outcome of a run that is `expected` to fail, and the verdict on that; the run's own where nothing is.
+    """Return the outcome of a run that is `expected` to fail with a verdict about that, or the run's own outcome.
 
-    Strict, as pytest's xfail can be: everything that holds although it was expected to fail is a failure, and so is
-    what fails besides. A run that could not be completed, or whose log is not `whole`, is never as expected. What had
-    to happen and did not is expected only by its name.
+    This is strict like pytest's `xfail(strict=True)`: an expected failure that passes is a failure, and so is any other
+    failed criterion. A run that could not be completed, or whose log is not `whole`, is never as expected. A missing
+    disturbance is only expected if its name is listed.
     """
     if expected is None or came_out is Outcome.ERROR or not whole:
         return came_out, None

@@ -16,7 +16,7 @@ _RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< "), "< ": ("< ", "≥ 
 
 
 def comparison(finding: Finding) -> str:
-    """What was measured against what, e.g. "0.84 s > 0.50 s after lidar.off"."""
+    """Return the measured value and the limit, e.g. "0.84 s > 0.50 s after lidar.off"."""
     if finding.status in (Status.INCONCLUSIVE, Status.ERROR):
         return f"{finding.status.value}: {finding.measured}"
     holds, violated = _RELATIONS.get(finding.limit[:2], ("", ""))
@@ -40,7 +40,7 @@ def time_and_place(finding: Finding, tick_rate: int) -> str:
 
 
 def subject(verdict: Verdict, finding: Finding) -> str:
-    """The criterion and, where it checks several things, which: "goals_reached: goal shelf"."""
+    """Return the criterion and the item that it checks, e.g. "goals_reached: goal shelf"."""
     if verdict.criterion == DISTURBANCE:  # its id is a name that an author gave, and would read as a criterion
         return finding.what
     rest = finding.what.removeprefix(verdict.criterion).removeprefix(":").strip()
@@ -48,7 +48,7 @@ def subject(verdict: Verdict, finding: Finding) -> str:
 
 
 def sentence(verdict: Verdict, finding: Finding, tick_rate: int) -> str:
-    """The whole line: "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)"."""
+    """Return the complete line: "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)"."""
     parts = (f"{subject(verdict, finding)}: {comparison(finding)}", time_and_place(finding, tick_rate))
     return ", ".join(part for part in parts if part)
 
@@ -61,7 +61,7 @@ def disturbance_times(one: DisturbanceOutcome, tick_rate: int) -> str:
 
 
 def disturbance_line(one: DisturbanceOutcome, tick_rate: int) -> str:
-    """The whole line: "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
+    """Return the complete line: "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
     came = (
         disturbance_times(one, tick_rate) if one.fired else "",
         one.effect,
@@ -71,15 +71,15 @@ def disturbance_line(one: DisturbanceOutcome, tick_rate: int) -> str:
 
 
 def violations(verdict: Verdict) -> tuple[Finding, ...]:
-    """The findings that keep the verdict from passing, in order."""
+    """Return the findings because of which the verdict does not pass, in order."""
     return tuple(finding for finding in verdict.findings if finding.status is not Status.PASS)
 
 
 def tightest_margin(verdicts: Sequence[Verdict]) -> str:
-    """The bound that was nearest to being broken: "path_length +0.14 m, 1 % of its limit"; "" when none has one.
+    """Return the smallest relative margin: "path_length +0.14 m, 1 % of its limit"; "" if there is none.
 
-    Numbers of events are left out: that 0 of 0 collisions happened is no news. So is how far from a goal the robot
-    stopped, and how long it stayed: it stops as soon as it is near enough, so that both are always at their limits.
+    Counts of events are left out because they are trivial. So are the distance from a goal and the time at it: a robot
+    stops as soon as it is close enough, so that both are always near their limits.
     """
     findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS and not _stopping(v, f)]
     measured = [(v, f) for v, f in findings if f.unit and f.margin is not None and isfinite(f.margin)]
@@ -96,13 +96,13 @@ def _stopping(verdict: Verdict, finding: Finding) -> bool:
 
 
 def _slack(finding: Finding) -> float:
-    """The margin as a share of the limit."""
+    """Return the margin relative to the limit."""
     margin, limit = finding.margin or 0.0, _limit(finding)
     return margin / abs(limit) if limit else margin
 
 
 def _limit(finding: Finding) -> float:
-    """What was allowed; 0 also where nobody said what was measured."""
+    """Return the limit, or 0 if it is unknown."""
     if finding.value is None:
         return 0.0
     margin, value = finding.margin or 0.0, finding.value

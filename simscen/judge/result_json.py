@@ -20,7 +20,7 @@ def to_json(result: RunResult) -> str:
 
 
 def result_data(result: RunResult) -> dict[str, Any]:
-    """The same as plain data, for results.json and others that hold several."""
+    """Return a result as plain data, for results.json and other files with several results."""
     lines = result.lines or (0,) * len(result.verdicts)
     error = result.error
     return {
@@ -47,7 +47,7 @@ def result_data(result: RunResult) -> dict[str, Any]:
 
 
 def from_json(text: str) -> RunResult:
-    """The result that `to_json` wrote. Raises ValueError when it is none, or one of another format."""
+    """Read a result that `to_json` wrote. Raises ValueError for other content or another format."""
     try:
         return from_data(json.loads(text))
     except (KeyError, TypeError) as error:
@@ -60,7 +60,7 @@ def read_result(path: Path) -> RunResult:
 
 
 def from_data(data: dict[str, Any]) -> RunResult:
-    """The result that `as_data` described."""
+    """Convert plain data of `result_data` to a result."""
     if data["format"] != FORMAT:
         raise ValueError(f"a result of format {data['format']}; this version reads {FORMAT}")
     return RunResult(
@@ -83,7 +83,7 @@ def from_data(data: dict[str, Any]) -> RunResult:
 
 
 def read_key(data: dict[str, Any]) -> RunKey:
-    """The key of the run that plain data describes; what simscen 0.1 called its variation was the stack."""
+    """Convert plain data to the key of a run. In simscen 0.1, `variation` was the name of the stack."""
     variation, stack_name = (data["variation"], data["stack_name"]) if "stack_name" in data else ("", data["variation"])
     return RunKey(data["scenario"], data["seed"], variation, stack_name)
 
@@ -105,7 +105,7 @@ def _read_happening(data: dict[str, Any]) -> DisturbanceOutcome:
 
 
 def verdict_data(verdict: Verdict, line: int, tick_rate: int) -> dict[str, Any]:
-    """A verdict with all its findings. `line` is where the criterion is written; 0 = unknown."""
+    """Return a verdict with its findings as plain data. `line` is the line of the criterion; 0 = unknown."""
     return {
         "criterion": verdict.criterion,
         "id": verdict.id,
@@ -117,7 +117,7 @@ def verdict_data(verdict: Verdict, line: int, tick_rate: int) -> dict[str, Any]:
 
 
 def read_verdict(data: dict[str, Any]) -> Verdict:
-    """The verdict that `verdict_data` described. Raises KeyError or ValueError when it is none."""
+    """Convert plain data of `verdict_data` to a verdict. Raises KeyError or ValueError for other content."""
     findings = tuple(_read_finding(finding) for finding in data["findings"])
     return Verdict(data["criterion"], data["id"], data["severity"], findings)
 

@@ -126,7 +126,7 @@ def _lined(result: RunResult) -> list[tuple[Verdict, int]]:
 
 
 def _called(verdict: Verdict, robot: str) -> Verdict:
-    """The verdict as one of this robot; that on a fault that did not happen tells the fault's name in its finding."""
+    """Return the verdict with the name of the robot. For a missing fault, the finding contains the fault's name."""
     findings = verdict.findings
     if verdict.criterion == DISTURBANCE:
         findings = tuple(replace(finding, measured=f"{robot}/{finding.measured}") for finding in findings)

@@ -32,7 +32,7 @@ FindWay = Callable[[Point, Point, float], list[Point]]
 
 
 def straight_path(_start: Point, goal: Point, _radius: float) -> list[Point]:
-    """The way of who looks at no map."""
+    """Return a straight path, for pedestrians without a map."""
     return [goal]
 
 
@@ -69,11 +69,11 @@ class Crowd:
         return {name: person.pose for name, person in self._people.items()}
 
     def radius(self, name: str) -> float:
-        """That of somebody's body, in meters."""
+        """Return the body radius of a pedestrian in m."""
         return self._people[name].who.radius
 
     def top_speed(self, name: str) -> float:
-        """The fastest that somebody ever walks, in m/s."""
+        """Return the maximum walking speed of a pedestrian in m/s."""
         who = self._people[name].who
         return max(forces.MOST_OF_SPEED * who.speed, THREATENING_SPEED)
 
@@ -103,7 +103,7 @@ class Crowd:
     def _reactions(
         self, people: list[Pedestrian], around: Surroundings, seconds: float
     ) -> tuple[list[ObservedRobot | None], list[PedestrianAction]]:
-        """The robot that each person reacts to now."""
+        """Return the robot that each pedestrian reacts to, and their actions."""
         reacting: list[ObservedRobot | None] = []
         deeds: list[PedestrianAction] = []
         for person in people:
@@ -118,7 +118,7 @@ class Crowd:
         return bool(self._walls.visible(np.array([person.place]), np.array([robot.pose[:2]]))[0])
 
     def _plan(self, person: Pedestrian, number: int) -> None:
-        """A way to the goal: for a new goal, or when somebody was pushed to where the next corner is out of view."""
+        """Plan a path to the goal: for a new goal, or if the next corner is out of view after a push."""
         goal = person.destination
         stale = person.planned_for != goal
         if not stale and person.way and (self._steps + number) % PATIENCE == 0:
@@ -136,7 +136,7 @@ class Crowd:
         around: Surroundings,
         walls: Near,
     ) -> Array:
-        """The forces on everybody but their own wish, (n, 2)."""
+        """Return the external forces (n, 2) on all pedestrians, without their own driving force."""
         force = self._social(people, reacting, places, velocities, around)
         force += self._obstacles(people, places, around, walls)
         for members in _groups(people):
@@ -240,7 +240,7 @@ def _groups(people: list[Pedestrian]) -> list[Numbers]:
 def _relaxed(
     wishes: list[Intent], places: Array, velocities: Array, pushed: Array, seconds: float
 ) -> tuple[Array, Array]:
-    """Moves and velocities after a time under a steady force: dv/dt = (wished - v) / τ + pushed, solved exactly."""
+    """Return moves and velocities under constant forces: dv/dt = (wished - v) / τ + pushed, solved exactly."""
     wished = np.zeros_like(places)
     for number, wish in enumerate(wishes):
         if wish.target is not None:
@@ -264,13 +264,13 @@ def _capped(vectors: Array, most: Array) -> Array:
 
 
 def _summed(who: Numbers, force: Array, count: int) -> Array:
-    """The forces (n, 2) on each of `count`, added one after the other: what is far away changes no rounding."""
+    """Return the sum of forces (n, 2) for each of `count`, added in order, so that rounding is reproducible."""
     sums = [np.bincount(who, force[:, axis], minlength=count) for axis in (0, 1)]
     return np.stack(sums, axis=1).astype(np.float64)  # of nobody it counts in whole numbers
 
 
 def _first_of_each(who: Numbers, owner: Numbers, distance: Array) -> Numbers:
-    """The nearest for each pair of a person and an owner."""
+    """Return the index of the nearest entry for each pair of a pedestrian and an owner."""
     order = np.lexsort((distance, owner, who))
     pairs = np.stack((who[order], owner[order]), axis=1)
     fresh = np.ones(len(order), dtype=np.bool_)
@@ -280,7 +280,7 @@ def _first_of_each(who: Numbers, owner: Numbers, distance: Array) -> Numbers:
 
 
 def _nearest_of(who: Numbers, places: Array, sides: Array, each: bool = False) -> tuple[Numbers, Array]:
-    """The nearest place of something for those within REACH of it, or of `each` of its sides."""
+    """Return the nearest point of an outline, or of `each` of its sides, for pedestrians within REACH."""
     some = np.repeat(who, len(sides))
     where = nearest_on(np.tile(sides, (len(who), 1, 1)), places[some])
     distance = np.hypot(*(where - places[some]).T)

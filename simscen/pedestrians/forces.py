@@ -46,10 +46,10 @@ GROUP_GAP = 0.8
 
 
 def social(towards: Array, closing: Array, wider: Array) -> Array:
-    """What somebody at whom others come does (n, 2): brakes along D, and turns aside.
+    """Return the social forces (n, 2) on pedestrians that others approach: deceleration along D, and evasion.
 
-    `towards` (n, 2) leads from them to the other in meters, `closing` (n, 2) is their own velocity less the other's in
-    m/s, `wider` (n,) how much wider than a person's the other's body is, in meters: so much nearer is it.
+    `towards` (n, 2) points from the pedestrian to the other in m, `closing` (n, 2) is the pedestrian's velocity minus
+    the other's in m/s, and `wider` (n,) is the additional radius in m of the other compared with a pedestrian.
     """
     apart = np.hypot(towards[:, 0], towards[:, 1])
     distance = np.maximum(apart, 1e-6)
@@ -68,13 +68,13 @@ def social(towards: Array, closing: Array, wider: Array) -> Array:
 
 
 def wall(away: Array, gap: Array) -> Array:
-    """What keeps somebody off a wall or a thing (n, 2): `away` from it, over `gap` (n,) meters of air."""
+    """Return the repulsive forces (n, 2) of walls and objects in direction `away`, at distances `gap` (n,) in m."""
     force: Array = (WALL * np.exp(-np.maximum(gap, 0.0) / WALL_RANGE))[:, np.newaxis] * away
     return force
 
 
 def group(places: Array, velocities: Array) -> Array:
-    """What keeps a group together (n, 2), of all who belong to it, at least two; in plain numbers, as it is small."""
+    """Return the forces (n, 2) that keep the members of a group together, computed with scalars for small groups."""
     here, moving = places.tolist(), velocities.tolist()
     count = len(here)
     mx, my = sum(x for x, _ in here) / count, sum(y for _, y in here) / count
@@ -121,7 +121,7 @@ def move_limits(who: Numbers, towards: Array, gap: Array, share: float = 1.0) ->
 
 
 def clip_moves(moves: Array, every: Iterable[MoveLimits]) -> Array:
-    """The moves (n, 2) cut down to what the limits leave, sliding along where that is possible."""
+    """Return the moves (n, 2) restricted to the limits, with sliding along them where possible."""
     parts = list(every)
     who = np.concatenate([part.who for part in parts])
     towards = np.concatenate([part.towards for part in parts])

@@ -140,7 +140,7 @@ class Pedestrian:
         return [PedestrianAction(self.who.name, "reacted", self.reacts_to)]
 
     def wish(self, robot: ObservedRobot | None) -> Intent:
-        """What they want, reacting to `robot` or not."""
+        """Return the intent of the pedestrian, which may react to `robot`."""
         if robot is None:
             return self._to_goal()
         where = robot.pose[:2]
@@ -193,5 +193,5 @@ class Pedestrian:
 
 
 def _braking(distance: float) -> float:
-    """The speed at which somebody comes to a stop in a distance in meters, and none within ARRIVED."""
+    """Return the speed from which a pedestrian can stop within a distance in m; 0 within ARRIVED."""
     return distance / RELAXATION_TIME if distance > ARRIVED else 0.0

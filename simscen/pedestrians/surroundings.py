@@ -39,7 +39,7 @@ class Surroundings:
 
 
 def edges(outlines: Sequence[Array]) -> Array:
-    """The sides of rings as segments (n, 2, 2)."""
+    """Return the edges of rings as segments (n, 2, 2)."""
     rings = [np.stack((ring, np.roll(ring, -1, axis=0)), axis=1) for ring in outlines]
     return np.concatenate(rings) if rings else np.empty((0, 2, 2))
 
@@ -80,7 +80,7 @@ class Walls:
         return who, self._owners[which], nearest_on(self._segments[which], points[who])
 
     def _around(self, column: int, row: int) -> Numbers:
-        """The segments that may be within REACH of somewhere in a square."""
+        """Return the segments that may be within REACH of any point of a grid square."""
         if (column, row) not in self._known:
             low = np.array([column, row]) * CELL
             outside = np.maximum(np.maximum(self._low - low - CELL, low - self._high), 0.0)
@@ -115,7 +115,7 @@ class _Sight:
         self._opaque[cells[:, 0], cells[:, 1]] = True
 
     def clear(self, eyes: Array, things: Array) -> npt.NDArray[np.bool_]:
-        """Looked at once in the length of a square along each line: walls are thicker, or closed."""
+        """Return which lines of sight are clear, sampled once per grid square, as walls are thicker or closed."""
         away = things - eyes
         distance = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
         looks = np.maximum(np.ceil((distance - 2 * ARMS_LENGTH) / self._cell), 0).astype(np.int64)
@@ -131,7 +131,7 @@ class _Sight:
 
 
 def nearest_on(segments: Array, points: Array) -> Array:
-    """The place (n, 2) on each segment (n, 2, 2) that is nearest to each point (n, 2)."""
+    """Return the point (n, 2) on each segment (n, 2, 2) that is nearest to each point (n, 2)."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     squared = np.maximum(np.sum(along * along, axis=1), 1e-18)
     part = np.clip(np.sum((points - start) * along, axis=1) / squared, 0.0, 1.0)

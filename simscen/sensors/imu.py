@@ -20,8 +20,8 @@ class ImuSensor:
         self._gyro_std, self._force_std = spec.gyro_noise, spec.accelerometer_noise
         self._gyro_variance, self._force_variance = spec.gyro_noise**2, spec.accelerometer_noise**2
         self._seconds, self._view = setting.seconds, setting.view
-        self._bias: list[float] = setting.chance.normal(0.0, spec.gyro_bias, 3).tolist()
-        self._normals = NormalStream(setting.chance)
+        self._bias: list[float] = setting.rng.normal(0.0, spec.gyro_bias, 3).tolist()
+        self._normals = NormalStream(setting.rng)
         self._velocity, _ = self._view.base_velocity()
         self._placements = self._view.placements()
 

@@ -24,7 +24,7 @@ class LidarSensor:
 
     def __init__(self, spec: Lidar, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
-        self._spec, self._rng, self._view, self._rays = spec, setting.chance, setting.view, setting.rays
+        self._spec, self._rng, self._view, self._rays = spec, setting.rng, setting.view, setting.rays
         is_full_circle = spec.field_of_view >= 2 * math.pi - 1e-9
         self._increment = spec.field_of_view / max(1, spec.beams if is_full_circle else spec.beams - 1)
         self._first = -spec.field_of_view / 2 if spec.beams > 1 else 0.0

@@ -34,7 +34,7 @@ class WheelOdometrySensor:
         self._position_variance_per_m = spec.translation_noise**2
         self._heading_variance_per_rad = spec.rotation_noise**2
         self._heading_variance_per_m = spec.drift_noise**2
-        self._normals = NormalStream(setting.chance)
+        self._normals = NormalStream(setting.rng)
         self._kinematics = kinematics_of(setting.drive)
         self._encoders = self._view.encoders()
         self._pose, self._covariance = Pose2(0.0, 0.0, 0.0), UNKNOWN_POSE_COVARIANCE

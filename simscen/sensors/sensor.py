@@ -60,7 +60,7 @@ class SensorSetting:
     name:     name of the sensor in the robot's file, repeated in its readings
     period:   ticks between two readings
     seconds:  the same in seconds
-    chance:   random generator of this sensor, from the stream `sensor.<name>` of the run's seed
+    rng:      random generator of this sensor, from the stream `sensor.<name>` of the run's seed
     view:     part of the true state that sensors may use
     rays:     ray caster for distances to the surroundings
     drive:    drive of the robot, for measurements at its wheels
@@ -69,7 +69,7 @@ class SensorSetting:
     name: str
     period: int
     seconds: float
-    chance: np.random.Generator
+    rng: np.random.Generator
     view: SensorView
     rays: RayCaster
     drive: Drive

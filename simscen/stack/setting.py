@@ -27,7 +27,7 @@ class Setting:
 
     surroundings:     robot model, map, keepout and speed zones, names of the lidars, tick rate
     name:             name of the random stream: "planner", "controller", "localizer", "behavior.spin", …, "stack"
-    streams:          random streams by name, derived from the seed of the run; use `chance` for your own stream
+    streams:          random streams by name, derived from the seed of the run; use `rng` for your own stream
     control_period:   time in s between two calls of a controller, goal checker, or behavior
     resolution:       cell size in m of the costmaps that the component gets
     estimate:         initial pose estimate; `reset` or `start` provides it again
@@ -74,7 +74,7 @@ class Setting:
         return Clock(self.surroundings.tick_rate)
 
     @cached_property
-    def chance(self) -> np.random.Generator:
+    def rng(self) -> np.random.Generator:
         """The component's own random generator, so that its draws do not affect other components."""
         return self.streams.generator(self.name)
 

@@ -85,7 +85,7 @@ class FakeStage:
         """Everywhere."""
         return True
 
-    def chance(self, name: str) -> np.random.Generator:
+    def rng(self, name: str) -> np.random.Generator:
         """The stream of seed 1."""
         return Streams(1).generator(name)
 

@@ -135,7 +135,7 @@ class Drive:
     odometry: tuple[str, ...] = ("ground_truth", "odom")
 
     def __post_init__(self) -> None:
-        self.chance = np.random.default_rng(1)
+        self.rng = np.random.default_rng(1)
         self.log: list[Event] = []
         self.track: list[Pose2] = [self.pose]
         self.commands: list[Twist] = []
@@ -173,7 +173,7 @@ class Drive:
         first = -self.field_of_view / 2
         angles = first + step * np.arange(self.beams, dtype=np.float64) + self.pose.yaw
         ranges = self.world.cast((self.pose.x, self.pose.y), angles)
-        ranges = np.round(ranges + self.chance.normal(0, self.noise, len(ranges)), 3)
+        ranges = np.round(ranges + self.rng.normal(0, self.noise, len(ranges)), 3)
         ranges[ranges > self.range_max] = np.inf
         return Scan("lidar", self.tick, ranges, first, step, 0.05, self.range_max)
 

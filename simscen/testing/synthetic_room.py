@@ -121,19 +121,17 @@ USUAL = Noise()
 
 def run(subject: Localizer, drive: Drive, seed: int, noise: Noise = USUAL, *, imu: bool = False) -> list[Belief]:
     """The beliefs (k) of a localizer, one for each row of the truth."""
-    chance, beliefs = np.random.default_rng((seed, 2)), []
-    ranges = drive.ranges + chance.normal(0, noise.lidar, drive.ranges.shape)
+    rng, beliefs = np.random.default_rng((seed, 2)), []
+    ranges = drive.ranges + rng.normal(0, noise.lidar, drive.ranges.shape)
     ranges = np.where(ranges < RANGE_MAX, np.round(ranges, 3), np.inf)
-    odometry, bias = Pose2(0, 0, 0), chance.normal(0, noise.gyro_bias)
+    odometry, bias = Pose2(0, 0, 0), rng.normal(0, noise.gyro_bias)
     for row, step in enumerate(drive.steps):
         tick, way = row * ODOMETRY_PERIOD, float(np.hypot(step[0], step[1]))
         heading = np.sqrt(noise.rotation**2 * abs(step[2]) + noise.drift**2 * way)
-        stretched = 1 + chance.normal() * noise.translation * np.sqrt(way) / max(way, 1e-9)
-        odometry = odometry.compose(
-            Pose2(step[0] * stretched, step[1] * stretched, step[2] + chance.normal() * heading)
-        )
+        stretched = 1 + rng.normal() * noise.translation * np.sqrt(way) / max(way, 1e-9)
+        odometry = odometry.compose(Pose2(step[0] * stretched, step[1] * stretched, step[2] + rng.normal() * heading))
         if imu and row:
-            rate = step[2] * TICK_RATE / ODOMETRY_PERIOD + bias + chance.normal() * noise.gyro
+            rate = step[2] * TICK_RATE / ODOMETRY_PERIOD + bias + rng.normal() * noise.gyro
             subject.on_imu(Imu("imu", tick, (0.0, 0.0, rate), (0.0, 0.0, 9.81)))
         subject.on_odometry(Odometry("odom", tick, odometry, Twist()))
         if tick % SCAN_PERIOD == 0:

@@ -46,14 +46,14 @@ pass: [{{goals_reached: {{}}}}]
 """
 
 
-def write(folder: Path, runs: int, chance: random.Random) -> dict[str, str]:
+def write(folder: Path, runs: int, rng: random.Random) -> dict[str, str]:
     """Scenarios, and for each the fault that it has; "" = none."""
     folder.mkdir()
     faults: dict[str, str] = {}
     for number in range(runs):
-        fault = chance.choice(sorted(FAULTS)) if chance.random() < 0.1 else ""
-        when = ".at.0" if fault and "prepare" not in fault and chance.random() < 0.5 else ""
-        x = round(chance.uniform(0.8, 1.5), 2)
+        fault = rng.choice(sorted(FAULTS)) if rng.random() < 0.1 else ""
+        when = ".at.0" if fault and "prepare" not in fault and rng.random() < 0.5 else ""
+        x = round(rng.uniform(0.8, 1.5), 2)
         text = SCENARIO.format(seed=number + 1, tag=fault + when or "innocent", x=x, goal=round(x + 0.5, 2))
         (folder / f"{number:04}.scenario.yaml").write_text(text)
         faults[f"{number:04}"] = fault
@@ -98,9 +98,9 @@ def left_behind() -> list[str]:
 def main() -> int:
     """Run the batch, then its innocent part alone, compare, and print the figures."""
     runs, seed = (int(word) for word in (*sys.argv[1:], *("500", "1")[len(sys.argv) - 1 :]))
-    chance = random.Random(seed)
+    rng = random.Random(seed)
     with tempfile.TemporaryDirectory() as name:
-        faults = write(Path(name) / "batch", runs, chance)
+        faults = write(Path(name) / "batch", runs, rng)
         came_out, out, seconds = batch(Path(name) / "batch")
         clean = Path(name) / "clean"
         clean.mkdir()

@@ -33,12 +33,12 @@ def test_all_kinds_of_drive_ship():
 
 def test_given_any_command_then_neither_speeds_nor_accelerations_exceed_the_limits(robot):
     spec, simulation = robot
-    limits, chance = spec.limits, random.Random(5)
+    limits, rng = spec.limits, random.Random(5)
     lateral = limits.lateral or limits.linear if isinstance(spec.drive, Holonomic) else 0.0
     fastest = max(limits.linear_acceleration, limits.linear_deceleration or 0.0)
     before = STOP
     for _ in range(40):
-        simulation.drive(Twist(*(chance.uniform(-9, 9) for _ in range(3))))
+        simulation.drive(Twist(*(rng.uniform(-9, 9) for _ in range(3))))
         simulation.step(24)
         now = simulation.truth().twist
         # Wheels that slip sideways let a base swing out a little further than was asked of it.

@@ -19,81 +19,81 @@ TOKENS = [
 ]  # fmt: skip
 
 
-def mutant(corpus: list[bytes], chance: random.Random) -> tuple[int, bytes]:
+def mutant(corpus: list[bytes], rng: random.Random) -> tuple[int, bytes]:
     """One of the corpus, by its index, damaged one to six times; of some only numbers, which reaches deeper."""
-    index = chance.randrange(len(corpus))
+    index = rng.randrange(len(corpus))
     data = corpus[index]
-    ways = _MUTATIONS if chance.random() < 0.6 else (_number,)
-    for _ in range(chance.choice((1, 1, 1, 2, 3, 6))):
-        data = chance.choice(ways)(data, corpus, chance)
+    ways = _MUTATIONS if rng.random() < 0.6 else (_number,)
+    for _ in range(rng.choice((1, 1, 1, 2, 3, 6))):
+        data = rng.choice(ways)(data, corpus, rng)
     return index, data[: 1 << 18]
 
 
-def _span(data: bytes, chance: random.Random) -> tuple[int, int]:
-    start = chance.randrange(len(data) + 1)
-    return start, min(len(data), start + chance.choice((1, 1, 2, 4, 8, 16, 64, 256)))
+def _span(data: bytes, rng: random.Random) -> tuple[int, int]:
+    start = rng.randrange(len(data) + 1)
+    return start, min(len(data), start + rng.choice((1, 1, 2, 4, 8, 16, 64, 256)))
 
 
-def _flip(data: bytes, _: list[bytes], chance: random.Random) -> bytes:
+def _flip(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
     if not data:
         return data
-    at = chance.randrange(len(data))
-    return data[:at] + bytes([data[at] ^ (1 << chance.randrange(8))]) + data[at + 1 :]
+    at = rng.randrange(len(data))
+    return data[:at] + bytes([data[at] ^ (1 << rng.randrange(8))]) + data[at + 1 :]
 
 
-def _cut(data: bytes, _: list[bytes], chance: random.Random) -> bytes:
-    start, end = _span(data, chance)
+def _cut(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
+    start, end = _span(data, rng)
     return data[:start] + data[end:]
 
 
-def _end(data: bytes, _: list[bytes], chance: random.Random) -> bytes:
-    return data[: chance.randrange(len(data) + 1)]
+def _end(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
+    return data[: rng.randrange(len(data) + 1)]
 
 
-def _repeat(data: bytes, _: list[bytes], chance: random.Random) -> bytes:
-    start, end = _span(data, chance)
-    return data[:end] + data[start:end] * chance.choice((1, 1, 2, 10, 100)) + data[end:]
+def _repeat(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
+    start, end = _span(data, rng)
+    return data[:end] + data[start:end] * rng.choice((1, 1, 2, 10, 100)) + data[end:]
 
 
-def _insert(data: bytes, _: list[bytes], chance: random.Random) -> bytes:
-    at = chance.randrange(len(data) + 1)
-    return data[:at] + chance.choice(TOKENS) + data[at:]
+def _insert(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
+    at = rng.randrange(len(data) + 1)
+    return data[:at] + rng.choice(TOKENS) + data[at:]
 
 
-def _overwrite(data: bytes, _: list[bytes], chance: random.Random) -> bytes:
-    start, end = _span(data, chance)
-    return data[:start] + chance.randbytes(end - start) + data[end:]
+def _overwrite(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
+    start, end = _span(data, rng)
+    return data[:start] + rng.randbytes(end - start) + data[end:]
 
 
-def _splice(data: bytes, corpus: list[bytes], chance: random.Random) -> bytes:
-    other = chance.choice(corpus)
-    return data[: _span(data, chance)[0]] + other[_span(other, chance)[0] :]
+def _splice(data: bytes, corpus: list[bytes], rng: random.Random) -> bytes:
+    other = rng.choice(corpus)
+    return data[: _span(data, rng)[0]] + other[_span(other, rng)[0] :]
 
 
-def _number(data: bytes, _: list[bytes], chance: random.Random) -> bytes:
+def _number(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
     found = list(_NUMBER.finditer(data))
     if not found:
         return data
-    one = chance.choice(found)
-    other = chance.choice(NUMBERS) if chance.random() < 0.5 else f"{chance.uniform(-5, 10):.3g}".encode()
+    one = rng.choice(found)
+    other = rng.choice(NUMBERS) if rng.random() < 0.5 else f"{rng.uniform(-5, 10):.3g}".encode()
     return data[: one.start()] + other + data[one.end() :]
 
 
-def _line(data: bytes, corpus: list[bytes], chance: random.Random) -> bytes:
+def _line(data: bytes, corpus: list[bytes], rng: random.Random) -> bytes:
     """Drop, repeat or move a line, or take one from elsewhere."""
     lines = data.split(b"\n")
-    at = chance.randrange(len(lines))
-    other = chance.choice(chance.choice(corpus).split(b"\n"))
-    lines[at : at + 1] = chance.choice(([], [lines[at]] * 2, [other], [lines[at], other], [b"  " + lines[at]]))
+    at = rng.randrange(len(lines))
+    other = rng.choice(rng.choice(corpus).split(b"\n"))
+    lines[at : at + 1] = rng.choice(([], [lines[at]] * 2, [other], [lines[at], other], [b"  " + lines[at]]))
     return b"\n".join(lines)
 
 
-def _word(data: bytes, _: list[bytes], chance: random.Random) -> bytes:
+def _word(data: bytes, _: list[bytes], rng: random.Random) -> bytes:
     """Put one word in the place of another, wherever it stands."""
     words = re.findall(rb"\w+", data)
     if not words:
         return data
-    return data.replace(chance.choice(words), chance.choice([*words, *NUMBERS, *TOKENS]), chance.choice((1, 1, -1)))
+    return data.replace(rng.choice(words), rng.choice([*words, *NUMBERS, *TOKENS]), rng.choice((1, 1, -1)))
 
 
 _MUTATIONS = (

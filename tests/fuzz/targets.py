@@ -60,10 +60,10 @@ class Target:
     read: Callable[[Path], list[Problem]]
     damage: Callable[[list[bytes], random.Random], tuple[int, bytes]] = field(default=mutant)
 
-    def build(self, folder: Path, chance: random.Random) -> Path:
+    def build(self, folder: Path, rng: random.Random) -> Path:
         """Write a mutant and what it needs; the mutant's path."""
         names = list(self.files)
-        index, data = self.damage(list(self.files.values()), chance)
+        index, data = self.damage(list(self.files.values()), rng)
         for name, text in self.beside.items():
             (folder / name).write_text(text.replace("{file}", names[index]))
         for name in ("tent.stl", "room.pgm"):
@@ -94,18 +94,18 @@ def read_log(path: Path) -> list[Problem]:
     return []
 
 
-def damaged_log(corpus: list[bytes], chance: random.Random) -> tuple[int, bytes]:
+def damaged_log(corpus: list[bytes], rng: random.Random) -> tuple[int, bytes]:
     """Half are damaged as bytes, which checksums notice; half inside their records, with checksums that fit."""
-    if chance.random() < 0.3:
-        return mutant(corpus, chance)
+    if rng.random() < 0.3:
+        return mutant(corpus, rng)
     out = io.BytesIO()
     writer = McapWriter(out, "ros2", "simscen")
     kinds: dict[int, MessageType] = {}
     channels: dict[int, Channel] = {}
-    rate = chance.choice((0.0005, 0.002, 0.02))
+    rate = rng.choice((0.0005, 0.002, 0.02))
 
     def damaged(data: bytes) -> bytes:
-        return mutant([data], chance)[1] if data and chance.random() < rate else data
+        return mutant([data], rng)[1] if data and rng.random() < rate else data
 
     with contextlib.suppress(KeyError, ValueError, struct.error, OverflowError):  # what cannot be written is no log
         for record in RecordReader(io.BytesIO(corpus[0])):
@@ -117,7 +117,7 @@ def damaged_log(corpus: list[bytes], chance: random.Random) -> tuple[int, bytes]
                 case records.Message():
                     channels[record.channel_id].write(record.log_time, damaged(record.data))
                 case records.Attachment():
-                    data = mutant([record.data], chance)[1] if chance.random() < 0.2 else record.data
+                    data = mutant([record.data], rng)[1] if rng.random() < 0.2 else record.data
                     writer.attach(record.name, record.media_type, data)
                 case records.Metadata():
                     values = {k: damaged(v.encode()).decode("utf-8", "replace") for k, v in record.metadata.items()}

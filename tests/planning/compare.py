@@ -43,12 +43,12 @@ PLANNERS: dict[str, PlannerSpec] = {
 class Way:
     """A way on a ground, with what the cheapest one costs."""
 
-    def __init__(self, view: CostmapView, chance: np.random.Generator) -> None:
+    def __init__(self, view: CostmapView, rng: np.random.Generator) -> None:
         self.view, self.rates = view, TraversalCosts(view, ROBOT, 2.0, True)
         free = np.argwhere(self.rates.free & (view.distance < 0.6))
         inside = Pose2(*((free[len(free) // 2][::-1] + 0.5) * view.resolution + view.origin).tolist())
         reachable = find_endpoints(self.rates, inside, inside, 0.5).reachable
-        self.start, self.goal = pair(self.rates, reachable, chance)
+        self.start, self.goal = pair(self.rates, reachable, rng)
         self.cost = cheapest(self.rates, self.start, self.goal)
         shortest = TraversalCosts(view, ROBOT, 0.0, True)
         self.length = cheapest(shortest, self.start, self.goal)
@@ -106,8 +106,8 @@ def main() -> None:
     ways = []
     for ground in (rooms, forest, maze):
         for number in range(6):
-            chance = np.random.default_rng((number, 20))
-            ways.append(Way(view_of(*ground(chance)), chance))
+            rng = np.random.default_rng((number, 20))
+            ways.append(Way(view_of(*ground(rng)), rng))
     table = HEAD + "".join(row(name, spec, ways) for name, spec in PLANNERS.items())
     print(table)
     before, rest = PAGE.read_text().split(BEGIN)

@@ -19,47 +19,45 @@ MOVES = [(a, b) for a in range(4) for b in range(-3, 4) if math.gcd(a, b) == 1 a
 """In 32 directions: at most 1.3 % longer than straight on."""
 
 
-def rooms(chance: np.random.Generator) -> tuple[Flatland, float, float]:
+def rooms(rng: np.random.Generator) -> tuple[Flatland, float, float]:
     """Two to four rooms each way, every one with a door, and things that stand about."""
-    columns, rows = chance.integers(2, 5, 2).tolist()
-    width, height = chance.uniform(3.5, 5.0, 2).tolist()
+    columns, rows = rng.integers(2, 5, 2).tolist()
+    width, height = rng.uniform(3.5, 5.0, 2).tolist()
     world = Flatland().room(columns * width, rows * height)
     for i in range(columns):
         for j in range(rows):
             if i + 1 < columns:
-                _wall(world, chance, True, (i + 1) * width, j * height, height, j == 0 or chance.random() < 0.5)
+                _wall(world, rng, True, (i + 1) * width, j * height, height, j == 0 or rng.random() < 0.5)
             if j + 1 < rows:
-                _wall(world, chance, False, (j + 1) * height, i * width, width, chance.random() < 0.6)
-    for x, y in chance.uniform((0.3, 0.3), (columns * width - 0.9, rows * height - 0.9), (columns * rows * 2, 2)):
-        a, b = chance.uniform(0.2, 0.8, 2)
+                _wall(world, rng, False, (j + 1) * height, i * width, width, rng.random() < 0.6)
+    for x, y in rng.uniform((0.3, 0.3), (columns * width - 0.9, rows * height - 0.9), (columns * rows * 2, 2)):
+        a, b = rng.uniform(0.2, 0.8, 2)
         world.boxes.append((x, y, x + a, y + b))
     return world, columns * width, rows * height
 
 
 def _wall(
-    world: Flatland, chance: np.random.Generator, upright: bool, at: float, low: float, size: float, door: bool
+    world: Flatland, rng: np.random.Generator, upright: bool, at: float, low: float, size: float, door: bool
 ) -> None:
-    gap = chance.uniform(0.8, 1.2)
-    begin = chance.uniform(0.3, size - gap - 0.3)
+    gap = rng.uniform(0.8, 1.2)
+    begin = rng.uniform(0.3, size - gap - 0.3)
     for a, b in ((low, low + begin), (low + begin + gap, low + size)) if door else ((low, low + size),):
         world.boxes.append((at, a, at + 0.12, b) if upright else (a, at, b, at + 0.12))
 
 
-def forest(chance: np.random.Generator) -> tuple[Flatland, float, float]:
+def forest(rng: np.random.Generator) -> tuple[Flatland, float, float]:
     """Trunks anywhere."""
-    width, height = chance.uniform(8, 14, 2).tolist()
+    width, height = rng.uniform(8, 14, 2).tolist()
     world = Flatland().room(width, height)
-    places = chance.uniform(
-        (0.5, 0.5), (width - 0.5, height - 0.5), (int(width * height * chance.uniform(0.2, 0.5)), 2)
-    )
-    world.discs = [(x, y, chance.uniform(0.08, 0.4)) for x, y in places.tolist()]
+    places = rng.uniform((0.5, 0.5), (width - 0.5, height - 0.5), (int(width * height * rng.uniform(0.2, 0.5)), 2))
+    world.discs = [(x, y, rng.uniform(0.08, 0.4)) for x, y in places.tolist()]
     return world, width, height
 
 
-def maze(chance: np.random.Generator) -> tuple[Flatland, float, float]:
+def maze(rng: np.random.Generator) -> tuple[Flatland, float, float]:
     """A perfect maze with a few walls taken out."""
-    columns, rows = chance.integers(4, 7, 2).tolist()
-    size = chance.uniform(1.0, 1.6)
+    columns, rows = rng.integers(4, 7, 2).tolist()
+    size = rng.uniform(1.0, 1.6)
     world = Flatland().room(columns * size, rows * size)
     seen, stack, open_ = {(0, 0)}, [(0, 0)], set()
     while stack:
@@ -69,23 +67,23 @@ def maze(chance: np.random.Generator) -> tuple[Flatland, float, float]:
         if not fresh:
             stack.pop()
             continue
-        cell = fresh[chance.integers(len(fresh))]
+        cell = fresh[rng.integers(len(fresh))]
         seen.add(cell)
         stack.append(cell)
         open_.add(frozenset(((x, y), cell)))
     for x in range(columns):
         for y in range(rows):
             right, up = (x + 1) * size, (y + 1) * size
-            if x + 1 < columns and frozenset(((x, y), (x + 1, y))) not in open_ and chance.random() > 0.1:
+            if x + 1 < columns and frozenset(((x, y), (x + 1, y))) not in open_ and rng.random() > 0.1:
                 world.boxes.append((right - 0.05, y * size, right + 0.05, up))
-            if y + 1 < rows and frozenset(((x, y), (x, y + 1))) not in open_ and chance.random() > 0.1:
+            if y + 1 < rows and frozenset(((x, y), (x, y + 1))) not in open_ and rng.random() > 0.1:
                 world.boxes.append((x * size, up - 0.05, right, up + 0.05))
     return world, columns * size, rows * size
 
 
 def large_maze(number: int, rooms: int, edge: int) -> OccupancyGrid:
     """A perfect maze of so many rooms each way, drawn on cells of 5 cm: `edge` of them a room, two of them a wall."""
-    chance, shut = np.random.default_rng(number), [(0, 0)]
+    rng, shut = np.random.default_rng(number), [(0, 0)]
     size = rooms * edge + 2
     cells = np.zeros((size, size), dtype=np.int8)
     for wall in range(0, size, edge):
@@ -98,7 +96,7 @@ def large_maze(number: int, rooms: int, edge: int) -> OccupancyGrid:
         if not fresh:
             shut.pop()
             continue
-        u, v = fresh[chance.integers(len(fresh))]
+        u, v = fresh[rng.integers(len(fresh))]
         seen.add((u, v))
         shut.append((u, v))
         low, left = min(y, v) * edge + 2, min(x, u) * edge + 2
@@ -115,11 +113,11 @@ def view_of(
     return Costmap(spec, Surroundings(robot, world.grid(bounds, resolution), RATE)).view
 
 
-def pair(rates: TraversalCosts, reachable: Array, chance: np.random.Generator) -> tuple[Pose2, Pose2]:
+def pair(rates: TraversalCosts, reachable: Array, rng: np.random.Generator) -> tuple[Pose2, Pose2]:
     """Two places that a way joins, at least 3 m apart."""
     cells = np.argwhere(reachable)
     while True:
-        ends = (cells[chance.integers(len(cells), size=2)][:, ::-1] + 0.5) * rates.resolution + rates.origin
+        ends = (cells[rng.integers(len(cells), size=2)][:, ::-1] + 0.5) * rates.resolution + rates.origin
         if math.dist(*ends) > 3.0:
             return Pose2(*ends[0].tolist()), Pose2(*ends[1].tolist())
 

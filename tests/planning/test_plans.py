@@ -45,12 +45,12 @@ def test_a_plan_costs_little_more_than_the_optimum(
 ) -> None:
     ratios = []
     for seed in range(3):
-        chance = np.random.default_rng((seed, len(kind)))
-        view = view_of(*GROUNDS[kind](chance))
+        rng = np.random.default_rng((seed, len(kind)))
+        view = view_of(*GROUNDS[kind](rng))
         rates = TraversalCosts(view, ROBOT, multiplier, True)
         middle = np.argwhere(rates.free)[len(np.argwhere(rates.free)) // 2][::-1] * view.resolution + view.origin
         inside = Pose2(*middle.tolist())
-        start, goal = pair(rates, find_endpoints(rates, inside, inside, 0.5).reachable, chance)
+        start, goal = pair(rates, find_endpoints(rates, inside, inside, 0.5).reachable, rng)
         points = planner(cost_travel_multiplier=multiplier).plan(view, start, goal, 1 + seed).points
         assert np.isfinite(rates.at(points[:, :2])).all()
         ratios.append(rates.along(points[:, :2]) / cheapest(rates, start, goal))
@@ -60,13 +60,13 @@ def test_a_plan_costs_little_more_than_the_optimum(
 
 def test_a_way_that_is_dear_here_and_there_and_else_straight_is_as_good(monkeypatch: pytest.MonkeyPatch) -> None:
     """As with people about: the way past what is dear is searched for, and joined with the straight one."""
-    chance, everywhere, dear = np.random.default_rng(3), list[int](), 0
+    rng, everywhere, dear = np.random.default_rng(3), list[int](), 0
     monkeypatch.setattr(medial_axis_planner, "nearby", lambda plan, *asked: everywhere.append(1) or plan(*asked))
     start, goal = Pose2(0.55, 1.55), Pose2(11.55, 1.75)
     for seed in range(20):
         costs = np.zeros((30, 120), dtype=np.uint8)
-        for column, row in chance.integers((8, 2), (20 + 4 * seed, 24), (6, 2)).tolist():
-            costs[row : row + 4, column : column + 4] = chance.integers(50, 253)
+        for column, row in rng.integers((8, 2), (20 + 4 * seed, 24), (6, 2)).tolist():
+            costs[row : row + 4, column : column + 4] = rng.integers(50, 253)
         view = CostmapView(costs, np.ones(costs.shape, dtype=np.float32), 0.1, (0.0, 0.0))
         rates = TraversalCosts(view, ROBOT, 2.0, True)
         points = medial_axis().plan(view, start, goal, seed).points
@@ -78,12 +78,12 @@ def test_a_way_that_is_dear_here_and_there_and_else_straight_is_as_good(monkeypa
 @pytest.mark.parametrize(("kind", "number", "seed"), [("rooms", 4, 2), ("forest", 3, 2), ("forest", 5, 1)])
 def test_a_plan_takes_the_cheaper_one_of_two_ways_that_cost_nearly_the_same(kind: str, number: int, seed: int) -> None:
     """It took the other one: a gap of a cell or two was not sampled, or straight legs said little of what ways cost."""
-    chance = np.random.default_rng((number, 77, len(kind)))
-    view = view_of(*GROUNDS[kind](chance))
+    rng = np.random.default_rng((number, 77, len(kind)))
+    view = view_of(*GROUNDS[kind](rng))
     rates = TraversalCosts(view, ROBOT, 2.0, True)
     free = np.argwhere(rates.free & (view.distance < 0.6))
     inside = Pose2(*((free[len(free) // 2][::-1] + 0.5) * view.resolution + view.origin).tolist())
-    start, goal = pair(rates, find_endpoints(rates, inside, inside, 0.5).reachable, chance)
+    start, goal = pair(rates, find_endpoints(rates, inside, inside, 0.5).reachable, rng)
     points = medial_axis().plan(view, start, goal, seed).points
     assert rates.along(points[:, :2]) < 1.045 * cheapest(rates, start, goal)
 

@@ -28,13 +28,13 @@ KINDS = get_args(Spec.model_fields["type"].annotation)
 
 def way(kind: str, number: int, robot: RobotModel = ROBOT, room: float = 0.0) -> tuple[CostmapView, Pose2, Pose2]:
     """A ground, and two places with so much room on it."""
-    chance = np.random.default_rng((number, len(kind), 5))
-    view = view_of(*GROUNDS[kind](chance), robot=robot)
+    rng = np.random.default_rng((number, len(kind), 5))
+    view = view_of(*GROUNDS[kind](rng), robot=robot)
     rates = TraversalCosts(view, robot, 2.0, True)
     free = np.argwhere(rates.free & (view.distance > room))
     inside = Pose2(*((free[len(free) // 2][::-1] + 0.5) * view.resolution + view.origin).tolist())
     reachable = find_endpoints(rates, inside, inside, 0.5).reachable & (view.distance > room)
-    return view, *pair(rates, reachable, chance)
+    return view, *pair(rates, reachable, rng)
 
 
 def passed(rates: TraversalCosts, points: Array) -> np.ndarray:

@@ -51,7 +51,7 @@ HEADS = {
     "action": "class Mine(Spec, Action):\n    def perform(self, stage):\n        ",
     "fault": "class Mine(Spec, Fault):\n"
     "    affects: ClassVar = frozenset({'Scan', 'Command', 'Wheels', 'Belief', 'Map'})\n"
-    "    def begin(self, chance, wheels):\n        return Broken()\n\nclass Broken(Disturbance):\n    ",
+    "    def begin(self, rng, wheels):\n        return Broken()\n\nclass Broken(Disturbance):\n    ",
     "sensor": "class Mine(SensorSpec):\n    component: ClassVar = 'mine:Device'\n"
     "    reading_type: ClassVar = 'Scan'\n\n"
     "class Device:\n    def __init__(self, spec, setting): self.setting = setting\n    def read(self, tick):\n        ",

@@ -25,7 +25,7 @@ def scan_matching_amcl(spec: model.ScanMatchingAmcl, setting: Setting) -> Locali
         return DeadReckoning(setting.estimate)
     motion, models = motion_model(spec, setting.robot.holonomic), map_models(setting.map, spec)
     trust = models.trust if spec.map_trust_full > 0 else None
-    particles = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, setting.chance, trust)
+    particles = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, setting.rng, trust)
     search = (models.search, models.trust) if spec.relocalization == "scan_matching" else None
     residuals = models.residuals if spec.covariance == "scatter" else None
     tick_rate = setting.surroundings.tick_rate

@@ -33,11 +33,11 @@ class ScanMatchingParticleFilter(ParticleFilter):
 
     def __init__(
         self, spec: ScanMatchingAmcl, motion: MotionModel, sensor: SensorModel, free_space: FreeSpace,
-        chance: np.random.Generator, trust: MapTrust | None = None,
+        rng: np.random.Generator, trust: MapTrust | None = None,
     ) -> None:  # fmt: skip
         """Create the filter. `trust` rates how well the map shows the robot's surroundings; None trusts it fully."""
         self._trust = trust
-        super().__init__(spec, motion, sensor, free_space, chance)
+        super().__init__(spec, motion, sensor, free_space, rng)
 
     def begin(self, estimate: Estimate) -> None:
         """Restart with particles around the estimate's pose, or over all free space if it has none."""
@@ -66,11 +66,11 @@ class ScanMatchingParticleFilter(ParticleFilter):
         says, and the map decides, unless it does not show the surroundings. All rotate as the scans show.
         """
         self._settle(delta)
-        poses = moved(self.particles.poses, seen, self._chance)
+        poses = moved(self.particles.poses, seen, self._rng)
         if self._map_weight > 0 and not seen.agrees(delta):
-            some = self._chance.random(len(poses)) < ODOMETRY_SHARE
+            some = self._rng.random(len(poses)) < ODOMETRY_SHARE
             driven = Step(Pose2(delta.x, delta.y, seen.delta.yaw), seen.covariance)
-            poses[some] = moved(self.particles.poses[some], driven, self._chance)
+            poses[some] = moved(self.particles.poses[some], driven, self._rng)
         self.particles = Particles(poses, self.particles.weights)
 
     def _settle(self, delta: Pose2) -> None:
@@ -84,7 +84,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
 
     def redistribute(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:
         """Put all particles around `poses` (k, 3), each with its share (k,). Return the new pose and covariance."""
-        drawn = around(poses, shares, self._bound.most, self._chance)
+        drawn = around(poses, shares, self._bound.most, self._rng)
         self.particles = Particles.equal(drawn)
         self._random = self._descendants = None
         self._scan_weight = 1.0

@@ -238,9 +238,9 @@ def _agree(first: Pose2, then: Pose2, second: Pose2, now: Pose2) -> bool:
     return math.hypot(off.x, off.y) < AGREE[0] and abs(off.yaw) < AGREE[1]
 
 
-def around(poses: Array, shares: Array, count: int, chance: np.random.Generator) -> Array:
+def around(poses: Array, shares: Array, count: int, rng: np.random.Generator) -> Array:
     """Particles (count, 3) about `poses` (k, 3), each with its share."""
-    chosen = chance.choice(len(poses), count, p=shares)
-    drawn: Array = poses[chosen] + chance.normal(0.0, AROUND, (count, 3))
+    chosen = rng.choice(len(poses), count, p=shares)
+    drawn: Array = poses[chosen] + rng.normal(0.0, AROUND, (count, 3))
     drawn[:, 2] = wrap_array(drawn[:, 2])
     return drawn

@@ -121,9 +121,9 @@ class Step:
         return math.hypot(off.x, off.y) < AGREES[0] + AGREES[1] * far and abs(off.yaw) < AGREES[2] + AGREES[3] * turned
 
 
-def moved(poses: Array, step: Step, chance: np.random.Generator) -> Array:
+def moved(poses: Array, step: Step, rng: np.random.Generator) -> Array:
     """Each of `poses` (n, 3) moved by its own copy of a step."""
-    ahead, left, turn = np.dot(_root(step.covariance), chance.standard_normal((3, len(poses))))
+    ahead, left, turn = np.dot(_root(step.covariance), rng.standard_normal((3, len(poses))))
     ahead += step.delta.x
     left += step.delta.y
     turn += step.delta.yaw

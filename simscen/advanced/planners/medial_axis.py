@@ -26,7 +26,7 @@ Mask = npt.NDArray[np.bool_]
 
 def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: int = 1) -> Array:
     """Centers of `free` cells (n, 2), another choice for each seed; `density` times as many to the meter."""
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     factor = max(1, round(BLOCK / costmap.resolution)) if density == 1 else 1
     size = factor * costmap.resolution
     room = np.where(free, costmap.distance, np.float32(0.0))
@@ -35,10 +35,10 @@ def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: in
     axis = _ridges(most, max(1, round(BESIDE / size)), 0.4 * size)
     tight = axis & (most < room[free].min(initial=np.inf) + TIGHT)
     chosen = [
-        _thinned(tight, IN_THE_TIGHT / density / size, chance),
-        _thinned(axis, ON_AXIS / density / size, chance),
-        _thinned(open_ground, IN_THE_OPEN / density / size, chance),
-        _thinned((most > 0) & ~open_ground, IN_THE_OPEN / density / size, chance),
+        _thinned(tight, IN_THE_TIGHT / density / size, rng),
+        _thinned(axis, ON_AXIS / density / size, rng),
+        _thinned(open_ground, IN_THE_OPEN / density / size, rng),
+        _thinned((most > 0) & ~open_ground, IN_THE_OPEN / density / size, rng),
     ]
     rows, columns = roomiest(room, np.concatenate(chosen), factor)
     x = costmap.origin[0] + (columns + 0.5) * costmap.resolution
@@ -59,11 +59,11 @@ def _ridges(room: npt.NDArray[np.float32], reach: int, less: float) -> Mask:
     return ridges & (room > 0)
 
 
-def _thinned(mask: Mask, spacing: float, chance: np.random.Generator) -> npt.NDArray[np.int64]:
+def _thinned(mask: Mask, spacing: float, rng: np.random.Generator) -> npt.NDArray[np.int64]:
     """One of the blocks (n, 2) of the mask in each square of a grid that is laid anyhow."""
-    cells = chance.permutation(np.flatnonzero(mask))
+    cells = rng.permutation(np.flatnonzero(mask))
     rows, columns = np.divmod(cells, mask.shape[1])
-    down, across = chance.uniform(0.0, spacing, 2)
+    down, across = rng.uniform(0.0, spacing, 2)
     row_of_squares = int(mask.shape[1] / spacing) + 2
     square = ((rows + down) / spacing).astype(np.int64) * row_of_squares + ((columns + across) / spacing).astype(
         np.int64

@@ -81,12 +81,12 @@ class Building:
 def building(number: int, rebuilt: int = 0) -> Building:
     """The floor of a number: always the same. `rebuilt` ones have other rooms and furniture right of the middle."""
     streams = Streams(number)
-    chance = streams.generator("floor")
-    length, depth = chance.uniform(*LENGTH), chance.uniform(*DEPTH)
-    width = chance.uniform(*CORRIDOR)
-    low = chance.uniform(0.35, 0.6) * (depth - width)
-    middle = chance.uniform(0.45, 0.55) * length
-    thickness = chance.uniform(*THICKNESS)
+    rng = streams.generator("floor")
+    length, depth = rng.uniform(*LENGTH), rng.uniform(*DEPTH)
+    width = rng.uniform(*CORRIDOR)
+    low = rng.uniform(0.35, 0.6) * (depth - width)
+    middle = rng.uniform(0.45, 0.55) * length
+    thickness = rng.uniform(*THICKNESS)
     halves = [
         _half(streams.generator(name), ends, (0.0, low, low + width, depth), thickness)
         for name, ends in (("left", (0.0, middle)), (f"right {rebuilt}" if rebuilt else "right", (middle, length)))
@@ -100,73 +100,73 @@ def building(number: int, rebuilt: int = 0) -> Building:
 
 
 def _half(
-    chance: np.random.Generator, ends: tuple[float, float], levels: tuple[float, ...], thickness: float
+    rng: np.random.Generator, ends: tuple[float, float], levels: tuple[float, ...], thickness: float
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Walls, glass, furniture, rooms and doors of one half; `levels` are the y of outer and corridor walls."""
     walls, glass, furniture, rooms, doors = ([np.empty((0, k))] for k in (4, 4, 4, 2, 2))
     for outer, inner in ((levels[0], levels[1]), (levels[3], levels[2])):
-        cuts = _cuts(chance, *ends)
+        cuts = _cuts(rng, *ends)
         for a, b in pairwise(cuts):
-            back = outer + np.sign(inner - outer) * (chance.uniform(0.5, 1.5) if chance.random() < 0.4 else 0.0)
+            back = outer + np.sign(inner - outer) * (rng.uniform(0.5, 1.5) if rng.random() < 0.4 else 0.0)
             if back != outer:
                 walls.append(wall((a, back), (b, back), thickness))
-            opening = _opening(chance, b - a)
+            opening = _opening(rng, b - a)
             front = wall((a, inner), (b, inner), thickness, [opening])
-            (glass if chance.random() < GLAZED else walls).append(front)
+            (glass if rng.random() < GLAZED else walls).append(front)
             low, high = sorted((back, inner))
             door = np.array([[a + sum(opening) / 2, inner]])
-            if b < ends[1] and chance.random() < CONNECTED:
-                gap = _opening(chance, high - low)
+            if b < ends[1] and rng.random() < CONNECTED:
+                gap = _opening(rng, high - low)
                 walls.append(wall((b, low), (b, high), thickness, [gap]))
                 door = np.concatenate((door, [[b, low + sum(gap) / 2]]))
             else:
                 walls.append(wall((b, low), (b, high), thickness))
             doors.append(door)
             rooms.append(np.array([[(a + b) / 2, (low + high) / 2]]))
-            furniture.append(boxes(_furniture(chance, (a, low, b, high), np.concatenate(doors))))
-    furniture.append(boxes(_along_corridor(chance, ends, levels[1:3], np.concatenate(doors))))
+            furniture.append(boxes(_furniture(rng, (a, low, b, high), np.concatenate(doors))))
+    furniture.append(boxes(_along_corridor(rng, ends, levels[1:3], np.concatenate(doors))))
     return tuple(np.concatenate(part) for part in (walls, glass, furniture, rooms, doors))  # type: ignore[return-value]
 
 
-def _cuts(chance: np.random.Generator, begin: float, end: float) -> list[float]:
+def _cuts(rng: np.random.Generator, begin: float, end: float) -> list[float]:
     """Where walls between rooms stand, the ends of the row included."""
     cuts = [begin]
     while end - cuts[-1] > ROOM[1]:
-        cuts.append(min(cuts[-1] + chance.uniform(*ROOM), end - ROOM[0]))
+        cuts.append(min(cuts[-1] + rng.uniform(*ROOM), end - ROOM[0]))
     return [*cuts, end]
 
 
-def _opening(chance: np.random.Generator, length: float) -> tuple[float, float]:
+def _opening(rng: np.random.Generator, length: float) -> tuple[float, float]:
     """A door in a wall of this length."""
-    width = chance.uniform(*DOOR)
-    begin = chance.uniform(0.3, length - width - 0.3)
+    width = rng.uniform(*DOOR)
+    begin = rng.uniform(0.3, length - width - 0.3)
     return begin, begin + width
 
 
 def _furniture(
-    chance: np.random.Generator, room: tuple[float, float, float, float], doors: Array
+    rng: np.random.Generator, room: tuple[float, float, float, float], doors: Array
 ) -> Iterator[tuple[float, float, float, float]]:
     """Desks and shelves along the walls of a room, some things in the middle."""
     left, low, right, high = room
-    for _ in range(int((right - left) * (high - low) / chance.uniform(4, 9))):
-        a, b = chance.uniform((0.5, 0.3), (1.8, 0.8))
-        if chance.random() < 0.5:
+    for _ in range(int((right - left) * (high - low) / rng.uniform(4, 9))):
+        a, b = rng.uniform((0.5, 0.3), (1.8, 0.8))
+        if rng.random() < 0.5:
             a, b = b, a
-        x, y = chance.uniform((left, low), (right - a, high - b))
-        if chance.random() < 0.7:
-            x, y = ((left, y), (right - a, y), (x, low), (x, high - b))[chance.integers(4)]
+        x, y = rng.uniform((left, low), (right - a, high - b))
+        if rng.random() < 0.7:
+            x, y = ((left, y), (right - a, y), (x, low), (x, high - b))[rng.integers(4)]
         if _clear_of(doors, (x, y, x + a, y + b)):
             yield x, y, x + a, y + b
 
 
 def _along_corridor(
-    chance: np.random.Generator, ends: tuple[float, float], levels: tuple[float, ...], doors: Array
+    rng: np.random.Generator, ends: tuple[float, float], levels: tuple[float, ...], doors: Array
 ) -> Iterator[tuple[float, float, float, float]]:
     """Cupboards and copiers against the walls of the corridor."""
-    for _ in range(int(chance.integers(2, 6))):
-        a, b = chance.uniform((0.5, 0.25), (1.6, 0.45))
-        x = chance.uniform(ends[0], ends[1] - a)
-        y = levels[0] if chance.random() < 0.5 else levels[1] - b
+    for _ in range(int(rng.integers(2, 6))):
+        a, b = rng.uniform((0.5, 0.25), (1.6, 0.45))
+        x = rng.uniform(ends[0], ends[1] - a)
+        y = levels[0] if rng.random() < 0.5 else levels[1] - b
         if _clear_of(doors, (x, y, x + a, y + b)):
             yield x, y, x + a, y + b
 
@@ -175,17 +175,17 @@ def _clear_of(doors: Array, box: tuple[float, float, float, float]) -> bool:
     return all(distance_to(boxes([box]), door)[0] > SWINGS for door in doors.tolist())
 
 
-def lived_in(floor: Building, chance: np.random.Generator) -> Array:
+def lived_in(floor: Building, rng: np.random.Generator) -> Array:
     """The furniture (n, 4) as it stands now: some of it moved, some taken away, some brought."""
-    stays = chance.random(len(floor.furniture))
+    stays = rng.random(len(floor.furniture))
     now = floor.furniture[stays > TAKEN].copy()
     moved = stays[stays > TAKEN] < TAKEN + MOVED
-    shift = chance.normal(0, 0.6, (int(moved.sum()), 2))
+    shift = rng.normal(0, 0.6, (int(moved.sum()), 2))
     now[moved] += np.hstack((shift, shift))
     brought = []
     for _ in range(int(BROUGHT * len(floor.furniture))):
-        x, y = floor.rooms[chance.integers(len(floor.rooms))] + chance.normal(0, 1.2, 2)
-        a, b = chance.uniform(0.3, 0.9, 2)
+        x, y = floor.rooms[rng.integers(len(floor.rooms))] + rng.normal(0, 1.2, 2)
+        a, b = rng.uniform(0.3, 0.9, 2)
         if _clear_of(floor.doors, (x, y, x + a, y + b)):
             brought.append((x, y, x + a, y + b))
     return np.concatenate((now, boxes(brought)))

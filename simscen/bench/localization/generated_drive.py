@@ -29,7 +29,7 @@ class ShutIn(ValueError):
     """No way leads out of the room in which the drive would begin."""
 
 
-def drive(floor: Building, furniture: Array, seconds: float, chance: np.random.Generator, alternate: bool) -> Array:
+def drive(floor: Building, furniture: Array, seconds: float, rng: np.random.Generator, alternate: bool) -> Array:
     """True poses (k, 3), STEP apart, between rooms drawn anywhere; if `alternate`, in the left half and the right one.
 
     Such a drive begins in the left half.
@@ -37,7 +37,7 @@ def drive(floor: Building, furniture: Array, seconds: float, chance: np.random.G
     ways = ShortestPaths(
         mesh_of(floor.walls, floor.glass, furniture), (0.0, 0.0, *floor.size), CLEARANCE, finest=FINEST
     )
-    corners = _corners(floor, ways, chance, alternate)
+    corners = _corners(floor, ways, rng, alternate)
     before, goal = next(corners), next(corners)
     x, y = before.tolist()
     pose = Pose2(x, y, float(np.arctan2(*(goal - before)[::-1])))
@@ -54,14 +54,14 @@ def drive(floor: Building, furniture: Array, seconds: float, chance: np.random.G
     return np.array(truth)
 
 
-def _corners(floor: Building, ways: ShortestPaths, chance: np.random.Generator, alternate: bool) -> Iterator[Array]:
+def _corners(floor: Building, ways: ShortestPaths, rng: np.random.Generator, alternate: bool) -> Iterator[Array]:
     """Places to turn at, without end, on the shortest ways between places in rooms."""
     here: Array | None = None
     right, failed = False, 0
     while True:
         side = (floor.rooms[:, 0] > floor.middle) == right
         rooms = floor.rooms[side] if alternate else floor.rooms
-        target = rooms[chance.integers(len(rooms))] + chance.normal(0, 0.8, 2)
+        target = rooms[rng.integers(len(rooms))] + rng.normal(0, 0.8, 2)
         start = target if here is None else here
         way = ways.way(Pose2(*start), Pose2(*target))
         failed = failed + 1 if way is None else 0
@@ -113,20 +113,20 @@ CLEAN = Wheels(0.0, 0.0, 0.0, False)
 """Wheels with nothing but the random errors of the simulator's sensor."""
 
 
-def reckoned(truth: Array, seconds: float, wheels: Wheels, spec: WheelOdometry, chance: np.random.Generator) -> Array:
+def reckoned(truth: Array, seconds: float, wheels: Wheels, spec: WheelOdometry, rng: np.random.Generator) -> Array:
     """Poses (k, 3) in the odom frame for true poses (k, 3), `seconds` apart."""
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(Pose2(*row) for row in truth))])
     way = np.hypot(steps[:, 0], steps[:, 1])
     scale, turn, bend = (
-        1 + chance.normal(0, wheels.scale),
-        1 + chance.normal(0, wheels.turn),
-        chance.normal(0, wheels.bend),
+        1 + rng.normal(0, wheels.scale),
+        1 + rng.normal(0, wheels.turn),
+        rng.normal(0, wheels.bend),
     )
-    along, around = chance.standard_normal((2, len(steps)))
-    stretch = scale * _slip(len(steps), seconds, wheels.slips, chance)
+    along, around = rng.standard_normal((2, len(steps)))
+    stretch = scale * _slip(len(steps), seconds, wheels.slips, rng)
     stretch[way > 0] += spec.translation_noise * along[way > 0] / np.sqrt(way[way > 0])
     heading = np.sqrt(spec.rotation_noise**2 * np.abs(steps[:, 2]) + spec.drift_noise**2 * way)
-    spun = _slip(len(steps), seconds, wheels.slips, chance)
+    spun = _slip(len(steps), seconds, wheels.slips, rng)
     turned = steps[:, 2] * turn * spun + bend * way + heading * around
     poses = [Pose2(0.0, 0.0, 0.0)]
     for x, y, yaw in np.column_stack((steps[:, 0] * stretch, steps[:, 1] * stretch, turned))[1:].tolist():
@@ -134,16 +134,16 @@ def reckoned(truth: Array, seconds: float, wheels: Wheels, spec: WheelOdometry, 
     return np.array(poses)
 
 
-def _slip(count: int, seconds: float, slips: bool, chance: np.random.Generator) -> Array:
+def _slip(count: int, seconds: float, slips: bool, rng: np.random.Generator) -> Array:
     """How much further than the base the wheels turn (count,): 1, and for short stretches 0.9 … 1.4."""
     factor = np.ones(count)
     if not slips:
         return factor
-    row = int(chance.exponential(STUMBLES_EACH) / seconds)
+    row = int(rng.exponential(STUMBLES_EACH) / seconds)
     while row < count:
-        end = row + max(1, int(chance.uniform(*STUMBLE) / seconds))
-        factor[row:end] = chance.uniform(0.9, 1.4)
-        row = end + int(chance.exponential(STUMBLES_EACH) / seconds)
+        end = row + max(1, int(rng.uniform(*STUMBLE) / seconds))
+        factor[row:end] = rng.uniform(0.9, 1.4)
+        row = end + int(rng.exponential(STUMBLES_EACH) / seconds)
     return factor
 
 
@@ -152,7 +152,7 @@ WANDERS = 2.5
 """m: how far from the middle of a room people who are in it walk, and from the corridor's middle never."""
 
 
-def people_in(floor: Building, count: int, seconds: float, people: int, chance: np.random.Generator) -> Array:
+def people_in(floor: Building, count: int, seconds: float, people: int, rng: np.random.Generator) -> Array:
     """Poses (count, people, 3), `seconds` apart: half of them up and down the corridor, the others about in rooms.
 
     Nobody gets out of the robot's way, and they walk through furniture.
@@ -162,12 +162,12 @@ def people_in(floor: Building, count: int, seconds: float, people: int, chance: 
     tracks = []
     for person in range(people):
         if person % 2:
-            ends = np.array([[2.0, corridor], [floor.size[0] - 2.0, corridor]]) + chance.normal(0, 0.2, (2, 2))
+            ends = np.array([[2.0, corridor], [floor.size[0] - 2.0, corridor]]) + rng.normal(0, 0.2, (2, 2))
         else:
-            middle = floor.rooms[chance.integers(len(floor.rooms))]
-            ends = middle + chance.uniform(-WANDERS, WANDERS, (2, 2)) / 2
+            middle = floor.rooms[rng.integers(len(floor.rooms))]
+            ends = middle + rng.uniform(-WANDERS, WANDERS, (2, 2)) / 2
         apart = float(np.hypot(*(ends[1] - ends[0])))
-        walked = times * WALKING * chance.uniform(0.4, 1.2) + chance.uniform(0, 2 * apart)
+        walked = times * WALKING * rng.uniform(0.4, 1.2) + rng.uniform(0, 2 * apart)
         back = walked % (2 * apart) > apart
         along = np.abs(walked % (2 * apart) - 2 * apart * back)
         heading = np.arctan2(*(ends[1] - ends[0])[::-1]) + np.pi * back
@@ -196,13 +196,13 @@ class Sight:
         """Of two meshes."""
         return cls(RayScene(opaque), RayScene(everything))
 
-    def distances(self, poses: Array, angles: Array, reach: float, chance: np.random.Generator) -> Array:
+    def distances(self, poses: Array, angles: Array, reach: float, rng: np.random.Generator) -> Array:
         """True ranges (n, b) from `poses` (n, 3) of the lidar along `angles` (b,); inf beyond `reach`."""
         heading = (poses[:, 2:] + angles).ravel()
         origins = np.column_stack((np.repeat(poses[:, :2], len(angles), axis=0), np.full(len(heading), HEIGHT / 2)))
         directions = np.column_stack((np.cos(heading), np.sin(heading), np.zeros(len(heading))))
         seen, behind = (scene.cast(origins, directions, reach) for scene in (self.all, self.opaque))
-        through = chance.random(len(heading)) < THROUGH
+        through = rng.random(len(heading)) < THROUGH
         distances: Array = np.where(through, behind, seen).reshape(len(poses), len(angles))
         return distances
 
@@ -232,10 +232,10 @@ def hidden_by(people: Array, poses: Array, angles: Array, ranges: Array) -> Arra
     return seen
 
 
-def measured(distances: Array, spec: Lidar, chance: np.random.Generator) -> Array:
+def measured(distances: Array, spec: Lidar, rng: np.random.Generator) -> Array:
     """What the electronics make of true distances: the simulator's lidar."""
     ranges: Array = (
-        np.round((distances + chance.normal(0, spec.noise, distances.shape)) / spec.resolution) * spec.resolution
+        np.round((distances + rng.normal(0, spec.noise, distances.shape)) / spec.resolution) * spec.resolution
     )
     ranges[ranges > spec.max_range] = np.inf
     ranges[ranges < spec.min_range] = -np.inf

@@ -107,19 +107,19 @@ class Log:
 
 def log(number: int, which: int, circumstance: str, seconds: float = SECONDS) -> Log:
     """Drive `which` through the building of a number under one of CIRCUMSTANCES: always the same."""
-    chance = Streams(number).generator(f"{circumstance} {which}")
+    rng = Streams(number).generator(f"{circumstance} {which}")
     beams, rate = LIDARS[which % len(LIDARS)]
     lidar = Lidar(
         rate=rate, beams=beams, field_of_view=np.pi, min_range=0.0, max_range=80.0, noise=0.01, resolution=0.01
     )
     floor = building(number, int(circumstance == "outdated"))
     alone = circumstance in ALONE
-    truth, furniture = _driven(floor, circumstance, seconds, chance)
-    odometry = reckoned(truth, STEP, CLEAN if circumstance == "clean" else Wheels(), WheelOdometry(), chance)
+    truth, furniture = _driven(floor, circumstance, seconds, rng)
+    odometry = reckoned(truth, STEP, CLEAN if circumstance == "clean" else Wheels(), WheelOdometry(), rng)
     if circumstance == "kidnapped":
-        other, _ = _driven(floor, circumstance, seconds, chance, furniture)
+        other, _ = _driven(floor, circumstance, seconds, rng, furniture)
         row = int(KIDNAPPED_AT / STEP)
-        carried = reckoned(other, STEP, Wheels(), WheelOdometry(), chance)
+        carried = reckoned(other, STEP, Wheels(), WheelOdometry(), rng)
         there = Pose2(*odometry[row])
         odometry = np.vstack(
             (odometry[:row], [there.compose(Pose2(*pose)) for pose in carried[: len(truth) - row].tolist()])
@@ -130,10 +130,10 @@ def log(number: int, which: int, circumstance: str, seconds: float = SECONDS) ->
     seen_from = np.array([Pose2(*pose).compose(MOUNT) for pose in poses.tolist()])
     angles = angles_of(lidar)
     sight = Sight.of(mesh_of(floor.walls, furniture), mesh_of(floor.walls, floor.glass, furniture))
-    ranges = sight.distances(seen_from, angles, lidar.max_range, chance)
+    ranges = sight.distances(seen_from, angles, lidar.max_range, rng)
     if not alone:
-        ranges = hidden_by(people_in(floor, len(poses), each * STEP, PEOPLE, chance), seen_from, angles, ranges)
-    ranges = measured(ranges, lidar, chance)
+        ranges = hidden_by(people_in(floor, len(poses), each * STEP, PEOPLE, rng), seen_from, angles, ranges)
+    ranges = measured(ranges, lidar, rng)
     readings = _readings(odometry, ranges, each, lidar)
     ticks = np.round(np.arange(len(truth)) * STEP * TICK_RATE_HZ).astype(np.int64)
     whole = mapped(number)
@@ -145,15 +145,15 @@ def log(number: int, which: int, circumstance: str, seconds: float = SECONDS) ->
 
 
 def _driven(
-    floor: Building, circumstance: str, seconds: float, chance: np.random.Generator, furniture: Array | None = None
+    floor: Building, circumstance: str, seconds: float, rng: np.random.Generator, furniture: Array | None = None
 ) -> tuple[Array, Array]:
     """The truth (k, 3) and the furniture (n, 4); drawn anew where furniture shuts the robot in."""
     while True:
         stands = furniture
         if stands is None:
-            stands = floor.furniture if circumstance in ALONE else lived_in(floor, chance)
+            stands = floor.furniture if circumstance in ALONE else lived_in(floor, rng)
         try:
-            return drive(floor, stands, seconds, chance, circumstance in ("outdated", "half")), stands
+            return drive(floor, stands, seconds, rng, circumstance in ("outdated", "half")), stands
         except ShutIn:
             continue
 
@@ -161,12 +161,12 @@ def _driven(
 @lru_cache(maxsize=2)
 def mapped(number: int) -> OccupancyGrid:
     """The map of a building, drawn from an earlier drive through all its rooms that nobody was in."""
-    floor, chance = building(number), Streams(number).generator("map")
+    floor, rng = building(number), Streams(number).generator("map")
     poses = tour(floor)
     angles = np.linspace(-np.pi, np.pi, 480, endpoint=False)
     sight = Sight.of(mesh_of(floor.walls, floor.furniture), mesh_of(floor.walls, floor.glass, floor.furniture))
-    ranges = sight.distances(poses, angles, 80.0, chance)
-    return drawn(poses + chance.normal(0, MAPPED_WITHIN, poses.shape), angles, ranges, floor.size)
+    ranges = sight.distances(poses, angles, 80.0, rng)
+    return drawn(poses + rng.normal(0, MAPPED_WITHIN, poses.shape), angles, ranges, floor.size)
 
 
 def _readings(odometry: Array, ranges: Array, each: int, lidar: Lidar) -> list[Odometry | Scan]:

@@ -37,10 +37,10 @@ def _numbered(name: str, stem: Path, numbers: Iterable[int], text: Callable[[int
 
 
 def _meeting(number: int) -> str:
-    chance = Streams(number).generator("corridor")
-    width = float(chance.uniform(*WIDTH))
+    rng = Streams(number).generator("corridor")
+    width = float(rng.uniform(*WIDTH))
     free = width / 2 - 0.35
-    west, east = chance.uniform(-free, free, 2).tolist()
+    west, east = rng.uniform(-free, free, 2).tolist()
     return f"""\
 simscen: 1
 name: two robots meet in {width:.2f} m
@@ -63,11 +63,11 @@ pass:
 
 
 def _ramp(number: int) -> str:
-    chance = Streams(number).generator("ramp")
-    slope, height = float(chance.uniform(*SLOPE)), float(chance.uniform(*HEIGHT))
-    run, flat = height / float(np.tan(np.radians(slope))), float(chance.uniform(1.5, 3.0))
+    rng = Streams(number).generator("ramp")
+    slope, height = float(rng.uniform(*SLOPE)), float(rng.uniform(*HEIGHT))
+    run, flat = height / float(np.tan(np.radians(slope))), float(rng.uniform(1.5, 3.0))
     top, below = (3.0 + run, 3.0 + run + flat), 3.0 + 2 * run + flat
-    end, y = below + 3.0, float(chance.uniform(0.6, HALL - 0.6))
+    end, y = below + 3.0, float(rng.uniform(0.6, HALL - 0.6))
     middle, size = HALL / 2, f"width: {HALL - 0.1:g}, height: {height:.4f}"
     return f"""\
 simscen: 1

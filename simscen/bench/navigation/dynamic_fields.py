@@ -57,45 +57,45 @@ class DynamicField:
 
 def dynamic_field(number: int, speed: float) -> DynamicField:
     """The field of this number (from 1) and mean speed in m/s: always the same."""
-    chance = Streams(number).generator(f"dynamic field {speed:g}")
-    count = int(chance.integers(COUNT[0], COUNT[1] + 1))
-    return DynamicField(number, speed, tuple(_mover(chance, speed) for _ in range(count)))
+    rng = Streams(number).generator(f"dynamic field {speed:g}")
+    count = int(rng.integers(COUNT[0], COUNT[1] + 1))
+    return DynamicField(number, speed, tuple(_mover(rng, speed) for _ in range(count)))
 
 
-def _mover(chance: np.random.Generator, speed: float) -> Mover:
-    points = _way(chance)
-    mean = speed + float(chance.uniform(-SPREAD, SPREAD))
-    deviation = float(chance.uniform(*DEVIATION))
+def _mover(rng: np.random.Generator, speed: float) -> Mover:
+    points = _way(rng)
+    mean = speed + float(rng.uniform(-SPREAD, SPREAD))
+    deviation = float(rng.uniform(*DEVIATION))
     steps = np.hypot(*np.diff(points, axis=0).T)
-    speeds = np.clip(chance.normal(mean, deviation, len(steps)), mean - SPREAD, mean + SPREAD)
+    speeds = np.clip(rng.normal(mean, deviation, len(steps)), mean - SPREAD, mean + SPREAD)
     times = np.concatenate(([0.0], np.cumsum(steps / speeds)))
-    return Mover(times, points, float(chance.uniform(0.0, 1.99 * times[-1])))
+    return Mover(times, points, float(rng.uniform(0.0, 1.99 * times[-1])))
 
 
-def _way(chance: np.random.Generator) -> Array:
+def _way(rng: np.random.Generator) -> Array:
     """Points (n, 2) about PIECE apart along a polynomial within the arena; every other one leads along y, or back.
 
     Raises RuntimeError after MOST_TRIES (never seen).
     """
     for _ in range(MOST_TRIES):
-        way = _inside(chance)
+        way = _inside(rng)
         along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
         if along[-1] < LEAST_WAY:
             continue
         at = np.linspace(0.0, along[-1], round(along[-1] / PIECE) + 1)
         points = np.column_stack((np.interp(at, along, way[:, 0]), np.interp(at, along, way[:, 1])))
-        points = points[:, ::-1] if chance.integers(2) else points
-        return points[::-1] if chance.integers(2) else points
+        points = points[:, ::-1] if rng.integers(2) else points
+        return points[::-1] if rng.integers(2) else points
     raise RuntimeError(f"none of {MOST_TRIES} polynomials stays within the arena for {LEAST_WAY:g} m")
 
 
-def _inside(chance: np.random.Generator) -> Array:
+def _inside(rng: np.random.Generator) -> Array:
     """The longest piece within the arena, as points (n, 2), of a polynomial through random points of it."""
-    order = int(chance.integers(ORDER[0], ORDER[1] + 1))
+    order = int(rng.integers(ORDER[0], ORDER[1] + 1))
     # Spread over the arena, so that the polynomial does not oscillate between points that nearly coincide.
     edges = np.linspace(-HALF, HALF, order + 2)
-    through = chance.uniform(edges[:-1], edges[1:])
-    polynomial = np.polynomial.Polynomial.fit(through, chance.uniform(-HALF, HALF, order + 1), order)
+    through = rng.uniform(edges[:-1], edges[1:])
+    polynomial = np.polynomial.Polynomial.fit(through, rng.uniform(-HALF, HALF, order + 1), order)
     x = np.linspace(-HALF, HALF, 401)
     y = polynomial(x)
     outside = np.flatnonzero(np.abs(y) > HALF)

@@ -53,18 +53,18 @@ def obstacle_field(number: int, gap: float = GAP, too_wide: float | None = None)
     Density is drawn anew until a disc of radius `gap` has a way, and one of `too_wide`, where that is given, has none.
     Raises RuntimeError after MOST_TRIES (never seen).
     """
-    chance = Streams(number).generator("obstacle field" if gap == GAP else f"obstacle field {gap:g}")
+    rng = Streams(number).generator("obstacle field" if gap == GAP else f"obstacle field {gap:g}")
     for _ in range(MOST_TRIES):
-        centers = _centers(_smoothed(chance))
+        centers = _centers(_smoothed(rng))
         if _crossable(centers, gap, too_wide) and np.isfinite(length := _shortest(centers, gap)):
             return ObstacleField(number, centers, length)
     raise RuntimeError(f"no way through any of {MOST_TRIES} fields of number {number}")
 
 
-def _smoothed(chance: np.random.Generator) -> Cells:
+def _smoothed(rng: np.random.Generator) -> Cells:
     """A field of random density and smoothness, walled at both sides; smoothed two to four times as in BARN."""
-    cells: Cells = chance.random((FIELD_ROWS, COLUMNS)) < chance.uniform(*FILL)
-    for _ in range(int(chance.integers(2, 5))):
+    cells: Cells = rng.random((FIELD_ROWS, COLUMNS)) < rng.uniform(*FILL)
+    for _ in range(int(rng.integers(2, 5))):
         cells[:, [0, -1]] = True
         around = _neighbors(cells)
         cells = (cells | (around >= FILL_AT)) & (around > CLEAR_AT)

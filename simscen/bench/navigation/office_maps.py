@@ -37,63 +37,63 @@ class _Floor:
 
 def building(number: int) -> tuple[Image, float]:
     """The map of the floor of this number (from 1), and the edge of its cells in meters: always the same."""
-    chance = Streams(number).generator("building")
+    rng = Streams(number).generator("building")
     resolution = RESOLUTIONS[number % len(RESOLUTIONS)]
-    width, depth = float(chance.uniform(*WIDE)), float(chance.uniform(*DEEP))
+    width, depth = float(rng.uniform(*WIDE)), float(rng.uniform(*DEEP))
     image = np.full((int(depth / FINE), int(width / FINE)), FREE, np.uint8)
-    floor = _Floor(image, float(chance.choice([0.05, 0.1, 0.2])))
+    floor = _Floor(image, float(rng.choice([0.05, 0.1, 0.2])))
     for wall in ((0, 0, width, 0), (0, depth, width, depth), (0, 0, 0, depth), (width, 0, width, depth)):
         floor.wall(*wall)
-    broad = float(chance.uniform(*CORRIDOR))
-    for y in np.arange(chance.uniform(4, 6), depth - 4, chance.uniform(9, 13)).tolist():
+    broad = float(rng.uniform(*CORRIDOR))
+    for y in np.arange(rng.uniform(4, 6), depth - 4, rng.uniform(9, 13)).tolist():
         for side in (-1, 1):
-            _rooms(floor, chance, y + side * broad / 2, side)
-    _across(floor, chance, broad)
+            _rooms(floor, rng, y + side * broad / 2, side)
+    _across(floor, rng, broad)
     image[[0, -1]], image[:, [0, -1]] = WALL, WALL
-    return _as_mapped(image, resolution, chance), resolution
+    return _as_mapped(image, resolution, rng), resolution
 
 
-def _rooms(floor: _Floor, chance: np.random.Generator, y: float, side: int) -> None:
+def _rooms(floor: _Floor, rng: np.random.Generator, y: float, side: int) -> None:
     """A line of rooms along a corridor, each with a door to it and some furniture."""
     depth, width = (size * FINE for size in floor.image.shape)
     x = 0.0
     while x < width:
-        room, door = float(chance.uniform(3, 7)), float(chance.uniform(*DOOR))
-        before = float(chance.uniform(0.3, room - door - 0.3))
+        room, door = float(rng.uniform(3, 7)), float(rng.uniform(*DOOR))
+        before = float(rng.uniform(0.3, room - door - 0.3))
         floor.wall(x, y, min(width, x + before), y)
         floor.wall(min(width, x + before + door), y, min(width, x + room), y)
-        far = min(max(y + side * float(chance.uniform(3.0, 3.8)), 0.0), depth)
+        far = min(max(y + side * float(rng.uniform(3.0, 3.8)), 0.0), depth)
         floor.wall(min(width, x + room), y, min(width, x + room), far)
-        for _ in range(int(chance.integers(0, 3))):
-            left, low = x + float(chance.uniform(0.5, room - 0.5)), y + side * float(chance.uniform(1.2, 2.8))
-            size = chance.uniform(0.2, 0.9, 2).tolist()
+        for _ in range(int(rng.integers(0, 3))):
+            left, low = x + float(rng.uniform(0.5, room - 0.5)), y + side * float(rng.uniform(1.2, 2.8))
+            size = rng.uniform(0.2, 0.9, 2).tolist()
             floor.wall(left, low, left + size[0], low + size[1], FINE)
         x += room
 
 
-def _across(floor: _Floor, chance: np.random.Generator, broad: float) -> None:
+def _across(floor: _Floor, rng: np.random.Generator, broad: float) -> None:
     """Corridors across, with walls that have gaps as wide as doors."""
     depth, width = (size * FINE for size in floor.image.shape)
-    for x in np.arange(chance.uniform(5, 9), width - 3, chance.uniform(12, 20)).tolist():
+    for x in np.arange(rng.uniform(5, 9), width - 3, rng.uniform(12, 20)).tolist():
         floor.image[int(0.5 / FINE) : -int(0.5 / FINE), int((x - broad / 2) / FINE) : int((x + broad / 2) / FINE)] = (
             FREE
         )
         for side in (-1, 1):
             y = 0.5
             while y < depth - 1:
-                long = float(chance.uniform(2, 6))
-                if chance.random() < 0.6:
+                long = float(rng.uniform(2, 6))
+                if rng.random() < 0.6:
                     floor.wall(x + side * broad / 2, y, x + side * broad / 2, min(depth, y + long))
-                y += long + float(chance.uniform(0.9, 1.6))
+                y += long + float(rng.uniform(0.9, 1.6))
 
 
-def _as_mapped(image: Image, resolution: float, chance: np.random.Generator) -> Image:
+def _as_mapped(image: Image, resolution: float, rng: np.random.Generator) -> Image:
     """In cells of the map: occupied where a good part of a cell is; some gray, as where a scan never came."""
     step = round(resolution / FINE)
     rows, columns = (size // step * step for size in image.shape)
     parts = image[:rows, :columns].reshape(rows // step, step, columns // step, step)
     mapped = np.where((parts == WALL).mean(axis=(1, 3)) > (0.3 if step > 2 else 0.49), WALL, FREE).astype(np.uint8)
-    mapped[(mapped == FREE) & (chance.random(mapped.shape) < 0.001)] = UNKNOWN
+    mapped[(mapped == FREE) & (rng.random(mapped.shape) < 0.001)] = UNKNOWN
     mapped[[0, -1]], mapped[:, [0, -1]] = WALL, WALL
     return mapped
 

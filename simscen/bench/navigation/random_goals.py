@@ -39,10 +39,10 @@ def random_drives(
     ways = ShortestPaths(built.mesh, built.world.bounds, radius + ROOM)
     free = np.argwhere(built.map.cells == 0)
     for number in numbers if len(free) else ():
-        chance = Streams(number).generator("errand")
+        rng = Streams(number).generator("errand")
         for _ in range(TRIES):
-            ends = built.map.center_of(free[chance.integers(0, len(free), 2)]).tolist()
-            start, goal = (Pose2(x, y, float(chance.uniform(-math.pi, math.pi))) for x, y in ends)
+            ends = built.map.center_of(free[rng.integers(0, len(free), 2)]).tolist()
+            start, goal = (Pose2(x, y, float(rng.uniform(-math.pi, math.pi))) for x, y in ends)
             if start.distance(goal) < least / 2 or any(_near(end, built) for end in (start, goal)):
                 continue
             length = ways.length(start, goal)

@@ -150,13 +150,13 @@ def write_warehouse(folder: Path) -> Path:
     Aisles of 2.4 m between the rows and one of 8 m across them; half of the carts drive where the robot passes.
     """
     folder.mkdir()
-    chance = np.random.default_rng(12)
+    rng = np.random.default_rng(12)
     columns = [*np.arange(4.0, 46.0, 0.75).tolist(), *np.arange(54.5, 96.5, 0.75).tolist()]
     bays = list(product(columns, (row + side for row in range(4, 97, 4) for side in (-0.4, 0.4))))
     stock = [
         f"  - {{name: unit {n}, {_unit(n)}, pose: {{x: {bays[bay][0]:.2f}, y: {bays[bay][1]:.2f}, yaw: {turn:.2f}}}}}"
         for n, (bay, turn) in enumerate(
-            zip(chance.permutation(len(bays))[:STANDING].tolist(), chance.uniform(-0.2, 0.2, STANDING), strict=True)
+            zip(rng.permutation(len(bays))[:STANDING].tolist(), rng.uniform(-0.2, 0.2, STANDING), strict=True)
         )
     ]
     carts = [
@@ -179,11 +179,11 @@ def _unit(number: int) -> str:
 def write_arena(folder: Path) -> Path:
     """A ROS map of 100 x 100 m at 5 cm with 400 blocks and 0.5 % of noise, as from SLAM; its scenario."""
     folder.mkdir()
-    chance = np.random.default_rng(7)
+    rng = np.random.default_rng(7)
     cells = np.full((EDGE, EDGE), FREE, dtype=np.int8)
-    cells[chance.random((EDGE, EDGE)) < 0.005] = OCCUPIED
+    cells[rng.random((EDGE, EDGE)) < 0.005] = OCCUPIED
     cells[:4] = cells[-4:] = cells[:, :4] = cells[:, -4:] = OCCUPIED
-    for column, row, width, depth in chance.integers((10, 10, 8, 8), (EDGE - 60, EDGE - 60, 50, 50), (400, 4)).tolist():
+    for column, row, width, depth in rng.integers((10, 10, 8, 8), (EDGE - 60, EDGE - 60, 50, 50), (400, 4)).tolist():
         cells[row : row + depth, column : column + width] = OCCUPIED
     middle = EDGE // 2
     cells[middle - 12 : middle + 12, 60:-60] = FREE

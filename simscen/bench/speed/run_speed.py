@@ -185,9 +185,9 @@ def _circle(beams: int) -> Array:
 
 def cylinders(count: int) -> list[Solid]:
     """So many cylinders of 7.5 cm radius, at random but for a free disc of 1 m about the origin."""
-    chance = np.random.default_rng(SEED)
+    rng = np.random.default_rng(SEED)
     edge = (count / 0.9) ** 0.5 / 2
-    places = chance.uniform(-edge, edge, (4 * count + 40, 2))
+    places = rng.uniform(-edge, edge, (4 * count + 40, 2))
     places = places[np.hypot(*places.T) > 1.0][:count]
     return [Solid(Cylinder(0.075, 1.0), Pose3(x, y, 0.5), f"cylinder {k}") for k, (x, y) in enumerate(places.tolist())]
 

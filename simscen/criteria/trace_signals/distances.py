@@ -123,7 +123,7 @@ def _along(points: Array, way: Array) -> tuple[Array, Array]:
 
 
 def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
-    """The index of the step (m, 2) that is nearest to each point (n, 2); products of matrices, for there are many."""
+    """Return the index of the segment (m, 2) nearest to each point (n, 2), computed with matrix products for speed."""
     along = points @ steps.T - (begins * steps).sum(axis=1)
     squared = np.maximum((steps**2).sum(axis=1), _TINY)
     share = np.clip(along / squared, 0.0, 1.0)
@@ -165,7 +165,7 @@ def pedestrian_gap(trace: Trace, case: Case) -> Array:
 
 
 def person_distance(query: SignalQuery) -> Array:
-    """The same as a signal."""
+    """Return the distance to people as a signal."""
     return pedestrian_gap(query.trace, query.case)
 
 

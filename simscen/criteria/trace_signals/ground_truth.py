@@ -29,7 +29,7 @@ BELIEF_TIMEOUT_S = 1.0
 
 
 def check_samples(samples: Samples, name: str, trace: Trace) -> Samples:
-    """The samples themselves. Raises InvalidTrace, naming signal and time, when one is nan or infinite."""
+    """Return the samples. Raises InvalidTrace with signal and time if a value is nan or infinite."""
     bad = ~np.isfinite(samples.values).all(axis=1)
     if bad.any():
         at = trace.seconds(int(samples.ticks[int(np.argmax(bad))]))
@@ -72,13 +72,13 @@ def check_finite(trace: Trace) -> None:
 
 
 def speed(trace: Trace) -> Samples:
-    """True speed over ground (m/s), (n, 1)."""
+    """Return the true speed over ground (n, 1) in m/s."""
     velocity = check_samples(trace.velocity, "the true velocity", trace)
     return type(velocity)(velocity.ticks, np.hypot(velocity.values[:, 0], velocity.values[:, 1])[:, np.newaxis])
 
 
 def turn_rate(trace: Trace) -> Samples:
-    """True turn rate without its sign (rad/s), (n, 1)."""
+    """Return the absolute true turn rate (n, 1) in rad/s."""
     velocity = check_samples(trace.velocity, "the true velocity", trace)
     return type(velocity)(velocity.ticks, np.abs(velocity.values[:, 2])[:, np.newaxis])
 
@@ -102,9 +102,9 @@ class Drive:
 
 
 def drive(trace: Trace) -> Drive:
-    """The way the robot drove: in the plane, in moves of at least SMALLEST_MOVE; being set down elsewhere is no drive.
+    """Return the driven path in the plane, in moves of at least SMALLEST_MOVE, without teleportation.
 
-    Yaw must not enter the norm (as it does in Arena's get_metrics.py, which so adds radians to meters).
+    Yaw is not part of the distance, unlike in Arena's get_metrics.py, which adds radians to meters.
     """
     poses, carried = truth(trace), set(teleport_samples(trace))
     kept, lengths = [0], [0.0]
@@ -162,9 +162,9 @@ def _stale(trace: Trace) -> Ticks:
 
 
 def first_sustained(ticks: Ticks, true: Flags, hold: int, end: int) -> tuple[int | None, bool]:
-    """The first of `ticks` from which `true` lasts for `hold` ticks, or up to `end`; and whether it lasted `hold`.
+    """Return the first of `ticks` from which `true` lasts `hold` ticks or until `end`, and whether it lasted `hold`.
 
-    A stretch lasts until the next sample that is not true. (None, False) when there is no such stretch.
+    An interval lasts until the next sample that is not true. Without such an interval, the result is (None, False).
     """
     begins = np.flatnonzero(true & ~np.concatenate(([False], true[:-1])))
     breaks = np.flatnonzero(~true & np.concatenate(([False], true[:-1])))

@@ -27,7 +27,7 @@ MAX_LINES = 6
 
 
 def explain_failures(verdicts: Sequence[Verdict], trace: Trace, case: Case) -> tuple[Verdict, ...]:
-    """The verdicts, and before the details of each failed finding what is known of its cause."""
+    """Return the verdicts with the likely causes inserted before the details of each failed finding."""
     return tuple(
         replace(one, findings=tuple(_explained(one.criterion, finding, trace, case) for finding in one.findings))
         for one in verdicts
@@ -42,7 +42,7 @@ def _explained(criterion: str, finding: Finding, trace: Trace, case: Case) -> Fi
 
 
 def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
-    """What is known of the cause of a failure of this kind at this tick, a line each."""
+    """Return lines about the likely causes of a failure of a criterion at a tick."""
     lines: list[str] = []
     named: set[str] = set()
     parts = [
@@ -109,7 +109,7 @@ OBJECT_SPEED_WINDOW_S = 0.25
 
 
 def diagnose_collision(trace: Trace, tick: int) -> tuple[list[str], set[str]]:
-    """A sentence for each thing that can move and was touched at `tick`; and the events that brought it there."""
+    """Return a sentence for each movable object touched at `tick`, and the names of the events that placed it there."""
     hits = {hit.name: hit for hit in trace.of_kind(EventKind.COLLISION_STARTED) if hit.tick == tick}
     touched = [thing for thing in movable_objects(trace, tick) if thing.name in hits]
     told = [(thing, _told(trace, thing, hits[thing.name])) for thing in touched]

@@ -38,7 +38,7 @@ def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> tuple[list[str
 
 
 def _story(trace: Trace, case: Case, tick: int) -> GoalOutcome | None:
-    """What became of the goal that the robot was given last by `tick`, as long as it is wanted."""
+    """Return the outcome of the last goal accepted up to `tick`, or None if it is not required."""
     begun = [outcome for outcome in goal_outcomes(trace, case) if outcome_start(outcome) <= tick]
     return begun[-1] if begun and not _over(begun[-1], tick) else None
 
@@ -60,7 +60,7 @@ def _walled_in(case: Case, goal: Goal) -> list[str]:
 
 
 def _held(trace: Trace, tick: int) -> list[str]:
-    """What its own stack says that it waits for; who gives a goal up no longer waits from then on."""
+    """Return what the stack reported to be waiting for, unless it has given up the goal."""
     last = [
         event
         for event in trace.of_kind(EventKind.ROBOT_HELD, EventKind.ROBOT_RELEASED)
@@ -75,7 +75,7 @@ def _held(trace: Trace, tick: int) -> list[str]:
 
 
 def _given_up(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
-    """What its own stack said when it gave the goal up, and what it had tried."""
+    """Return what the stack reported when it gave up the goal, and what it had tried."""
     end = outcome.end
     if end is None or end.tick > tick or code_of(end) == ErrorCode.NAVIGATE_TIMEOUT.name:  # that only says when
         return []
@@ -95,7 +95,7 @@ def _failed_recoveries(trace: Trace, outcome: GoalOutcome, tick: int) -> list[st
 
 
 def _touching(trace: Trace, tick: int) -> list[str]:
-    """What it has begun to touch and still does."""
+    """Return what the robot is touching."""
     since: dict[str, int] = {}
     for event in trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED):
         if event.tick <= tick and event.kind == EventKind.COLLISION_STARTED:
@@ -116,7 +116,7 @@ def _occupied(trace: Trace, case: Case, goal: Goal, there: list[MovableObject]) 
 
 
 def _standing_at(trace: Trace, case: Case, tick: int, there: list[MovableObject]) -> tuple[list[str], set[str]]:
-    """The thing nearest to the robot, when it is very near."""
+    """Return the object nearest to the robot if it is very close."""
     if not there or not len(trace.truth):
         return [], set()
     place = np.array([trace.place(tick)])
@@ -158,7 +158,7 @@ def diagnose_blocked_path(
 
 
 def free_width(passage: Passage, there: Sequence[MovableObject]) -> float:
-    """The diameter in meters of the largest disc that can cross the passage."""
+    """Return the diameter in m of the largest disc that can pass."""
     ends = np.array(passage.ends)
     share = np.linspace(0.0, 1.0, 2 + round(passage.width / SEARCH_STEP_M))[:, None]
     middles = ends[0] + share * (ends[1] - ends[0])
@@ -168,13 +168,13 @@ def free_width(passage: Passage, there: Sequence[MovableObject]) -> float:
 
 
 def _guilty(passage: Passage, there: Sequence[MovableObject], needed: float) -> list[MovableObject]:
-    """The one thing that does it alone, or all that have a part in it."""
+    """Return the single object that blocks the passage, or all objects that contribute."""
     alone = [thing for thing in there if free_width(passage, [thing]) < needed]
     return alone[-1:] or [thing for thing in there if free_width(passage, [thing]) < passage.width - NEGLIGIBLE_WIDTH_M]
 
 
 def _ahead(trace: Trace, case: Case, goal: str, tick: int) -> list[Passage]:
-    """The passages that the robot has still to cross; all of them when it is not on the way."""
+    """Return the passages that the robot still has to cross; all of them if it is not on the path."""
     found = [passage for passage in case.passages if passage.goal == goal]
     if not found or not len(trace.truth):
         return found

@@ -98,7 +98,7 @@ def _runs(number: int) -> str:
 
 
 def _known(runs: list[RunResult], name: str) -> list[float]:
-    """The values of a metric, those of each of several robots (`a/collisions`)."""
+    """Return the values of a metric, including those of each of several robots (`a/collisions`)."""
     found = [value for run in runs for metric, value in run.metrics.items() if _is(metric, name)]
     return [value for value in found if value is not None]
 

@@ -90,23 +90,23 @@ def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> Bas
 
 
 def _kind(name: str) -> str:
-    """What a metric measures, of whichever robot: `a/collisions` are collisions."""
+    """Return the name of a metric without the robot: `a/collisions` becomes `collisions`."""
     return name.rpartition("/")[2]
 
 
 def _chosen(pairs: Sequence[Pair]) -> list[str]:
-    """The COMPARED metrics, those of each robot together."""
+    """Return the names of the COMPARED metrics, grouped over robots."""
     names = {name for pair in pairs for run in pair for name in run.metrics if _kind(name) in COMPARED_METRICS}
     return sorted(names, key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_kind(name))))
 
 
 def _added(pairs: Sequence[Pair]) -> list[str]:
-    """The metrics that scenarios ask installed packages for."""
+    """Return the names of metrics from installed packages."""
     return sorted({name for pair in pairs for run in pair for name in run.metrics if _kind(name) not in METRICS})
 
 
 def _arrived(run: RunResult) -> set[str]:
-    """The robots that reached their last goals; the only one has no name."""
+    """Return the robots that reached their last goals; a single robot has the name ""."""
     times = {name: value for name, value in run.metrics.items() if _kind(name) == "time_to_goal"}
     return {name.rpartition("/")[0] for name, value in times.items() if value is not None}
 
@@ -120,7 +120,7 @@ def _flip(pair: Pair) -> Flip | None:
 
 
 def _why(run: RunResult) -> str:
-    """The first thing that was violated."""
+    """Return the first violation."""
     told = [
         sentence(verdict, finding, run.tick_rate)
         for verdict in run.verdicts

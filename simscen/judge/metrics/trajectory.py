@@ -18,7 +18,7 @@ PATH_METRICS = ("heading_change", "path_irregularity", "aol", *_CURVATURE)
 
 
 def path_metrics(trace: Trace, way: Drive) -> Values:
-    """Turns and curvature of the true way, which the robot drove so; being set down elsewhere is no part of it."""
+    """Return turns and curvature of the driven path, without teleportation."""
     legs = path_segments(trace, way)
     turned = heading_change(trace)
     return {
@@ -30,7 +30,7 @@ def path_metrics(trace: Trace, way: Drive) -> Values:
 
 
 def path_segments(trace: Trace, way: Drive) -> list[Array]:
-    """The corners (n, 2) of each piece of the way that was driven without being set down elsewhere."""
+    """Return the points (n, 2) of each part of the driven path between teleportations."""
     corners = truth(trace).at(way.ticks)[:, :2]
     breaks = np.flatnonzero(np.diff(way.travelled) == 0.0) + 1
     return [leg for leg in np.split(corners, breaks) if len(leg)]
@@ -44,7 +44,7 @@ def heading_change(trace: Trace) -> float:
 
 
 def _irregularity(trace: Trace, turned: float) -> float | str:
-    """What was turned beyond the first plan to each goal (SEAN; a stub in HuNavSim)."""
+    """Return the rotation beyond that of the first plan to each goal (SEAN; a stub in HuNavSim)."""
     starts = [event.tick for event in trace.of_kind(EventKind.GOAL_ACCEPTED)]
     first = [next((plan for plan in trace.plans if plan.tick >= start), None) for start in starts]
     if not starts or None in first:
@@ -144,7 +144,7 @@ def _pairs(steps: Array) -> tuple[list[int], list[int]]:
 
 
 def _between(origin: Array, poses: Array) -> Array:
-    """The poses (n, 3), or with more behind, as seen from `origin` (n, 3)."""
+    """Return poses (n, 3 or more columns) relative to `origin` (n, 3)."""
     c, s = np.cos(origin[:, 2]), np.sin(origin[:, 2])
     dx, dy = (poses - origin)[:, :2].T
     return np.column_stack((c * dx + s * dy, c * dy - s * dx, poses[:, 2] - origin[:, 2]))

@@ -28,7 +28,7 @@ def _chances(sampled: Sampled, path: str) -> list[float]:
     if sampled.method == "random":
         return chances
     order = sorted(range(count), key=lambda number: _hash(sampled.seed, path, "stratum", number))
-    return [(stratum + chance) / count for stratum, chance in zip(order, chances, strict=True)]
+    return [(stratum + rng) / count for stratum, rng in zip(order, chances, strict=True)]
 
 
 def _hash(seed: int, path: str, what: str, number: int) -> float:

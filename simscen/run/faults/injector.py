@@ -80,9 +80,9 @@ class FaultInjector:
         """
         entry = self._faults[index]
         self._begun[index] += 1
-        chance = self._streams.generator(f"fault{self._names[index]}#{self._begun[index]}")
+        rng = self._streams.generator(f"fault{self._names[index]}#{self._begun[index]}")
         setting = self._setting(entry)
-        disturbance: object = entry.fault.begin(chance, setting)
+        disturbance: object = entry.fault.begin(rng, setting)
         if not isinstance(disturbance, Disturbance):
             self._broke(index, f"begins as {disturbance!r}, which is no Disturbance")
         self.active[index, self._begun[index]] = _Active(index, entry.sensor, setting.kind, disturbance)

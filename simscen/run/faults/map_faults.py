@@ -42,10 +42,10 @@ def _of_one(prepared: PreparedScenario, streams: Streams) -> PreparedScenario:
 
 
 def _disturbed(
-    grid: OccupancyGrid, entry: FaultEntry, chance: np.random.Generator, prepared: PreparedScenario
+    grid: OccupancyGrid, entry: FaultEntry, rng: np.random.Generator, prepared: PreparedScenario
 ) -> OccupancyGrid:
     clock = Clock(prepared.spec.physics.tick_rate)
-    disturbed: object = entry.fault.begin(chance, FaultSetting(clock=clock, kind=MAP)).map(grid)
+    disturbed: object = entry.fault.begin(rng, FaultSetting(clock=clock, kind=MAP)).map(grid)
     if not isinstance(disturbed, OccupancyGrid):
         raise RunError(
             BROKEN_COMPONENT, f"fault `{entry.label}` makes {type(disturbed).__name__} of a map{entry.added_by}"

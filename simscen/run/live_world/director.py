@@ -94,8 +94,8 @@ class TriggerState:
     has held.
     """
 
-    def __init__(self, trigger: Trigger, chance: np.random.Generator) -> None:
-        self._trigger, self._chance = trigger, chance
+    def __init__(self, trigger: Trigger, rng: np.random.Generator) -> None:
+        self._trigger, self._rng = trigger, rng
         self._watch = ConditionState(trigger)
         self._held = False
         self._left = trigger.times
@@ -120,7 +120,7 @@ class TriggerState:
         return self._held != before and self._held == (self._trigger.edge == "rising")
 
     def _lucky(self) -> bool:
-        return self._trigger.probability >= 1 or bool(self._chance.random() < self._trigger.probability)
+        return self._trigger.probability >= 1 or bool(self._rng.random() < self._trigger.probability)
 
 
 class ConditionState:

@@ -209,7 +209,7 @@ class LiveStage:
         """Return whether a pedestrian with this radius in m fits at a place."""
         return self._walking.room(place, radius, walls_only)
 
-    def chance(self, name: str) -> np.random.Generator:
+    def rng(self, name: str) -> np.random.Generator:
         """Return a new generator for the random stream of this name."""
         return self._streams.generator(name)
 

@@ -26,7 +26,7 @@ class ClimbLimits(NamedTuple):
 
 
 def compute_climb_limits(body: RobotBody, friction: float = 1.0) -> ClimbLimits:
-    """What a robot can climb: held up by its hull, by grip, or by what its motors can do, whichever is least."""
+    """Return what a robot can climb, limited by its hull, by grip, and by its motors."""
     wheels = [wheel for wheel in body.wheels if wheel.driven and wheel.torque > 0]
     if not wheels:
         return ClimbLimits(0.0, 0.0)
@@ -36,9 +36,9 @@ def compute_climb_limits(body: RobotBody, friction: float = 1.0) -> ClimbLimits:
 
 
 def grip_angle(body: RobotBody, friction: float) -> float:
-    """The slope in rad on which the wheels spin: tan θ = μ · the share of the weight that is on driven wheels.
+    """Return the slope in rad on which the wheels spin: tan θ = μ · share of the weight on driven wheels.
 
-    That share shrinks on the slope, where the weight leans back by h tan θ on a caster behind the axle.
+    The share decreases with the slope, because the weight shifts back by h tan θ onto a caster behind the axle.
     """
     x, z = (float(body.chassis.center[axis]) for axis in (0, 2))
     standing = [caster.pose.x for caster in body.casters if not caster_gap(caster)]
@@ -63,7 +63,7 @@ def _driven_share(body: RobotBody) -> float:
 
 
 def approach_angle(body: RobotBody) -> float:
-    """The slope in rad of the ramp that the hull scrapes as the front wheels come to its foot."""
+    """Return the slope in rad of the ramp that the hull touches when the front wheels reach its lower edge."""
     foremost = max(body.wheels, key=lambda wheel: wheel.x)
     hanging = [c for c in compliant_casters(body.casters) if caster_gap(c) > 0 and c.pose.x > foremost.x]
     points = np.concatenate([solid.pose.apply(hull_points(solid.shape)) for solid in body.hull])

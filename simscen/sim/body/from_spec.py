@@ -24,7 +24,7 @@ def build_robot_body(
     read_mesh: MeshReader | None = None,
     found: RobotFiles | None = None,
 ) -> RobotBody:
-    """The body of a robot as specified.
+    """Build the body of a robot from its specification.
 
     `file` is the `*.robot.yaml`, to which `spec.urdf` is relative unless it was `found` already; `roots` are the
     folders that the URDF and its meshes must lie in; `read_mesh` reads a mesh file. Raises InvalidInput when the URDF

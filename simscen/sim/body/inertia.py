@@ -23,12 +23,12 @@ class MassProperties:
     tensor: Array
 
     def placed(self, pose: Pose3) -> "MassProperties":
-        """The same thing in the frame in which its own frame has this pose."""
+        """Return the properties in the parent frame, in which their frame has this pose."""
         turn = pose.rotation()
         return MassProperties(self.mass, pose.apply(self.center[None])[0], turn @ self.tensor @ turn.T)
 
     def principal(self) -> tuple[Vector, Pose3]:
-        """The principal moments and the frame they are given in: at the center of mass, along the principal axes."""
+        """Return the principal moments and their frame: at the center of mass, along the principal axes."""
         x, y, z = self.center.tolist()
         if np.abs(self.tensor - np.diag(np.diag(self.tensor))).max() <= 1e-9 * np.trace(self.tensor):
             a, b, c = np.diag(self.tensor).tolist()
@@ -79,7 +79,7 @@ def volume(shape: Shape) -> float:
 
 
 def inertia_of_shape(shape: Shape, mass: float) -> MassProperties:
-    """A solid of uniform density about its own origin; a mesh counts as its bounding box."""
+    """Return the properties of a solid of uniform density about its origin; a mesh counts as its bounding box."""
     match shape:
         case Box((x, y, z)):
             return _symmetric(mass, (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12)

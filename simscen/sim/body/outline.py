@@ -17,18 +17,18 @@ _CIRCLE = 64
 
 
 def circle(radius: float, corners: int = 32) -> Polygon:
-    """A regular polygon with its corners on the circle, anticlockwise from straight ahead."""
+    """Return a regular polygon with its corners on a circle, counterclockwise from straight ahead."""
     angles = [2 * math.pi * k / corners for k in range(corners)]
     return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
 
 
 def footprint(solids: Iterable[Solid]) -> Polygon:
-    """The convex outline of solids seen from above, anticlockwise."""
+    """Return the convex outline of solids seen from above, counterclockwise."""
     return convex_hull(np.concatenate([solid.pose.apply(hull_points(solid.shape))[:, :2] for solid in solids]))
 
 
 def outlines_in_band(solids: Iterable[Solid], z_range: tuple[float, float]) -> list[Polygon]:
-    """The outlines of solids seen from above, those that reach into the heights; of a mesh or tilted one, its hull."""
+    """Return outlines from above of the solids within a range of heights; meshes and tilted solids as convex hulls."""
     return [outline for solid in solids if (outline := _outline(solid.shape, solid.pose, z_range))]
 
 
@@ -76,7 +76,7 @@ def radius_and_height(solids: Iterable[Solid]) -> tuple[float, float]:
 
 
 def convex_hull(points: Array) -> Polygon:
-    """The convex hull of points (n, 2), anticlockwise (Andrew's monotone chain, 1979)."""
+    """Return the convex hull of points (n, 2), counterclockwise (Andrew's monotone chain, 1979)."""
     ordered = sorted({(round(x, 9), round(y, 9)) for x, y in _outer(points).tolist()})
     if len(ordered) < 3:
         return tuple(ordered)

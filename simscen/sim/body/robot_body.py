@@ -84,13 +84,13 @@ Vector = tuple[float, float, float]
 
 
 def add_payload(body: RobotBody, mass: float, at: Vector) -> RobotBody:
-    """The robot with a load of `mass` kg in one point `at` in its base frame; its motors stay as they are."""
+    """Return the robot with a load of `mass` kg at a point in its base frame; the motors stay the same."""
     load = MassProperties(mass, np.array(at), np.zeros((3, 3)))
     return replace(body, chassis=combine([body.chassis, load]))
 
 
 def scale_motor_torque(body: RobotBody, share: float) -> RobotBody:
-    """The robot with a share of the torque of its motors."""
+    """Return the robot with a fraction of its motor torque."""
     wheels = tuple(replace(wheel, torque=share * wheel.torque) for wheel in body.wheels)
     return replace(body, wheels=wheels, power=share * body.power)
 
@@ -101,7 +101,7 @@ def hull_height(body: RobotBody) -> float:
 
 
 def center_of_mass(body: RobotBody) -> Vector:
-    """The center of mass of the whole robot in its base frame."""
+    """Return the center of mass of the whole robot in its base frame."""
     wheels = [wheel.inertia.mass * np.array((wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
     x, y, z = (np.sum([body.chassis.mass * body.chassis.center, *wheels], axis=0) / body.mass).tolist()
     return x, y, z
@@ -119,7 +119,7 @@ MIN_GROUND_CLEARANCE_M = 0.005
 
 
 def check_ground_clearance(spec: RobotSpec, file: Path | None) -> None:
-    """Raises InvalidInput for a robot on wheels with a part of its `body` on the ground."""
+    """Raise InvalidInput if a part of the `body` of a wheeled robot touches the ground."""
     on_wheels = not isinstance(spec.drive, Omnidirectional)
     if on_wheels and any(part.z < MIN_GROUND_CLEARANCE_M for part in spec.body or ()):
         message = f"a part of the body of {spec.name!r} reaches the ground: it would drag instead of roll"
@@ -133,7 +133,7 @@ MAX_EXTENT_M = 10.0
 
 
 def check_robot_size(body: RobotBody, file: Path | None) -> None:
-    """Raises InvalidInput for a robot that extends farther than FARTHEST from its base frame."""
+    """Raise InvalidInput for a robot that extends farther than MAX_EXTENT_M from its base frame."""
     across, up = radius_and_height(body.solid)
     wheels = max((math.hypot(wheel.x, wheel.y) + wheel.radius for wheel in body.wheels), default=0.0)
     farthest = max(across, up, wheels, body.circumscribed_radius)

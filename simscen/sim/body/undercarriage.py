@@ -68,7 +68,7 @@ class Wheel:
 
 
 def wheels_for_drive(drive: Drive, mass: float) -> tuple[Wheel, ...]:
-    """The wheels of a drive, rear before front and left before right; none for an omnidirectional one."""
+    """Return the wheels of a drive, rear before front and left before right; none for an omnidirectional one."""
     match drive:
         case Omnidirectional():
             return ()
@@ -90,12 +90,12 @@ def wheels_for_drive(drive: Drive, mass: float) -> tuple[Wheel, ...]:
 
 
 def wheel_inertia(mass: float, radius: float, width: float) -> MassProperties:
-    """A wheel as a disc that turns about y."""
+    """Return the properties of a wheel as a disc that rotates about y."""
     return inertia_of_shape(Cylinder(radius, width), mass).placed(Pose3.from_rpy(0, 0, 0, math.pi / 2, 0, 0))
 
 
 def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wheel, ...]:
-    """The wheels with motors that suit a robot of this mass in kg; a planar base has its own."""
+    """Return the wheels with motors for a robot of this mass in kg; a planar base has its own motors."""
     if isinstance(drive, Mecanum):
         return wheels
     grip = mass * GRAVITY / max(1, sum(wheel.driven for wheel in wheels))
@@ -112,9 +112,9 @@ def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wh
 
 
 def wheel_guards(wheel: Wheel, parts: Sequence[Solid]) -> tuple[Solid, ...]:
-    """What of a wheel can touch an obstacle: a box around it, unless the hull hides it.
+    """Return the collision shape of a wheel for obstacles: a box around it, unless the hull covers it.
 
-    It ends above the ground and below the wheel's top, so that it never carries weight.
+    The box ends above the ground and below the top of the wheel, so that it never carries weight.
     """
     box = Solid(
         Box((2 * wheel.radius, wheel.width, 1.2 * wheel.radius)), Pose3(wheel.x, wheel.y, wheel.radius), "wheel"
@@ -145,7 +145,7 @@ def add_casters(
 
 
 def compliant_casters(casters: Sequence[Solid]) -> tuple[Solid, ...]:
-    """The same casters on uneven ground, where the unloaded one gives way."""
+    """Return the casters for uneven ground, where the unloaded one yields."""
     return tuple(_raised(caster) if caster_gap(caster) > 0 else caster for caster in casters)
 
 

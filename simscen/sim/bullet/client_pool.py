@@ -25,7 +25,7 @@ class ClientPool:
             self._free.append(_grounded(_connected()))
 
     def take(self) -> int:
-        """A client with nothing in it but the plane z = 0; what parameters it has nobody knows."""
+        """Return a client that contains only the plane z = 0; its parameters are undefined."""
         return self._free.pop() if self._free else _grounded(_connected())
 
     def give_back(self, client: int) -> None:

@@ -80,7 +80,7 @@ def set_collision_filter(client: int, create_rigid_body: int, link: int, group: 
 
 
 def static_mesh(client: int, mesh: TriangleMesh) -> list[int]:
-    """What never moves, as few bodies: concave meshes without the faces that lie on the ground."""
+    """Create static geometry as few bodies: concave meshes without the faces that lie on the ground."""
     return static_faces(client, mesh.vertices, above_floor(mesh.vertices, mesh.faces))
 
 
@@ -127,7 +127,7 @@ def concave_shape(client: int, mesh: Mesh) -> int:
 
 
 def convex_shape(client: int, corners: Array) -> int:
-    """The convex hull of points (n, 3)."""
+    """Create the shape of the convex hull of points (n, 3)."""
     shape: int = pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=corners.tolist(), physicsClientId=client)
     return _made(shape)
 
@@ -156,7 +156,7 @@ def compound_shape(client: int, solids: Iterable[Solid]) -> int:
 
 
 def hull_shape(client: int, solids: Iterable[Solid]) -> int:
-    """The convex hull of solids of any kind."""
+    """Create the shape of the convex hull of any solids."""
     return convex_shape(client, np.concatenate([solid.pose.apply(_corners(solid.shape)) for solid in solids]))
 
 
@@ -165,7 +165,7 @@ def _corners(shape: Shape) -> Array:
 
 
 def hull_shapes(client: int, solids: Sequence[Solid]) -> list[int]:
-    """A robot's hull: one shape of all primitives, then the convex hull of each other solid."""
+    """Create the shapes of a robot's hull: one of all primitives, and the convex hull of each other solid."""
     primitives = [solid for solid in solids if isinstance(solid.shape, PRIMITIVES)]
     others = [solid for solid in solids if not isinstance(solid.shape, PRIMITIVES)]
     first = [compound_shape(client, primitives)] if primitives else []
@@ -173,9 +173,9 @@ def hull_shapes(client: int, solids: Sequence[Solid]) -> list[int]:
 
 
 def body_shape(client: int, solids: Sequence[Solid], pushable: bool, triangulate: Triangulate) -> int:
-    """The collision shape of something that moves; concave where it is and nothing pushes it.
+    """Create the collision shape of a moving object; concave if it is and cannot be pushed.
 
-    Bullet moves convex shapes only, so what it pushes and cannot build from primitives becomes its convex hull.
+    Bullet can push convex shapes only. A pushable object that is not made of primitives becomes its convex hull.
     """
     if are_primitives(solids):
         return compound_shape(client, solids)
@@ -193,7 +193,7 @@ def are_primitives(solids: Sequence[Solid]) -> bool:
 
 
 def fuse_surfaces(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
-    """The surfaces of solids as one."""
+    """Return the surfaces of solids as one mesh."""
     meshes = [(triangulate(solid.shape), solid.pose) for solid in solids]
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in meshes)])
     vertices = np.concatenate([pose.apply(mesh.vertices) for mesh, pose in meshes])
@@ -204,9 +204,9 @@ def fuse_surfaces(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
 def create_rigid_body(
     client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float, look: int = DEFAULT_VISUAL
 ) -> int:
-    """A rigid body of a collision shape, with principal moments and center of mass in `frame`, and how it looks.
+    """Create a rigid body with a collision shape, a visual shape, and principal moments and center of mass in `frame`.
 
-    Nothing pushes one of mass 0, which sleeps while it stands: Bullet looks anew at what lies upon something awake.
+    A body with mass 0 cannot be pushed. It sleeps while it stands, so that objects on it can sleep as well.
     """
     moments, base_from_center = frame
     center = pose.compose(base_from_center)
@@ -248,10 +248,10 @@ def put_to_sleep(client: int, number: int) -> None:
 def create_static_body(
     client: int, shape: int, look: int = DEFAULT_VISUAL, pose: Pose3 = ORIGIN, friction: float = 1.0
 ) -> int:
-    """A body that never moves; it sleeps, for Bullet looks anew at what lies upon something that is awake.
+    """Create a static body. It sleeps, so that objects on it can sleep as well.
 
-    It is a rigid body: a multibody, as Bullet would have it, has six velocities of its own that stay zero, and each
-    contact with it is solved for them too. On a ground that is one a robot's step takes an eighth longer.
+    It is a rigid body instead of Bullet's default multibody, whose six velocities would be part of each contact. With a
+    multibody as the ground, a step of a robot takes an eighth longer.
     """
     number: int = pybullet.createMultiBody(
         0.0, shape, look, pose.position, pose.quaternion, useMaximalCoordinates=1, physicsClientId=client
@@ -265,14 +265,14 @@ def create_static_body(
 
 
 def create_ground_plane(client: int, look: int = DEFAULT_VISUAL) -> int:
-    """The plane z = 0."""
+    """Create the plane z = 0."""
     return create_static_body(client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client), look)
 
 
 def invisible_shape(client: int) -> int:
-    """The look of what nobody will ever see, a triangle too small to be drawn: Bullet makes that of a shape at once.
+    """Create a visual shape that is too small to be drawn, for simulations without images.
 
-    For a plane it paints 3 MB, which takes a millisecond.
+    By default, Bullet creates a visual shape from each collision shape, which takes a millisecond for a plane.
     """
     corners = [(0.0, 0.0, 0.0), (1e-9, 0.0, 0.0), (0.0, 1e-9, 0.0)]
     look: int = pybullet.createVisualShape(

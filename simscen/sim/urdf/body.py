@@ -28,14 +28,14 @@ CASTER = 0.35
 def body_from_urdf(
     spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: RobotFiles | None
 ) -> RobotBody:
-    """The body that `spec.urdf`, relative to `file` unless it was `found`, describes. Raises InvalidInput."""
+    """Return the body that `spec.urdf` describes, relative to `file` unless it was `found`. Raises InvalidInput."""
     return body_from_tree(spec, read_spec_tree(spec, file, roots, read_mesh, found))
 
 
 def read_spec_tree(
     spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: RobotFiles | None
 ) -> Tree:
-    """The links and joints that `spec.urdf` describes. Raises InvalidInput."""
+    """Read the links and joints of `spec.urdf`. Raises InvalidInput."""
     assert spec.urdf is not None
     folder = (file or Path()).resolve().parent
     folders = Folders.of(roots or (folder,), found.packages if found else None)
@@ -50,7 +50,7 @@ def read_spec_tree(
 def read_tree(
     path: Path, folders: Folders, read_mesh: MeshReader | None, arguments: Mapping[str, str] | None = None
 ) -> Tree:
-    """The links and joints of a URDF or xacro file. Raises InvalidInput."""
+    """Read the links and joints of a URDF or xacro file. Raises InvalidInput."""
     path = folders.named(path)
     robot = read_xml(path, folders)
     expanded = path.suffix == ".xacro" or "xmlns:xacro" in robot.attributes
@@ -62,12 +62,12 @@ def read_tree(
 
 
 def _text(argument: str | float | bool) -> str:
-    """An argument as it would stand in an XML file."""
+    """Return an argument as text for an XML file."""
     return str(argument).lower() if isinstance(argument, bool) else str(argument)
 
 
 def body_from_tree(spec: RobotSpec, tree: Tree) -> RobotBody:
-    """The robot: joints that are neither wheels nor steering stay at zero."""
+    """Build the robot. Joints that are neither wheels nor steering stay at zero."""
     joints = select_wheels(tree, spec.drive)
     _check_wheels(spec, tree, joints)
     rolling = {link for wheel in joints for link in tree.subtree(wheel.joint.child)}
@@ -105,7 +105,7 @@ def _check_wheels(spec: RobotSpec, tree: Tree, wheels: list[WheelJoint]) -> None
 
 
 def _check_corners(tree: Tree, wheels: list[WheelJoint]) -> None:
-    """Raises InvalidInput unless there is one wheel at each corner, as mecanum wheels must be."""
+    """Raise InvalidInput unless there is one wheel at each corner, as mecanum wheels must be."""
     middle = np.mean([wheel.place[:2] for wheel in wheels], axis=0) if wheels else (0.0, 0.0)
     corners = {(wheel.place[0] > middle[0], wheel.place[1] > middle[1]) for wheel in wheels}
     if len(wheels) != 4 or len(corners) != 4:
@@ -116,7 +116,7 @@ def _check_corners(tree: Tree, wheels: list[WheelJoint]) -> None:
 
 
 def check_front_steering(wheels: Sequence[WheelJoint]) -> None:
-    """Raises InvalidInput for a car whose steered wheels are not ahead of those that drive."""
+    """Raise InvalidInput for a car whose steered wheels are not ahead of those that drive."""
     steered = [wheel for wheel in wheels if wheel.steered]
     if not steered:
         return
@@ -144,7 +144,7 @@ def _lowest(solid: Solid) -> float:
 
 
 def _scale(spec: RobotSpec, tree: Tree) -> float:
-    """What all masses are multiplied with, so that the robot weighs what its specification says."""
+    """Return the factor on all masses for which the robot has the specified mass."""
     total = sum(link.mass.mass for link in tree.links.values() if link.mass is not None)
     if total <= 0:
         raise InvalidInput([tree.element.problem("no link has a mass", "give its <inertial> a <mass>")])
@@ -177,7 +177,7 @@ def _wheel(tree: Tree, wheel: WheelJoint, base_from_root: Pose3, scale: float, s
 
 
 def _off_the_ground(tree: Tree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
-    """The hull without casters. Raises InvalidInput when the hull itself would drag over the ground."""
+    """Return the hull without casters. Raises InvalidInput when the hull itself would drag over the ground."""
     points = [solid.pose.apply(hull_points(solid.shape)) for solid in hull]
     whole = np.ptp(np.concatenate(points)[:, :2], axis=0)
     kept = []

@@ -57,7 +57,7 @@ class MeshSource:
     expanded: bool = False
 
     def mesh(self, element: Element) -> Mesh:
-        """The mesh a `<mesh>` element names; raises Unusable at its line."""
+        """Read the mesh of a `<mesh>` element; raises Unusable with its line."""
         written = element.text("filename")
         scale = element.numbers("scale", 3, (1.0, 1.0, 1.0))
         try:
@@ -88,7 +88,7 @@ class MeshSource:
 
 
 def parse_link(element: Element, meshes: MeshSource) -> Link:
-    """A `<link>`; raises Unusable."""
+    """Parse a `<link>`; raises Unusable."""
     collisions = tuple(
         Solid(_shape(collision.needed("geometry"), meshes), _origin(collision), element.text("name"))
         for collision in element.all("collision")
@@ -98,7 +98,7 @@ def parse_link(element: Element, meshes: MeshSource) -> Link:
 
 
 def parse_joint(element: Element) -> Joint:
-    """A `<joint>`; raises Unusable."""
+    """Parse a `<joint>`; raises Unusable."""
     given = None if element.attributes.get("type") in ("fixed", "floating") else element.child("axis")
     axis = (1.0, 0.0, 0.0) if given is None else given.numbers("xyz", 3, (1.0, 0.0, 0.0))
     length = math.hypot(*axis)

@@ -34,11 +34,11 @@ HINT = "write a short *.robot.yaml beside it that names its drive, limits and se
 
 
 def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshReader | None = None) -> RobotSpec:
-    """The robot in a URDF file: drive from its wheels, and a lidar, odometry and IMU with our defaults.
+    """Infer the specification of a robot from its URDF: drive from the wheels, and default lidar, odometry, and IMU.
 
-    Two driven wheels make a differential drive, four or more a skid-steered one, steered wheels a car. Limits are
-    1 m/s, 1.5 rad/s, 1 m/s² and 2 rad/s², or less where its wheel joints say so. The lidar sits on the link that is
-    called laser, lidar or scan, or on top. Raises InvalidInput when the file is unusable or its drive is not plain.
+    Two driven wheels make a differential drive, four or more a skid-steer drive, steered wheels a car. Limits are 1
+    m/s, 1.5 rad/s, 1 m/s², and 2 rad/s², or those of the wheel joints if they are lower. The lidar is on the link named
+    laser, lidar, or scan, or on top. Raises InvalidInput if the file is invalid or its drive ambiguous.
     """
     folders = Folders.of(roots or (path.resolve().parent,))
     tree = read_tree(path, folders, read_mesh)

@@ -25,14 +25,14 @@ class Tree:
     element: Element = field(repr=False)
 
     def subtree(self, link: str) -> Iterator[str]:
-        """A link and everything that hangs on it."""
+        """Yield a link and all its descendants."""
         yield link
         for joint in self.below.get(link, []):
             yield from self.subtree(joint.child)
 
 
 def build_tree(robot: Element, meshes: MeshSource) -> Tree:
-    """The tree of a `<robot>`. Raises InvalidInput with everything that is wrong with its links and joints."""
+    """Build the tree of a `<robot>`. Raises InvalidInput with all problems of its links and joints."""
     if robot.tag != "robot":
         raise InvalidInput([robot.problem(f"expected <robot>, got <{robot.tag}>")])
     if sum(1 for _ in robot.all("link")) > MOST_LINKS:

@@ -32,7 +32,7 @@ class WheelJoint:
 
 
 def infer_wheels(tree: Tree) -> list[WheelJoint]:
-    """The wheels that the URDF makes plain: continuous joints about a sideways axis that carry something round."""
+    """Return the wheels in a URDF: continuous joints with a lateral axis and a round link."""
     steering = steered_links(tree, [j for j in tree.joints.values() if j.type in TURNING and _about(tree, j, 2)])
     wheels = [
         wheel_joint(tree, joint, joint.child in steering)
@@ -43,7 +43,7 @@ def infer_wheels(tree: Tree) -> list[WheelJoint]:
 
 
 def select_wheels(tree: Tree, drive: Drive) -> list[WheelJoint]:
-    """The wheels of a drive: those that its specification names, or those that are found. Raises InvalidInput."""
+    """Return the wheels of a drive: those in its specification, or the inferred ones. Raises InvalidInput."""
     if isinstance(drive, Omnidirectional):
         return []
     steering = drive.steering if isinstance(drive, Ackermann) else None
@@ -77,7 +77,7 @@ def steered_links(tree: Tree, knuckles: Sequence[Joint]) -> set[str]:
 
 
 def wheel_joint(tree: Tree, joint: Joint, steered: bool) -> WheelJoint | None:
-    """The wheel on a joint by its collision shape; None when that is not round."""
+    """Return the wheel on a joint by its collision shape, or None if that is not round."""
     for solid in tree.links[joint.child].solids:
         place = tree.poses[joint.child].compose(solid.pose).position
         match solid.shape:

@@ -28,14 +28,14 @@ class Element(markup.Element):
     """An element of a URDF or xacro file."""
 
     def needed(self, tag: str) -> Self:
-        """The first child of that kind; raises Unusable when there is none."""
+        """Return the first child with this tag; raises Unusable if there is none."""
         found = self.child(tag)
         if found is None:
             raise InvalidElement(self, f"<{self.tag}> without <{tag}>")
         return found
 
     def text(self, attribute: str) -> str:
-        """An attribute that must be there."""
+        """Return a required attribute."""
         if not self.attributes.get(attribute):
             raise InvalidElement(self, f'<{self.tag}> without {attribute}="…"')
         return self.attributes[attribute]
@@ -63,13 +63,13 @@ class Element(markup.Element):
         return values
 
     def problem(self, message: str, hint: str = "") -> Problem:
-        """What is wrong with it."""
+        """Return a problem of this element."""
         source = self.source.line(self.line)
         return Problem(self.source.name, self.line, self.col, CODE, message, hint, source=source)
 
 
 def parse_xml(data: bytes, file: str) -> Element:
-    """The root of an XML text. Raises InvalidInput, with the line, for what is not read."""
+    """Parse an XML text. Raises InvalidInput with the line of an error."""
     try:
         return markup.parse(data, markup.Source.of(data, file), Element)
     except markup.Broken as error:
@@ -91,7 +91,7 @@ class RobotFiles:
 
 
 def read_xml(path: Path, folders: Folders) -> Element:
-    """The elements of a URDF or of a file that it includes, as written. Raises InvalidInput."""
+    """Read a URDF or an included file without expansion. Raises InvalidInput."""
     shown = folders.shown(path)
     try:
         _, data = folders.open(path, URDF_BYTES)

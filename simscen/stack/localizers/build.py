@@ -29,7 +29,7 @@ def amcl(spec: model.Amcl, setting: Setting) -> Localizer:
     if setting.map is None:
         return DeadReckoning(setting.estimate)
     motion, models = motion_model(spec, setting.robot.holonomic), map_models(setting.map, spec)
-    particle_filter = ParticleFilter(spec, motion, models.sensor, models.free_space, setting.chance)
+    particle_filter = ParticleFilter(spec, motion, models.sensor, models.free_space, setting.rng)
     return AmclLocalizer(spec, particle_filter, motion, setting.estimate, setting.surroundings.tick_rate)
 
 

@@ -21,7 +21,7 @@ NO_BEARING = 0.01
 class MotionModel(Protocol):
     """Moves particles; `delta` is the motion that odometry reports, in the base frame before it."""
 
-    def sample(self, poses: Array, delta: Pose2, chance: np.random.Generator) -> Array:
+    def sample(self, poses: Array, delta: Pose2, rng: np.random.Generator) -> Array:
         """New poses (n, 3): each of `poses` (n, 3) moved by its own noisy copy of `delta`."""
         ...
 
@@ -36,11 +36,11 @@ class Differential:
 
     alpha: tuple[float, float, float, float]
 
-    def sample(self, poses: Array, delta: Pose2, chance: np.random.Generator) -> Array:
+    def sample(self, poses: Array, delta: Pose2, rng: np.random.Generator) -> Array:
         """New poses (n, 3)."""
         motion, variances = self._steps(delta)
         std = [math.sqrt(variance) for variance in variances]
-        turn, drive, turn_again = chance.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
+        turn, drive, turn_again = rng.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
         heading = poses[:, 2] + turn
         moved = columns(len(poses))
         moved[:, 0] = poses[:, 0] + drive * np.cos(heading)
@@ -78,10 +78,10 @@ class Omni:
 
     alpha: tuple[float, float, float, float, float]
 
-    def sample(self, poses: Array, delta: Pose2, chance: np.random.Generator) -> Array:
+    def sample(self, poses: Array, delta: Pose2, rng: np.random.Generator) -> Array:
         """New poses (n, 3)."""
         motion, std = (math.hypot(delta.x, delta.y), 0.0, delta.yaw), self._noise(delta)
-        drive, strafe, turn = chance.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
+        drive, strafe, turn = rng.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
         bearing = poses[:, 2] + math.atan2(delta.y, delta.x)
         c, s = np.cos(bearing), np.sin(bearing)
         moved = columns(len(poses))

@@ -36,10 +36,10 @@ class ParticleFilter:
 
     def __init__(
         self, spec: AmclParameters, motion: MotionModel, sensor: SensorModel, free_space: FreeSpace,
-        chance: np.random.Generator,
+        rng: np.random.Generator,
     ) -> None:  # fmt: skip
-        self._spec, self._motion, self._sensor, self._free_space, self._chance = (
-            spec, motion, sensor, free_space, chance,
+        self._spec, self._motion, self._sensor, self._free_space, self._rng = (
+            spec, motion, sensor, free_space, rng,
         )  # fmt: skip
         self._bound = KldBound(spec.pf_err, spec.pf_z, spec.min_particles, spec.max_particles)
         self._few_suffice = bool(self._bound.samples(BINS_IN_TOUCH) <= self._bound.least)
@@ -47,7 +47,7 @@ class ParticleFilter:
 
     def begin(self, estimate: Estimate) -> None:
         """Restart with particles around the estimate's pose, or over all free space if it has none."""
-        self.particles = self._free_space.begin(estimate, self._bound.most, self._chance)
+        self.particles = self._free_space.begin(estimate, self._bound.most, self._rng)
         self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.strays)
         self._random: npt.NDArray[np.bool_] | None = None  # (n,) put anywhere after the last scan
         self._descendants: npt.NDArray[np.bool_] | None = None  # (n,) these and what descends from such
@@ -59,7 +59,7 @@ class ParticleFilter:
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own sample of the motion model. `delta` is the odometry in the base frame."""
-        poses = self._motion.sample(self.particles.poses, delta, self._chance)
+        poses = self._motion.sample(self.particles.poses, delta, self._rng)
         self.particles = Particles(poses, self.particles.weights)
 
     def correct(self, scan: Scan) -> tuple[Pose2, Array] | None:
@@ -101,7 +101,7 @@ class ParticleFilter:
         kept = slice(None) if self._random is None or self._random.all() else ~self._random
         likely = float(weights[kept].sum() / self.particles.weights[kept].sum())
         tracked = math.log(likely) + shift if likely > 0 else -math.inf
-        probes = self._free_space.draw(PROBES, self._chance)
+        probes = self._free_space.draw(PROBES, self._rng)
         anywhere = exponent * self._sensor.log_likelihood(probes, beams, False)
         scale = self._sensor.tempering(beams)
         self._recovery.observe(tracked * scale, anywhere * scale)
@@ -115,7 +115,7 @@ class ParticleFilter:
         if self._spec.selective_resampling and self.particles.effective > len(self.particles.weights) / 2:
             return
         if self._few_suffice and self._recovery.share == 0 and in_touch(self.particles):
-            chosen = systematic(self.particles.weights, self._bound.least, self._chance)
+            chosen = systematic(self.particles.weights, self._bound.least, self._rng)
             self.particles = Particles.equal(self.particles.poses.T.take(chosen, axis=1).T)
             self._descendants = None
             return
@@ -135,12 +135,12 @@ class ParticleFilter:
         Rows (count, 4): x, y, yaw, and _RANDOM, _DESCENDANT or 0.
         """
         drawn = np.zeros((count, 4))
-        chosen = systematic(self.particles.weights, count, self._chance)
+        chosen = systematic(self.particles.weights, count, self._rng)
         drawn[:, :3] = self.particles.poses[chosen]
         if self._descendants is not None:
             drawn[self._descendants[chosen], 3] = _DESCENDANT
         if (share := self._recovery.share) > 0:
-            lost = self._chance.random(count) < share
-            drawn[lost, :3] = self._free_space.draw(int(lost.sum()), self._chance)
+            lost = self._rng.random(count) < share
+            drawn[lost, :3] = self._free_space.draw(int(lost.sum()), self._rng)
             drawn[lost, 3] = _RANDOM
-        return self._chance.permutation(drawn)
+        return self._rng.permutation(drawn)

@@ -62,10 +62,10 @@ class Particles:
         return bool((np.abs(places - places.mean(axis=0)) <= distance).all())
 
 
-def around(pose: Pose2, std: tuple[float, float, float], count: int, chance: np.random.Generator) -> Array:
+def around(pose: Pose2, std: tuple[float, float, float], count: int, rng: np.random.Generator) -> Array:
     """Poses (count, 3) drawn from a normal distribution about `pose`, as nav2_amcl's pf_init does."""
     poses = columns(count)
-    poses[:] = chance.normal(pose, std, (count, 3))
+    poses[:] = rng.normal(pose, std, (count, 3))
     poses[:, 2] = wrap_array(poses[:, 2])
     return poses
 
@@ -106,16 +106,16 @@ class FreeSpace:
         free = np.flatnonzero(self._grid.cells == FREE)
         return (free if len(free) else np.arange(self._grid.cells.size)).astype(np.int32)
 
-    def draw(self, count: int, chance: np.random.Generator) -> Array:
+    def draw(self, count: int, rng: np.random.Generator) -> Array:
         """Poses (count, 3) in the map frame."""
-        row, column = np.divmod(self._cells[chance.integers(len(self._cells), size=count)], self._grid.shape[1])
-        local = (np.column_stack((column, row)) + chance.random((count, 2))) * self._grid.resolution
+        row, column = np.divmod(self._cells[rng.integers(len(self._cells), size=count)], self._grid.shape[1])
+        local = (np.column_stack((column, row)) + rng.random((count, 2))) * self._grid.resolution
         poses = columns(count)
-        poses[:, :2], poses[:, 2] = self._grid.origin.apply(local), chance.uniform(-np.pi, np.pi, count)
+        poses[:, :2], poses[:, 2] = self._grid.origin.apply(local), rng.uniform(-np.pi, np.pi, count)
         return poses
 
-    def begin(self, estimate: Estimate, count: int, chance: np.random.Generator) -> Particles:
+    def begin(self, estimate: Estimate, count: int, rng: np.random.Generator) -> Particles:
         """Particles for an estimate: around its pose, or anywhere when it has none."""
         if estimate.pose is None:
-            return Particles.equal(self.draw(count, chance))
-        return Particles.equal(around(estimate.pose, estimate.std, count, chance))
+            return Particles.equal(self.draw(count, rng))
+        return Particles.equal(around(estimate.pose, estimate.std, count, rng))

@@ -11,13 +11,13 @@ from simscen.stack.localizers.kld import KldBound, bins
 Indices = npt.NDArray[np.int64]
 
 
-def systematic(weights: Array, count: int, chance: np.random.Generator) -> Indices:
+def systematic(weights: Array, count: int, rng: np.random.Generator) -> Indices:
     """Return indices (count,), ascending, drawn in proportion to `weights` (n,) with minimum variance.
 
     The low-variance sampler of Probabilistic Robotics, table 4.4: an index is drawn ⌊count·w⌋ or ⌈count·w⌉ times.
     """
     cumulated = weights.cumsum()
-    positions = (np.arange(count) + chance.random()) * (cumulated[-1] / count)
+    positions = (np.arange(count) + rng.random()) * (cumulated[-1] / count)
     drawn = cumulated.searchsorted(positions, side="right")
     # The last position can round up to the very end; the last index that has any weight is meant.
     clipped: Indices = np.minimum(drawn, cumulated.searchsorted(cumulated[-1]))

@@ -85,10 +85,10 @@ class ControllerContract(ComponentContract):
     @promise
     def no_command_exceeds_the_limits_of_the_base(self) -> None:
         """Given any pose and velocity then no command exceeds the limits."""
-        view, chance = self.view(), np.random.default_rng(3)
+        view, rng = self.view(), np.random.default_rng(3)
         for _ in range(30):
-            pose = Pose2(*chance.uniform((1, 2, -3), (6, 4, 3)).tolist())
-            twist = Twist(float(chance.uniform(0, self.robot.max_linear)), 0.0, float(chance.uniform(-1, 1)))
+            pose = Pose2(*rng.uniform((1, 2, -3), (6, 4, 3)).tolist())
+            twist = Twist(float(rng.uniform(0, self.robot.max_linear)), 0.0, float(rng.uniform(-1, 1)))
             self.command(self.following(), pose, twist, view)
 
     @promise

@@ -106,10 +106,10 @@ class LocalizerContract(Contract):
     @promise
     def odometry_and_gyroscope_that_lie_never_make_the_belief_insane(self) -> None:
         """Given odometry and turn rates that are nan, infinite or huge then the belief stays sane."""
-        subject, chance = self.told(here()), np.random.default_rng(5)
+        subject, rng = self.told(here()), np.random.default_rng(5)
         for k in range(40):
-            x, y, yaw = chance.choice([0.0, np.nan, np.inf, -np.inf, 1e300, -9e5, 4.0, 1e-300], 3).tolist()
-            rate = float(chance.choice([np.nan, np.inf, 99.0, -1e9]))
+            x, y, yaw = rng.choice([0.0, np.nan, np.inf, -np.inf, 1e300, -9e5, 4.0, 1e-300], 3).tolist()
+            rate = float(rng.choice([np.nan, np.inf, 99.0, -1e9]))
             imu = Imu("imu", 24 * k, (0.0, 0.0, rate), (0.0, 0.0, 9.8))
             call_component("takes a turn rate", subject.on_imu, imu)
             step(subject, k, Pose2(x, y, yaw))
@@ -179,7 +179,7 @@ def sane(subject: Localizer) -> Belief:
 
 def _lies(seed: int) -> Array:
     """Ranges that no lidar should give, of a different kind for each seed."""
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     kinds = [np.nan, np.inf, -np.inf, 0.0, -5.0, 1e300, 12.0, 0.05, 3.0]
-    wild = chance.choice([np.nan, np.inf, -1.0, 1e9, 2.0, 0.3], BEAMS)
-    return np.full(BEAMS, kinds[seed]) if seed < len(kinds) else chance.choice([wild, chance.uniform(0, 12, BEAMS)])
+    wild = rng.choice([np.nan, np.inf, -1.0, 1e9, 2.0, 0.3], BEAMS)
+    return np.full(BEAMS, kinds[seed]) if seed < len(kinds) else rng.choice([wild, rng.uniform(0, 12, BEAMS)])

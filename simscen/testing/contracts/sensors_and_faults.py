@@ -168,8 +168,8 @@ class SensorContract(Contract):
     def built(self, seed: int = 1) -> tuple[Sensor, FakeSensorView, int]:
         """A new one, what it looks at, and ticks between two readings."""
         clock, view = Clock(240), FakeSensorView()
-        period, chance = clock.period(self.spec.rate), np.random.default_rng(seed)
-        setting = SensorSetting(NAME, period, clock.seconds(period), chance, view, SquareRoomRays(), DRIVE)
+        period, rng = clock.period(self.spec.rate), np.random.default_rng(seed)
+        setting = SensorSetting(NAME, period, clock.seconds(period), rng, view, SquareRoomRays(), DRIVE)
         return call_component("is built", lambda: self.spec.implementation()(self.spec, setting)), view, period
 
     def measured(self, sensor: Sensor, view: FakeSensorView, period: int) -> list[Reading]:

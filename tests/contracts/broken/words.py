@@ -74,7 +74,7 @@ class Disturbing(Disturbance):
 class OnScans(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
 
-    def begin(self, chance, wheels):
+    def begin(self, rng, wheels):
         return Disturbing(self.changed)
 
     def changed(self, reading):
@@ -112,7 +112,7 @@ class WritesIntoTheReading(OnScans):
 
 @word("its end leaves", "leaves 'dust'")
 class LeavesDust(OnScans):
-    def begin(self, chance, wheels):
+    def begin(self, rng, wheels):
         work = Disturbance()
         work.end = lambda: "dust"  # type: ignore[method-assign,assignment,return-value]
         return work

@@ -7,9 +7,9 @@ from simscen.core.geometry import Array
 
 
 def test_nees_is_that_of_filterpy() -> None:
-    chance = np.random.default_rng(1)
-    square = chance.normal(size=(3, 3))
-    covariance, error = square @ square.T + np.eye(3), chance.normal(size=3)
+    rng = np.random.default_rng(1)
+    square = rng.normal(size=(3, 3))
+    covariance, error = square @ square.T + np.eye(3), rng.normal(size=3)
     expected = NEES(error[None], np.zeros((1, 3)), covariance[None])[0]
     assert nees(error, covariance) == pytest.approx(expected)
 
@@ -26,14 +26,14 @@ def test_the_bounds_are_those_of_the_literature(runs: int, low: float, high: flo
 
 
 def test_a_consistent_estimator_lies_within_the_bounds() -> None:
-    chance = np.random.default_rng(7)
+    rng = np.random.default_rng(7)
     covariance = np.diag([0.01, 0.04, 0.001])
-    values = [nees(chance.multivariate_normal(np.zeros(3), covariance), covariance) for _ in range(1000)]
+    values = [nees(rng.multivariate_normal(np.zeros(3), covariance), covariance) for _ in range(1000)]
     low, high = bounds(1000)
     assert low < anees(values) < high
 
 
-def filtered(chance: np.random.Generator, campaigns: int, buildings: int, shared: float) -> Array:
+def filtered(rng: np.random.Generator, campaigns: int, buildings: int, shared: float) -> Array:
     """NEES (campaigns, buildings, 25) of a Kalman filter that follows a random walk: five logs, each at five moments.
 
     Each measurement errs on its own (variance 4) and as all do in its building (variance `shared`); the filter knows of
@@ -43,12 +43,12 @@ def filtered(chance: np.random.Generator, campaigns: int, buildings: int, shared
     before = (walk + np.sqrt(walk**2 + 4 * walk * noise)) / 2  # the Riccati equation's steady state, of one coordinate
     gain = before / (before + noise)
     variance = (1 - gain) * before + shared
-    error = np.sqrt(variance - shared) * chance.standard_normal((campaigns, buildings, 5, 3))
-    common = np.sqrt(shared) * chance.standard_normal((campaigns, buildings, 1, 3))
+    error = np.sqrt(variance - shared) * rng.standard_normal((campaigns, buildings, 5, 3))
+    common = np.sqrt(shared) * rng.standard_normal((campaigns, buildings, 1, 3))
     values = []
     for step in range(20):
-        walked = error + np.sqrt(walk) * chance.standard_normal(error.shape)
-        error = (1 - gain) * walked + gain * np.sqrt(noise) * chance.standard_normal(error.shape)
+        walked = error + np.sqrt(walk) * rng.standard_normal(error.shape)
+        error = (1 - gain) * walked + gain * np.sqrt(noise) * rng.standard_normal(error.shape)
         if step % 4 == 3:
             values.append(np.square(error + common).sum(axis=-1) / variance)
     return np.stack(values, axis=-1).reshape(campaigns, buildings, 25)

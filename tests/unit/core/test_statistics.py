@@ -7,7 +7,7 @@ from scipy import stats
 from simscen.core.statistics import MIN_PAIRS, bootstrap_mean_interval, sign_test
 
 
-def chance(seed: int = 1) -> np.random.Generator:
+def rng(seed: int = 1) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
@@ -27,28 +27,28 @@ def test_the_sign_test_of_very_many_pairs_does_not_overflow() -> None:
 def test_the_interval_is_scipys_percentile_bootstrap(n: int) -> None:
     """Both draw 10 000 times, each in its own way, so that they agree as far as that decides."""
     values = stats.gamma(2.0).rvs(n, random_state=n) - 1.5
-    own = bootstrap_mean_interval(list(values), chance())
-    theirs = stats.bootstrap((values,), np.mean, n_resamples=10_000, method="percentile", rng=chance(2))
+    own = bootstrap_mean_interval(list(values), rng())
+    theirs = stats.bootstrap((values,), np.mean, n_resamples=10_000, method="percentile", rng=rng(2))
     spread = values.std() / n**0.5
     assert own == pytest.approx(tuple(theirs.confidence_interval), abs=0.08 * spread)
 
 
 def test_the_interval_holds_the_true_mean_about_as_often_as_it_says() -> None:
     """Of 40 pairs; a percentile bootstrap is known to be a little too narrow."""
-    draws = chance(3).normal(0.4, 1.0, (300, 40))
-    intervals = [bootstrap_mean_interval(row.tolist(), chance(k)) for k, row in enumerate(draws)]
+    draws = rng(3).normal(0.4, 1.0, (300, 40))
+    intervals = [bootstrap_mean_interval(row.tolist(), rng(k)) for k, row in enumerate(draws)]
     held = sum(low <= 0.4 <= high for low, high in filter(None, intervals))
     assert 0.90 <= held / 300 <= 0.98
 
 
 def test_the_same_differences_give_the_same_interval_and_few_of_them_none() -> None:
     values = [0.5, 1.0, -0.25, 2.0, 0.75, 0.0]
-    assert bootstrap_mean_interval(values, chance()) == bootstrap_mean_interval(values, chance())
-    assert bootstrap_mean_interval(values[: MIN_PAIRS - 1], chance()) is None
-    assert bootstrap_mean_interval([0.25] * 9, chance()) == (0.25, 0.25)
+    assert bootstrap_mean_interval(values, rng()) == bootstrap_mean_interval(values, rng())
+    assert bootstrap_mean_interval(values[: MIN_PAIRS - 1], rng()) is None
+    assert bootstrap_mean_interval([0.25] * 9, rng()) == (0.25, 0.25)
 
 
 def test_an_interval_of_many_pairs_is_drawn_in_parts() -> None:
-    low, high = bootstrap_mean_interval(chance(4).normal(1.0, 1.0, 8_000).tolist(), chance()) or (0.0, 0.0)
+    low, high = bootstrap_mean_interval(rng(4).normal(1.0, 1.0, 8_000).tolist(), rng()) or (0.0, 0.0)
     assert high - low == pytest.approx(2 * 1.96 / 8_000**0.5, rel=0.1)
     assert low < 1.0 < high

@@ -25,9 +25,9 @@ def judged(region, truth, footprint=SQUARE, seconds=10, distance=0.0, events=(),
     return finding
 
 
-def star(chance, size, corners):
-    angles = np.sort(chance.uniform(0, 2 * np.pi, corners))
-    radii = chance.uniform(0.2, 1.0, corners) * size
+def star(rng, size, corners):
+    angles = np.sort(rng.uniform(0, 2 * np.pi, corners))
+    radii = rng.uniform(0.2, 1.0, corners) * size
     return np.column_stack((radii * np.cos(angles), radii * np.sin(angles))).tolist()
 
 
@@ -52,11 +52,11 @@ SEEDS = st.integers(0, 2**32 - 1)
 @given(SEEDS)
 @settings(deadline=None)
 def test_the_sign_and_every_positive_distance_are_those_of_shapely(seed):
-    chance = np.random.default_rng(seed)
-    hull, region = star(chance, 0.8, chance.integers(3, 8)), star(chance, 2.0, chance.integers(3, 12))
+    rng = np.random.default_rng(seed)
+    hull, region = star(rng, 0.8, rng.integers(3, 8)), star(rng, 2.0, rng.integers(3, 12))
     if not (shapely.Polygon(hull).is_valid and shapely.Polygon(region).is_valid):
         return
-    x, y, yaw = *chance.uniform(-2.5, 2.5, 2), chance.uniform(-3, 3)
+    x, y, yaw = *rng.uniform(-2.5, 2.5, 2), rng.uniform(-3, 3)
     found = judged(region, [[0, x, y, yaw]], hull, seconds=0.1)
     moved = placed(hull, x, y, yaw)
     overlap = moved.intersection(shapely.Polygon(region)).area
@@ -70,9 +70,9 @@ def test_the_sign_and_every_positive_distance_are_those_of_shapely(seed):
 @given(SEEDS)
 @settings(deadline=None)
 def test_convex_polygons_that_overlap_are_as_deep_as_the_shortest_way_out(seed):
-    chance = np.random.default_rng(seed)
-    hull, region = convex(star(chance, 0.8, 6)), convex(star(chance, 2.0, 7))
-    x, y, yaw = *chance.uniform(-1.5, 1.5, 2), chance.uniform(-3, 3)
+    rng = np.random.default_rng(seed)
+    hull, region = convex(star(rng, 0.8, 6)), convex(star(rng, 2.0, 7))
+    x, y, yaw = *rng.uniform(-1.5, 1.5, 2), rng.uniform(-3, 3)
     moved = placed(hull, x, y, yaw)
     if moved.intersection(shapely.Polygon(region)).area > 1e-9:
         found = judged(region, [[0, x, y, yaw]], hull, seconds=0.1)

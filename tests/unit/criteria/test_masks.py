@@ -22,10 +22,10 @@ LONG = [[-0.4, -0.1], [0.3, -0.2], [0.5, 0.0], [0.3, 0.2], [-0.4, 0.1]]
 NOTCHED = [[-0.4, -0.3], [0.4, -0.3], [0.4, 0.3], [0.0, 0.0], [-0.4, 0.3]]
 
 
-def mask_of(chance, values, share):
-    cells = np.where(chance.random((9, 7)) < share, chance.choice(values, (9, 7)), 0).astype(np.int8)
-    origin = Pose2(*chance.uniform(-1, 1, 2), chance.uniform(-math.pi, math.pi))
-    return OccupancyGrid(cells, float(chance.uniform(0.1, 0.5)), origin)
+def mask_of(rng, values, share):
+    cells = np.where(rng.random((9, 7)) < share, rng.choice(values, (9, 7)), 0).astype(np.int8)
+    origin = Pose2(*rng.uniform(-1, 1, 2), rng.uniform(-math.pi, math.pi))
+    return OccupancyGrid(cells, float(rng.uniform(0.1, 0.5)), origin)
 
 
 def judged(criterion, grid, truth, footprint=(), seconds=10.0):
@@ -57,9 +57,9 @@ def placed(outline, x, y, yaw):
 @given(SEEDS, st.sampled_from([LONG, NOTCHED]))
 @settings(deadline=None)
 def test_the_distance_to_a_keepout_mask_is_that_of_shapely_to_each_of_its_cells(seed, hull):
-    chance = np.random.default_rng(seed)
-    grid = mask_of(chance, [40, 100, 100], share=0.3)
-    x, y, yaw = *chance.uniform(-3, 3, 2), chance.uniform(-3, 3)
+    rng = np.random.default_rng(seed)
+    grid = mask_of(rng, [40, 100, 100], share=0.3)
+    x, y, yaw = *rng.uniform(-3, 3, 2), rng.uniform(-3, 3)
     (finding,), _ = judged({"keepout": {"mask": "a.yaml"}}, grid, [[0, x, y, yaw]], hull, seconds=0.1)
     area, here = area_of(grid), placed(hull, x, y, yaw)
     if not len(area.geoms):
@@ -76,9 +76,9 @@ def test_the_distance_to_a_keepout_mask_is_that_of_shapely_to_each_of_its_cells(
 @given(SEEDS)
 @settings(deadline=None, max_examples=30)
 def test_a_drive_is_as_far_from_a_keepout_mask_as_its_nearest_pose(seed):
-    chance = np.random.default_rng(seed)
-    grid = mask_of(chance, [100], share=0.1)
-    way = [[t, *chance.uniform(-3, 3, 2), chance.uniform(-3, 3)] for t in (0, 2, 4)]
+    rng = np.random.default_rng(seed)
+    grid = mask_of(rng, [100], share=0.1)
+    way = [[t, *rng.uniform(-3, 3, 2), rng.uniform(-3, 3)] for t in (0, 2, 4)]
     (finding,), trace = judged({"keepout": {"mask": "a.yaml"}}, grid, way, LONG, seconds=4)
     area = area_of(grid)
     if not len(area.geoms):
@@ -101,9 +101,9 @@ def test_a_round_robot_without_a_footprint_is_judged_by_its_radius():
 @given(SEEDS, st.sampled_from([0.0, 0.2, 0.5]))
 @settings(deadline=None, max_examples=50)
 def test_the_speed_is_judged_by_the_cell_that_the_robot_truly_is_in(seed, grace):
-    chance = np.random.default_rng(seed)
-    grid = mask_of(chance, [20, 60], share=0.6)
-    way = [[t, *chance.uniform(-1.5, 1.5, 2)] for t in range(0, 5)]
+    rng = np.random.default_rng(seed)
+    grid = mask_of(rng, [20, 60], share=0.6)
+    way = [[t, *rng.uniform(-1.5, 1.5, 2)] for t in range(0, 5)]
     how = {"file": "a.yaml", "base": 100.0, "multiplier": -1.0}
     criterion = {"speed": {"mask": how, "full_speed": 1.0, "tolerance": 0.0, "grace": grace}}
     (finding,), trace = judged(criterion, grid, way, seconds=4)

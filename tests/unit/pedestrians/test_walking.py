@@ -67,7 +67,7 @@ def order(rows: np.ndarray, directions: np.ndarray, width: float = 0.5) -> float
     return float((((alike - other) / (alike + other)) ** 2).mean())
 
 
-def two_way(seed: int, chance: np.random.Generator) -> tuple[float, float]:
+def two_way(seed: int, rng: np.random.Generator) -> tuple[float, float]:
     """Order of those in the middle of a corridor while two crowds walk through each other, and that of shuffles."""
     drawn = np.random.default_rng(seed)
     crowd = people(around=corridor(5.0))
@@ -83,15 +83,15 @@ def two_way(seed: int, chance: np.random.Generator) -> tuple[float, float]:
         there = np.abs(everybody[:, step, 0]) < 7.0
         rows, ways = everybody[there, step, 1], directions[there]
         orders.append(order(rows, ways))
-        shuffled += [order(rows, chance.permutation(ways)) for _ in range(20)]
+        shuffled += [order(rows, rng.permutation(ways)) for _ in range(20)]
     return float(np.mean(orders)), float(np.mean(shuffled))
 
 
 @pytest.mark.slow
 def test_lanes_form_where_two_crowds_walk_through_each_other():
     """Their order is more than twice that of the same people with shuffled directions, and above it in every crowd."""
-    chance = np.random.default_rng(1)
-    found = np.array([two_way(seed, chance) for seed in range(3)])
+    rng = np.random.default_rng(1)
+    found = np.array([two_way(seed, rng) for seed in range(3)])
     assert (found[:, 0] > found[:, 1]).all(), found
     assert found[:, 0].mean() > 2 * found[:, 1].mean(), found
 
@@ -112,12 +112,12 @@ def test_those_of_a_group_keep_together_and_walk_side_by_side():
 
 def test_nobody_walks_through_a_wall_or_through_each_other():
     """Fifty in a hurry who all want through one door."""
-    chance = np.random.default_rng(5)
+    rng = np.random.default_rng(5)
     box = [[[0, 0], [8, 0]], [[8, 0], [8, 8]], [[8, 8], [0, 8]], [[0, 8], [0, 0]]]
     crowd = people(around=walls(*box, [[0, 4], [3.4, 4]], [[4.6, 4], [8, 4]]))
     spots = [(x, y) for x in np.arange(0.5, 7.6, 0.7) for y in np.arange(0.5, 3.6, 0.7)][:50]
     for number, (x, y) in enumerate(spots):
-        crowd.add(walker(f"p{number:02}", x, y, (float(chance.uniform(3.9, 4.1)), 7.7), speed=2.0))
+        crowd.add(walker(f"p{number:02}", x, y, (float(rng.uniform(3.9, 4.1)), 7.7), speed=2.0))
     tracks, _ = walk(crowd, 8.0)
     ways = np.stack([track[:, :2] for track in tracks.values()], axis=1)
     apart = np.hypot(*np.moveaxis(ways[:, :, None] - ways[:, None], 3, 0)) + 9 * np.eye(len(spots))

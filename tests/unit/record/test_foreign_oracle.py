@@ -95,15 +95,15 @@ def test_verdicts_and_margins_agree(own: Path, disguised: Path, text: dict[str, 
 
 @pytest.mark.parametrize("compressed", [True, False])
 def test_a_log_with_wrong_bytes_is_read_or_refused(tmp_path: Path, compressed: bool) -> None:
-    chance, file = random.Random(7), tmp_path / "a.mcap"
+    rng, file = random.Random(7), tmp_path / "a.mcap"
     options = {} if compressed else {"use_chunking": False}
     data = write_mcap(file, drive(2.0), **options).read_bytes()
     refused = 0
     for _ in range(150):
         spoilt = bytearray(data)
-        for _ in range(chance.choice((1, 3, 20))):
-            spoilt[chance.randrange(8, len(data))] = chance.randrange(256)
-        file.write_bytes(spoilt[: chance.choice((len(data), chance.randrange(8, len(data))))])
+        for _ in range(rng.choice((1, 3, 20))):
+            spoilt[rng.randrange(8, len(data))] = rng.randrange(256)
+        file.write_bytes(spoilt[: rng.choice((len(data), rng.randrange(8, len(data))))])
         is_simscen_log(file)
         try:
             read_foreign_log(file, ForeignLogOptions(truth="/mocap"))

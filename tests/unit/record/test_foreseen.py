@@ -22,10 +22,10 @@ def predicted(
     moves: tuple[str, ...], stays: dict[str, Pose3], pauses: float, seed: int, begin: int = 0
 ) -> list[Moment]:
     """Four seconds in which some things stay, and others move at most moments."""
-    chance = np.random.default_rng(seed)
-    table = chance.uniform(-5, 5, (160, len(moves), 7))
+    rng = np.random.default_rng(seed)
+    table = rng.uniform(-5, 5, (160, len(moves), 7))
     for moment in range(1, len(table)):
-        table[moment] = np.where(chance.random((len(moves), 1)) < pauses, table[moment - 1], table[moment])
+        table[moment] = np.where(rng.random((len(moves), 1)) < pauses, table[moment - 1], table[moment])
     everything = dict(sorted({**stays, **dict.fromkeys(moves, Pose3())}.items()))
     moments = []
     for first in range(0, len(table), AHEAD):
@@ -38,7 +38,7 @@ def predicted(
         moments += [
             Moment(tick, Truth(Pose3(x=tick / 240), STOP, 1.0, objects), (), Decision(STOP))
             for tick, objects in zip(ticks, places, strict=True)
-            if objects is not None and (pauses < 0.5 or chance.random() < 0.9)
+            if objects is not None and (pauses < 0.5 or rng.random() < 0.9)
         ]
     return moments
 

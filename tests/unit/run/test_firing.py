@@ -104,8 +104,8 @@ def lasts(values, beats):
 @pytest.mark.parametrize("where", COMBINED)
 def test_a_condition_may_last_anywhere_inside_of_others(where):
     words, truth = COMBINED[where]
-    chance = np.random.default_rng(5)
-    fast, hall = (np.repeat(chance.random(60) < 0.6, chance.integers(1, 9, 60)) for _ in range(2))
+    rng = np.random.default_rng(5)
+    fast, hall = (np.repeat(rng.random(60) < 0.6, rng.integers(1, 9, 60)) for _ in range(2))
     length = min(len(fast), len(hall))
     fast, hall = fast[:length], hall[:length]
     watch = ConditionState(Trigger.model_validate(words))

@@ -7,6 +7,6 @@ from simscen.sensors.normal_stream import BUFFER_SIZE, NormalStream
 
 
 def test_numbers_drawn_ahead_are_those_of_single_draws_bit_for_bit():
-    ahead, chance = NormalStream(Streams(7).generator("sensor.imu")), Streams(7).generator("sensor.imu")
+    ahead, rng = NormalStream(Streams(7).generator("sensor.imu")), Streams(7).generator("sensor.imu")
     for count in (6, 3, BUFFER_SIZE - 1, 1, 2 * BUFFER_SIZE, 5):
-        assert ahead.take(count) == np.array([chance.standard_normal() for _ in range(count)]).tolist()
+        assert ahead.take(count) == np.array([rng.standard_normal() for _ in range(count)]).tolist()

@@ -17,8 +17,8 @@ EXACT = {"translation_noise": 0.0, "rotation_noise": 0.0, "drift_noise": 0.0}
 
 
 def odometry(view, drive=DRIVE, seed=1, seconds=0.025, **spec):
-    chance = np.random.default_rng(seed)
-    setting = SensorSetting("odom", 6, seconds, chance, view, None, drive)
+    rng = np.random.default_rng(seed)
+    setting = SensorSetting("odom", 6, seconds, rng, view, None, drive)
     return WheelOdometrySensor(WheelOdometry(**spec), setting)
 
 

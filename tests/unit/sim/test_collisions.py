@@ -104,14 +104,14 @@ def test_wheels_on_the_ground_are_no_collision_even_where_the_world_has_a_floor_
 @pytest.mark.parametrize("seed", range(2))
 def test_no_contact_is_missed_compared_with_asking_after_every_tick(simulate, monkeypatch, seed, pushable):
     """Clearance rules out contacts for a while (conservative advancement); here it is checked against asking always."""
-    chance = random.Random(seed)
-    places = [(chance.uniform(-3, 3), chance.uniform(-3, 3)) for _ in range(40)]
+    rng = random.Random(seed)
+    places = [(rng.uniform(-3, 3), rng.uniform(-3, 3)) for _ in range(40)]
     solids = [box(f"box{k}", x, y, 0.2, 0.3) for k, (x, y) in enumerate(places) if abs(x) + abs(y) > 0.8]
     path = MotionPath((0.0, 4.0), (Pose2(-3, 0.3), Pose2(3, -0.3)), "back_and_forth")
     bodies = [Body("cart", CART, Pose3(-3, 0.3), path=path)]
     if pushable:
         bodies.append(Body("box", (box("box", 0, 0, 0.2, 0.2, 0.2),), Pose3(0.6), 0.5))
-    commands = [Twist(chance.uniform(-0.5, 0.5), 0.0, chance.uniform(-2, 2)) for _ in range(30)]
+    commands = [Twist(rng.uniform(-0.5, 0.5), 0.0, rng.uniform(-2, 2)) for _ in range(30)]
 
     def run():
         simulation, events = simulate(solids=solids, bodies=bodies), []

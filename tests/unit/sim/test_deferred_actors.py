@@ -23,33 +23,33 @@ CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
 NAMES = [f"thing {number}" for number in range(10)]
 
 
-def wild_path(chance, start, wide):
+def wild_path(rng, start, wide):
     """At up to 5 m/s, from a place."""
-    places = [(start[0] + chance.gauss(0, wide), start[1] + chance.gauss(0, wide)) for _ in range(3)]
-    mode = chance.choice(["once", "loop", "back_and_forth"])
-    poses = [Pose2(*start), *(Pose2(*place, chance.uniform(-3, 3)) for place in places)]
+    places = [(start[0] + rng.gauss(0, wide), start[1] + rng.gauss(0, wide)) for _ in range(3)]
+    mode = rng.choice(["once", "loop", "back_and_forth"])
+    poses = [Pose2(*start), *(Pose2(*place, rng.uniform(-3, 3)) for place in places)]
     if mode == "loop":
         poses[-1] = poses[0]
     times = [0.0]
     for here, there in pairwise(poses):
-        times.append(times[-1] + math.dist(here[:2], there[:2]) / chance.choice([0.5, 2.0, 5.0]) + 0.3)
-    ease = chance.choice(["linear", "smooth", "spline"])
-    return MotionPath(tuple(times), tuple(poses), mode, chance.choice([0.0, 1.0]), ease)
+        times.append(times[-1] + math.dist(here[:2], there[:2]) / rng.choice([0.5, 2.0, 5.0]) + 0.3)
+    ease = rng.choice(["linear", "smooth", "spline"])
+    return MotionPath(tuple(times), tuple(poses), mode, rng.choice([0.0, 1.0]), ease)
 
 
-def thing(chance, name, start):
-    path = None if chance.random() < 0.3 else wild_path(chance, start, chance.choice([1, 5]))
+def thing(rng, name, start):
+    path = None if rng.random() < 0.3 else wild_path(rng, start, rng.choice([1, 5]))
     return Body(name, CRATE, Pose3(*start), path=path)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_all_whose_ways_lead_a_robot_within_its_reach_are_met_and_few_others(simulate, seed):
     """Held against where paths are at many moments."""
-    chance = random.Random(seed)
-    bodies = [thing(chance, f"{k}", (chance.uniform(-20, 20), chance.uniform(-20, 20))) for k in range(60)]
+    rng = random.Random(seed)
+    bodies = [thing(rng, f"{k}", (rng.uniform(-20, 20), rng.uniform(-20, 20))) for k in range(60)]
     simulation = simulate(bodies=bodies, pose=Pose2(100.0, 100.0), has_images=False)
     actors = list(simulation._scene.actors._actors.values())
-    absent, place = DeferredActors(actors), (chance.uniform(-5, 5), chance.uniform(-5, 5), 0.0)
+    absent, place = DeferredActors(actors), (rng.uniform(-5, 5), rng.uniform(-5, 5), 0.0)
     met = absent.activate_near([ProximityQuery(place, 3.0)])
 
     def nearest(actor: Actor) -> float:
@@ -72,11 +72,11 @@ def test_all_whose_ways_lead_a_robot_within_its_reach_are_met_and_few_others(sim
 
 def course(seed, present):
     """What two robots at up to 2 m/s meet among fast carts: truth and collisions of each beat, and who was present."""
-    chance = random.Random(seed)
+    rng = random.Random(seed)
     quick = build_robot_body(shipped("turtlebot"))
     quick = replace(quick, limits=quick.limits.model_copy(update={"linear": 2.0, "linear_acceleration": 4.0}))
-    bodies = [thing(chance, name, (chance.uniform(-9, 9), chance.uniform(-9, 9))) for name in NAMES]
-    bodies += [thing(chance, f"far {number}", (60.0, 10.0 * number)) for number in range(3)]
+    bodies = [thing(rng, name, (rng.uniform(-9, 9), rng.uniform(-9, 9))) for name in NAMES]
+    bodies += [thing(rng, f"far {number}", (60.0, 10.0 * number)) for number in range(3)]
     placed = {
         "a": RobotPlacement(quick, Pose2(0.0, 0.0)),
         "b": RobotPlacement(build_robot_body(shipped("jackal")), Pose2(2.0, 1.5)),
@@ -89,16 +89,16 @@ def course(seed, present):
             robot.drive(Twist(1.5 if beat % 20 < 15 else -1.5, 0.0, 1.0))
             beats.append((robot.truth(), robot.collisions()))
         if beat % 8 == 7:
-            robot, name = simulation.robots[chance.choice("ab")], chance.choice(NAMES)
+            robot, name = simulation.robots[rng.choice("ab")], rng.choice(NAMES)
             here, there = robot.base_pose(), simulation.object_pose(name)
-            beside = (here.x + chance.uniform(0.3, 1.0), here.y + chance.uniform(-1.0, 1.0))
+            beside = (here.x + rng.uniform(0.3, 1.0), here.y + rng.uniform(-1.0, 1.0))
             what = beat // 8
             if what in (0, 3):  # beside a cart, or into it
-                robot.place(Pose2(there.x + chance.uniform(-0.9, 0.9), there.y + 0.5))
+                robot.place(Pose2(there.x + rng.uniform(-0.9, 0.9), there.y + 0.5))
             elif what == 1:
-                simulation.spawn(thing(chance, "new", beside))
+                simulation.spawn(thing(rng, "new", beside))
             elif what == 2:
-                simulation.move(name, wild_path(chance, there[:2], 3))
+                simulation.move(name, wild_path(rng, there[:2], 3))
             else:
                 simulation.place(name, Pose2(*beside))
     count = len(simulation._scene.actors.names_by_id()), len(simulation._scene.actors.bodies())

@@ -62,10 +62,10 @@ def test_a_sill_that_holds_the_robot_is_a_collision_and_leaves_no_clearance(simu
     assert min(clearance for _, clearance, _ in samples) <= 0.0
 
 
-def wild_world(chance, pushable):
-    places = [(chance.uniform(-3, 3), chance.uniform(-3, 3)) for _ in range(40)]
+def wild_world(rng, pushable):
+    places = [(rng.uniform(-3, 3), rng.uniform(-3, 3)) for _ in range(40)]
     solids = [
-        box(f"box{k}", x, y, 0.2, 0.3, chance.choice([0.01, 0.015, 0.05, 1.0]), chance.uniform(0, 3))
+        box(f"box{k}", x, y, 0.2, 0.3, rng.choice([0.01, 0.015, 0.05, 1.0]), rng.uniform(0, 3))
         for k, (x, y) in enumerate(places)
         if abs(x) + abs(y) > 0.8
     ]
@@ -85,15 +85,15 @@ def test_ruling_contacts_out_gives_the_events_and_the_clearance_of_asking_at_eve
     simulate, monkeypatch, seed, robot, pushable
 ):
     def run():
-        chance = random.Random(seed)
-        simulation = simulate(robot, *wild_world(chance, pushable))
+        rng = random.Random(seed)
+        simulation = simulate(robot, *wild_world(rng, pushable))
         events, samples = [], []
         for k in range(24):
-            simulation.drive(Twist(chance.uniform(-0.5, 0.5), 0.0, chance.uniform(-2, 2)))
+            simulation.drive(Twist(rng.uniform(-0.5, 0.5), 0.0, rng.uniform(-2, 2)))
             if k % 8 == 5:
-                simulation.push((chance.uniform(-4, 4), chance.uniform(-4, 4)))
+                simulation.push((rng.uniform(-4, 4), rng.uniform(-4, 4)))
             if k == 17:  # not into the cart: how Bullet parts what overlaps depends on where it saw both before
-                simulation.place_robot(Pose2(0.0, 0.0, chance.uniform(-3, 3)))
+                simulation.place_robot(Pose2(0.0, 0.0, rng.uniform(-3, 3)))
             more = watch(simulation, 96)
             events, samples = events + more[0], samples + more[1]
         return events, samples

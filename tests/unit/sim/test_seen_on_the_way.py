@@ -24,11 +24,11 @@ CARTS = [f"cart {number}" for number in range(16)]
 
 def carts() -> list[Body]:
     """One after the other they cross a square of 20 m, about its middle."""
-    chance, bodies = np.random.default_rng(1), []
+    rng, bodies = np.random.default_rng(1), []
     for name in CARTS:
-        begin = Pose2(*chance.uniform(-10, 10, 2).tolist())
-        end = Pose2(*(-chance.uniform(0.7, 1.3, 2) * begin[:2]).tolist())
-        start, lasts = chance.uniform(0, 9), chance.uniform(6, 12)
+        begin = Pose2(*rng.uniform(-10, 10, 2).tolist())
+        end = Pose2(*(-rng.uniform(0.7, 1.3, 2) * begin[:2]).tolist())
+        start, lasts = rng.uniform(0, 9), rng.uniform(6, 12)
         path = MotionPath((0.0, float(lasts)), (begin, end), start=float(start))
         bodies.append(Body(name, PARTS, Pose3.planar(begin), path=path))
     return [*bodies, Body("shelf", PARTS, Pose3(1.0, 1.0)), Body("late", PARTS, Pose3(-6.0, 6.0))]
@@ -37,7 +37,7 @@ def carts() -> list[Body]:
 def test_a_scan_is_that_of_a_scene_that_was_told_of_everything(simulate, monkeypatch) -> None:
     """Whoever else looks, from wherever and however far; also once something is given a script."""
     monkeypatch.setattr(ray_caster, "REFRESH_DISTANCE_M", 0.5)
-    simulation, chance = simulate(solids=[WALL], bodies=carts(), drive=(0.02, 0.0, 0.1)), np.random.default_rng(2)
+    simulation, rng = simulate(solids=[WALL], bodies=carts(), drive=(0.02, 0.0, 0.1)), np.random.default_rng(2)
     robot, told = simulation.robot, RayScene(fuse([WALL]))
     rays, watched = (LiveRayCaster(RayScene(fuse([WALL])), robot) for _ in range(2))
     ahead, met = 0, set[str]()
@@ -49,7 +49,7 @@ def test_a_scan_is_that_of_a_scene_that_was_told_of_everything(simulate, monkeyp
         told.set_moving({name: (MESH, there) for name, there in objects.items()})
         seen = told.sweep(FAN, pose, REACH)
         if beat % 2 == 1:
-            watched.sweep(FAN, Pose3(*chance.uniform(-5, 5, 2).tolist(), 0.2), float(chance.uniform(1, 5)))
+            watched.sweep(FAN, Pose3(*rng.uniform(-5, 5, 2).tolist(), 0.2), float(rng.uniform(1, 5)))
         assert np.array_equal(rays.sweep(FAN, pose, REACH), seen)
         assert np.array_equal(watched.sweep(FAN, pose, REACH), seen)
         if beat % 10 == 0:

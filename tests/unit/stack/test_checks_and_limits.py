@@ -302,8 +302,8 @@ def test_a_long_robot_that_touches_something_may_turn_out_of_it_but_not_further_
 def test_discs_cover_the_hull() -> None:
     robot = box_robot(0.9, 0.3)
     discs = Footprint(robot, 0.05).discs
-    chance = np.random.default_rng(1)
-    inside = chance.uniform((-0.45, -0.15), (0.45, 0.15), (2000, 2))
+    rng = np.random.default_rng(1)
+    inside = rng.uniform((-0.45, -0.15), (0.45, 0.15), (2000, 2))
     near = np.hypot(inside[:, None, 0] - discs.offsets, inside[:, None, 1]).min(axis=1)
     assert near.max() <= discs.radius
     assert discs.radius < 0.25
@@ -408,11 +408,11 @@ def test_the_monitor_brakes_for_what_moves_wherever_the_whole_look_at_the_hull_w
 ) -> None:
     hasty, thorough = (CollisionMonitor(MonitorSpec(), robot, (), RATE) for _ in range(2))
     monkeypatch.setattr(thorough, "_may_meet_moving", lambda *_: True)
-    chance, braked, spared = np.random.default_rng(4), 0, 0
+    rng, braked, spared = np.random.default_rng(4), 0, 0
     for _ in range(400):
-        places, speeds = chance.normal(0.0, 1.2, (2, 2)), chance.normal(0.0, 0.7, (2, 2))
+        places, speeds = rng.normal(0.0, 1.2, (2, 2)), rng.normal(0.0, 0.7, (2, 2))
         moving = MovingObstacles(places, speeds, np.array((0.3, 0.1)), np.zeros((2, 4, 4)), 0.0)
-        wanted = Twist(*chance.normal(0.0, (0.5, 0.1, 0.8)).tolist())
+        wanted = Twist(*rng.normal(0.0, (0.5, 0.1, 0.8)).tolist())
         hasty.on_moving(moving)
         thorough.on_moving(moving)
         allowed = thorough.allow(wanted, Pose2(0.0, 0.0))

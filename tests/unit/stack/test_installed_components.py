@@ -54,7 +54,7 @@ class Straight(PlannerSpec):
 class StraightPlanner:
     def __init__(self, spec, setting):
         self.spec, self.setting = spec, setting
-        setting.chance.random(1000)
+        setting.rng.random(1000)
         if spec.does == "not begin":
             raise OSError("no such model")
 
@@ -86,7 +86,7 @@ class Careful(PlannerSpec):
 
 
 def careful(spec, setting):
-    setting.chance.random(1000)
+    setting.rng.random(1000)
     return ompl_planner(OmplPlanner(), setting)
 
 

@@ -11,10 +11,10 @@ from simscen.testing.flatland import round_robot
 
 
 def test_what_is_told_to_come_no_nearer_comes_no_nearer_whichever_way_one_goes() -> None:
-    chance, times = np.random.default_rng(5), np.linspace(0.0, 3.0, 3001)
+    rng, times = np.random.default_rng(5), np.linspace(0.0, 3.0, 3001)
     for _ in range(200):
-        x, y, vx, vy = chance.normal(0.0, 2.0, 4).tolist()
-        here, speed = complex(*chance.normal(0.0, 2.0, 2)), float(chance.uniform(0.0, 3.0))
+        x, y, vx, vy = rng.normal(0.0, 2.0, 4).tolist()
+        here, speed = complex(*rng.normal(0.0, 2.0, 2)), float(rng.uniform(0.0, 3.0))
         thing = MovingObstacle(complex(x, y), complex(vx, vy), 0.3, 0.0, 0.0, 0.0)
         off = np.abs(thing.place + thing.velocity * times - here) - speed * times - 0.3
         assert thing.missed_by(here, speed, 3.0) == pytest.approx(off.min(), abs=2e-3)
@@ -40,17 +40,13 @@ def test_arrays_are_what_it_was_made_of_and_turn_with_the_frame() -> None:
 
 def test_what_is_told_at_once_to_stay_off_a_way_stays_off_it_at_each_moment() -> None:
     """Robots that brake, speed up and drive backward, beside a bent path, among things on all sides."""
-    chance, robot, clear, off = np.random.default_rng(7), round_robot(), 0, 0
+    rng, robot, clear, off = np.random.default_rng(7), round_robot(), 0, 0
     along = np.linspace(0.0, 5.0, 101)
     for _ in range(300):
-        path = Followed(np.column_stack((along, np.sin(along * chance.uniform(0.0, 2.0)))))
-        here = Pose2(
-            float(chance.uniform(-0.3, 3.0)), float(chance.uniform(-0.4, 0.4)), float(chance.uniform(-3.0, 3.0))
-        )
-        twist, wanted = (Twist(float(chance.uniform(-0.5, 0.5)), 0.0, 0.0) for _ in range(2))
-        thing = MovingObstacle(
-            complex(*chance.uniform(-4, 4, 2)), complex(*chance.uniform(-1, 1, 2)), 0.3, 0.01, 0.0, 0.02
-        )
+        path = Followed(np.column_stack((along, np.sin(along * rng.uniform(0.0, 2.0)))))
+        here = Pose2(float(rng.uniform(-0.3, 3.0)), float(rng.uniform(-0.4, 0.4)), float(rng.uniform(-3.0, 3.0)))
+        twist, wanted = (Twist(float(rng.uniform(-0.5, 0.5)), 0.0, 0.0) for _ in range(2))
+        thing = MovingObstacle(complex(*rng.uniform(-4, 4, 2)), complex(*rng.uniform(-1, 1, 2)), 0.3, 0.01, 0.0, 0.02)
         moving = MovingObstacles.of((thing,), 1.5)
         place, speed, apart = path.course(here, twist, wanted, robot)
         way = path.driven(here, twist, wanted, (1.0,), robot, turns=False)

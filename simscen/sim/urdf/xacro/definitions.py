@@ -49,11 +49,11 @@ class Macros:
     spaces: "dict[str, Macros]" = field(default_factory=dict)
 
     def find(self, name: str) -> Macro | None:
-        """The innermost macro of that name."""
+        """Return the innermost macro with this name."""
         return next((scope.macros[name] for scope in self._outwards() if name in scope.macros), None)
 
     def space(self, name: str) -> "Macros | None":
-        """The innermost namespace of that name."""
+        """Return the innermost namespace with this name."""
         return next((scope.spaces[name] for scope in self._outwards() if name in scope.spaces), None)
 
     def _outwards(self) -> "Iterator[Macros]":
@@ -64,7 +64,7 @@ class Macros:
 
 
 def parse_macro(element: Element) -> Macro:
-    """The macro that an element defines; raises Refused."""
+    """Parse a macro definition; raises Refused."""
     name = element.name.removeprefix("xacro:")
     if not name or name == "call" or "." in name:
         raise ExpansionError(f"{name[:60]!r} is not a name for a macro")
@@ -85,7 +85,7 @@ def _parameters(text: str) -> list[Parameter]:
 
 # Resolve which macro a call means and bind its parameters.
 def resolve_macro(written: str, scope: Scope, macros: Macros) -> tuple[Macro, Scope, Macros]:
-    """The macro `name` or `namespace.name` and the scopes that its own lie in; raises Refused."""
+    """Return the macro `name` or `namespace.name` with its enclosing scopes; raises Refused."""
     *spaces, name = written.split(".")
     for space in spaces:
         owner, inner = scope.owner(space), macros.space(space)

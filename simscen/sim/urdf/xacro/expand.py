@@ -42,9 +42,9 @@ class UnknownArgument(InvalidInput):
 def expand(
     robot: Element, file: Path, folders: Folders, read: FileReader, arguments: Mapping[str, str] | None = None
 ) -> Element:
-    """The `robot` of the xacro `file` with everything expanded; `arguments` are in place of defaults.
+    """Expand the `robot` of a xacro `file`; `arguments` override the defaults.
 
-    Raises InvalidInput, and UnknownArgument of it.
+    Raises InvalidInput, or its subclass UnknownArgument.
     """
     whole = replace(robot, tag="", attributes={}, children=[])
     expansion = _Expansion(file, folders, read, arguments or {})
@@ -63,7 +63,7 @@ def expand(
 
 
 def declared_in(element: Element) -> set[str]:
-    """The arguments that a file declares, whether or not what holds them is expanded."""
+    """Return all arguments that a file declares, also in parts that are not expanded."""
     own = {element.name} if element.tag == "xacro:arg" else set()
     return own.union(*map(declared_in, element.children))
 

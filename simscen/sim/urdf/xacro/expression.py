@@ -29,11 +29,11 @@ class Names(Protocol):
     """Where an expression's names are looked up."""
 
     def value(self, path: tuple[str, ...]) -> Value:
-        """The property of that name, `ns.name` as two; raises KeyError."""
+        """Return the property with this name, given as its parts; raises KeyError."""
 
 
 def evaluate(text: str, names: Names, budget: Budget) -> Value:
-    """The value of an expression; raises Refused."""
+    """Evaluate an expression; raises Refused."""
     if len(text) > MOST_CHARACTERS:
         raise ExpansionError(f"an expression is longer than {MOST_CHARACTERS} characters")
     try:

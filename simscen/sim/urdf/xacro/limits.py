@@ -82,7 +82,7 @@ def size(value: Value) -> int:
 
 
 def parse_literal(text: str) -> Value:
-    """What a text in an attribute means by itself: 'quoted' is text, then a number or a boolean if it is one."""
+    """Convert the text of an attribute: 'quoted' is text, otherwise a number or a boolean if it is one."""
     if len(text) >= 2 and text[0] == text[-1] == "'":
         return text[1:-1]
     if "_" in text:  # Python would read 1_000 as a number
@@ -96,7 +96,7 @@ def parse_literal(text: str) -> Value:
 
 
 def parse_bool(value: Value) -> bool:
-    """What `<xacro:if value=…>` means; raises Refused."""
+    """Convert the value of `<xacro:if value=…>`; raises Refused."""
     if not isinstance(value, str):
         return bool(value)
     if value in ("true", "True", "false", "False"):

@@ -39,21 +39,21 @@ class Scope:
     held: dict[str, Held] = field(default_factory=dict)
 
     def owner(self, name: str) -> "Scope | None":
-        """The innermost scope that has a property of that name."""
+        """Return the innermost scope with a property of this name."""
         scope: Scope | None = self
         while scope is not None and name not in scope.held:
             scope = scope.parent
         return scope
 
     def top(self) -> "Scope":
-        """The outermost scope."""
+        """Return the outermost scope."""
         scope = self
         while scope.parent is not None:
             scope = scope.parent
         return scope
 
     def caller(self) -> "Scope":
-        """What `scope="parent"` means: the scope around this one; from a macro, past namespaces."""
+        """Return the scope for `scope="parent"`: the enclosing one; in a macro, beyond namespaces."""
         scope = self.parent
         while scope is not None and scope.namespace and not self.namespace:
             scope = scope.parent

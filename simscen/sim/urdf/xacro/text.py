@@ -22,7 +22,7 @@ class TextEvaluator:
         self._folders = folders
 
     def value(self, text: str, scope: Scope) -> Value:
-        """What a text means in a scope: a lone expression keeps its type; raises Refused."""
+        """Evaluate a text in a scope; a single expression keeps its type. Raises Refused."""
         self.budget.spend(1 + len(text) // 16)
         if "$" not in text:
             return text
@@ -42,16 +42,16 @@ class TextEvaluator:
         return joined
 
     def text(self, text: str, scope: Scope) -> str:
-        """What a text means, as text; raises Refused."""
+        """Evaluate a text and return text; raises Refused."""
         return str(self.value(text, scope))
 
     def literal(self, text: str, scope: Scope) -> Value:
-        """What a text means, as the number or boolean that it may be; raises Refused."""
+        """Evaluate a text and convert it to a number or boolean if it is one; raises Refused."""
         value = self.value(text, scope)
         return parse_literal(value) if isinstance(value, str) else value
 
     def property(self, scope: Scope, name: str) -> "Value | Scope":
-        """A property of a scope, evaluated now if it was not before; raises KeyError, Refused."""
+        """Return a property of a scope, evaluated on first use; raises KeyError or Refused."""
         owner = scope.owner(name)
         if owner is None:
             raise KeyError(name)
@@ -130,7 +130,7 @@ class _Scoped:
 
 
 def required_attribute(element: Element, attribute: str, empty: bool = False) -> str:
-    """An attribute that must be there, as written; raises Refused."""
+    """Return a required attribute as written; raises Refused."""
     text = element.attributes.get(attribute)
     if text is None or not (text or empty):
         raise ExpansionError(f'<{element.tag[:60]}> without {attribute}="…"')

@@ -59,7 +59,7 @@ class MppiController(PathFollower):
     def __init__(self, spec: MppiSpec, setting: Setting) -> None:
         robot = setting.robot
         super().__init__(spec.vx_max, robot)
-        self._spec, self._footprint, self._chance = spec, setting.footprint, setting.chance
+        self._spec, self._footprint, self._rng = spec, setting.footprint, setting.rng
         self._base = mppi_limits(spec, robot, self._fastest)
         model = spec.motion_model or ("Omni" if self._base.high[1] > 0.0 else "DiffDrive")
         self._axes = 3 if model == "Omni" else 2
@@ -89,7 +89,7 @@ class MppiController(PathFollower):
 
     def _draw(self) -> None:
         shape = (self._axes, self._spec.time_steps, self._spec.batch_size)
-        self._noise = self._chance.standard_normal(shape, dtype=np.float32) * self._std[:, None, None]
+        self._noise = self._rng.standard_normal(shape, dtype=np.float32) * self._std[:, None, None]
 
     def begin(self) -> None:
         """Another goal; the control sequence is kept as a start."""

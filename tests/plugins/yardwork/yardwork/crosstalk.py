@@ -28,14 +28,14 @@ class Crosstalk(Spec, Fault):
     drift: AngularSpeed = math.radians(30)
     """How fast it wanders, for a lidar with ten scans a second."""
 
-    def begin(self, chance: np.random.Generator, wheels: Wheels) -> Disturbance:
+    def begin(self, rng: np.random.Generator, wheels: Wheels) -> Disturbance:
         """Begin in the direction that it says."""
-        return _Interference(self, chance)
+        return _Interference(self, rng)
 
 
 class _Interference(Disturbance):
-    def __init__(self, spec: Crosstalk, chance: np.random.Generator) -> None:
-        self._spec, self._chance, self._scans = spec, chance, 0
+    def __init__(self, spec: Crosstalk, rng: np.random.Generator) -> None:
+        self._spec, self._rng, self._scans = spec, rng, 0
 
     def reading(self, reading: Reading) -> Reading | None:
         if not isinstance(reading, Scan):
@@ -44,5 +44,5 @@ class _Interference(Disturbance):
         self._scans += 1
         off = np.remainder(reading.angles() - middle + math.pi, 2 * math.pi) - math.pi
         seen = np.where(np.isfinite(reading.ranges), reading.ranges, reading.range_max)
-        echo = self._chance.uniform(reading.range_min, np.maximum(seen, reading.range_min))
+        echo = self._rng.uniform(reading.range_min, np.maximum(seen, reading.range_min))
         return replace(reading, ranges=np.where(np.abs(off) <= self._spec.width / 2, echo, reading.ranges))

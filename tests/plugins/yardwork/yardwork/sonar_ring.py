@@ -31,6 +31,6 @@ class SonarRing:
         origins = np.repeat(pose.apply(self._origin), len(self._directions), axis=0)
         found = self._setting.rays.cast(origins, self._directions @ pose.rotation().T)
         ranges = found.reshape(spec.sensors, RAYS).min(axis=1)
-        ranges = ranges + self._setting.chance.normal(0.0, spec.noise, spec.sensors)
+        ranges = ranges + self._setting.rng.normal(0.0, spec.noise, spec.sensors)
         ranges = np.where(ranges > spec.max_range, np.inf, np.maximum(ranges, spec.min_range))
         return Scan(self.name, tick, ranges, 0.0, self._step, spec.min_range, spec.max_range, self._mount)

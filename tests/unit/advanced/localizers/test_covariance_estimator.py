@@ -31,12 +31,12 @@ def corrections(
     seed: int, lasting: float, error: Array, particles: Array, misfit: ScanResiduals = AS_MAPPED
 ) -> Iterator[tuple[Array, Array]]:
     """Errors (3,) and covariances (3, 3) of a drive."""
-    chance, scatter = np.random.default_rng(seed), CovarianceEstimator()
-    truth, off = Pose2(3.0, -2.0, 1.0), error * chance.standard_normal(3)
+    rng, scatter = np.random.default_rng(seed), CovarianceEstimator()
+    truth, off = Pose2(3.0, -2.0, 1.0), error * rng.standard_normal(3)
     start = truth
     for _ in range(2 * COUNTED):
         truth = truth.compose(STEP)
-        off = lasting * off + np.sqrt(1 - lasting**2) * error * chance.standard_normal(3)
+        off = lasting * off + np.sqrt(1 - lasting**2) * error * rng.standard_normal(3)
         c, s = np.cos(truth.yaw), np.sin(truth.yaw)
         wrong = np.array(((c, -s, 0), (s, c, 0), (0, 0, 1))) @ off
         x, y, yaw = (np.array(truth) + wrong).tolist()
@@ -58,7 +58,7 @@ def test_errors_that_all_poses_share_are_told_by_beams_that_are_off() -> None:
     """What beams that are off mean was learned where poses scatter, and holds where they all err alike."""
 
     def doubt(misfit: ScanResiduals) -> float:
-        chance, scatter, base, covariance = (
+        rng, scatter, base, covariance = (
             np.random.default_rng(1),
             CovarianceEstimator(),
             Pose2(0.0, 0.0, 0.0),
@@ -66,7 +66,7 @@ def test_errors_that_all_poses_share_are_told_by_beams_that_are_off() -> None:
         )
         for k in range(2 * COUNTED):
             base, learning = base.compose(Pose2(0.25, 0.0, 0.0)), k < COUNTED
-            x = base.x + (0.05 * float(chance.standard_normal()) if learning else 0.1)
+            x = base.x + (0.05 * float(rng.standard_normal()) if learning else 0.1)
             scatter.drive(base, MATCHED)
             covariance = scatter.widened(Pose2(x, 0.0, 0.0), TOO_SURE, AS_MAPPED if learning else misfit)
         return float(np.sqrt(covariance[0, 0]))
@@ -90,14 +90,14 @@ def test_what_matched_scans_drift_by_is_not_what_the_poses_are_off_by() -> None:
     """Along a corridor without features nothing but wheels tells how far the robot went, and the map puts it right."""
     blind, stds = np.diag(np.square((0.05, 0.004, 0.0017))), []
     for doubt in (MATCHED, blind):
-        chance, scatter, base, covariance = (
+        rng, scatter, base, covariance = (
             np.random.default_rng(2),
             CovarianceEstimator(),
             Pose2(0.0, 0.0, 0.0),
             TOO_SURE,
         )
         for k in range(2 * COUNTED):
-            base = base.compose(Pose2(0.25 + 0.05 * float(chance.standard_normal()), 0.0, 0.0))
+            base = base.compose(Pose2(0.25 + 0.05 * float(rng.standard_normal()), 0.0, 0.0))
             scatter.drive(base, doubt)
             covariance = scatter.widened(Pose2(0.25 * k, 0.0, 0.0), TOO_SURE, AS_MAPPED)
         stds.append(float(np.sqrt(covariance[0, 0])))

@@ -72,8 +72,8 @@ def test_beams_that_hit_nothing_stay_when_some_of_the_others_are_left_out() -> N
 @pytest.mark.parametrize("count", [500, 700])
 def test_of_many_particles_some_are_asked(count: int) -> None:
     """Whether or not it is known where the beams end at all of them."""
-    chance = np.random.default_rng(3)
-    poses = chance.normal((0.0, 0.0, 0.0), (0.1, 0.1, 0.02), (count, 3))
+    rng = np.random.default_rng(3)
+    poses = rng.normal((0.0, 0.0, 0.0), (0.1, 0.1, 0.02), (count, 3))
     beams, asked_ones = beams_to(np.linspace(-1.0, 3.0, 40) + 1.9j), poses[:: -(-count // 50)]
     worth, alone = trust().of(Particles.equal(poses), beams), trust().of(Particles.equal(asked_ones), beams)
     assert 0.0 < worth.fitting < 1.0

@@ -25,14 +25,14 @@ def test_it_is_expected_where_its_scans_say_that_it_went() -> None:
 
 @pytest.mark.parametrize("off", [(0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.1), (0.2, -0.1, 0.05)])
 def test_errors_of_steps_add_up_as_they_do_for_many_robots_that_go_the_same_way(off: tuple[float, ...]) -> None:
-    chance, base, sure = (
+    rng, base, sure = (
         np.random.default_rng(1),
         THEN,
         PosePrior.at(np.array([5.0, 5.0, 0.7]), THEN, (1e-6, 1e-6, 1e-6)),
     )
     robots = np.tile(np.array(sure.pose), (20_000, 1))
     for _ in range(20):
-        robots, before, base = moved(robots, STEP, chance), base, base.compose(STEP.delta)
+        robots, before, base = moved(robots, STEP, rng), base, base.compose(STEP.delta)
         sure = sure.after(before, base, 0.3, ObservedMotion(step=STEP))
     off_by = errors_about(sure.expected(base), robots)
     aside, spread = np.array(off), off_by.T @ off_by / len(robots)
@@ -54,8 +54,8 @@ def test_where_scans_do_not_tell_the_next_step_errs_as_the_last_one(
 ) -> None:
     """Twice as far leads twice as far astray; errors by chance lead √2 as far, and those of a step count besides."""
     sure = SURE.after(THEN, THEN, 10.0, way).after(THEN, THEN, 10.0, way)
-    chance = 0.0 if way.step is None else 2 * way.step.covariance[axis, axis]
-    off = np.eye(3)[axis] * 2 * np.sqrt((AROUND[axis] + 2 * drift[axis]) ** 2 + chance)
+    rng = 0.0 if way.step is None else 2 * way.step.covariance[axis, axis]
+    off = np.eye(3)[axis] * 2 * np.sqrt((AROUND[axis] + 2 * drift[axis]) ** 2 + rng)
     assert far(sure, THEN, off) == pytest.approx(2.0)
 
 

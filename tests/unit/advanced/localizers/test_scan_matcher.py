@@ -97,9 +97,9 @@ def test_particles_spread_as_the_covariance_of_the_step_says() -> None:
         def standard_normal(self, size: object = None, *_: object, **__: object) -> Array:  # type: ignore[override]
             return np.eye(3)
 
-    chance = np.random.default_rng(4)
+    rng = np.random.default_rng(4)
     for _ in range(20):
-        root = chance.normal(size=(3, 3)) * 0.05
+        root = rng.normal(size=(3, 3)) * 0.05
         covariance, delta = root @ root.T + np.diag((1e-6, 1e-6, 1e-6)), Pose2(0.3, 0.1, -0.2)
         after = moved(np.zeros((3, 3)), Step(delta, covariance), Ones(np.random.PCG64(1)))
         off = (after - np.array(delta)).T

@@ -117,26 +117,26 @@ RUNS, SECONDS = 25, 5.0
 
 def sampled(case: dict[str, float], slip: float, seed: int) -> tuple[Belief, Array]:
     """A drive in bends with noise as its specification says, and slips that last about a second."""
-    chance = np.random.default_rng((seed, round(1000 * slip)))
+    rng = np.random.default_rng((seed, round(1000 * slip)))
     n, dt = round(SECONDS * RATE), 1 / RATE
     t = np.arange(n) * dt
-    phase, often = chance.uniform(0, 6.3), chance.uniform(0.3, 1.0)
+    phase, often = rng.uniform(0, 6.3), rng.uniform(0.3, 1.0)
     truth = np.column_stack((np.full(n, case["speed"]), np.zeros(n), 1.2 * np.sin(often * t * 2 + phase)))
     way, turn = np.abs(truth[:, 0]) * dt, np.abs(truth[:, 2]) * dt
     claimed = truth.copy()
-    claimed[:, 0] += chance.normal(0, case["translation"] * np.sqrt(way)) / dt
-    claimed[:, 2] += chance.normal(0, case["rotation"] * np.sqrt(way + turn)) / dt
-    share = chance.normal(0, slip)
+    claimed[:, 0] += rng.normal(0, case["translation"] * np.sqrt(way)) / dt
+    claimed[:, 2] += rng.normal(0, case["rotation"] * np.sqrt(way + turn)) / dt
+    share = rng.normal(0, slip)
     for k in range(n):
         truth[k, 0] *= 1 + share
-        share = share * math.exp(-dt) + chance.normal(0, slip * math.sqrt(1 - math.exp(-2 * dt)))
-    bias = chance.normal(0, case["bias"])
+        share = share * math.exp(-dt) + rng.normal(0, slip * math.sqrt(1 - math.exp(-2 * dt)))
+    bias = rng.normal(0, case["bias"])
     spec = SlipEkf(
         type="slip_ekf", translation_noise=case["translation"], rotation_noise=case["rotation"],
         gyro_noise=case["gyro"],
         gyro_bias=case["bias"], gyro_bias_walk=0.0, wheel_slip=slip,
     )  # fmt: skip
-    return replayed(spec, truth, claimed, truth[:, 2] + bias + chance.normal(0, case["gyro"], n))
+    return replayed(spec, truth, claimed, truth[:, 2] + bias + rng.normal(0, case["gyro"], n))
 
 
 @pytest.mark.sample(2)

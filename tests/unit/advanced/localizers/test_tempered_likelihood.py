@@ -22,9 +22,9 @@ Z_HIT, Z_RAND, SIGMA = 0.5, 0.5, 0.2
 @pytest.mark.parametrize(("resolution", "unknown"), [(0.1, 0.5), (0.1, 0.97), (0.3, 0.9), (1.5, 0.5), (0.1, 0.0)])
 def test_the_map_ends_in_unknown_cells_next_to_free_ones(resolution: float, unknown: float) -> None:
     """It also ends more than a meter behind a wall."""
-    chance = np.random.default_rng(3)
-    cells = np.where(chance.random((40, 30)) < 0.5, FREE, OCCUPIED)
-    cells[chance.random((40, 30)) < unknown] = UNKNOWN
+    rng = np.random.default_rng(3)
+    cells = np.where(rng.random((40, 30)) < 0.5, FREE, OCCUPIED)
+    cells[rng.random((40, 30)) < unknown] = UNKNOWN
     bordered = np.pad(cells, 1, constant_values=UNKNOWN)
     to_known = distance_transform_edt(bordered == UNKNOWN)
     ends = (distance_transform_edt(bordered != FREE) == to_known) | (to_known * resolution > MAX_WALL_THICKNESS_M)

@@ -129,12 +129,12 @@ def test_where_nothing_moves_switching_it_off_changes_nothing() -> None:
 def test_what_looks_at_the_cheapest_ways_only_finds_the_way_that_is_cheapest_of_all(
     robot: RobotModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    chance = np.random.default_rng(2)
+    rng = np.random.default_rng(2)
     costmap = CostmapView(np.zeros((200, 200), np.uint8), np.full((200, 200), 2.0, np.float32), 0.05, (-5.0, -5.0))
     costmap.distance[:, 120:] = np.maximum(2.0 - 0.05 * np.arange(80), 0.0)
     path = Followed(np.column_stack((np.arange(0.0, 8.0, 0.05), np.zeros(160))))
     given = list[list[Twist]]()
-    drawn = [(chance.normal(0, 2, (3, 2)), chance.normal(0, 1, (3, 2)), chance.uniform(0, 1, 3)) for _ in range(24)]
+    drawn = [(rng.normal(0, 2, (3, 2)), rng.normal(0, 1, (3, 2)), rng.uniform(0, 1, 3)) for _ in range(24)]
     for at_once in (avoidance.AT_ONCE, 10**6):
         monkeypatch.setattr(avoidance, "AT_ONCE", at_once)
         avoids, commands = Avoidance(Prediction(), robot, 1.0), list[Twist]()

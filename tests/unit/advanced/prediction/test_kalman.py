@@ -9,9 +9,9 @@ from simscen.advanced.prediction.track import ConstantVelocityFilter
 
 
 def test_it_is_filterpys_filter_of_either_axis() -> None:
-    chance = np.random.default_rng(3)
+    rng = np.random.default_rng(3)
     seconds, acceleration = 0.1, 1.5
-    state, covariance = chance.normal(size=4), np.kron([[0.1, 0.02], [0.02, 1.5]], np.eye(2))
+    state, covariance = rng.normal(size=4), np.kron([[0.1, 0.02], [0.02, 1.5]], np.eye(2))
     point = ConstantVelocityFilter(complex(*state[:2]), complex(*state[2:]), 0.1, 0.02, 1.5)
     oracle = KalmanFilter(dim_x=4, dim_z=2)
     oracle.x, oracle.P = state.copy(), covariance
@@ -21,7 +21,7 @@ def test_it_is_filterpys_filter_of_either_axis() -> None:
     oracle.Q = np.kron(np.eye(2), Q_discrete_white_noise(2, seconds, acceleration**2))[np.ix_(order, order)]
     oracle.H = np.eye(2, 4)
     for _ in range(5):
-        measured, deviation = chance.normal(size=2), float(chance.uniform(0.01, 0.2))
+        measured, deviation = rng.normal(size=2), float(rng.uniform(0.01, 0.2))
         point.predict(seconds, acceleration)
         point.correct(complex(*measured), deviation)
         oracle.predict()

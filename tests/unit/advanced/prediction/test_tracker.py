@@ -34,7 +34,7 @@ class Watch:
         """`covered`: range of the first 40 beams, if something covers them."""
         self.discs, self.base, self.told = discs, base, told or base
         self.walls, self.view, self.beams, self.covered = walls or Flatland(), view, beams, covered
-        self.tracker, self.chance, self.time = Tracker(Prediction(), RATE), np.random.default_rng(1), 0.0
+        self.tracker, self.rng, self.time = Tracker(Prediction(), RATE), np.random.default_rng(1), 0.0
 
     def run(self, seconds: float, each: Callable[["Watch"], None] = lambda _: None) -> "Watch":
         for _ in range(round(seconds * 10)):
@@ -43,7 +43,7 @@ class Watch:
             world = Flatland(self.walls.boxes, [*self.walls.discs, *self.discs(self.time)])
             step = self.view / (self.beams if self.view == FULL else self.beams - 1)
             angles = -self.view / 2 + step * np.arange(self.beams)
-            ranges = world.cast((here.x, here.y), angles + here.yaw) + self.chance.normal(0, 0.01, self.beams)
+            ranges = world.cast((here.x, here.y), angles + here.yaw) + self.rng.normal(0, 0.01, self.beams)
             ranges = np.round(np.where(ranges > 30.0, np.inf, ranges), 3)
             if self.covered is not None:
                 ranges[:40] = self.covered
@@ -199,11 +199,9 @@ def test_nothing_moves_while_odometry_drifts(view: float, beams: int) -> None:
 
 def test_posts_beside_a_fast_way_do_not_move_while_wheels_slip_by_a_tenth() -> None:
     """Where a post is, a beam went by before that by odometry went just where the post stands."""
-    chance = np.random.default_rng(3)
+    rng = np.random.default_rng(3)
     posts = Flatland()
-    posts.discs += [
-        (x, side * float(chance.uniform(1.2, 4.5)), 0.075) for x in np.arange(-2, 24, 0.3) for side in (-1, 1)
-    ]
+    posts.discs += [(x, side * float(rng.uniform(1.2, 4.5)), 0.075) for x in np.arange(-2, 24, 0.3) for side in (-1, 1)]
 
     def straight(t: float) -> Pose2:
         return Pose2(2.0 * t, 0.0, 0.1 * math.sin(2.0 * t))
@@ -225,11 +223,9 @@ def test_what_is_put_down_before_a_row_of_posts_and_taken_away_again_does_not_ho
 
 def test_posts_do_not_move_when_the_robot_skids_aside_and_its_wheels_do_not_know() -> None:
     """By 0.12 m within half a second, there and back, while it swings: nearly all of them stand where it was free."""
-    chance = np.random.default_rng(39)
+    rng = np.random.default_rng(39)
     posts = Flatland()
-    posts.discs += [
-        (x, side * float(chance.uniform(0.4, 2.5)), 0.075) for x in np.arange(-2, 8, 0.2) for side in (-1, 1)
-    ]
+    posts.discs += [(x, side * float(rng.uniform(0.4, 2.5)), 0.075) for x in np.arange(-2, 8, 0.2) for side in (-1, 1)]
 
     def swinging(t: float) -> Pose2:
         return Pose2(1.0 - math.cos(0.4 * t), 0.0, 0.5 * math.sin(1.3 * t))
@@ -252,12 +248,12 @@ def test_the_last_piece_of_a_scan_is_as_near_as_its_last_hit() -> None:
 
 
 def test_hits_that_are_in_one_run_are_never_told_beforehand_to_be_in_several() -> None:
-    chance, step, told = np.random.default_rng(4), math.radians(1.0), list[tuple[bool, bool]]()
+    rng, step, told = np.random.default_rng(4), math.radians(1.0), list[tuple[bool, bool]]()
     for _ in range(400):
-        ranges = np.repeat(chance.uniform(1.0, 6.0, 18), 4) + chance.normal(0.0, 0.04, 72)
-        ranges[chance.random(72) < 0.1] = np.inf
+        ranges = np.repeat(rng.uniform(1.0, 6.0, 18), 4) + rng.normal(0.0, 0.04, 72)
+        ranges[rng.random(72) < 0.1] = np.inf
         hits = answers(ranges, np.fmin(ranges, 1e5) * np.exp(1j * step * np.arange(72)), step, 0.1, 10.0)
-        which = chance.random(len(hits.beams)) < 0.15
+        which = rng.random(len(hits.beams)) < 0.15
         told.append((runs(hits).together(which, 3), hits.may_be_together(which.nonzero()[0].tolist(), 3)))
         first, last = runs(hits).first, runs(hits).last
         assert told[-1][0] == any(which[one : other + 1].sum() >= 3 for one, other in zip(first, last, strict=True))
@@ -267,10 +263,8 @@ def test_hits_that_are_in_one_run_are_never_told_beforehand_to_be_in_several() -
 
 def test_who_looks_at_all_beams_at_once_tells_what_he_tells_who_looks_at_some_of_them_first() -> None:
     """After a scan in which something had appeared all are looked at; wires appear at many scans."""
-    chance = np.random.default_rng(2)
-    wires = Flatland(
-        discs=[(6 * chance.random() + 1, 2.2 * (-1) ** k * (0.5 + chance.random()), 0.002) for k in range(30)]
-    )
+    rng = np.random.default_rng(2)
+    wires = Flatland(discs=[(6 * rng.random() + 1, 2.2 * (-1) ** k * (0.5 + rng.random()), 0.002) for k in range(30)])
 
     def flies(t: float) -> list[Disc]:
         """Four beams wide, where each sixth is looked at first."""
@@ -293,10 +287,10 @@ def test_who_looks_at_all_beams_at_once_tells_what_he_tells_who_looks_at_some_of
 
 def test_a_scan_that_is_garbage_moves_nothing_and_breaks_nothing() -> None:
     tracker = Tracker(Prediction(), RATE)
-    chance = np.random.default_rng(1)
+    rng = np.random.default_rng(1)
     for k in range(20):
-        ranges = chance.uniform(-5, 40, 360)
-        ranges[chance.random(360) < 0.3] = np.nan
+        ranges = rng.uniform(-5, 40, 360)
+        ranges[rng.random(360) < 0.3] = np.nan
         tracker.on_scan(
             Scan("lidar", k * 24, ranges[: 360 if k % 3 else k // 3], -3.14, 0.0175, 0.1, 30.0), Pose2(0, 0)
         )

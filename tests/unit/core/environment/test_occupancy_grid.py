@@ -9,11 +9,11 @@ from simscen.core.geometry import Pose2
     ("cell", "finest", "expected"), [(0.2, 0.05, 0.05), (0.18, 0.05, 0.045), (0.02, 0.05, 0.02), (0.4, 0.2, 0.2)]
 )
 def test_a_coarse_map_is_split_into_whole_parts_and_means_what_it_meant(cell, finest, expected):
-    chance = np.random.default_rng(2)
-    coarse = OccupancyGrid(chance.choice([0, 40, 100, -1], (12, 9)).astype(np.int8), cell, Pose2(1, 2, 0.3))
+    rng = np.random.default_rng(2)
+    coarse = OccupancyGrid(rng.choice([0, 40, 100, -1], (12, 9)).astype(np.int8), cell, Pose2(1, 2, 0.3))
     fine = coarse.refined(finest)
     assert fine.resolution == pytest.approx(expected)
-    places = coarse.origin.apply(chance.uniform((-0.5, -0.5), (9 * cell + 0.5, 12 * cell + 0.5), (2000, 2)))
+    places = coarse.origin.apply(rng.uniform((-0.5, -0.5), (9 * cell + 0.5, 12 * cell + 0.5), (2000, 2)))
     assert np.array_equal(fine.values_at(places), coarse.values_at(places))
 
 

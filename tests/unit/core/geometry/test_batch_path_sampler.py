@@ -9,23 +9,23 @@ from simscen.core.geometry.scripted_poses import BatchPathSampler
 from simscen.core.geometry.shapes import MotionPath
 
 
-def any_path(chance: np.random.Generator) -> MotionPath:
+def any_path(rng: np.random.Generator) -> MotionPath:
     """Of up to five legs: some straight, some of no time, some that turn; sometimes eased."""
-    count = int(chance.integers(1, 6))
-    steps = chance.uniform(0.1, 3.0, count - 1) * (chance.random(count - 1) < 0.8)
+    count = int(rng.integers(1, 6))
+    steps = rng.uniform(0.1, 3.0, count - 1) * (rng.random(count - 1) < 0.8)
     times = np.concatenate(([0.0], np.cumsum(steps)))
-    headings = np.cumsum(chance.uniform(-4, 4, count) * (chance.random(count) < 0.4))
-    poses = [Pose2(*pose) for pose in np.column_stack((chance.uniform(-9, 9, (count, 2)), headings)).tolist()]
-    mode, ease = str(chance.choice(["once", "loop", "back_and_forth"])), str(chance.choice(["linear"] * 4 + ["smooth"]))
-    start, phase = float(chance.choice([0.0, 1.7])), float(chance.choice([0.0, 0.6]))
+    headings = np.cumsum(rng.uniform(-4, 4, count) * (rng.random(count) < 0.4))
+    poses = [Pose2(*pose) for pose in np.column_stack((rng.uniform(-9, 9, (count, 2)), headings)).tolist()]
+    mode, ease = str(rng.choice(["once", "loop", "back_and_forth"])), str(rng.choice(["linear"] * 4 + ["smooth"]))
+    start, phase = float(rng.choice([0.0, 1.7])), float(rng.choice([0.0, 0.6]))
     return MotionPath(tuple(times.tolist()), tuple(poses), mode, start, ease, phase)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_each_is_where_it_is_when_it_is_asked_alone(seed: int) -> None:
-    chance = np.random.default_rng(seed)
-    each = [(any_path(chance), float(height)) for height in chance.uniform(0, 1, 30)]
-    ticks = np.arange(0, 6 * 480, 6)[:, np.newaxis] - chance.integers(0, 240, len(each))
+    rng = np.random.default_rng(seed)
+    each = [(any_path(rng), float(height)) for height in rng.uniform(0, 1, 30)]
+    ticks = np.arange(0, 6 * 480, 6)[:, np.newaxis] - rng.integers(0, 240, len(each))
     ticks[0, :] = 0
     # Also exactly where legs begin and end, and where the way turns back.
     ends = np.array([(p.times[0], p.times[1] if len(p.times) > 1 else 0.0, p.times[-1]) for p, _ in each]).T

@@ -132,11 +132,11 @@ def test_a_track_is_where_its_path_is_bit_for_bit(mode, ease):
 @pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
 @pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
 def test_nothing_strays_farther_from_its_ways_than_they_say(ease, mode):
-    chance = random.Random(5)
+    rng = random.Random(5)
     strayed = []
     for _ in range(20):
-        poses = tuple(Pose2(chance.uniform(-5, 5), chance.uniform(-5, 5), chance.uniform(-3, 3)) for _ in range(4))
-        path = MotionPath((0.0, *sorted(chance.uniform(0.1, 9) for _ in range(3))), poses, mode, ease=ease)
+        poses = tuple(Pose2(rng.uniform(-5, 5), rng.uniform(-5, 5), rng.uniform(-3, 3)) for _ in range(4))
+        path = MotionPath((0.0, *sorted(rng.uniform(0.1, 9) for _ in range(3))), poses, mode, ease=ease)
         for moment in range(60):
             x, y, _ = pose_at(path, 0.3 * moment)
             away = [(beside(x, y, way), way.deviation) for way in swept_segments(path)]
@@ -163,16 +163,16 @@ def swept(path, begin, end, reach):
 @pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
 @pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
 def test_no_part_ever_moves_farther_than_the_largest_step(mode, ease):
-    chance = random.Random(f"{mode} {ease}")
+    rng = random.Random(f"{mode} {ease}")
     for _ in range(40):
-        count, reach = chance.randint(2, 6), chance.uniform(0, 1)
-        times = tuple(itertools.accumulate((chance.choice([0.01, 0.3, 1.0]) for _ in range(count - 1)), initial=0.0))
-        poses = [Pose2(*(chance.uniform(-2, 2) for _ in range(3))) for _ in range(count)]
+        count, reach = rng.randint(2, 6), rng.uniform(0, 1)
+        times = tuple(itertools.accumulate((rng.choice([0.01, 0.3, 1.0]) for _ in range(count - 1)), initial=0.0))
+        poses = [Pose2(*(rng.uniform(-2, 2) for _ in range(3))) for _ in range(count)]
         poses[-1] = poses[0] if mode == "loop" else poses[-1]
-        path, step = MotionPath(times, tuple(poses), mode, 0.0, ease), chance.choice([0.005, 0.1, 2.0])
+        path, step = MotionPath(times, tuple(poses), mode, 0.0, ease), rng.choice([0.005, 0.1, 2.0])
         most = largest_step(path, step, reach)
         for _ in range(20):
-            begin = chance.uniform(-step, 2 * times[-1])
+            begin = rng.uniform(-step, 2 * times[-1])
             assert swept(path, begin, begin + step, reach) <= most + 1e-9
 
 

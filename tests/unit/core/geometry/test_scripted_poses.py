@@ -11,8 +11,8 @@ from simscen.core.geometry.scripted_poses import PredictedPoses
 
 @pytest.mark.parametrize("distance", [0.5, 8.0, 20.0, math.inf])
 def test_those_are_far_that_are_so_at_each_of_the_ticks(distance: float) -> None:
-    chance, names = np.random.default_rng(5), tuple(f"cart {number}" for number in range(40))
-    table = chance.normal(0, 3, (20, 40, 7)) + chance.normal(0, 12, (40, 7))
+    rng, names = np.random.default_rng(5), tuple(f"cart {number}" for number in range(40))
+    table = rng.normal(0, 3, (20, 40, 7)) + rng.normal(0, 12, (40, 7))
     predicted = PredictedPoses(range(20), names, table, {name: Pose3() for name in ("shelf", *names)})
     place = (3.0, -2.0, 0.5)
     nearest = {name: min(math.dist(predicted.at(tick)[name][:3], place) for tick in range(20)) for name in names}

@@ -71,8 +71,8 @@ def test_every_operator_is_what_brute_force_over_all_windows_says(values, first,
 
 def test_until_over_a_whole_minute_takes_no_cubic_time():
     """rtamt 0.4.10 takes 106 s for this; by definition it is 1201 samples and as many windows."""
-    chance = np.random.default_rng(3)
-    p, q = chance.normal(1.0, 1.0, 1201), chance.normal(-2.0, 1.0, 1201)
+    rng = np.random.default_rng(3)
+    p, q = rng.normal(1.0, 1.0, 1201), rng.normal(-2.0, 1.0, 1201)
     whole = operators.until(p, q, Ahead(0, 1200).of(1201), Continuation(-math.inf, True))
     assert whole[0] == max(min(q[k], p[:k].min(initial=math.inf)) for k in range(1201))
 
@@ -83,8 +83,8 @@ WINDOWS = [Ahead(first, last) for first in range(4) for last in (None, *range(fi
 
 @pytest.mark.parametrize("seed", range(20))
 def test_windows_of_every_length_match_brute_force(seed):
-    chance, ahead = np.random.default_rng(seed), Continuation(math.inf, True)
-    values = chance.integers(-9, 9, 11).astype(np.float64)
+    rng, ahead = np.random.default_rng(seed), Continuation(math.inf, True)
+    values = rng.integers(-9, 9, 11).astype(np.float64)
     for window in (Ahead(first, first + length) for first in range(3) for length in range(7)):
         assert operators.always(values, window.of(len(values)), ahead).tolist() == brute(
             "always", values.tolist(), window, ahead

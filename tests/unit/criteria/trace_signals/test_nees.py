@@ -26,8 +26,8 @@ def test_errors_count_in_standard_deviations_squared(error, expected):
 
 
 def test_it_is_the_error_in_the_inverse_covariance_whatever_is_correlated():
-    chance = np.random.default_rng(4)
-    roots, errors = chance.normal(size=(30, 3, 3)), chance.normal(size=(30, 3))
+    rng = np.random.default_rng(4)
+    roots, errors = rng.normal(size=(30, 3, 3)), rng.normal(size=(30, 3))
     full = roots @ roots.transpose(0, 2, 1) + 0.1 * np.eye(3)
     rows, columns = np.triu_indices(3)
     expected = [error @ np.linalg.inv(matrix) @ error for error, matrix in zip(errors, full, strict=True)]

@@ -354,8 +354,8 @@ def test_of_regions_side_by_side_each_place_is_in_one():
 
 def test_inside_are_the_points_that_are_inside_for_shapely():
     corners = [[0, 0], [4, 1], [3, 5], [2, 1.5], [-1, 4]]
-    chance = np.random.default_rng(5)
-    points = chance.uniform(-2, 6, (400, 2))
+    rng = np.random.default_rng(5)
+    points = rng.uniform(-2, 6, (400, 2))
     within = shapely.contains_xy(shapely.Polygon(corners), *points.T)
     assert points_in_polygon(points, np.array(corners)).tolist() == within.tolist()
 
@@ -428,9 +428,9 @@ def test_without_the_truth_there_is_no_clock(name):
 
 
 def test_the_nearest_point_of_a_plan_is_found_among_long_and_short_steps():
-    chance = np.random.default_rng(2)
-    way = np.cumsum(chance.normal(0, [[1.0, 1.0]] * 10 + [[0.02, 0.02]] * 30, (40, 2)), axis=0)
-    robot = chance.normal(0, 4, (81, 2))
+    rng = np.random.default_rng(2)
+    way = np.cumsum(rng.normal(0, [[1.0, 1.0]] * 10 + [[0.02, 0.02]] * 30, (40, 2)), axis=0)
+    robot = rng.normal(0, 4, (81, 2))
     trace = synthetic_trace({"seconds": 2, "truth": [[0, 0, 0]]})
     trace = replace(
         trace,

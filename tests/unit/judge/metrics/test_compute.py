@@ -285,13 +285,13 @@ def test_two_contacts_at_once_last_as_long_as_their_union():
 
 def lost(seconds=60.0, seed=4):
     """A curved drive with a belief that wanders around the truth."""
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     trace = synthetic_trace({"seconds": seconds, "truth": circle(3, seconds, turns=2)})
     values = trace.belief.values.copy()
     ticks = trace.belief.ticks
     yaw = np.interp(ticks, trace.truth.ticks, np.unwrap(trace.truth.values[:, 2]))
-    values[:, :2] = trace.truth.at(ticks)[:, :2] + chance.normal(0, 0.1, (len(ticks), 2))
-    values[:, 2] = (yaw + chance.normal(0, 0.2, len(ticks)) + math.pi) % (2 * math.pi) - math.pi
+    values[:, :2] = trace.truth.at(ticks)[:, :2] + rng.normal(0, 0.1, (len(ticks), 2))
+    values[:, 2] = (yaw + rng.normal(0, 0.2, len(ticks)) + math.pi) % (2 * math.pi) - math.pi
     return replace(trace, belief=Samples(ticks, values))
 
 
@@ -332,9 +332,9 @@ def test_a_short_drive_has_no_relative_error_but_a_reason():
 
 
 def test_nees_is_that_of_filterpy():
-    trace, chance = lost(), np.random.default_rng(9)
+    trace, rng = lost(), np.random.default_rng(9)
     true, values = trace.truth.at(trace.belief.ticks), trace.belief.values.copy()
-    squares = chance.normal(size=(len(values), 3, 3))
+    squares = rng.normal(size=(len(values), 3, 3))
     covariances = squares @ squares.transpose(0, 2, 1) + 0.05 * np.eye(3)
     values[:, 3:9] = covariances[(slice(None), *np.triu_indices(3))]
     errors = values[:, :3] - true
@@ -347,8 +347,8 @@ def test_nees_is_that_of_filterpy():
 
 
 def test_nees_of_errors_drawn_from_the_covariance_is_three():
-    chance = np.random.default_rng(5)
-    belief = [[k / 10, *chance.normal(0, 0.1, 3)] for k in range(3001)]
+    rng = np.random.default_rng(5)
+    belief = [[k / 10, *rng.normal(0, 0.1, 3)] for k in range(3001)]
     metrics = measured({"seconds": 300, "truth": [[0, 0, 0]], "belief": belief})
     assert metrics["nees"] == pytest.approx(3.0, abs=0.2)
     assert metrics["ape_trans_rmse"] == pytest.approx(0.1 * math.sqrt(2), rel=0.05)

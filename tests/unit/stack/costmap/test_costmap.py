@@ -155,9 +155,9 @@ def test_an_obstacle_beyond_the_ray_tracing_range_persists() -> None:
 def test_distances_kept_up_to_date_piece_by_piece_equal_those_computed_at_once() -> None:
     world = Flatland().room(8, 6)
     map_ = costmap(world)
-    walls, chance = np.count_nonzero(map_.view.costs == 254), np.random.default_rng(5)
+    walls, rng = np.count_nonzero(map_.view.costs == 254), np.random.default_rng(5)
     for k in range(12):
-        world.discs = [(*chance.uniform((1, 1), (7, 5)), 0.2) for _ in range(4)]
+        world.discs = [(*rng.uniform((1, 1), (7, 5)), 0.2) for _ in range(4)]
         pose = Pose2(1.0 + 0.5 * k, 3.0, 0.3 * k)
         map_.update(pose, scan_of(world, pose, noise=0.01))
         assert np.allclose(map_.view.distance, full(map_.view.costs == 254), atol=1e-6)

@@ -54,8 +54,8 @@ def test_a_cell_beside_a_wall_is_part_of_it() -> None:
 
 def test_a_drive_sees_the_same_with_updates_as_if_all_were_computed_anew() -> None:
     """What is computed again around changed cells is what a costmap of the same marks shows."""
-    chance = np.random.default_rng(5)
-    world = Flatland(discs=[(x, y, 0.03) for x, y in chance.uniform(-3, 3, (12, 2)).tolist() if math.hypot(x, y) > 1])
+    rng = np.random.default_rng(5)
+    world = Flatland(discs=[(x, y, 0.03) for x, y in rng.uniform(-3, 3, (12, 2)).tolist() if math.hypot(x, y) > 1])
     spec = Spec(denoise_layer=DenoiseLayer(enabled=True, minimal_group_size=4), rolling_size=8.0)
     map_ = Costmap(spec, Surroundings(round_robot(), None, RATE))
     for k in range(6):

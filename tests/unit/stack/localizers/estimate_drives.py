@@ -83,8 +83,8 @@ def _pillars() -> dict[str, object]:
 
 def _clutter() -> dict[str, object]:
     """25 boxes in a room of 16 x 10 m."""
-    chance = np.random.default_rng(5)
-    boxes = chance.uniform((1, 1, 0.3, 0.3), (15, 9, 1.2, 1.2), (25, 4)).tolist()
+    rng = np.random.default_rng(5)
+    boxes = rng.uniform((1, 1, 0.3, 0.3), (15, 9, 1.2, 1.2), (25, 4)).tolist()
     return _hall(16, 10, [(x, y, a, b) for x, y, a, b in boxes])
 
 
@@ -116,12 +116,12 @@ def drive(name: str, seed: int, seconds: float = 60.0) -> Array:
     return np.array(truth)
 
 
-def _corners(name: str, chance: np.random.Generator) -> Iterator[Array]:
+def _corners(name: str, rng: np.random.Generator) -> Iterator[Array]:
     """Places to turn at, without end, on the shortest ways between places drawn anywhere."""
     left, low, right, high = building(name).world.bounds
     here: Array | None = None
     while True:
-        ends = chance.uniform((left, low), (right, high), (2, 2))
+        ends = rng.uniform((left, low), (right, high), (2, 2))
         way = ways(name).way(Pose2(*(ends[0] if here is None else here)), Pose2(*ends[1]))
         if way is not None:
             yield from way if here is None else way[1:]
@@ -140,13 +140,13 @@ def record(truth: Array, scene: RayScene) -> Way:
 
 def moved_furniture(name: str, truth: Array, seed: int) -> RayScene:
     """The world with boxes that no map shows, none on the robot's way."""
-    built, chance = building(name), np.random.default_rng((seed, 2))
+    built, rng = building(name), np.random.default_rng((seed, 2))
     low, high = built.world.bounds[:2], built.world.bounds[2:]
     boxes: list[tuple[float, float, float, float]] = []
     area = (high[0] - low[0]) * (high[1] - low[1])
     while len(boxes) < area / 8:
-        x, y = chance.uniform(low, high)
-        a, b = chance.uniform(0.3, 1.0, 2)
+        x, y = rng.uniform(low, high)
+        a, b = rng.uniform(0.3, 1.0, 2)
         if np.hypot(*(truth[:, :2] - (x, y)).T).min() > 0.3 + np.hypot(a, b) / 2:
             boxes.append((float(x), float(y), float(a), float(b)))
     spec = WorldSpec.model_validate({"simscen": 1, "obstacles": _hall(1, 1, boxes)["obstacles"]})
@@ -155,20 +155,20 @@ def moved_furniture(name: str, truth: Array, seed: int) -> RayScene:
 
 def crowded(way: Way, seed: int, people: int = 6) -> Way:
     """The same among people that come and go, on wheels that slip by up to 30 %, for seconds."""
-    chance, ranges = np.random.default_rng((seed, 3)), way.ranges.copy()
-    bearing, distance = chance.uniform(-np.pi, np.pi, people), chance.uniform(0.6, 2.5, people)
-    phase, period = chance.uniform(0, 2 * np.pi, people), chance.uniform(8, 30, people)
+    rng, ranges = np.random.default_rng((seed, 3)), way.ranges.copy()
+    bearing, distance = rng.uniform(-np.pi, np.pi, people), rng.uniform(0.6, 2.5, people)
+    phase, period = rng.uniform(0, 2 * np.pi, people), rng.uniform(8, 30, people)
     for row, yaw in enumerate(way.truth[:, 2]):
-        bearing += chance.normal(0, 0.05, people)
-        distance = np.clip(distance + chance.normal(0, 0.05, people), 0.5, 3)
+        bearing += rng.normal(0, 0.05, people)
+        distance = np.clip(distance + rng.normal(0, 0.05, people), 0.5, 3)
         here = np.sin(2 * np.pi * row / 10 / period + phase) > 0
         for towards, far in zip(bearing[here], distance[here], strict=True):
             off = np.abs((ANGLES - towards + yaw + np.pi) % (2 * np.pi) - np.pi)
             np.minimum(ranges[row], far, out=ranges[row], where=off < np.arctan(0.3 / far))
     slip, row = np.ones((len(way.steps), 3)), 0
     while row < len(slip):
-        end = row + int(chance.integers(5, 20))
-        slip[row:end, 0] += chance.choice([0, 0, 0.1, -0.1, 0.3])
+        end = row + int(rng.integers(5, 20))
+        slip[row:end, 0] += rng.choice([0, 0, 0.1, -0.1, 0.3])
         row = end
     slip[:, 2] += (slip[:, 0] - 1) / 6
     return Way(way.truth, way.steps * slip, ranges)
@@ -198,13 +198,13 @@ class Case:
 
     def readings(self) -> Iterator[tuple[Odometry, Scan]]:
         """Odometry and scan at each tenth of a second, with our sensors' default noise."""
-        chance, odometry = np.random.default_rng((self.seed, 4)), Pose2(0.0, 0.0, 0.0)
-        ranges = self.way.ranges + chance.normal(0, 0.01, self.way.ranges.shape)
+        rng, odometry = np.random.default_rng((self.seed, 4)), Pose2(0.0, 0.0, 0.0)
+        ranges = self.way.ranges + rng.normal(0, 0.01, self.way.ranges.shape)
         ranges = np.where(ranges < self.range_max, ranges, np.inf)
         for row, step in enumerate(self.way.steps):
             far = float(np.hypot(step[0], step[1]))
-            stretched = 1 + chance.normal() * 0.01 * np.sqrt(far) / max(far, 1e-9)
-            turn = step[2] + chance.normal() * np.sqrt(1e-4 * abs(step[2]) + 2.5e-5 * far)
+            stretched = 1 + rng.normal() * 0.01 * np.sqrt(far) / max(far, 1e-9)
+            turn = step[2] + rng.normal() * np.sqrt(1e-4 * abs(step[2]) + 2.5e-5 * far)
             odometry = odometry.compose(Pose2(step[0] * stretched, step[1] * stretched, turn))
             told = Odometry("odom", row * PERIOD, odometry, Twist())
             yield told, Scan("lidar", row * PERIOD, ranges[row], -np.pi, 2 * np.pi / BEAMS, 0.05, self.range_max)

@@ -28,13 +28,13 @@ def crowded(way: Drive, seed: int, people: int = 8) -> Drive:
 
     People are 0.6 m wide and walk 0.5 to 3 m from the robot. Slipping wheels turn up to 30 % too far, for seconds.
     """
-    chance, angles = np.random.default_rng((seed, 7)), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
+    rng, angles = np.random.default_rng((seed, 7)), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
     ranges = cast(way.truth[::EACH], angles, np.concatenate((np.delete(BOXES, GONE, axis=0), NEW)))
-    bearing, distance = chance.uniform(-np.pi, np.pi, people), chance.uniform(0.6, 2.5, people)
-    phase, period = chance.uniform(0, 2 * np.pi, people), chance.uniform(8, 30, people)
+    bearing, distance = rng.uniform(-np.pi, np.pi, people), rng.uniform(0.6, 2.5, people)
+    phase, period = rng.uniform(0, 2 * np.pi, people), rng.uniform(8, 30, people)
     for row, (seen, yaw) in enumerate(zip(ranges, way.truth[::EACH, 2], strict=True)):
-        bearing += chance.normal(0, 0.05, people)
-        distance = np.clip(distance + chance.normal(0, 0.05, people), 0.5, 3)
+        bearing += rng.normal(0, 0.05, people)
+        distance = np.clip(distance + rng.normal(0, 0.05, people), 0.5, 3)
         here = np.sin(2 * np.pi * row * SCAN_PERIOD / TICK_RATE / period + phase) > 0
         for towards, far in zip(bearing[here], distance[here], strict=True):
             off = np.abs((angles - towards + yaw + np.pi) % (2 * np.pi) - np.pi)
@@ -42,8 +42,8 @@ def crowded(way: Drive, seed: int, people: int = 8) -> Drive:
     slip = np.ones((len(way.steps), 3))
     row = 0
     while row < len(slip):
-        end = row + int(chance.integers(20, 80))
-        slip[row:end, 0] += chance.choice([0, 0, 0.1, -0.1, 0.3])
+        end = row + int(rng.integers(20, 80))
+        slip[row:end, 0] += rng.choice([0, 0, 0.1, -0.1, 0.3])
         row = end
     slip[:, 2] += (slip[:, 0] - 1) / 6
     return Drive(way.truth, way.steps * slip, ranges)

@@ -98,9 +98,9 @@ def wrong_start(spec: Spec, seeds: Iterable[int]) -> Search:
     """The estimate is 0.5 m off in a random direction and 20° to either side."""
     ways = {}
     for seed in seeds:
-        chance, path = np.random.default_rng((seed, 4)), drive(20.0, seed % 12)
+        rng, path = np.random.default_rng((seed, 4)), drive(20.0, seed % 12)
         x, y, yaw = path.truth[0]
-        away, side = chance.uniform(-np.pi, np.pi), chance.choice([-1, 1])
+        away, side = rng.uniform(-np.pi, np.pi), rng.choice([-1, 1])
         guess = Pose2(x + 0.5 * np.cos(away), y + 0.5 * np.sin(away), yaw + side * np.deg2rad(20))
         ways[seed] = (path, Estimate(guess))
     return search(spec, seeds, ways)

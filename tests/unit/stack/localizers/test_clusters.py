@@ -13,8 +13,8 @@ from simscen.stack.localizers.particles import Particles
 
 @pytest.mark.parametrize(("seed", "count", "width"), [(0, 40, 2.0), (1, 200, 4.0), (2, 600, 5.0), (3, 1, 1.0)])
 def test_groups_are_the_connected_components_of_touching_bins(seed: int, count: int, width: float) -> None:
-    chance = np.random.default_rng(seed)
-    keys = bins(np.column_stack((chance.uniform(-width, width, (count, 2)), chance.uniform(-9, 9, count))))
+    rng = np.random.default_rng(seed)
+    keys = bins(np.column_stack((rng.uniform(-width, width, (count, 2)), rng.uniform(-9, 9, count))))
     cells = np.column_stack(split(keys))
     apart = np.abs(cells[:, None] - cells)
     apart[..., 2] = np.minimum(apart[..., 2], 36 - apart[..., 2])
@@ -61,8 +61,8 @@ def test_a_pose_is_not_averaged_across_the_cut_of_the_circle_to_its_opposite() -
 
 
 def test_the_covariance_is_the_weighted_one_about_the_pose() -> None:
-    chance = np.random.default_rng(4)
-    poses, weights = group(Pose2(0.2, 0.2, 0.05), 0.03, 500, 5), chance.random(500)
+    rng = np.random.default_rng(4)
+    poses, weights = group(Pose2(0.2, 0.2, 0.05), 0.03, 500, 5), rng.random(500)
     particles = Particles(poses, weights / weights.sum())
     mean = Pose2(*np.average(poses, axis=0, weights=weights).tolist())
     assert np.allclose(spread(particles, mean), np.cov(poses.T, aweights=weights, ddof=0))
@@ -108,10 +108,10 @@ def test_of_a_wide_even_cloud_the_middle_is_the_answer_whichever_particle_is_bes
 @pytest.mark.parametrize("peak", [1.0, 16.0])
 def test_weights_that_change_by_a_thousandth_move_the_pose_by_that_much_of_the_clouds_width(peak: float) -> None:
     """So there is no jump without a scan that says so."""
-    poses, chance = wide(), np.random.default_rng(9)
-    weights = chance.uniform(1, 3, len(poses))
+    poses, rng = wide(), np.random.default_rng(9)
+    weights = rng.uniform(1, 3, len(poses))
     before, _ = summarize(Particles(poses, weights / weights.sum()), peak)
-    changed = weights * chance.choice([1, 1.001], len(poses))
+    changed = weights * rng.choice([1, 1.001], len(poses))
     after, _ = summarize(Particles(poses, changed / changed.sum()), peak)
     assert before.distance(after) < 0.001 * peak * 3
 

@@ -66,9 +66,9 @@ def test_omni_noise_has_the_variances_of_nav2() -> None:
 @pytest.mark.parametrize("model", [Differential((2e-4, 3e-4, 4e-4, 1e-4)), Omni((2e-4, 3e-4, 4e-4, 1e-4, 5e-4))])
 @pytest.mark.parametrize("delta", [Pose2(0.3, 0.1, 0.4), Pose2(-0.4, 0.05, -0.3), Pose2(0, 0, 0.9)])
 def test_the_carried_covariance_is_that_of_moved_particles(model: MotionModel, delta: Pose2) -> None:
-    chance = np.random.default_rng(3)
+    rng = np.random.default_rng(3)
     covariance = np.array([[4e-4, 1e-4, -5e-5], [1e-4, 3e-4, 2e-5], [-5e-5, 2e-5, 1e-4]])
-    poses = model.sample(chance.multivariate_normal(START, covariance, MANY), delta, chance)
+    poses = model.sample(rng.multivariate_normal(START, covariance, MANY), delta, rng)
     carried = model.carry(covariance, START.yaw, delta)
     scale = np.sqrt(np.outer(np.diag(carried), np.diag(carried)))
     assert np.allclose(np.cov(poses.T) / scale, carried / scale, atol=0.015)

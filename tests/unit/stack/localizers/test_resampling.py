@@ -33,26 +33,26 @@ def test_an_index_is_drawn_as_often_as_its_weight_says_rounded_either_way(count:
 
 def test_a_particle_without_weight_is_never_drawn() -> None:
     given = np.array([0.0, 0.5, 0.0, 0.5, 0.0])
-    chance = np.random.default_rng(0)
-    drawn = np.concatenate([systematic(given, 9, chance) for _ in range(200)])
+    rng = np.random.default_rng(0)
+    drawn = np.concatenate([systematic(given, 9, rng) for _ in range(200)])
     assert set(drawn.tolist()) == {1, 3}
 
 
 def test_draws_follow_the_weights() -> None:
     """Chi-square over single draws, which are independent of each other."""
-    given, chance = weights(5, 20), np.random.default_rng(5)
-    drawn = np.bincount([int(systematic(given, 1, chance)[0]) for _ in range(20_000)], minlength=20)
+    given, rng = weights(5, 20), np.random.default_rng(5)
+    drawn = np.bincount([int(systematic(given, 1, rng)[0]) for _ in range(20_000)], minlength=20)
     likely = given > 1e-3
     expected = given[likely] / given[likely].sum() * drawn[likely].sum()
     assert stats.chisquare(drawn[likely], expected).pvalue > 1e-3
 
 
 def test_adaptive_draws_cut_short_still_follow_the_weights() -> None:
-    poses, chance = np.random.default_rng(1).uniform(-2, 2, (50, 3)), np.random.default_rng(2)
+    poses, rng = np.random.default_rng(1).uniform(-2, 2, (50, 3)), np.random.default_rng(2)
     given, bound = weights(6, 50), KldBound(0.05, 0.99, 100, 5000)
 
     def draw(count: int) -> Array:
-        return chance.permutation(poses[systematic(given, count, chance)])
+        return rng.permutation(poses[systematic(given, count, rng)])
 
     drawn = [adaptive(draw, bound) for _ in range(400)]
     assert any(len(sample) % 100 for sample in drawn), "the last block was never cut"
@@ -61,13 +61,13 @@ def test_adaptive_draws_cut_short_still_follow_the_weights() -> None:
 
 
 def test_a_spread_out_set_keeps_more_particles_than_a_narrow_one() -> None:
-    chance, bound = np.random.default_rng(3), KldBound(0.05, 0.99, 100, 2000)
-    sizes = [len(adaptive(lambda n, s=spread: chance.normal(0.2, s, (n, 3)), bound)) for spread in (0.01, 0.3, 0.8, 9)]
+    rng, bound = np.random.default_rng(3), KldBound(0.05, 0.99, 100, 2000)
+    sizes = [len(adaptive(lambda n, s=spread: rng.normal(0.2, s, (n, 3)), bound)) for spread in (0.01, 0.3, 0.8, 9)]
     assert sizes == sorted(sizes)
     assert (sizes[0], sizes[-1]) == (100, 2000)
 
 
 def test_the_number_kept_is_the_bound_of_the_bins_they_fill() -> None:
-    chance, bound = np.random.default_rng(3), KldBound(0.05, 0.99, 100, 5000)
-    kept = adaptive(lambda n: chance.normal(0, 0.5, (n, 3)), bound)
+    rng, bound = np.random.default_rng(3), KldBound(0.05, 0.99, 100, 5000)
+    kept = adaptive(lambda n: rng.normal(0, 0.5, (n, 3)), bound)
     assert len(kept) == pytest.approx(int(bound.samples(len(np.unique(bins(kept))))), abs=1)

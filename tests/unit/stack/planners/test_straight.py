@@ -37,10 +37,10 @@ def left_at(costs: Array, start: Pose2, goal: Pose2) -> float:
 
 
 def test_a_straight_way_is_dear_as_far_as_it_meets_dear_cells() -> None:
-    chance, told = np.random.default_rng(5), []
+    rng, told = np.random.default_rng(5), []
     for _ in range(300):
-        costs = (chance.random((30, 40)) < 0.02) * chance.integers(1, 253, (30, 40))
-        start, goal = (Pose2(*(chance.uniform((0, 0), (40, 30)) * SIZE + CORNER).tolist()) for _ in range(2))
+        costs = (rng.random((30, 40)) < 0.02) * rng.integers(1, 253, (30, 40))
+        start, goal = (Pose2(*(rng.uniform((0, 0), (40, 30)) * SIZE + CORNER).tolist()) for _ in range(2))
         told.append(dear_until(view_of(costs), start, goal, RADIUS))
         assert told[-1] == pytest.approx(left_at(costs, start, goal) * start.distance(goal))
     assert 60 < told.count(0.0) < 240

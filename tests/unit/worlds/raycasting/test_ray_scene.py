@@ -132,8 +132,8 @@ def test_answers_do_not_depend_on_what_was_asked_before_or_on_the_order_of_bodie
 
 
 def test_many_bodies_are_seen_as_if_they_were_one_world():
-    chance = np.random.default_rng(6)
-    places = [Pose3.from_rpy(*chance.uniform((-9, -9, 0), (9, 9, 1)), *chance.uniform(-3, 3, 3)) for _ in range(40)]
+    rng = np.random.default_rng(6)
+    places = [Pose3.from_rpy(*rng.uniform((-9, -9, 0), (9, 9, 1)), *rng.uniform(-3, 3, 3)) for _ in range(40)]
     apart, together = (
         RayScene(fuse(ROOM)),
         RayScene(fuse([*ROOM, *(Solid(Box((0.7, 0.3, 0.5)), pose.compose(Pose3(z=0.2))) for pose in places)])),
@@ -206,11 +206,11 @@ def test_a_fan_meets_what_its_rays_meet_one_by_one(first, beams, field):
 
 
 def test_the_rays_of_a_fan_within_a_cone_are_told_as_counting_all_would_tell():
-    chance = np.random.default_rng(11)
+    rng = np.random.default_rng(11)
     for _ in range(500):
-        count, first = int(chance.integers(1, 60)), float(chance.uniform(-7, 7))
-        increment = float(chance.uniform(0.01, 2 * math.pi / count))
-        (x, y), least = chance.normal(size=2), float(chance.uniform(-2.5, 2.5))
+        count, first = int(rng.integers(1, 60)), float(rng.uniform(-7, 7))
+        increment = float(rng.uniform(0.01, 2 * math.pi / count))
+        (x, y), least = rng.normal(size=2), float(rng.uniform(-2.5, 2.5))
         angles = first + increment * np.arange(count)
         met = set(np.flatnonzero(x * np.cos(angles) + y * np.sin(angles) >= least).tolist())
         told = [ray for rays in RayFan(first, increment, count).towards(x, y, least) for ray in range(count)[rays]]
