@@ -151,6 +151,7 @@ PLACES = {
     "stack.stack": Place("scenario", STACK),
     "stack.speed_zones": Place("scenario", STACK + "speed_zones:\n    -\n      "),
     "stack.speed_mask": Place("scenario", STACK + "speed_mask:\n    "),
+    "stack.odometry_filter": Place("scenario", STACK + "odometry:\n    "),
     "stack.external": Place("scenario", STACK + "external: mine\n  "),
     **{f"stack.{key}": Place("scenario", f"{STACK}{key}:\n    ") for key in (
         "costmap", "local_costmap", "planner", "goal_checker", "progress_checker", "recovery", "velocity_smoother",

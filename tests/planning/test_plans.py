@@ -61,7 +61,9 @@ def test_a_plan_costs_little_more_than_the_optimum(
 def test_a_way_that_is_dear_here_and_there_and_else_straight_is_as_good(monkeypatch: pytest.MonkeyPatch) -> None:
     """As with people about: the way past what is dear is searched for, and joined with the straight one."""
     rng, everywhere, dear = np.random.default_rng(3), list[int](), 0
-    monkeypatch.setattr(medial_axis_planner, "nearby", lambda plan, *asked: everywhere.append(1) or plan(*asked))
+    monkeypatch.setattr(
+        medial_axis_planner, "plan_in_windows", lambda plan, *asked: everywhere.append(1) or plan(*asked)
+    )
     start, goal = Pose2(0.55, 1.55), Pose2(11.55, 1.75)
     for seed in range(20):
         costs = np.zeros((30, 120), dtype=np.uint8)

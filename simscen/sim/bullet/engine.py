@@ -74,9 +74,9 @@ def set_physics_parameters(client: int, tick_rate: int, solver_iterations: int, 
     pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=client)
 
 
-def set_collision_filter(client: int, create_rigid_body: int, link: int, group: int, others: int) -> None:
-    """Let a link touch only what is in the groups `others`, and of that only what lets itself be touched by `group`."""
-    pybullet.setCollisionFilterGroupMask(create_rigid_body, link, group, others, physicsClientId=client)
+def set_collision_filter(client: int, body: int, link: int, group: int, others: int) -> None:
+    """Set the collision group of a link and the groups that it collides with; both sides must match."""
+    pybullet.setCollisionFilterGroupMask(body, link, group, others, physicsClientId=client)
 
 
 def static_mesh(client: int, mesh: TriangleMesh) -> list[int]:
@@ -104,10 +104,10 @@ def above_floor(vertices: Array, faces: Faces) -> Faces:
 
 
 def _concave(client: int, vertices: Array, faces: Faces) -> int:
-    create_rigid_body = create_static_body(client, concave_shape(client, submesh(vertices, faces)))
+    body = create_static_body(client, concave_shape(client, submesh(vertices, faces)))
     # Bullet would thicken the triangles by 1 mm.
-    pybullet.changeDynamics(create_rigid_body, -1, collisionMargin=0.0, physicsClientId=client)
-    return create_rigid_body
+    pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
+    return body
 
 
 def concave_shape(client: int, mesh: Mesh) -> int:
