@@ -83,8 +83,9 @@ class StackSpec(InProcessStack):
 
     @model_validator(mode="before")
     @classmethod
-    def _by_profile(cls, said: Any) -> Any:
-        return apply_profile(said) if isinstance(said, Mapping) and said.get("profile") in PROFILES else said
+    def _apply_profile(cls, parameters: Any) -> Any:
+        has_profile = isinstance(parameters, Mapping) and parameters.get("profile") in PROFILES
+        return apply_profile(parameters) if has_profile else parameters
 
     @property
     def builder(self) -> str:

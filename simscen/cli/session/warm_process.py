@@ -34,9 +34,9 @@ Image.preinit()  # imports what it would import when the first picture is writte
 
 def main() -> None:
     """Serve the supervisor until it closes its end of the connection."""
-    *told, replies = sys.argv[1:]
-    for whereabouts in told:
-        apply_plugin_path(whereabouts)
+    *plugin_paths, replies = sys.argv[1:]
+    for plugin_path in plugin_paths:
+        apply_plugin_path(plugin_path)
     ForkServer(0, int(replies), _warm_up, _perform).serve()
 
 
