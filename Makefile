@@ -3,7 +3,7 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 VENV := .venv
 BIN := $(VENV)/bin
-PYTHON ?= $(shell for v in 3.11 3.10; do \
+PYTHON ?= $(shell for v in 3.11 3.10 3.12 3.13; do \
 	for p in python$$v $(HOME)/.pyenv/versions/$$v.*/bin/python $(HOME)/.local/share/uv/python/cpython-$$v.*/bin/python3; do \
 	if command -v $$p >/dev/null 2>&1 && $$p -c "import sys; sys.exit('%d.%d' % sys.version_info[:2] != '$$v')" 2>/dev/null; \
 	then echo $$p; exit; fi; done; done)
@@ -23,7 +23,7 @@ setup: $(STAMP)  ## Make the virtual environment in .venv (the other targets do 
 
 $(STAMP): pyproject.toml
 	@test -n "$(PYTHON)" || { \
-	echo "simscen needs Python 3.10 or 3.11 (pybullet has no wheels for newer ones), and none was found."; \
+	echo "simscen needs Python 3.10 to 3.13 (best 3.11: pybullet is compiled for 3.12 and newer), and none was found."; \
 	echo "Get one without touching your system, then run make again:"; \
 	echo "    curl -LsSf https://astral.sh/uv/install.sh | sh && uv python install 3.11"; \
 	echo "or name one yourself:  make $(firstword $(MAKECMDGOALS)) PYTHON=/path/to/python3.11"; exit 1; }

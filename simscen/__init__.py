@@ -36,18 +36,22 @@ def simulate(
         stack: Stack to use instead of the scenario's own, as NAME=VALUE like --stack.
         variation: Name of one of the scenario's variations; see `variations`.
 
-    The same scenario and seed give the same run bit for bit. If the physics engine crashes, it ends this process; the
-    command line therefore gives each run its own process.
+    The same scenario and seed give the same run bit for bit as on the command line, unless NumPy was imported before
+    the first call: then NumPy uses its own CPU kernels (docs/design/determinism.md). If the physics engine crashes, it
+    ends this process; the command line therefore gives each run its own process.
 
     Raises:
         simscen.core.errors.InvalidInput: A file is invalid.
         simscen.core.errors.UsageError: The stack or the variation is invalid.
         simscen.core.errors.RunError: The run could not be completed.
     """
+    from simscen.core.cpu_kernels import pin_kernels
+
+    pin_kernels()  # before NumPy is imported
     from pathlib import Path
 
     from simscen.cli.session.stacks import load_with
-    from simscen.run.preparation.scenario import prepare
+    from simscen.run.preparation import prepare
     from simscen.run.simulate import simulate as run
 
     home = None if root is None else Path(root)

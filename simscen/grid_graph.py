@@ -103,3 +103,8 @@ def resample_polyline(way: Array, spacing: float, least: int = 1) -> Array:
     along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
     wanted = np.linspace(0.0, along[-1], max(least, math.ceil(along[-1] / spacing)) + 1)
     return np.column_stack((np.interp(wanted, along, way[:, 0]), np.interp(wanted, along, way[:, 1])))
+
+
+def polyline_length(points: Array) -> float:
+    """Return the length in m of a polyline (n, 2)."""
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

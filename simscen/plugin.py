@@ -29,9 +29,8 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import CostGrid, Decision, Samples, Trace
     from simscen.core.records.verdict import Evidence, Finding, Status
     from simscen.core.stage import Effect, Situation, Stage
-    from simscen.criteria.base import Criterion
+    from simscen.criteria.base import Criterion, Measure
     from simscen.criteria.findings import at_least, at_most, counted, held, missed, undecided
-    from simscen.criteria.plugin_metric import Measure
     from simscen.criteria.trace_signals.ground_truth import clearance, drive, pose_error, speed, truth, turn_rate
     from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance, Sight, Wheels
     from simscen.model.checkers import GoalCheckerSpec
@@ -263,8 +262,7 @@ _WHERE = {
         "Mount",
         "SensorSpec",
     ),
-    "simscen.criteria.base": ("Criterion",),
-    "simscen.criteria.plugin_metric": ("Measure",),
+    "simscen.criteria.base": ("Criterion", "Measure"),
     "simscen.faults.base": (
         "Disturbance",
         "Fault",

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from simscen.core.cpu_kernels import pin_kernels
 from simscen.spec import choice, registry
 
+pin_kernels()  # before the tests import NumPy, so that runs in this process are the same as on the command line
 Lay = Callable[..., Path]
 
 # Whoever starts the tests in the background has them ignore Ctrl-C, which every program that they start would inherit.

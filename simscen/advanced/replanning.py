@@ -10,7 +10,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Goal, Path
 from simscen.core.records.events import Event
 from simscen.model.planners import PlannerSpec
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.followed_plan import WATCH_DISTANCE_M, FollowedPlan
 from simscen.stack.footprint import distances
 from simscen.stack.plan_manager import PlanManager, PlanResult
@@ -78,7 +78,7 @@ class AdvancedPlanManager(PlanManager):
         self,
         spec: PlannerSpec,
         planner: Planner,
-        costmap: Costmap,
+        costmap: LayeredCostmap,
         plan_seed: Callable[[int], int],
         radius: float,
         steered: bool = False,
@@ -134,7 +134,7 @@ class AdvancedPlanManager(PlanManager):
         if not (self._avoids_moving or len(moving)) or now - self._moving_checked_at < MOVING_PERIOD_S:
             return False
         if not self._avoids_moving and not meets_moving_obstacle(
-            moving, pose, plan.places(4), self._speed, self._radius
+            moving, pose, plan.sampled_points(4), self._speed, self._radius
         ):
             return False
         self._moving_checked_at = now
@@ -170,3 +170,35 @@ class AdvancedPlanManager(PlanManager):
         self._checked_revision = self._costmap.view.revision
         self._max_obstacle_cells = self._costmap.obstacle_cells
         return event
+
+
+INITIAL_WAIT_S = 10.0
+"""Time until the entire costmap may be cleared again; it doubles each time."""
+PROGRESS_M = 1.0
+"""The robot must have come this much closer to its goal for the last clearing to count as successful."""
+
+
+class ClearingBackoff:
+    """Clear the entire global costmap at first and then ever more rarely, otherwise only the area around the robot.
+
+    Obstacles that were seen earlier may have disappeared. But a robot that clears the costmap each time it finds no
+    path plans around the end of a wall that is out of sight, drives there, sees it, and has forgotten the other end.
+    """
+
+    def __init__(self) -> None:
+        """Start as for a new goal."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Prepare for a new goal."""
+        self._wait, self._due, self._nearest = INITIAL_WAIT_S, 0.0, float("inf")
+
+    def entirely(self, now: float, to_go: float) -> bool:
+        """Return whether to clear all of it `now` (s), with the goal `to_go` m away in a straight line."""
+        if to_go <= self._nearest - PROGRESS_M:
+            self._wait, self._due = INITIAL_WAIT_S, now
+        if now < self._due:
+            return False
+        self._due, self._wait = now + self._wait, 2 * self._wait
+        self._nearest = min(self._nearest, to_go)
+        return True

@@ -1,14 +1,55 @@
-"""The advanced stack: the reference stack with motion prediction and compensation of wheel slip."""
+"""The advanced stack and its builder: the reference stack with motion prediction and compensation of wheel slip."""
 
+import math
 from typing import Any
 
 from simscen.advanced.prediction.motion_prediction import MotionPrediction
-from simscen.advanced.turn_slip import TurnSlipObserver
+from simscen.advanced.replanning import AdvancedPlanManager, ClearingBackoff
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
+from simscen.stack.build import StackBuilder
+from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
+from simscen.stack.navigator import ClearEntirely, ClearingPolicy
+from simscen.stack.plan_manager import PlanManager
+from simscen.stack.protocols import Controller, Planner
 from simscen.stack.reference import ReferenceStack
+
+DECAY_DISTANCE_M = 0.5
+"""Distance in which an earlier estimate decays by a factor of e, because the ground changes."""
+MAX_CURVATURE_PER_M = 1.0
+"""Limit of the estimate, in case of a broken sensor."""
+
+
+class TurnSlipObserver:
+    """Compares wheel odometry with the odometry that fuses wheels and gyroscope."""
+
+    def __init__(self) -> None:
+        self._curvature = 0.0
+        self._before: tuple[Pose2, Pose2] | None = None
+
+    def learn(self, wheels: Pose2, fused: Pose2) -> None:
+        """Update the estimate with poses of wheel and fused odometry; ignores values that are not finite."""
+        if not math.isfinite(wheels.x + wheels.y + wheels.yaw + fused.yaw):
+            return
+        before, self._before = self._before, (wheels, fused)
+        if before is None:
+            return
+        c, s = math.cos(before[0].yaw), math.sin(before[0].yaw)
+        ahead = c * (wheels.x - before[0].x) + s * (wheels.y - before[0].y)
+        turned = math.remainder((fused.yaw - before[1].yaw) - (wheels.yaw - before[0].yaw), math.tau)
+        share = min(1.0, abs(ahead) / DECAY_DISTANCE_M)
+        if ahead != 0.0:
+            curvature = self._curvature + share * (turned / ahead - self._curvature)
+            self._curvature = min(max(curvature, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
+
+    def countered(self, command: Twist) -> Twist:
+        """Return the command to send so that the robot turns as `command` intends."""
+        if command.vx == 0.0 or self._curvature == 0.0:
+            return command
+        return Twist(command.vx, command.vy, command.wz - self._curvature * command.vx)
+
 
 ROBOT_FRAME = Pose2(0.0, 0.0)
 """Pose of the robot in its own frame."""
@@ -53,8 +94,8 @@ class AdvancedStack(ReferenceStack):
         around = self._prediction.seen_from(tick, ROBOT_FRAME)
         self._has_moving_obstacles = len(around) > 0
         self._monitor.on_moving(around)
-        self._costmaps.near.moving = self._prediction.seen_from(tick, frames.odometry)
-        self._costmaps.wide.moving = self._prediction.seen_from(tick, frames.pose)
+        self._costmaps.local_costmap.moving = self._prediction.seen_from(tick, frames.odometry)
+        self._costmaps.global_costmap.moving = self._prediction.seen_from(tick, frames.pose)
 
     def _on_drive(self) -> None:
         if self._prediction.stands:
@@ -63,15 +104,48 @@ class AdvancedStack(ReferenceStack):
     def _adjust_wanted_command(self, tick: int, frames: Frames, command: Twist) -> Twist:
         if self._prediction.calm:
             return command
-        return self._prediction.steer(tick, command, frames.pose, self._twist, self._costmaps.wide.view, self.plan)
+        return self._prediction.steer(
+            tick, command, frames.pose, self._twist, self._costmaps.global_costmap.view, self.plan
+        )
 
     def _adjust_sent_command(self, command: Twist) -> Twist:
         return command if self._turn_slip is None else self._turn_slip.countered(command)
 
     def _on_idle(self, tick: int, pose: Pose2) -> None:
         """Step out of the way of moving obstacles, and come back."""
-        command = self._prediction.stand(tick, pose, self._twist, self._costmaps.wide.view)
+        command = self._prediction.stand(tick, pose, self._twist, self._costmaps.global_costmap.view)
         if command == STOP or self._monitor.silent(tick):
             self._commands.stop(tick)
         elif not self._commands.busy(tick):
             self._commands.want(tick, command, self._commands.periods(tick))
+
+
+class AdvancedStackBuilder(StackBuilder):
+    """Builder of the advanced stack: replaces the plan manager, the clearing policy, and the stack itself."""
+
+    def make_plan_manager(self, planner: Planner, costmaps: Costmaps, controller: Controller) -> PlanManager:
+        """Make a plan manager that avoids moving obstacles at the full speed of the controller."""
+        self._full_speed = controller.full_speed
+        return AdvancedPlanManager(
+            self.spec.planner,
+            planner,
+            costmaps.global_costmap,
+            self.plan_seed,
+            self.robot.inscribed_radius,
+            steered=self.robot.turning_radius > 0.0,
+            latency=self.latency["planner"],
+            speed=controller.full_speed,
+        )
+
+    def make_clearing_policy(self) -> ClearingPolicy:
+        """Make the policy for clearing the global costmap."""
+        return ClearEntirely() if self.spec.recovery.clear_entirely else ClearingBackoff()
+
+    def make_stack(self, *parts: Any) -> AdvancedStack:
+        """Make the stack of its components, with motion prediction and compensation of turn slip."""
+        surroundings, spec = self.surroundings, self.spec
+        prediction = MotionPrediction(
+            spec.prediction, self.robot, surroundings.lidars, surroundings.tick_rate, self._full_speed
+        )
+        counters_slip = spec.localizer.fuses_odometry and spec.velocity_smoother.counter_turn_slip
+        return AdvancedStack(*parts, prediction=prediction, turn_slip=TurnSlipObserver() if counters_slip else None)

@@ -20,7 +20,7 @@ _COMMENT = re.compile(rb"<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?(?:\?>|\Z)|<!--(?P<tex
 """A comment; CDATA sections and processing instructions match too, so that no comment is found inside them."""
 
 
-class Broken(Exception):
+class MalformedXml(Exception):
     """Why a text is not XML that is read, at which line and column of it, both from 1."""
 
     def __init__(self, message: str, line: int, col: int, source: str = "", hint: str = "") -> None:
@@ -99,9 +99,9 @@ def parse(data: bytes, source: Source, kind: type[E]) -> E:
         (parent.children if parent else root).append(element)
         open_elements.append(element)
         if len(open_elements) > DEEPEST:
-            raise Broken(f"nested deeper than {DEEPEST}", line, col)
+            raise MalformedXml(f"nested deeper than {DEEPEST}", line, col)
         if count > MOST_ELEMENTS:
-            raise Broken(f"more than {MOST_ELEMENTS} elements", line, col)
+            raise MalformedXml(f"more than {MOST_ELEMENTS} elements", line, col)
 
     def end(_: str) -> None:
         open_elements.pop()
@@ -137,13 +137,13 @@ def _run(parser: expat.XMLParserType, data: bytes, source: Source) -> None:
     def doctype(*_: object) -> None:
         line, col = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1
         hint = "remove the document type declaration and its entities"
-        raise Broken("DOCTYPE not allowed", line, col, source.line(line), hint)
+        raise MalformedXml("DOCTYPE not allowed", line, col, source.line(line), hint)
 
     parser.StartDoctypeDeclHandler = doctype
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         message = f"not well-formed XML: {expat.ErrorString(error.code)}"
-        raise Broken(message, error.lineno, error.offset + 1, source.line(error.lineno)) from error
+        raise MalformedXml(message, error.lineno, error.offset + 1, source.line(error.lineno)) from error
     except (ValueError, LookupError) as error:  # an encoding that Python's codecs do not know
-        raise Broken(f"cannot be read as XML: {error}", 1, 1) from error
+        raise MalformedXml(f"cannot be read as XML: {error}", 1, 1) from error

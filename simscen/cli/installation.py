@@ -11,9 +11,9 @@ from pathlib import Path
 
 from simscen.cli.requirements import unmet_requirements
 from simscen.run.process.isolation import MAX_FILE_BYTES, MAX_MEMORY_BYTES, MAX_OPEN_FILES
-from simscen.run.reproducibility.environment import PACKAGES, cpu_flags
+from simscen.run.reproducibility import PACKAGES, cpu_flags
 
-SUPPORTED_PYTHONS = ((3, 10), (3, 11))
+SUPPORTED_PYTHONS = ((3, 10), (3, 11), (3, 12), (3, 13))
 MIN_DISK_BYTES = 500 << 20
 """About a hundred logs of one minute."""
 MIN_MEMORY_BYTES = 1 << 30
@@ -30,7 +30,7 @@ class CheckFailed(Exception):
 def python() -> str:
     """Check the Python version, and return it with the path of the interpreter."""
     if sys.version_info[:2] not in SUPPORTED_PYTHONS:
-        raise CheckFailed(f"{platform.python_version()}: simscen needs Python 3.10 or 3.11")
+        raise CheckFailed(f"{platform.python_version()}: simscen needs Python 3.10 to 3.13")
     return f"{platform.python_version()} ({sys.executable})"
 
 

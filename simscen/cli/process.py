@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from simscen.core.cpu_kernels import pinned_variables
 from simscen.core.errors import Exit, UsageError
 
 OUTPUT_LOST_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO})
@@ -87,7 +88,8 @@ def engine_output_on_stderr() -> Iterator[None]:
 
 def caller_environment() -> dict[str, str]:
     """Return the environment variables as the caller of simscen set them, for programs started on their behalf."""
-    variables = {name: value for name, value in os.environ.items() if name != PYDANTIC_PLUGINS_VARIABLE}
+    changed = {PYDANTIC_PLUGINS_VARIABLE, *pinned_variables()}
+    variables = {name: value for name, value in os.environ.items() if name not in changed}
     if _PYDANTIC_PLUGINS_AT_START is not None:
         variables[PYDANTIC_PLUGINS_VARIABLE] = _PYDANTIC_PLUGINS_AT_START
     return variables

@@ -20,11 +20,13 @@ def start() -> None:
     gc.disable()
     try:
         from simscen.cli.main import is_light, main
+        from simscen.core.cpu_kernels import pin_kernels
     except ModuleNotFoundError as error:
         _exit_unusable([f"{error.name} is not installed; install simscen again with its dependencies"])
 
     if signal.getsignal(signal.SIGINT) is _exit_on_interrupt:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    pin_kernels()
     light = is_light(sys.argv[1:])
     _check_requirements(all_packages=not light and sys.argv[1:2] != ["doctor"])
     try:

@@ -11,8 +11,7 @@ import numpy as np
 from pydantic import GetJsonSchemaHandler, PlainValidator
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from simscen.core.messages.goal_names import FAILED
-from simscen.core.messages.navigation import ErrorCode, Goal, error_code
+from simscen.core.messages.navigation import FAILED, ErrorCode, Goal, error_code
 from simscen.core.records.events import Event, EventKind
 from simscen.criteria.trace_signals.ground_truth import truth
 

@@ -37,14 +37,14 @@ class AnyCriterion(Choice):
     speed: Annotated[Criterion | None, LazySpec("simscen.criteria.speed", "Speed")] = None
     stopped_within: Annotated[Criterion | None, LazySpec("simscen.criteria.stopping", "StoppedWithin")] = None
     stuck: Annotated[Criterion | None, LazySpec("simscen.criteria.stopping", "Stuck")] = None
-    localization_error: Annotated[
-        Criterion | None, LazySpec("simscen.criteria.localization_error", "LocalizationError")
-    ] = None
-    relocalized_within: Annotated[
-        Criterion | None, LazySpec("simscen.criteria.localization_error", "RelocalizedWithin")
-    ] = None
+    localization_error: Annotated[Criterion | None, LazySpec("simscen.criteria.localization", "LocalizationError")] = (
+        None
+    )
+    relocalized_within: Annotated[Criterion | None, LazySpec("simscen.criteria.localization", "RelocalizedWithin")] = (
+        None
+    )
     localization_consistency: Annotated[
-        Criterion | None, LazySpec("simscen.criteria.localization_consistency", "LocalizationConsistency")
+        Criterion | None, LazySpec("simscen.criteria.localization", "LocalizationConsistency")
     ] = None
     smoothness: Annotated[Criterion | None, LazySpec("simscen.criteria.smoothness", "Smoothness")] = None
     replans: Annotated[Criterion | None, LazySpec("simscen.criteria.event_counts", "Replans")] = None

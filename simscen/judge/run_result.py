@@ -10,8 +10,8 @@ from simscen.core.records.events import DisturbanceOutcome, Event
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import COMPLETE_COVERAGE, ExpectedFailure, LogCoverage, Status, Verdict
+from simscen.criteria.base import AnyMeasure
 from simscen.criteria.findings import InvalidTrace
-from simscen.criteria.plugin_metric import AnyMeasure
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.criteria.trace_signals.sampling import check_recorded_signals, time_gaps

@@ -1,1 +1,1 @@
-"""Load YAML files as validated scenarios, or report every problem with its position and a hint."""
+"""Load and check scenarios: YAML files to validated models and built worlds, or problems with positions and hints."""

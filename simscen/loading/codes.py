@@ -72,7 +72,7 @@ CODES = {
     "SC800": "The log cannot be read.",
     "SC801": "The file is not a log of simscen.",
     "SC802": "The log is damaged.",
-    "SC803": "The log ends too early: its run broke off.",
+    "SC803": "The log is truncated: its run was aborted.",
     "SC804": "A log that simscen did not write cannot be judged.",
     "SC805": "The log was judged with a criterion of an installed package that is not installed as it was then.",
     "SC810": "The folder has no journal of a session, or one that cannot be understood.",

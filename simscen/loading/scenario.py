@@ -10,15 +10,15 @@ from simscen.loading import multirobot
 from simscen.loading.checks.runner import check_robot_names, check_scenario
 from simscen.loading.files.assets import Assets, load_judged_masks
 from simscen.loading.files.paths import PathSandbox
+from simscen.loading.known_names import places_of, resolve_places, unknown_places
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.loading.nav2.stack import with_nav2_parameters
-from simscen.loading.places import places_of, resolve_places, unknown_places
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.stacks.stackfile import not_a_scenario, recognize_stack_file
 from simscen.loading.variations.expand import Variation, expand_variations
-from simscen.loading.variations.problems import VariationProblems, merge_problems
+from simscen.loading.variations.naming import VariationProblems, merge_problems
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec

@@ -6,12 +6,12 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from simscen.actions.registry import AnyAction
-from simscen.faults.registry import AnyFault
+from simscen.actions.base import AnyAction
+from simscen.faults.base import AnyFault
 from simscen.spec.base import Spec
 from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration
-from simscen.triggers.registry import Trigger
+from simscen.triggers.base import Trigger
 
 
 def _one_or_several(value: Any) -> str:

@@ -1,9 +1,10 @@
 """Parameters of the localizers, with Nav2's names and default values."""
 
 import math
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from simscen.spec.base import Ranged, Typed, type_discriminator
 from simscen.spec.extensible_union import ExtensibleUnion
@@ -33,7 +34,7 @@ class LocalizerSpec(Typed):
 
 
 class AmclParameters(Ranged, LocalizerSpec):
-    """Parameters of nav2_amcl, with its names and default values."""
+    """Parameters of nav2_amcl, with its names and, except for `laser_model_type`, its default values."""
 
     needs_map: ClassVar[bool] = True
     robot_model: Literal["differential", "omni"] | None = None
@@ -64,9 +65,9 @@ class AmclParameters(Ranged, LocalizerSpec):
     """Number of filter updates per resampling."""
     max_beams: Annotated[int, Field(ge=2, le=4096)] = 60
     """Maximum number of beams of a scan that are compared with the map."""
-    laser_model_type: Literal["likelihood_field", "likelihood_field_prob", "beam"] = "likelihood_field"
-    """Sensor model. `likelihood_field_prob` is more accurate; `likelihood_field` tolerates more obstacles that are not
-    on the map."""
+    laser_model_type: Literal["likelihood_field", "likelihood_field_prob", "beam"] = "likelihood_field_prob"
+    """Sensor model. `likelihood_field`, the default of nav2_amcl, tolerates more obstacles that are not on the map, but
+    is less accurate, and loses the robot if scans are far apart."""
     z_hit: Probability = 0.5
     """Weight of beams that end at an obstacle of the map."""
     z_short: Probability = 0.05
@@ -113,7 +114,15 @@ class Amcl(AmclParameters):
     precomputation: ClassVar[str] = "simscen.stack.localizers.build:precompute"
     type: Literal["amcl"] = "amcl"
     parameters: Literal["nav2"] | None = None
-    """Deprecated: `amcl` always has the default values of nav2_amcl. Remove it."""
+    """Deprecated: use `profile: nav2` for the default values of nav2_amcl."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_values_of_nav2(cls, values: Any) -> Any:
+        """Apply the deprecated `parameters: nav2`; values that are given win."""
+        if isinstance(values, Mapping) and values.get("parameters") == "nav2":
+            return {"laser_model_type": "likelihood_field", **values}
+        return values
 
 
 class EkfParameters(LocalizerSpec):

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from simscen.core.messages.goal_names import FAILED, Mode
+from simscen.core.messages.navigation import FAILED, Mode
 from simscen.spec.base import Spec
 from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.quantities import Duration, PositiveLength

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from simscen.spec.base import Spec
-from simscen.spec.quantities import NonNegativeAngularSpeed
+from simscen.spec.quantities import Frequency, NonNegativeAngularSpeed
 
 Variance = Annotated[float, Field(ge=0, le=1e6)]
 
@@ -19,6 +19,9 @@ class OdometryFilter(Spec):
 
     type: Literal["ekf", "wheel"] = "ekf"
     """`ekf`: an extended Kalman filter of wheel odometry and the yaw rate of the IMU. `wheel`: wheel odometry alone."""
+    frequency: Frequency = 30.0
+    """Largest rate of the updates. An update uses the motion and the turn since the last one, so nothing is lost. With
+    wheel odometry at 40 Hz, every second reading causes an update."""
     process_noise_covariance: Annotated[list[Variance], Field(min_length=3, max_length=3)] = [10.0, 10.0, 10.0]
     """Variances by which vx, vy (m²/s²) and the yaw rate (rad²/s²) may change within one second. The diagonal of
     robot_localization's matrix; its other entries do not apply."""

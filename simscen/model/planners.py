@@ -52,8 +52,11 @@ class OmplParameters(PlannerSpec):
 class OmplPlanner(OmplParameters):
     """OMPL planner on the costmap."""
 
-    component: ClassVar[str] = "simscen.stack.planners.build:ompl_planner"
+    component: ClassVar[str] = "simscen.stack.planners.ompl_planner:ompl_planner"
     type: Literal["bit_star", "rrt_connect", "rrt_star", "informed_rrt_star", "aorrtc", "kpiece"] = "bit_star"
+    gap_clearance: Annotated[NonNegativeLength, Field(le=1)] = 0.07
+    """Clearance on both sides of the robot's inscribed circle that a gap must have for the plan to lead through it, if
+    there is another path, however long. Start and goal themselves may be closer to obstacles. 0 = any gap will do."""
     improving_iterations: Iterations = 500
     """Number of iterations of planners that improve their path; `bit_star` uses two batches of 200 samples instead."""
     simplify: bool = True

@@ -79,7 +79,7 @@ class Retrace(BehaviorSpec):
     The robot backs up straight if its path is not known.
     """
 
-    component: ClassVar[str] = "simscen.advanced.recovery.retrace:Retrace"
+    component: ClassVar[str] = "simscen.advanced.retrace:Retrace"
     type: Literal["retrace"] = "retrace"
     backup_dist: NonNegativeLength = 0.30
     """Minimum distance to drive back."""

@@ -38,12 +38,12 @@ from simscen.spec.quantities import (
 )
 
 if TYPE_CHECKING:
-    from simscen.criteria.plugin_metric import AnyMeasure
+    from simscen.criteria.base import AnyMeasure
     from simscen.model.disturbances import EventEntry, FaultEntry, SequenceStep
     from simscen.model.variations import Variations
-    from simscen.triggers.registry import Trigger
+    from simscen.triggers.base import Trigger
 else:
-    AnyMeasure = Annotated[Spec, LazySpec("simscen.criteria.plugin_metric", "AnyMeasure")]
+    AnyMeasure = Annotated[Spec, LazySpec("simscen.criteria.base", "AnyMeasure")]
     EventEntry = Annotated[Spec, LazySpec("simscen.model.disturbances", "EventEntry")]
     FaultEntry = Annotated[Spec, LazySpec("simscen.model.disturbances", "FaultEntry")]
     Variations = Annotated[Spec, LazySpec("simscen.model.variations", "Variations")]

@@ -34,7 +34,7 @@ _LatencyOrRobots = Annotated[
 
 
 REFERENCE_BUILDER = "simscen.stack.build:StackBuilder"
-ADVANCED_BUILDER = "simscen.advanced.build:AdvancedStackBuilder"
+ADVANCED_BUILDER = "simscen.advanced.stack:AdvancedStackBuilder"
 
 
 class InProcessStack(StackBase, Typed):

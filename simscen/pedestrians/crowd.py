@@ -12,7 +12,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.pedestrians import forces
 from simscen.pedestrians.forces import RELAXATION_TIME, MoveLimits, Numbers, clip_moves, move_limits
 from simscen.pedestrians.pedestrian import SCARED_FORCE, THREATENING_SPEED, Intent, Pedestrian
-from simscen.pedestrians.surroundings import REACH, Near, ObservedRobot, Surroundings, Walls, edges, nearest_on
+from simscen.pedestrians.surroundings import REACH, Near, ObservedRobot, Surroundings, WallMap, edges, nearest_on
 
 VIEW = 10.0
 """m beyond which nobody minds anybody (HuNavSim's max_dist_view)."""
@@ -47,7 +47,7 @@ class _Others(NamedTuple):
 class Crowd:
     """Everybody in one world, in the order of their names; nothing in it draws chance."""
 
-    def __init__(self, walls: Walls, find_way: FindWay = straight_path) -> None:
+    def __init__(self, walls: WallMap, find_way: FindWay = straight_path) -> None:
         self._walls, self._find_way = walls, find_way
         self._people: dict[str, Pedestrian] = {}
         self._steps = 0

@@ -57,7 +57,7 @@ ARMS_LENGTH = 0.3
 """m from one's own middle and from that of what one looks at, within which nothing hides it."""
 
 
-class Walls:
+class WallMap:
     """Segments (n, 2, 2) in meters, each of the solid `owners` (n,); those that are `opaque` (n,) hide what is behind.
 
     Raises ValueError for segments that are not finite.

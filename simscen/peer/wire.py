@@ -132,7 +132,6 @@ def _taken(layout: struct.Struct, body: bytes, offset: int) -> tuple[Any, ...]:
     return layout.unpack_from(body, offset)
 
 
-# MERGED: Socket between simscen and a stack, which transfers whole frames.
 class Gone(ConnectionError):
     """The other side has closed the connection."""
 

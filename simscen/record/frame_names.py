@@ -1,43 +1,44 @@
-"""The names of the coordinate frames (ROS REP 105)."""
+"""Names of the coordinate frames in a log (ROS REP 105)."""
 
 MAP, ODOM, BASE, TRUTH = "map", "odom", "base_link", "base_link_truth"
-_OBJECT = "object/"
+_OBJECT_PREFIX = "object/"
 
 
 class RobotFrames:
-    """The frames of a robot. Each of several has its name in front of its own, so that all are in one tree.
+    """Frame names of one robot.
 
-    `map` and the frames of moving things are of all.
+    With several robots, each frame is prefixed with the robot's name, so that all robots share one tf tree. The frame
+    `map` and the frames of moving objects have no prefix.
     """
 
     def __init__(self, robot: str = "") -> None:
-        # What begins with object/ is a moving thing's.
-        self._front = f"{robot}{'_' if f'{robot}/' == _OBJECT else ''}/" if robot else ""
-        self.odom, self.base, self.truth = self.of(ODOM), self.of(BASE), self.of(TRUTH)
+        # A robot named "object" must not get the prefix of the moving objects.
+        self._prefix = f"{robot}{'_' if f'{robot}/' == _OBJECT_PREFIX else ''}/" if robot else ""
+        self.odom, self.base, self.truth = self.log_frame(ODOM), self.log_frame(BASE), self.log_frame(TRUTH)
 
-    def of(self, frame: str) -> str:
-        """What the log calls a frame of the robot's stack."""
-        return frame if frame == MAP else f"{self._front}{frame}"
+    def log_frame(self, frame: str) -> str:
+        """Return the name in the log of a frame of the robot's stack."""
+        return frame if frame == MAP else f"{self._prefix}{frame}"
 
-    def of_sensor(self, name: str) -> str:
-        """What the log calls the frame of a sensor."""
-        return self.of(sensor_frame(name))
+    def sensor_frame(self, sensor: str) -> str:
+        """Return the name in the log of a sensor's frame."""
+        return self.log_frame(sensor_frame(sensor))
 
-    def own(self, frame: str) -> str:
-        """What the robot's stack calls a frame of the log; older logs call it so, too."""
-        return frame.removeprefix(self._front)
+    def stack_frame(self, frame: str) -> str:
+        """Return a frame of the log without the robot's prefix. Logs of older versions have no prefix."""
+        return frame.removeprefix(self._prefix)
 
 
-def sensor_frame(name: str) -> str:
-    """The frame of a sensor: its own name, unless that would close a loop in the tree."""
-    return f"{name}_link" if name in (MAP, ODOM, BASE, TRUTH) else name
+def sensor_frame(sensor: str) -> str:
+    """Return the frame of a sensor: the sensor's name, changed if the name is that of another frame."""
+    return f"{sensor}_link" if sensor in (MAP, ODOM, BASE, TRUTH) else sensor
 
 
 def object_frame(name: str) -> str:
-    """The frame of a moving thing, apart from the robot's frames whatever its name."""
-    return f"{_OBJECT}{name}"
+    """Return the frame of a moving object."""
+    return f"{_OBJECT_PREFIX}{name}"
 
 
 def object_in_frame(frame: str) -> str | None:
-    """The moving thing whose frame this is; None for other frames."""
-    return frame[len(_OBJECT) :] if frame.startswith(_OBJECT) else None
+    """Return the name of the moving object that a frame belongs to, or None for other frames."""
+    return frame[len(_OBJECT_PREFIX) :] if frame.startswith(_OBJECT_PREFIX) else None

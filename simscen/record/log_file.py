@@ -1,4 +1,4 @@
-"""Opens a log that somebody else may have put there, and reads the records that are whole."""
+"""Opening log files, reading their MCAP records, and writing a log under a partial name until it is complete."""
 
 import errno
 import json
@@ -18,10 +18,11 @@ from simscen.core.errors import RunError
 from simscen.record.log_header import RESULT
 
 MAX_RECORD_BYTES = 1 << 28
+PARTIAL_SUFFIX = ".partial.mcap"
 
 
 def open_log(path: Path) -> IO[bytes]:
-    """The file, for reading. Raises OSError, also for what is not a regular file: a FIFO would be waited for."""
+    """Open a file for reading. Raises OSError, also if it is not a regular file: reading a FIFO would block."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
@@ -30,10 +31,11 @@ def open_log(path: Path) -> IO[bytes]:
 
 
 def attached_result(path: Path) -> dict[str, Any] | None:
-    """Return the result.json in a log, from the index at its end; None if there is no such log."""
+    """Return the result.json that is attached to a log, or None if the log or the attachment does not exist."""
     try:
         with open_log(path) as stream:
-            found = next((one for one in make_reader(stream).iter_attachments() if one.name == RESULT), None)
+            attachments = make_reader(stream).iter_attachments()
+            found = next((file for file in attachments if file.name == RESULT), None)
             data = json.loads(found.data) if found is not None else None
     except (OSError, McapError, ValueError, struct.error):
         return None
@@ -41,26 +43,27 @@ def attached_result(path: Path) -> dict[str, Any] | None:
 
 
 class RecordReader:
-    """All records up to the footer, or to the one that is cut short, which `cut` then says; chunks are opened.
+    """Iterates over all records of an MCAP file, including those inside chunks.
 
-    Going through them raises what the mcap library raises on bytes that are no MCAP.
+    Stops before a truncated record and then sets `is_truncated`. Raises the exceptions of the mcap library on bytes
+    that are not MCAP.
     """
 
     def __init__(self, stream: IO[bytes]) -> None:
-        # The library cannot see a record that is cut short; StreamReader takes anything that can `read`.
+        # The library does not detect a truncated record. StreamReader accepts any object with a `read` method.
         exact: Any = _ExactStream(stream)
         self._reader = StreamReader(exact, validate_crcs=True, record_size_limit=MAX_RECORD_BYTES)
-        self.cut = False
+        self.is_truncated = False
 
     def __iter__(self) -> Iterator[records.McapRecord]:
         try:
             yield from self._reader.records
         except EndOfFile:
-            self.cut = True
+            self.is_truncated = True
 
 
 class _ExactStream:
-    """A stream that gives as many bytes as it is asked for, or raises EndOfFile."""
+    """A stream that returns exactly the requested number of bytes, or raises EndOfFile."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
@@ -72,14 +75,11 @@ class _ExactStream:
         return data
 
 
-PARTIAL_SUFFIX = ".partial.mcap"
-
-
 class LogFile:
     """Writes `run.partial.mcap` and renames it to `run.mcap` on `finish`.
 
-    Nothing is buffered in the process: what was written survives its death. A full disk or the like is a
-    RunError of kind "output"; `failed` then says that the file takes no more.
+    Nothing is buffered in the process, so written data survives if the process is killed. If the disk is full or the
+    file cannot be written, raises RunError of kind "output" and sets `failed`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -92,8 +92,8 @@ class LogFile:
             raise write_error(self.partial, error) from error
 
     def write(self, data: bytes, /) -> None:
-        """Write all of `data`; a raw write may take only a part."""
-        rest = memoryview(data)
+        """Write all of `data`."""
+        rest = memoryview(data)  # a raw write may write only a part
         try:
             while rest:
                 rest = rest[self._raw.write(rest) :]
@@ -103,7 +103,7 @@ class LogFile:
             raise write_error(self.partial, error) from error
 
     def finish(self) -> None:
-        """The log is whole: give it its name."""
+        """Close the file and give it its final name."""
         try:
             self._raw.close()
             self.partial.replace(self.path)
@@ -111,12 +111,12 @@ class LogFile:
             raise write_error(self.partial, error) from error
 
     def abandon(self) -> None:
-        """The run broke off: leave what there is under the partial name."""
+        """Close the file and keep its partial name, because the run was aborted."""
         self._raw.close()
 
 
 def write_error(path: Path, error: OSError) -> RunError:
-    """What a log that cannot be written means for its run."""
+    """Return the RunError for a log that cannot be written."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return RunError("output", f"no space left writing {path}")
     return RunError("output", f"cannot write {path}: {error.strerror}")

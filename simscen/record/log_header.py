@@ -1,4 +1,4 @@
-"""What a log says about its run besides what happened: enough to judge it and to run it again."""
+"""Metadata and attachments of a log: everything besides the messages that is needed to judge or repeat the run."""
 
 import json
 from collections.abc import Mapping
@@ -17,15 +17,15 @@ from simscen.core.records.run_result import RunKey
 
 FORMAT = "1"
 STACK_RECORD = "simscen.stack"
-"""The metadata record that says what an external stack was: known to its end, so it stands at the end of the log."""
-_FACT = "fact."
+"""Metadata record that describes the external stacks. It is written at the end of the log, when it is complete."""
+_FACT_PREFIX = "fact."
 STACK_FACT, STACK_NAME_FACT, VARIATION_FACT = "stack", "variation", "varied"
-"""Facts: NAME=VALUE of the stack that took the place of the scenario's own, what the run is called by it where there
-are several, and the scenario's variation."""
+"""Names of facts: NAME=VALUE of the stack that replaced the scenario's stack, the stack's part of the run's name if
+several stacks are compared, and the scenario's variation."""
 ROBOTS, RESOLUTION, ORIGIN = "robots", "map.resolution", "map.origin"
-"""In the metadata record: the names of several robots, and where the map of a robot is."""
+"""Keys of the metadata record: the names of several robots, and the resolution and origin of a robot's map."""
 END, COUNT_PREFIX = "simscen.end", "messages:"
-"""Metadata record at the end of a whole log, and what the names of its message counts by topic begin with."""
+"""Metadata record at the end of a complete log, and the prefix of its message counts by topic."""
 OWN_FILES = CASE, SCENARIO, RESULT = "case.json", "scenario.yaml", "result.json"
 _MEDIA_TYPES = {
     ".json": "application/json",
@@ -39,14 +39,22 @@ _CASES = TypeAdapter(Case)
 
 @dataclass(frozen=True, eq=False)
 class LogHeader:
-    """A run as it was ordered.
+    """Description of a run before it starts.
 
-    `name` is the scenario's id, `scenario` its resolved YAML text. `map` is what the robot was given. `frames` are
-    where sensors sit on the robot's base; a lidar that is not among them is placed by its first scan. `sensors` are
-    the kinds of their readings by name, in the order in which they get their topics; a log that is read does not know.
-    `robots` are the headers of each of several robots by name; what stands here of a robot is then that of the first.
-    `robot_description` is URDF. `files` travel along under their names, `facts` as metadata; neither may hold a wall
-    clock, a host or a process number, or equal runs would differ.
+    With several robots, `robots` has the header of each robot by name, and the robot fields of the header itself are
+    those of the first robot. `files` and `facts` must not contain wall-clock times, host names or process IDs, because
+    logs of equal runs must be equal.
+
+    Attributes:
+        name: ID of the scenario.
+        scenario: Resolved YAML text of the scenario.
+        map: Map that the robot was given.
+        robot_description: URDF of the robot.
+        frames: Poses of the sensors on the robot's base. A lidar that is missing here is placed by its first scan.
+        sensors: Reading types by sensor name, in the order in which sensors get their topics. Empty if read from a log.
+        files: Attachments by name.
+        facts: Additional metadata.
+        robots: Headers of several robots by name.
     """
 
     name: str
@@ -63,17 +71,17 @@ class LogHeader:
 
     @property
     def key(self) -> RunKey:
-        """The key of the run."""
+        """Key of the run."""
         return RunKey(self.name, self.seed, self.facts.get(VARIATION_FACT, ""), self.facts.get(STACK_NAME_FACT, ""))
 
 
 def case_to_json(case: Case) -> str:
-    """A Case as strict JSON: infinity, which JSON lacks, is written as the text "Infinity"."""
+    """Return a Case as strict JSON. Infinity is written as the text "Infinity"."""
     return str(to_json(case, inf_nan_mode="strings", indent=1), "utf-8")
 
 
 def case_from_json(text: str | bytes) -> Case:
-    """The Case that `case_to_json` wrote. Raises ValueError when it is none."""
+    """Parse the JSON that `case_to_json` wrote. Raises ValueError if it is not a Case."""
     try:
         return _CASES.validate_json(text)
     except ValidationError as error:
@@ -81,47 +89,46 @@ def case_from_json(text: str | bytes) -> Case:
 
 
 def media_type(name: str) -> str:
-    """The media type of a file by its name, without asking the machine's own table, which would differ."""
+    """Return the media type for a file name. Does not use the table of the operating system, so that logs are equal."""
     return _MEDIA_TYPES.get(PurePosixPath(name).suffix, "application/octet-stream")
 
 
-def run_metadata(about: LogHeader, clock: Clock) -> dict[str, str]:
-    """The metadata record "simscen". Numbers are written so that they are read back exactly."""
-    known = {"format": FORMAT, "scenario": about.name, "seed": str(about.seed), "tick_rate": str(clock.rate)}
-    known |= {ROBOTS: json.dumps(list(about.robots))} if about.robots else _map_facts(about)
-    for name, one in about.robots.items():
-        known |= {f"{name}.{fact}": value for fact, value in _map_facts(one).items()}
-    return known | {f"{_FACT}{name}": value for name, value in about.facts.items()}
+def run_metadata(header: LogHeader, clock: Clock) -> dict[str, str]:
+    """Return the metadata record "simscen". Numbers keep their exact values."""
+    metadata = {"format": FORMAT, "scenario": header.name, "seed": str(header.seed), "tick_rate": str(clock.rate)}
+    metadata |= {ROBOTS: json.dumps(list(header.robots))} if header.robots else _map_facts(header)
+    for name, robot_header in header.robots.items():
+        metadata |= {f"{name}.{fact}": value for fact, value in _map_facts(robot_header).items()}
+    return metadata | {f"{_FACT_PREFIX}{name}": value for name, value in header.facts.items()}
 
 
-def _map_facts(about: LogHeader) -> dict[str, str]:
-    if about.map is None:
+def _map_facts(header: LogHeader) -> dict[str, str]:
+    if header.map is None:
         return {}
-    x, y, yaw = about.map.origin
-    return {RESOLUTION: repr(float(about.map.resolution)), ORIGIN: json.dumps([x, y, yaw])}
+    x, y, yaw = header.map.origin
+    return {RESOLUTION: repr(float(header.map.resolution)), ORIGIN: json.dumps([x, y, yaw])}
 
 
 def robot_metadata(run_metadata: Mapping[str, str], robot: str) -> dict[str, str]:
-    """What the metadata record says of one of several robots, as it would of the only one."""
+    """Return the metadata record with the map of one of several robots."""
     own = {fact: run_metadata[f"{robot}.{fact}"] for fact in (RESOLUTION, ORIGIN) if f"{robot}.{fact}" in run_metadata}
     return {**run_metadata, **own}
 
 
 def extra_facts(run_metadata: Mapping[str, str]) -> dict[str, str]:
-    """LogHeader.facts as `facts` wrote them."""
-    return {name[len(_FACT) :]: value for name, value in run_metadata.items() if name.startswith(_FACT)}
+    """Return `LogHeader.facts` from the metadata record."""
+    return {name[len(_FACT_PREFIX) :]: value for name, value in run_metadata.items() if name.startswith(_FACT_PREFIX)}
 
 
-def attachments(about: LogHeader) -> dict[str, bytes]:
-    """The files in the log, by name."""
-    several = {f"{name}/{CASE}": case_to_json(one.case).encode() for name, one in about.robots.items()}
-    own = several or {CASE: case_to_json(about.case).encode()}
-    if about.scenario:
-        own[SCENARIO] = about.scenario.encode()
-    taken = sorted(set(about.files) & set(OWN_FILES))
-    if taken:
-        raise ValueError(f"a log has a file {taken[0]} of its own")
-    return own | dict(about.files)
+def attachments(header: LogHeader) -> dict[str, bytes]:
+    """Return the attachments of the log by name. Raises ValueError if a file has a reserved name."""
+    cases = {f"{name}/{CASE}": case_to_json(robot.case).encode() for name, robot in header.robots.items()}
+    files = cases or {CASE: case_to_json(header.case).encode()}
+    if header.scenario:
+        files[SCENARIO] = header.scenario.encode()
+    if reserved := sorted(set(header.files) & set(OWN_FILES)):
+        raise ValueError(f"the file name {reserved[0]} is reserved in a log")
+    return files | dict(header.files)
 
 
 SCENERY_FILE = "scenery.json"
@@ -129,13 +136,13 @@ _SCENERIES = TypeAdapter(Scenery)
 
 
 def scenery_to_json(scenery: Scenery) -> bytes:
-    """The scenery as strict JSON."""
+    """Return the scenery as strict JSON."""
     return to_json(scenery)
 
 
-def scenery_from_header(about: LogHeader) -> Scenery:
-    """What the log says there was to see; nothing where it is older than that. Raises ValueError when it is none."""
-    data = about.files.get(SCENERY_FILE)
+def scenery_from_header(header: LogHeader) -> Scenery:
+    """Return the scenery of the log, empty for logs of older versions. Raises ValueError if it is invalid."""
+    data = header.files.get(SCENERY_FILE)
     if data is None:
         return Scenery()
     try:

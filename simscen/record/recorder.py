@@ -1,4 +1,4 @@
-"""Writes a run to an MCAP log that ROS 2 tools open."""
+"""Recording of a run to an MCAP log that ROS 2 tools can open, and the buffer of moments in front of it."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -19,53 +19,52 @@ from simscen.record.simtime import SimTime
 
 
 class Recorder:
-    """Eats moments in the order of their ticks, those of several robots apart. Equal moments give equal bytes; nothing
-    in it is a wall clock.
+    """Writes the moments of each robot in the order of their ticks. Equal moments give equal bytes.
 
-    Given a path it writes beside it under a partial name until `close`; leaving the context without `close` leaves the
-    partial file, with the index that readers ask for unless the disk is full. Given a sink it writes there. Raises
-    RunError of kind "output" when the disk does not take it.
+    `target` is a path or a sink of bytes. A file has a partial name until `close`; leaving the context without `close`
+    keeps the partial file, with an index unless the disk is full. Raises RunError of kind "output" if the log cannot be
+    written.
     """
 
-    def __init__(self, target: "str | Path | Sink", clock: Clock, about: LogHeader) -> None:
+    def __init__(self, target: "str | Path | Sink", clock: Clock, header: LogHeader) -> None:
         self._file = LogFile(Path(target)) if isinstance(target, str | Path) else None
         sink = self._file if self._file is not None else target
         assert not isinstance(sink, str | Path)
         self._writer = McapWriter(sink, profile="ros2", library="simscen")
         out, time = LogPublisher(self._writer), SimTime(clock.rate)
-        self._writer.note("simscen", log_header.run_metadata(about, clock))
-        for name, data in log_header.attachments(about).items():
-            self._writer.attach(name, log_header.media_type(name), data)
-        each, scenery = about.robots or {"": about}, scenery_from_header(about)
-        first = next(iter(each))
+        self._writer.add_metadata("simscen", log_header.run_metadata(header, clock))
+        for name, data in log_header.attachments(header).items():
+            self._writer.add_attachment(name, log_header.media_type(name), data)
+        headers, scenery = header.robots or {"": header}, scenery_from_header(header)
+        first = next(iter(headers))
         self.robots = {
             name: RobotPublisher(
-                NamespacedPublisher(out, name) if name else out, time, one, scenery, name, clock=name == first
+                NamespacedPublisher(out, name) if name else out, time, robot, scenery, name, clock=name == first
             )
-            for name, one in each.items()
+            for name, robot in headers.items()
         }
-        """What takes the moments of each robot, by name; the only one has none. The first one tells the time."""
+        """Publishers by robot name ("" for a single robot). The first one also publishes /clock."""
 
     def append(self, moment: Moment) -> None:
-        """Write one beat of the only robot."""
+        """Write one moment of a single robot."""
         (robot,) = self.robots.values()
         robot.append(moment)
-        self.settle()
+        self.flush_if_due()
 
-    def settle(self) -> None:
-        """No moment comes for a while: see to it that a killed run keeps those that came."""
-        next(iter(self.robots.values())).settle()
+    def flush_if_due(self) -> None:
+        """Write buffered messages to the file if there are enough, so that a killed run loses little."""
+        next(iter(self.robots.values())).flush_if_due()
 
     def close(self, end_tick: int, result: str = "", stack: Mapping[str, str] | None = None) -> None:
-        """Write the end of the run, its result (JSON) and what external stacks were, then give the file its name."""
+        """Write the result (JSON), the facts on external stacks and the end record, then give the file its name."""
         if result:
-            self._writer.attach(log_header.RESULT, "application/json", result.encode())
+            self._writer.add_attachment(log_header.RESULT, "application/json", result.encode())
         if stack:
-            self._writer.note(log_header.STACK_RECORD, dict(stack))
+            self._writer.add_metadata(log_header.STACK_RECORD, dict(stack))
         counts = {
             f"{log_header.COUNT_PREFIX}{topic}": str(n) for topic, n in sorted(self._writer.message_counts().items())
         }
-        self._writer.note(log_header.END, {"tick": str(end_tick), **counts})
+        self._writer.add_metadata(log_header.END, {"tick": str(end_tick), **counts})
         self._writer.finish()
         if self._file is not None:
             self._file.finish()
@@ -79,56 +78,56 @@ class Recorder:
     ) -> None:
         if self._file is not None:
             if not self._file.failed:
-                with suppress(RunError):  # why the run broke off is worth more than that its log did, too
+                with suppress(RunError):  # the exception that aborted the run is more important
                     self._writer.finish()
             self._file.abandon()
 
 
 MOMENT_DELAY_S = 0.9
-"""Seconds for which the moments of a run wait: less than a log of twenty may lose when it is killed."""
+"""Longest time in seconds for which moments are buffered."""
 
 
 class MomentSink(Protocol):
-    """Takes the moments of a robot, in order: the MCAP recorder, the trace builder, a progress display."""
+    """Receives the moments of a robot in order: the MCAP recorder, the trace builder, a progress display."""
 
     def append(self, moment: Moment) -> None:
-        """Take one moment."""
+        """Process one moment."""
         ...
 
 
 class Flushable(Protocol):
-    """Keeps something back as long as more comes."""
+    """Buffers its output."""
 
-    def settle(self) -> None:
-        """Nothing comes for a while."""
+    def flush_if_due(self) -> None:
+        """Write the buffer if it is large enough."""
         ...
 
 
 class MomentBuffer:
-    """Keeps the moments of all robots in their order, and hands them on when the oldest has waited for so many ticks.
+    """Buffers the moments of all robots in their order and writes them in batches.
 
-    Between two beats all else runs, so that what writes a moment has left the processor's caches each time: it then
-    takes twice as long as for the second of two moments in a row. What waits is lost when the process is killed.
+    Writing several moments in a row halves the time for each, because the code and data stay in the processor's caches.
+    Buffered moments are lost if the process is killed.
     """
 
     def __init__(self, ticks: int, file: Flushable | None = None) -> None:
-        """0: nothing waits. The `file` behind the logs is told each time that all which waited has been handed on."""
-        self.waiting: list[tuple[tuple[MomentSink, ...], Moment]] = []
+        """Buffer moments for at most `ticks` (0: no buffering). `file` is flushed after each batch, if due."""
+        self.pending: list[tuple[tuple[MomentSink, ...], Moment]] = []
         self._file = file
-        self.ticks, self.until = ticks, 0
+        self.ticks, self.next_flush_tick = ticks, 0
 
-    def before(self, *logs: MomentSink) -> MomentSink:
-        """What takes the moments of a robot for these logs."""
-        return _RobotSink(self, logs)
+    def sink(self, *logs: MomentSink) -> MomentSink:
+        """Return a sink that buffers the moments of one robot for these logs."""
+        return _BufferedSink(self, logs)
 
     def flush(self) -> None:
-        """Hand on all that waits."""
-        waiting, self.waiting = self.waiting, []
-        for logs, moment in waiting:
+        """Write all buffered moments."""
+        pending, self.pending = self.pending, []
+        for logs, moment in pending:
             for log in logs:
                 log.append(moment)
         if self._file is not None:
-            self._file.settle()
+            self._file.flush_if_due()
 
     def __enter__(self) -> "MomentBuffer":
         return self
@@ -137,20 +136,20 @@ class MomentBuffer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if kind is not None:
-            with suppress(RunError):  # why the run broke off is worth more than that its log did, too
+            with suppress(RunError):  # the exception that aborted the run is more important
                 self.flush()
 
 
-class _RobotSink:
-    """One robot's way into the backlog."""
+class _BufferedSink:
+    """Adds the moments of one robot to a MomentBuffer."""
 
-    def __init__(self, backlog: MomentBuffer, logs: tuple[MomentSink, ...]) -> None:
-        self._backlog, self._logs = backlog, logs
+    def __init__(self, buffer: MomentBuffer, logs: tuple[MomentSink, ...]) -> None:
+        self._buffer, self._logs = buffer, logs
 
     def append(self, moment: Moment) -> None:
-        """Let it wait for the next ones, unless the oldest has waited long enough."""
-        backlog, tick = self._backlog, moment.tick
-        backlog.waiting.append((self._logs, moment))
-        if tick >= backlog.until:
-            backlog.until = tick + backlog.ticks
-            backlog.flush()
+        """Buffer a moment, and flush the buffer if its oldest moment has waited long enough."""
+        buffer, tick = self._buffer, moment.tick
+        buffer.pending.append((self._logs, moment))
+        if tick >= buffer.next_flush_tick:
+            buffer.next_flush_tick = tick + buffer.ticks
+            buffer.flush()

@@ -1,34 +1,34 @@
-"""Ticks as nanoseconds and back, in whole numbers."""
+"""Conversion between ticks and nanoseconds in integers."""
 
 NS_PER_SECOND = 1_000_000_000
 
-
-Stamp = tuple[int, int]  # builtin_interfaces/Time: whole seconds and the nanoseconds beyond them
+Stamp = tuple[int, int]
+"""builtin_interfaces/Time: seconds and nanoseconds."""
 
 
 class SimTime:
-    """Simulated time of a clock with `rate` ticks a second.
+    """Simulated time of a clock with `rate` ticks per second, 1 to 999,999,999.
 
-    A tick is rarely a whole number of nanoseconds (1/240 s is not), so it is written rounded down; `tick` undoes that
-    exactly for every rate below 1 GHz.
+    A tick is rarely a whole number of nanoseconds (1/240 s is not), so times are rounded down. `tick` inverts the
+    rounding exactly.
     """
 
     def __init__(self, rate: int) -> None:
         if not 1 <= rate < NS_PER_SECOND:
-            raise ValueError(f"a clock of {rate} Hz cannot be told in nanoseconds")
+            raise ValueError(f"a clock rate of {rate} Hz cannot be expressed in nanoseconds")
         self.rate = rate
-        self._last: tuple[int, Stamp] = (0, (0, 0))  # most of what a beat says is of that beat
+        self._last: tuple[int, Stamp] = (0, (0, 0))  # most messages of a step have the stamp of that step
 
     def nanoseconds(self, tick: int) -> int:
-        """Nanoseconds since the start of the run."""
+        """Return the nanoseconds from the start of the run to a tick."""
         return tick * NS_PER_SECOND // self.rate
 
     def stamp(self, tick: int) -> Stamp:
-        """The same as a ROS time."""
+        """Return the ROS time of a tick."""
         if tick != self._last[0]:
             self._last = tick, divmod(tick * NS_PER_SECOND // self.rate, NS_PER_SECOND)
         return self._last[1]
 
     def tick(self, nanoseconds: int) -> int:
-        """The tick that `nanoseconds` was written for."""
+        """Return the tick for which `nanoseconds` or `stamp` returned this time."""
         return -(-nanoseconds * self.rate // NS_PER_SECOND)

@@ -1,10 +1,10 @@
-"""The topics of a log, with the types and quality of service that ROS 2's nodes would have given them."""
+"""Topics of a log with the message types and quality of service that ROS 2 nodes use."""
 
 from typing import NamedTuple
 
 
 class Topic(NamedTuple):
-    """A topic and its message type; `latched` = transient local, so that late subscribers get the last message."""
+    """A topic and its message type. `latched` means transient local: late subscribers get the last message."""
 
     name: str
     type: str
@@ -18,12 +18,12 @@ MAP = Topic("/map", "nav_msgs/msg/OccupancyGrid", latched=True)
 ROBOT_DESCRIPTION = Topic("/robot_description", "std_msgs/msg/String", latched=True)
 TRUTH = Topic("/ground_truth/odom", "nav_msgs/msg/Odometry")
 FILTERED_ODOMETRY = Topic("/odometry/filtered", "nav_msgs/msg/Odometry")
-"""As robot_localization's ekf_node names it."""
+"""The name that ekf_node of robot_localization uses."""
 CLEARANCE = Topic("/simscen/clearance", "std_msgs/msg/Float64")
 BELIEF = Topic("/amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped")
 PARTICLES = Topic("/particle_cloud", "nav2_msgs/msg/ParticleCloud")
 PARTICLE_POSES = Topic("/particlecloud", "geometry_msgs/msg/PoseArray")
-"""As AMCL published it before Nav2 had a message of its own: viewers show it without a plug-in."""
+"""The message that AMCL published before Nav2 had its own. Viewers show it without a plug-in."""
 PLAN = Topic("/plan", "nav_msgs/msg/Path")
 LOCAL_PLAN = Topic("/local_plan", "nav_msgs/msg/Path")
 GLOBAL_COSTMAP = Topic("/global_costmap/costmap", "nav_msgs/msg/OccupancyGrid", latched=True)
@@ -41,8 +41,8 @@ IMU_TYPE = "sensor_msgs/msg/Imu"
 IMAGE_TYPE = "sensor_msgs/msg/Image"
 BUMPER_TYPE = "std_msgs/msg/Bool"
 
-# rosbag2's metadata version 8: enums are rmw's integers, which both older and newer rosbag2 read; version 9's names
-# are refused by older ones. Keep last 10 (1 when latched), reliable, automatic liveliness, no deadlines.
+# Metadata version 8 of rosbag2: enums are the integers of rmw, which all versions of rosbag2 read. Older versions
+# reject the names of version 9. The profile is: keep last 10 (1 if latched), reliable, no deadlines.
 _QOS = """\
 - history: 1
   depth: {depth}
@@ -63,5 +63,5 @@ _QOS = """\
 
 
 def qos(latched: bool) -> str:
-    """`offered_qos_profiles` as rosbag2 writes it."""
+    """Return the channel metadata `offered_qos_profiles` as rosbag2 writes it."""
     return _QOS.format(depth=1, durability=1) if latched else _QOS.format(depth=10, durability=2)

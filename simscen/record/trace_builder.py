@@ -1,7 +1,7 @@
-"""The samples of a run as they are collected, and the Trace they make.
+"""Collection of the samples of a run, and their conversion to a Trace.
 
-The TraceBuilder fills rows from moments, the log reader from messages. Both hand in headings as the quaternions that
-the log stores, and one function turns them into yaw: so the two traces are equal to the last bit.
+The TraceBuilder collects samples from moments, the log reader from messages. Both pass orientations as the quaternions
+that the log stores, and one function converts them to yaw, so that the two traces are equal to the last bit.
 """
 
 import math
@@ -25,10 +25,7 @@ _tick = struct.Struct("d").pack
 
 
 class SignalBuffer:
-    """A signal in the making: a tick and `width` numbers a row, which `pack` makes a part of `rows`.
-
-    Ticks are exact in a double for a million years of simulated time.
-    """
+    """Growing table of a signal: each row has a tick and `width` numbers, packed as doubles by `pack`."""
 
     def __init__(self, width: int) -> None:
         self._width = width + 1
@@ -40,36 +37,36 @@ class SignalBuffer:
         self.rows += self.pack(tick, *values)
 
     def append(self, tick: int, values: Array) -> None:
-        """Append a row of as many numbers in whatever shape."""
+        """Append a row of `width` numbers in an array of any shape."""
         self.rows += _tick(tick)
         self.rows += values.tobytes()
 
     def extend(self, ticks: Ticks, values: Array) -> None:
-        """Append rows: ticks (n,) and values (n, width)."""
+        """Append the rows of ticks (n,) and values (n, width)."""
         self.rows += np.column_stack((ticks, values)).tobytes()
 
     def sort(self) -> None:
-        """Put rows in the order of their ticks."""
+        """Sort the rows by tick."""
         ticks, values = self.columns()
         order = ticks.argsort(kind="stable")
         self.rows = bytearray()
         self.extend(ticks[order], values[order])
 
     def columns(self) -> tuple[Ticks, Array]:
-        """Ticks (n,) and values (n, width)."""
+        """Return ticks (n,) and values (n, width)."""
         table = np.frombuffer(bytes(self.rows)).reshape(-1, self._width)
         return table[:, 0].astype(np.int64), table[:, 1:]
 
 
 def yaw_from_quaternions(quaternions: Array) -> Array:
-    """Rotations about z in [-π, π] of quaternions (n, 4) x, y, z, w."""
+    """Return the yaw angles in [-π, π] of quaternions (n, 4) x, y, z, w."""
     x, y, z, w = quaternions.T.copy()
     angles: Array = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return angles
 
 
 def exact_planar_poses(points: Array) -> Array:
-    """(n, 7) poses, as Pose3.planar makes them to the last bit, of points (n, 3) x, y, yaw."""
+    """Return poses (n, 7) for points (n, 3) x, y, yaw, equal to those of Pose3.planar to the last bit."""
     poses = np.zeros((len(points), 7))
     poses[:, :2] = points[:, :2]
     halves = np.where(np.isfinite(points[:, 2]), points[:, 2] / 2, np.nan).tolist()
@@ -78,15 +75,15 @@ def exact_planar_poses(points: Array) -> Array:
 
 
 def to_planar(poses: Array) -> Array:
-    """(n, 3) x, y, yaw of poses (n, 7): x, y, z and a quaternion."""
+    """Return x, y, yaw (n, 3) of poses (n, 7) with x, y, z and a quaternion."""
     return np.column_stack((poses[:, :2], yaw_from_quaternions(poses[:, 3:7])))
 
 
 class TraceRows:
-    """All signals of a run in the making. A pose is x, y, z and a quaternion x, y, z, w.
+    """Collected signals of a run. A pose is x, y, z and a quaternion x, y, z, w.
 
-    truth: pose, vx, vy, wz · clearance: meters · belief: pose, xx, xy, xyaw, yy, yyaw, yawyaw · odometry: pose ·
-    command: vx, vy, wz · objects: pose · plans: (tick made, poses (n, 7)).
+    Columns: `truth` has pose, vx, vy, wz; `clearance` meters; `belief` pose and the covariances xx, xy, xyaw, yy, yyaw,
+    yawyaw; `odometry` and `objects` pose; `command` vx, vy, wz. `plans` are (planning tick, poses (n, 7)).
     """
 
     def __init__(self) -> None:
@@ -96,37 +93,37 @@ class TraceRows:
         self.odometry = SignalBuffer(7)
         self.command = SignalBuffer(3)
         self.objects: dict[str, SignalBuffer] = {}
-        self._together: dict[tuple[str, ...], SignalBuffer] = {}
+        self._joint: dict[tuple[str, ...], SignalBuffer] = {}
         self.scans: list[int] = []
         self.plans: list[tuple[int, Array]] = []
         self.events: list[Event] = []
 
     def object(self, name: str) -> SignalBuffer:
-        """The rows of a moving thing."""
-        known = self.objects.get(name)
-        if known is None:
-            known = self.objects[name] = SignalBuffer(7)
-        return known
+        """Return the buffer of a moving object."""
+        buffer = self.objects.get(name)
+        if buffer is None:
+            buffer = self.objects[name] = SignalBuffer(7)
+        return buffer
 
-    def together(self, names: tuple[str, ...]) -> SignalBuffer:
-        """The rows of things at ticks at which all of them have moved, one pose beside the other; until `part`."""
-        known = self._together.get(names)
-        if known is None:
-            known = self._together[names] = SignalBuffer(7 * len(names))
-        return known
+    def joint_objects(self, names: tuple[str, ...]) -> SignalBuffer:
+        """Return a buffer for ticks at which all these objects have moved: their poses, side by side in a row."""
+        buffer = self._joint.get(names)
+        if buffer is None:
+            buffer = self._joint[names] = SignalBuffer(7 * len(names))
+        return buffer
 
-    def part(self) -> None:
-        """Give each thing its own rows, in the order of their ticks."""
-        for names, series in self._together.items():
-            ticks, poses = series.columns()
+    def split_joint_objects(self) -> None:
+        """Move the rows of joint buffers to the buffers of the single objects, sorted by tick."""
+        for names, buffer in self._joint.items():
+            ticks, poses = buffer.columns()
             for column, name in enumerate(names):
                 self.object(name).extend(ticks, poses[:, 7 * column : 7 * column + 7])
-        for name in {name: None for names in self._together for name in names}:
+        for name in {name: None for names in self._joint for name in names}:
             self.objects[name].sort()
-        self._together.clear()
+        self._joint.clear()
 
     def trace(self, tick_rate: int, end: int) -> Trace:
-        """What happened until `end`."""
+        """Return the Trace until the tick `end`."""
         truth_ticks, truth = self.truth.columns()
         belief_ticks, belief = self.belief.columns()
         return Trace(
@@ -145,41 +142,40 @@ class TraceRows:
         )
 
 
-def _poses(series: SignalBuffer) -> Samples:
-    ticks, poses = series.columns()
+def _poses(buffer: SignalBuffer) -> Samples:
+    ticks, poses = buffer.columns()
     return Samples(ticks, to_planar(poses))
 
 
 class TraceBuilder:
-    """Eats moments in the order of their ticks; `finish` gives the Trace.
+    """Builds the Trace of a run from moments in the order of their ticks.
 
-    It is the very Trace that `replay.read_log` gives for a log recorded from the same moments: headings take the way
-    over the log's quaternions, which costs them at most a last bit.
+    The Trace equals the one that `read_log` returns for a log recorded from the same moments.
     """
 
     def __init__(self, clock: Clock, thinning: Thinning | None = None) -> None:
-        """`thinning` is that of a log which is told of each moment next, so that what is kept is worked out once."""
+        """Pass the `thinning` of a log that receives each moment next, so that decisions are made only once."""
         self._clock = clock
         self._thinning = Thinning(clock.rate) if thinning is None else thinning
         self._rows = TraceRows()
         self._truth, self._odometry, self._belief = SignalBuffer(11), SignalBuffer(3), SignalBuffer(9)
-        """Pose, twist and clearance; x, y, yaw; the same with a covariance: they become rows at the end."""
+        """Columns: pose, twist and clearance; x, y, yaw; x, y, yaw and covariance. `finish` converts them to rows."""
 
     def append(self, moment: Moment) -> None:
-        """Take in one beat: appends a few numbers, computes nothing."""
+        """Add one moment. Only appends numbers, because this runs in every step."""
         tick, truth, decision = moment.tick, moment.truth, moment.decision
         rows, thinning = self._rows, self._thinning
         if truth is not None:
             pose, twist, clearance, objects = truth
-            series = self._truth
-            series.rows += series.pack(tick, *pose, *twist, clearance)
+            buffer = self._truth
+            buffer.rows += buffer.pack(tick, *pose, *twist, clearance)
             if objects:
                 self._add_objects(tick, thinning.moved(tick, truth))
         for reading in moment.readings:
             if type(reading) is Odometry:
                 if thinning.keeps_odometry(reading):
-                    series = self._odometry
-                    series.rows += series.pack(tick, *reading.pose)
+                    buffer = self._odometry
+                    buffer.rows += buffer.pack(tick, *reading.pose)
             elif type(reading) is Scan:
                 rows.scans.append(tick)
         if thinning.keeps_command(tick, decision.command):
@@ -195,14 +191,14 @@ class TraceBuilder:
 
     def _add_objects(self, tick: int, moved: Mapping[str, Pose3]) -> None:
         if type(moved) is PosesAtTick:
-            self._rows.together(moved.predicted.names).append(tick, moved.table)
+            self._rows.joint_objects(moved.predicted.names).append(tick, moved.table)
             return
         for name, pose in moved.items():
-            series = self._rows.object(name)
-            series.rows += series.pack(tick, *pose)
+            buffer = self._rows.object(name)
+            buffer.rows += buffer.pack(tick, *pose)
 
     def finish(self, end_tick: int) -> Trace:
-        """The run until `end_tick`; nothing may be appended to it from then on."""
+        """Return the Trace until `end_tick`. Nothing may be appended afterwards."""
         rows, (ticks, truth) = self._rows, self._truth.columns()
         rows.truth.extend(ticks, truth[:, :10])
         rows.clearance.extend(ticks, truth[:, 10:])
@@ -210,5 +206,5 @@ class TraceBuilder:
         rows.odometry.extend(ticks, exact_planar_poses(odometry))
         ticks, belief = self._belief.columns()
         rows.belief.extend(ticks, np.column_stack((exact_planar_poses(belief), belief[:, 3:])))
-        rows.part()
+        rows.split_joint_objects()
         return rows.trace(self._clock.rate, end_tick)

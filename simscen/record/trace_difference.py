@@ -1,4 +1,4 @@
-"""Where two runs that should be equal part."""
+"""Comparison of the traces of two runs that should be equal, as for --check-determinism."""
 
 from collections.abc import Iterator
 
@@ -20,26 +20,26 @@ Difference = tuple[int, str]
 
 
 def first_difference(one: Trace, other: Trace) -> str | None:
-    """The first tick and field in which two traces differ by a bit, as a sentence; None when they are equal.
+    """Return the first tick and field in which two traces differ by at least one bit, as text; None if they are equal.
 
-    Fields that part at the same tick are told in the order of cause and effect: truth before odometry before belief
+    If several fields differ first at the same tick, the likely cause is named: truth before odometry before belief
     before command.
     """
     if one.tick_rate != other.tick_rate:
         return f"tick rate: {one.tick_rate} against {other.tick_rate} Hz"
-    found = list(_differences(one, other))
-    if not found:
+    differences = list(_differences(one, other))
+    if not differences:
         return None
-    tick, what = min(found, key=lambda difference: difference[0])
-    return f"tick {tick} (t = {one.seconds(tick):.3f} s): {what}"
+    tick, text = min(differences, key=lambda difference: difference[0])
+    return f"tick {tick} (t = {one.seconds(tick):.3f} s): {text}"
 
 
 def _differences(one: Trace, other: Trace) -> Iterator[Difference]:
     for name in ("truth", "velocity", "clearance", "odometry"):
         yield from _in_samples(name, getattr(one, name), getattr(other, name))
-    nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    empty = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     for name in sorted({*one.objects, *other.objects}):
-        yield from _in_samples(f"object {name}", one.objects.get(name, nothing), other.objects.get(name, nothing))
+        yield from _in_samples(f"object {name}", one.objects.get(name, empty), other.objects.get(name, empty))
     yield from _in_samples("scan", *(Samples(t.scans, np.empty((len(t.scans), 0))) for t in (one, other)))
     for name in ("belief", "command"):
         yield from _in_samples(name, getattr(one, name), getattr(other, name))
@@ -56,7 +56,7 @@ def _differences(one: Trace, other: Trace) -> Iterator[Difference]:
 
 
 def _in_samples(name: str, one: Samples, other: Samples) -> Iterator[Difference]:
-    """The first row that differs, bit for bit (nan equals itself, 0.0 is not -0.0)."""
+    """Yield the first row that differs, bit for bit (nan equals itself, 0.0 differs from -0.0)."""
     n = min(len(one), len(other))
     a, b = (np.ascontiguousarray(samples.values[:n]) for samples in (one, other))
     differs = a.view(np.int64) != b.view(np.int64)
@@ -76,29 +76,29 @@ def _in_samples(name: str, one: Samples, other: Samples) -> Iterator[Difference]
 
 
 def _missing(name: str, one: list[int], other: list[int]) -> Iterator[Difference]:
-    """That one run has more of something."""
+    """Yield a difference if one run has more ticks than the other."""
     if len(one) != len(other):
         longer = max(one, other, key=len)
         yield longer[min(len(one), len(other))], f"{name}: {len(one)} against {len(other)}"
 
 
 POSE_TOLERANCE = 1e-5
-"""m and rad by which true poses may differ. Without fused multiply-add they differ by less than 1e-12 after 90 s."""
+"""Tolerance for true poses in m and rad. Machines with different arithmetic differ by less than 1e-12 after 90 s."""
 
 
 def first_disagreement(one: Trace, other: Trace) -> str | None:
-    """The first tick at which the true poses are not the same within TOLERANCE, as a sentence; None: there is none."""
+    """Return the first tick at which true poses differ by more than POSE_TOLERANCE, as text; None if there is none."""
     if one.tick_rate != other.tick_rate:
         return f"tick rate: {one.tick_rate} against {other.tick_rate} Hz"
-    both = min(len(one.truth.ticks), len(other.truth.ticks))
-    apart = np.abs(one.truth.values[:both] - other.truth.values[:both])
-    apart[:, 2] = np.minimum(apart[:, 2], np.abs(2 * np.pi - apart[:, 2]))
-    wrong = np.flatnonzero(
-        (one.truth.ticks[:both] != other.truth.ticks[:both]) | ~(apart <= POSE_TOLERANCE).all(axis=1)
+    count = min(len(one.truth.ticks), len(other.truth.ticks))
+    distance = np.abs(one.truth.values[:count] - other.truth.values[:count])
+    distance[:, 2] = np.minimum(distance[:, 2], np.abs(2 * np.pi - distance[:, 2]))
+    rows = np.flatnonzero(
+        (one.truth.ticks[:count] != other.truth.ticks[:count]) | ~(distance <= POSE_TOLERANCE).all(axis=1)
     )
-    if len(wrong):
-        tick = int(one.truth.ticks[wrong[0]])
-        x, y, yaw = apart[wrong[0]].tolist()
+    if len(rows):
+        tick = int(one.truth.ticks[rows[0]])
+        x, y, yaw = distance[rows[0]].tolist()
         when = f"tick {tick} (t = {one.seconds(tick):.3f} s)"
         return f"{when}: the true pose differs by {x:.2g} m, {y:.2g} m, {yaw:.2g} rad"
     if one.end != other.end:

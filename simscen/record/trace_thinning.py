@@ -1,4 +1,4 @@
-"""What of a run is kept: the recorder and the TraceBuilder ask here, so that log and Trace hold the same samples."""
+"""Selection of the samples to keep of a run, shared by the recorder and the TraceBuilder."""
 
 from collections.abc import Mapping
 
@@ -13,93 +13,94 @@ STANDSTILL_RATE_HZ = 1
 
 
 class Thinning:
-    """Drops what says nothing new, on a clock of `rate` ticks a second.
+    """Drops samples without new information. The clock has `rate` ticks per second.
 
-    A command is kept when it differs from the last one, and else 20 times a second. The pose of a moving thing is
-    kept when it has changed, and else once a second. Of several odometries the first that speaks is the robot's.
-    Whoever asks again about the tick that was last asked about is told the same.
+    A command is kept if it differs from the last one, and otherwise 20 times a second. The pose of a moving object is
+    kept if it has changed, and otherwise once a second. Of several odometry sensors, the first one with a reading is
+    the robot's odometry. Repeated calls for the same tick return the same answer.
     """
 
     def __init__(self, rate: int) -> None:
         self._command_period = max(1, rate // COMMAND_RATE_HZ)
         self._standstill_period = max(1, rate // STANDSTILL_RATE_HZ)
         self._command: Twist | None = None
-        self._commanded = 0
-        self._asked = -1
-        self._objects: dict[str, tuple[int, Pose3]] = {}
+        self._command_kept_tick = 0
+        self._command_checked_tick = -1
         self._odometry: str | None = None
-        self._at_rest: Mapping[str, Pose3] | None = None
-        self._due = 0
-        self._moved_at = -1
+        self._kept_poses: dict[str, tuple[int, Pose3]] = {}
+        self._resting: Mapping[str, Pose3] | None = None
+        """The poses of the previous sample: the same object means that nothing has moved since."""
+        self._standstill_due_tick = 0
+        self._moved_tick = -1
         self._moved: Mapping[str, Pose3] = {}
-        self._whole: tuple[int, PosesAtTick] | None = None
-        """The sample before, if all things of it are kept: `_objects` does not know of it yet."""
+        self._all_kept: tuple[int, PosesAtTick] | None = None
+        """The previous sample if all its objects were kept. It is added to `_kept_poses` only when needed."""
 
     def keeps_command(self, tick: int, command: Twist) -> bool:
-        """Whether the command of this beat is kept."""
-        if tick != self._asked:
-            self._asked = tick
-            if command != self._command or tick - self._commanded >= self._command_period:
-                self._command, self._commanded = command, tick
-        return self._commanded == tick
+        """Return whether to keep the command of this tick."""
+        if tick != self._command_checked_tick:
+            self._command_checked_tick = tick
+            if command != self._command or tick - self._command_kept_tick >= self._command_period:
+                self._command, self._command_kept_tick = command, tick
+        return self._command_kept_tick == tick
 
     def keeps_odometry(self, odometry: Odometry) -> bool:
-        """Whether this is the robot's own odometry."""
+        """Return whether a reading is from the sensor that counts as the robot's odometry."""
         if self._odometry is None:
             self._odometry = odometry.sensor
         return odometry.sensor == self._odometry
 
     def moved(self, tick: int, truth: Truth) -> Mapping[str, Pose3]:
-        """The moving things whose pose is kept at this tick, by name."""
-        if tick != self._moved_at:
-            self._moved_at, self._moved = tick, self._kept(tick, truth)
+        """Return the moving objects whose poses to keep at this tick, by name."""
+        if tick != self._moved_tick:
+            self._moved_tick, self._moved = tick, self._objects_to_keep(tick, truth.objects)
         return self._moved
 
-    def _kept(self, tick: int, truth: Truth) -> Mapping[str, Pose3]:
-        objects = truth.objects
+    def _objects_to_keep(self, tick: int, objects: Mapping[str, Pose3]) -> Mapping[str, Pose3]:
         if type(objects) is PosesAtTick and self._all_moved(objects):
-            self._whole, self._at_rest = (tick, objects), objects
+            self._all_kept, self._resting = (tick, objects), objects
             return objects
-        if self._whole is not None:
-            before, places = self._whole
-            self._objects.update({name: (before, pose) for name, pose in places.items()})
-        kept = self._each(tick, objects)
-        self._whole = (tick, objects) if type(objects) is PosesAtTick and len(kept) == len(objects) else None
+        if self._all_kept is not None:
+            previous_tick, poses = self._all_kept
+            self._kept_poses.update({name: (previous_tick, pose) for name, pose in poses.items()})
+        kept = self._changed_objects(tick, objects)
+        self._all_kept = (tick, objects) if type(objects) is PosesAtTick and len(kept) == len(objects) else None
         return kept
 
     def _all_moved(self, objects: PosesAtTick) -> bool:
-        """Whether everything is elsewhere than in the sample before, of which everything is kept."""
-        if self._whole is None:
+        """Return whether all objects have moved since the previous sample, of which all were kept."""
+        if self._all_kept is None:
             return False
-        before, seen = self._whole[1], objects.predicted
-        return before.predicted is seen and before.row == objects.row - 1 and seen.all_moved[objects.row]
+        previous, predicted = self._all_kept[1], objects.predicted
+        return previous.predicted is predicted and previous.row == objects.row - 1 and predicted.all_moved[objects.row]
 
-    def _each(self, tick: int, objects: Mapping[str, Pose3]) -> dict[str, Pose3]:
+    def _changed_objects(self, tick: int, objects: Mapping[str, Pose3]) -> dict[str, Pose3]:
         kept = dict[str, Pose3]()
-        at_rest = objects is self._at_rest  # nothing has moved since the sample before
-        if at_rest and tick < self._due:
+        is_resting = objects is self._resting
+        if is_resting and tick < self._standstill_due_tick:
             return kept
         for name, pose in objects.items():
-            last = self._objects.get(name)
+            last = self._kept_poses.get(name)
             if last is None or last[1] != pose or tick - last[0] >= self._standstill_period:
-                self._objects[name] = (tick, pose)
+                self._kept_poses[name] = (tick, pose)
                 kept[name] = pose
-        self._at_rest = objects
-        self._due = 0
-        if at_rest:
-            self._due = min([self._objects[name][0] for name in objects], default=tick) + self._standstill_period
+        self._resting = objects
+        self._standstill_due_tick = 0
+        if is_resting:
+            oldest = min([self._kept_poses[name][0] for name in objects], default=tick)
+            self._standstill_due_tick = oldest + self._standstill_period
         return kept
 
 
 class Throttle:
-    """Lets pass what comes at least a period of `rate` hertz after what passed before."""
+    """Limits messages to `rate` hertz of simulated time."""
 
     def __init__(self, ticks_per_second: int, rate: int) -> None:
         self._period = max(1, ticks_per_second // rate)
         self._next: int | None = None
 
     def passes(self, tick: int) -> bool:
-        """Whether it is time."""
+        """Return whether a message may be written at this tick, and count it."""
         if self._next is not None and tick < self._next:
             return False
         self._next = tick + self._period

@@ -1,4 +1,4 @@
-"""Stacks side by side, as lines for the console."""
+"""Comparison of several stacks as console lines, HTML and Markdown."""
 
 from collections.abc import Callable, Iterator, Sequence
 from html import escape
@@ -8,67 +8,68 @@ from simscen.report.display_text import one_line
 from simscen.report.styled_line import StyledLine, StyledText
 
 MAX_FLIPS = 10
+"""Maximum number of runs with different outcomes to list."""
 MIN_NAME_COLUMNS = 24
-"""Columns that a scenario's name has at least, however narrow the terminal."""
+"""Minimum width of the column of scenario names."""
 MAX_STACK_NAME = 16
 
 
 def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | None = None) -> Iterator[StyledLine]:
-    """Outcomes of each scenario with each stack, then each stack against the first.
+    """Yield a table of outcomes by scenario and stack, then the comparison of each stack with the first one.
 
-    `prefix` is what all ids begin with. Names of scenarios are cut to fit into `columns`; None = as long as they are.
+    `prefix` is removed from IDs. Names are shortened to fit into `columns`, if given.
     """
     yield ()
-    yield from _outcomes(comparison, prefix, columns)
+    yield from _outcome_table(comparison, prefix, columns)
     for against in comparison.against:
         yield ()
-        yield from _against(comparison.baseline, against, prefix)
+        yield from _comparison_section(comparison.baseline, against, prefix)
     yield ()
 
 
 def outcome_text(outcomes: OutcomeCounts) -> str:
-    """3/5: passed of those that came to an end; then, with an exclamation mark, how many did not."""
+    """Return passed and finished runs such as "3/5", followed by the number of errors such as "1!"."""
     errors = f" {outcomes.errors}!" if outcomes.errors else ""
     return f"{outcomes.passed}/{outcomes.decided}{errors}"
 
 
 def excluded_text(against: BaselineComparison) -> str:
-    """What is not compared, and why; "" for nothing."""
-    told = []
+    """Return which runs are not compared, and why, or ""."""
+    parts = []
     if against.broken:
-        told.append(f"{_pairs(against.broken)} with an error")
+        parts.append(f"{_pairs(against.broken)} with an error")
     if against.alone:
-        told.append(f"{against.alone} {'run' if against.alone == 1 else 'runs'} without a partner")
-    return "left out: " + ", ".join(told) if told else ""
+        parts.append(f"{against.alone} {'run' if against.alone == 1 else 'runs'} without a partner")
+    return "left out: " + ", ".join(parts) if parts else ""
 
 
 def unfinished_text(against: BaselineComparison) -> str:
-    """Of how many pairs only one arrived; "" for none."""
+    """Return the number of pairs in which only one run reached its goals, or ""."""
     if not against.parted:
         return ""
-    return f"of {_pairs(against.parted)} only one run arrived, so how these drove is not compared"
+    return f"in {_pairs(against.parted)} only one run reached its goals, so their metrics are not compared"
 
 
 def comparison_headline(baseline: str, against: BaselineComparison) -> str:
-    """Dwb against ref: 10 pairs, passed 8 and 9 …"""
+    """Return the result of the comparison in one line: pairs, better and worse outcomes, p-value."""
     won = sum(flip.passed == against.stack for flip in against.flips)
     lost = len(against.flips) - won
-    told = f"{against.stack} against {baseline}: {_pairs(against.pairs)} of the same scenario and seed"
+    text = f"{against.stack} against {baseline}: {_pairs(against.pairs)} of the same scenario and seed"
     if not against.pairs:
         return f"{against.stack} against {baseline}: nothing to compare"
     if not against.flips:
-        return f"{told}, none came out otherwise"
-    return f"{told}, {won} better, {lost} worse (p = {against.p:.2g})"
+        return f"{text}, all with equal outcomes"
+    return f"{text}, {won} better, {lost} worse (p = {against.p:.2g})"
 
 
 def difference_columns(one: MetricDifference) -> tuple[str, str, str, str]:
-    """The two means, their difference, and its interval; what is below 1 m or 1 s with a digit more."""
+    """Return the two means, their difference, and its interval, with an extra digit for values below 1."""
     digits = 3 if one.unit and max(abs(one.baseline), abs(one.value)) < 1 else 2
     interval = "" if one.interval is None else " … ".join(f"{bound:+.{digits}f}" for bound in one.interval)
     return f"{one.baseline:.{digits}f}", f"{one.value:.{digits}f}", f"{one.difference:+.{digits}f}", interval
 
 
-def _outcomes(comparison: Comparison, prefix: str, columns: int | None) -> Iterator[StyledLine]:
+def _outcome_table(comparison: Comparison, prefix: str, columns: int | None) -> Iterator[StyledLine]:
     rows = [
         (one_line(scenario.removeprefix(prefix)), [outcome_text(row[name]) for name in comparison.stacks])
         for scenario, row in comparison.outcomes.items()
@@ -77,8 +78,8 @@ def _outcomes(comparison: Comparison, prefix: str, columns: int | None) -> Itera
         rows.append(("all", [outcome_text(comparison.total(name)) for name in comparison.stacks]))
     heads = [shorten(name) for name in comparison.stacks]
     widths = [max(len(head), *(len(cells[number]) for _, cells in rows)) + 3 for number, head in enumerate(heads)]
-    room = None if columns is None else max(MIN_NAME_COLUMNS, columns - 2 - sum(widths))
-    names = [shorten(name, room) if room else name for name, _ in rows]
+    available = None if columns is None else max(MIN_NAME_COLUMNS, columns - 2 - sum(widths))
+    names = [shorten(name, available) if available else name for name, _ in rows]
     longest = max(len(name) for name in ("passed", *names))
 
     def row(name: str, cells: Sequence[str]) -> str:
@@ -88,10 +89,10 @@ def _outcomes(comparison: Comparison, prefix: str, columns: int | None) -> Itera
     for name, (_, cells) in zip(names, rows, strict=True):
         yield (StyledText(row(name, cells)),)
     if any(row[name].errors for row in comparison.outcomes.values() for name in row):
-        yield (StyledText("  ! = could not be completed, and counts neither way", "quiet"),)
+        yield (StyledText("  ! = runs with errors, which are not counted", "quiet"),)
 
 
-def _against(baseline: str, against: BaselineComparison, prefix: str) -> Iterator[StyledLine]:
+def _comparison_section(baseline: str, against: BaselineComparison, prefix: str) -> Iterator[StyledLine]:
     yield (StyledText(f"  {comparison_headline(baseline, against)}", "name"),)
     for flip in against.flips[:MAX_FLIPS]:
         better = flip.passed == against.stack
@@ -132,7 +133,7 @@ def _differences(baseline: str, against: BaselineComparison) -> Iterator[StyledL
 
 
 def shorten(text: str, most: int = MAX_STACK_NAME) -> str:
-    """Text of at most so many columns: beginnings and ends are what names differ in."""
+    """Shorten text to `most` characters by removing its middle."""
     return text if len(text) <= most else f"{text[: (most - 1) // 2]}…{text[-(most // 2) :]}"
 
 
@@ -141,14 +142,14 @@ def _pairs(number: int) -> str:
 
 
 EXPLANATION = (
-    "Runs are paired by scenario and seed. Passed: of those that came to an end. Differences are means over pairs, "
-    "with 95 % intervals by bootstrap; p is the sign test. - / = / + are pairs in which it was less, the same, more."
+    "Runs are paired by scenario and seed. Passed: number of passed and of finished runs. Differences are means over "
+    "pairs with 95 % bootstrap intervals; p is from the sign test. - / = / +: pairs with a lower, equal, higher value."
 )
 _HEAD = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "- / = / +", "p")
 
 
 def as_html(comparison: Comparison) -> str:
-    """A section of the page: outcomes of each scenario, then each stack against the first."""
+    """Return the comparison as a section of the report."""
     names = "".join(
         f"<th>{_html_text(name)}<div class='quiet'>{_html_text(given)}</div></th>"
         for name, given in comparison.stacks.items()
@@ -167,7 +168,7 @@ def as_html(comparison: Comparison) -> str:
 
 
 def as_markdown(comparison: Comparison, cell: Callable[[str], str]) -> list[str]:
-    """The same as lines of Markdown; `cell` makes text harmless that others wrote."""
+    """Return the comparison as lines of Markdown. `cell` escapes text of users."""
     names = [cell(name) for name in comparison.stacks]
     lines = ["", f"| passed | {' | '.join(names)} |", f"|---|{'---:|' * len(names)}"]
     rows = [*comparison.outcomes.items(), ("all", {name: comparison.total(name) for name in comparison.stacks})]
@@ -226,7 +227,7 @@ def _difference(one: MetricDifference) -> str:
 
 
 def _cells(one: MetricDifference) -> tuple[str, ...]:
-    """A row of the table of differences."""
+    """Return a row of the table of differences."""
     before, after, difference, interval = difference_columns(one)
     name = f"{one.metric}, {one.unit}".removesuffix(", ")
     signs = f"{one.lower} / {one.equal} / {one.higher}"

@@ -1,4 +1,4 @@
-"""Text from users and workers, made safe to show: what could move a cursor or lie about order becomes visible."""
+"""Escaping of text from users and workers for terminals, XML, and CI logs, and display of file paths."""
 
 import os
 import re
@@ -13,48 +13,48 @@ _ASCII = str.maketrans(
 
 
 def escape_control(text: str) -> str:
-    """Control, bidirectional and lone surrogate characters as escapes; tabs and newlines stay.
+    """Replace control, bidirectional and lone surrogate characters by escapes. Keep tabs and newlines.
 
-    What remains may stand in XML 1.0 as it is.
+    The result is valid in XML 1.0.
     """
     return _UNSAFE.sub(lambda match: _escaped(match[0]), text)
 
 
 def one_line(text: str) -> str:
-    """The same on one line."""
+    """Escape control characters, and replace all white space by single spaces."""
     return escape_control(" ".join(text.split()))
 
 
 def shell_command_text(text: str) -> str:
-    """A command of shlex.join on one line, to be pasted: its spaces stay, and what would break the line is quoted.
+    """Return a command of shlex.join on one line, to be copied into bash or zsh.
 
-    Line breaks and tabs stand between single quotes there; bash and zsh read `$'…'`.
+    Line breaks and tabs, which shlex.join puts into single quotes, become `$'…'`.
     """
     return escape_control(text.replace("\n", "'$'\\n''").replace("\t", "'$'\\t''"))
 
 
 def display_width(text: str) -> int:
-    """How many columns of a terminal the text takes."""
+    """Return the number of terminal columns of a text."""
     return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
 
 
 def ascii_only(text: str) -> str:
-    """For terminals that know nothing else: our own signs have stand-ins, the rest becomes escapes."""
+    """Return ASCII for terminals without Unicode: replacements for simscen's symbols, escapes for the rest."""
     return text.translate(_ASCII).encode("ascii", "backslashreplace").decode("ascii")
 
 
 def escape_ci_commands(line: str) -> str:
-    """A line of output that no CI takes for one of its commands, such as `::error::` at its start on GitHub."""
+    """Escape a line of output so that no CI system reads it as a command, such as `::error::` on GitHub."""
     return re.sub(r"^(\s*):(?=:)", r"\1\\x3a", escape_ci_markers(line))
 
 
 def escape_ci_markers(text: str) -> str:
-    """Text without what CI obeys anywhere in a line: `##[error]` (GitHub, Azure), `##vso[…]`, `##teamcity[…]`."""
+    """Escape CI commands that can be anywhere in a line: `##[error]` (GitHub, Azure), `##vso[…]`, `##teamcity[…]`."""
     return _MARKER.sub(r"##\1\\[", text)
 
 
 def escape_ci_markers_in_json(document: str) -> str:
-    """The same for a JSON document, whose content stays as it is."""
+    """Escape CI commands in a JSON document without changing its content."""
     return document.replace("##", "#\\u0023")
 
 
@@ -64,18 +64,18 @@ def _escaped(character: str) -> str:
 
 
 def relative_to_checkout(file: str) -> str:
-    """`file`, as seen from the working folder, relative to $GITHUB_WORKSPACE; as it is where it is not in there.
+    """Convert a path relative to the working folder to one relative to $GITHUB_WORKSPACE, if the file is in there.
 
-    GitHub places annotations by the top of the repository that it checked out, wherever the command was called.
+    GitHub expects paths of annotations to be relative to the top of the repository.
     """
     workspace = os.environ.get("GITHUB_WORKSPACE")
     if not workspace:
         return file
-    top, real = Path(os.path.realpath(workspace)), Path(os.path.realpath(file))
-    return real.relative_to(top).as_posix() if real.is_relative_to(top) and os.path.lexists(real) else file
+    top, target = Path(os.path.realpath(workspace)), Path(os.path.realpath(file))
+    return target.relative_to(top).as_posix() if target.is_relative_to(top) and os.path.lexists(target) else file
 
 
 def relative_to_cwd(file: str, folder: str) -> str:
-    """`file`, as seen from `folder`, as seen from the working folder; as it is where it has gone since."""
-    there = str(Path(folder, file))
-    return min(os.path.relpath(there), there, key=len) if file and folder and os.path.lexists(there) else file
+    """Convert a path relative to `folder` to one relative to the working folder, if the file still exists."""
+    path = str(Path(folder, file))
+    return min(os.path.relpath(path), path, key=len) if file and folder and os.path.lexists(path) else file

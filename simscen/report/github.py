@@ -1,4 +1,4 @@
-"""GitHub Actions: an annotation at the line of each violated criterion, and a summary of the job in Markdown."""
+"""Reporter for GitHub Actions: annotations at the lines of violated criteria, and a job summary in Markdown."""
 
 from types import TracebackType
 from typing import TextIO
@@ -8,7 +8,7 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.finding_text import tightest_margin
 from simscen.report.comparison import as_markdown
-from simscen.report.console import text_reporter
+from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import one_line, relative_to_checkout
 from simscen.report.results_json import relative
 from simscen.report.text_reporters import Reporter
@@ -21,10 +21,10 @@ _MARKDOWN_ESCAPES = {ord(sign): f"&#{ord(sign)};" for sign in "\\`*_[]|~#@&<>"}
 def github_reporter(
     out: TextIO, summary: TextIO | None = None, slow: int | None = None, pictures: str = ""
 ) -> Reporter:
-    """The lines of a pipe, with annotations among them. `summary` is the file that $GITHUB_STEP_SUMMARY names.
+    """Return a reporter that prints plain lines and annotations, and writes the job summary to `summary`.
 
-    `slow` is as for text_reporter. `pictures` is the address below which the output folder's pictures will be found:
-    a summary shows none that it does not get from somewhere.
+    `slow` is the number of slowest runs to list, as in text_reporter. `pictures` is the URL of the uploaded output
+    folder; without it, the summary has no pictures.
     """
     return _GitHub(out, summary, slow, pictures)
 
@@ -45,7 +45,7 @@ class _GitHub:
         self._plain.__exit__(kind, error, trace)
 
     def __call__(self, event: SessionEvent) -> None:
-        """Print, annotate, and sum up at the end."""
+        """Print the event, with annotations for a finished run, and write the summary at the end."""
         self._plain(event)
         if isinstance(event, RunFinished):
             self._runs.append(event)
@@ -58,16 +58,14 @@ class _GitHub:
 
 
 def annotations(run: RunFinished) -> list[str]:
-    """The workflow commands for one run."""
+    """Return the workflow commands for one run."""
     name = short_run_name(run.key)
     if excuse := excuse_text(run):
-        line = next((c.line for c in reported_violations(run) if not c.warning), 0)
+        line = next((each.line for each in reported_violations(run) if not each.warning), 0)
         return [_command("notice", run, line, name, excuse)]
     lines = [
-        _command(
-            "warning" if found.warning else "error", run, found.line, name, "\n".join((found.message, *found.detail))
-        )
-        for found in reported_violations(run)
+        _command("warning" if each.warning else "error", run, each.line, name, "\n".join((each.message, *each.detail)))
+        for each in reported_violations(run)
     ]
     if run.outcome is Outcome.ERROR:
         lines.append(_command("error", run, 0, name, error_summary(run)))
@@ -75,15 +73,15 @@ def annotations(run: RunFinished) -> list[str]:
 
 
 def markdown(runs: list[RunFinished], session: SessionFinished, pictures: str = "") -> str:
-    """A table of all runs, the ones that did not pass first; then their pictures, where they have an address."""
-    signs = {
+    """Return a table of all runs, failures first, and with a URL the pictures of failures."""
+    symbols = {
         Outcome.ERROR: "⚠️",
         Outcome.FAILED: "❌",
         Outcome.FAILED_AS_EXPECTED: "🟡",
         Outcome.SKIPPED: "⏭️",
         Outcome.PASSED: "✅",
     }
-    order = list(signs)
+    order = list(symbols)
     ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.result.path, run.key))
     errors = "error" if session.errors == 1 else "errors"
     more = f", {session.expected} failed as expected" if session.expected else ""
@@ -91,7 +89,7 @@ def markdown(runs: list[RunFinished], session: SessionFinished, pictures: str = 
     head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}{more}"
     compared = [] if session.comparison is None else as_markdown(session.comparison, _cell)
     rows = [
-        f"| {signs[run.outcome]} | {_cell(short_run_name(run.key))} "
+        f"| {symbols[run.outcome]} | {_cell(short_run_name(run.key))} "
         f"| {run.result.simulated:.1f} s | {_reason_cell(run)} |"
         for run in ordered
     ]
@@ -101,42 +99,42 @@ def markdown(runs: list[RunFinished], session: SessionFinished, pictures: str = 
 
 
 def _picture_lines(runs: list[RunFinished], folder: str, pictures: str) -> list[str]:
-    """The pictures of the first runs that did not pass."""
-    bad = [run for run in runs if not run.outcome.good and run.artifacts.picture]
+    """Return the pictures of the first runs that did not pass."""
+    failures = [run for run in runs if not run.outcome.good and run.artifacts.picture]
     lines = []
-    for run in bad[:MAX_PICTURES]:
+    for run in failures[:MAX_PICTURES]:
         address = f"{pictures.rstrip('/')}/{quote(relative(run.artifacts.picture, folder))}"
         lines += [f"**{_cell(short_run_name(run.key))}**", "", f"![map of the run]({address})", ""]
     return lines
 
 
 def _reason_cell(run: RunFinished) -> str:
-    """A cell: every criterion that failed in a line of its own, or what the run came nearest to."""
+    """Return a table cell with one line per violated criterion, or with the tightest margin if the run passed."""
     if run.outcome is Outcome.ERROR:
         return _cell(error_summary(run))
     if excuse := excuse_text(run):
         return _cell(excuse)
-    told = [_cell(complaint.message) for complaint in reported_violations(run)]
-    nearest = tightest_margin(run.result.verdicts)
-    return "<br>".join(told) if told or not nearest else f"tightest: {_cell(nearest)}"
+    messages = [_cell(violation.message) for violation in reported_violations(run)]
+    tightest = tightest_margin(run.result.verdicts)
+    return "<br>".join(messages) if messages or not tightest else f"tightest: {_cell(tightest)}"
 
 
 def _command(level: str, run: RunFinished, line: int, title: str, message: str) -> str:
     file = relative_to_checkout(scenario_file(run))
-    where = f"file={_property(file)},line={max(line or 1, 1)},title={_property(title)}"
-    return f"::{level} {where}::{_data(message)}"
+    properties = f"file={_escape_property(file)},line={max(line or 1, 1)},title={_escape_property(title)}"
+    return f"::{level} {properties}::{_escape_message(message)}"
 
 
-def _data(text: str) -> str:
-    """Escaped as @actions/core escapes the message of a command."""
+def _escape_message(text: str) -> str:
+    """Escape the message of a command as @actions/core does."""
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
-def _property(text: str) -> str:
-    """Escaped as @actions/core escapes a property of a command."""
-    return _data(text).replace(":", "%3A").replace(",", "%2C")
+def _escape_property(text: str) -> str:
+    """Escape a property of a command as @actions/core does."""
+    return _escape_message(text).replace(":", "%3A").replace(",", "%2C")
 
 
 def _cell(text: str) -> str:
-    """Text that means nothing in a Markdown table or in HTML."""
+    """Escape text for a cell of a Markdown table."""
     return one_line(text).translate(_MARKDOWN_ESCAPES)

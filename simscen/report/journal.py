@@ -1,7 +1,7 @@
-"""events.jsonl: what happened in a session, one line each, kept even when simscen itself is killed.
+"""Writer of events.jsonl, the journal of a session, which survives if simscen is killed.
 
-The first line of a session lists all its runs; each later one says that a run began or how it ended, and is on the
-disk before the session goes on. Everything else in the output folder can be made from it again.
+The first line of a session lists all its runs. Each further line records that a run started or ended, and is written to
+disk before the session continues. All other reports can be generated again from the journal.
 """
 
 import fcntl
@@ -26,27 +26,26 @@ from simscen.report.journal_reader import (
 
 
 class Journal:
-    """Listens to a session in `folder` and writes it down; holds the folder's lock until its process ends.
+    """Writes the events of a session in `folder`, and locks the folder until the process ends.
 
-    With `goes_on` the folder may hold a journal already. Raises UsageError when the folder is another session's,
-    OSError when the file cannot be opened. When a line cannot be written later, `error` says why and the runs go on:
-    there may be room again, and the reports still come.
+    With `resume`, the folder may contain a journal. Raises UsageError if the folder belongs to another session, OSError
+    if the file cannot be opened. If a line cannot be written later, sets `error` and lets the session continue.
     """
 
-    def __init__(self, folder: Path, goes_on: bool = False) -> None:
+    def __init__(self, folder: Path, resume: bool = False) -> None:
         self.folder = folder
         self.error: OSError | None = None
         self._file = os.open(folder / JOURNAL_FILE, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         _lock(self._file, folder)
-        if _whole_lines(self._file) and not goes_on:
-            raise UsageError(f"the output folder {folder} holds a session already; nothing in it was touched")
+        if _truncate_to_complete_lines(self._file) and not resume:
+            raise UsageError(f"the output folder {folder} already contains a session; nothing in it was changed")
         self._numbers: dict[RunKey, int] = {}
-        self._answered: set[RunKey] = set()
-        self._begun = time.monotonic()
+        self._finished: set[RunKey] = set()
+        self._start = time.monotonic()
 
     def plan(self, runs: Sequence[PlannedRun], version: str, workers: int) -> None:
-        """Open a session of these runs; what stood in the journal before no longer counts."""
-        self._numbers, self._answered = {run.key: number for number, run in enumerate(runs)}, set()
+        """Start a session with these runs. Previous lines of the journal no longer count."""
+        self._numbers, self._finished = {run.key: number for number, run in enumerate(runs)}, set()
         facts = {
             "format": JOURNAL_FORMAT,
             "version": version,
@@ -57,40 +56,36 @@ class Journal:
         self._write({"event": "planned", **facts, "runs": [planned_run_to_data(run) for run in runs]})
 
     def __call__(self, event: SessionEvent) -> None:
-        """Write down what must not be lost."""
+        """Write a line for a started or finished run, and for the end of the session."""
         match event:
             case RunStarted():
                 self._write({"event": "started", "run": self._numbers[event.key]})
             case RunFinished():
-                answer = {
-                    "event": "finished",
-                    "run": self._numbers[event.key],
-                    **finished_run_to_data(event, self.folder),
-                }
-                if self._write(answer):
-                    self._answered.add(event.key)
+                data = finished_run_to_data(event, self.folder)
+                if self._write({"event": "finished", "run": self._numbers[event.key], **data}):
+                    self._finished.add(event.key)
             case SessionFinished():
                 self._write({"event": "ended", "interrupted": event.interrupted})
             case _:
                 pass
 
-    def complete(self, answers: Sequence[RunFinished]) -> None:
-        """Write down the answers that are missing: an interrupt or a full disk may have come between."""
-        for answer in answers:
-            if answer.key not in self._answered:
-                self(answer)
+    def complete(self, runs: Sequence[RunFinished]) -> None:
+        """Write the finished runs that are missing after an interrupt or a full disk."""
+        for run in runs:
+            if run.key not in self._finished:
+                self(run)
 
     def close(self) -> None:
-        """Let go of the folder."""
+        """Close the file and unlock the folder."""
         os.close(self._file)
 
     def _write(self, message: dict[str, Any]) -> bool:
-        message = {**message, "at": round(time.monotonic() - self._begun, 3)}
+        message = {**message, "at": round(time.monotonic() - self._start, 3)}
         data = json.dumps(message, sort_keys=True, ensure_ascii=True, allow_nan=False).encode() + b"\n"
         size = os.fstat(self._file).st_size
         try:
             written = os.write(self._file, data)
-            if written < len(data):  # the disk is full: say so, as the rest of the line would
+            if written < len(data):  # the disk is full: writing the rest raises the error
                 os.write(self._file, data[written:])
             os.fdatasync(self._file)
         except OSError as error:
@@ -100,8 +95,8 @@ class Journal:
         return True
 
 
-def _whole_lines(file: int) -> int:
-    """Cut off what a killed writer left of its last line; the size of the rest."""
+def _truncate_to_complete_lines(file: int) -> int:
+    """Remove an incomplete last line, which a killed process left, and return the remaining size."""
     data = os.pread(file, os.fstat(file).st_size, 0)
     size = data.rfind(b"\n") + 1
     if size < len(data):
@@ -110,7 +105,7 @@ def _whole_lines(file: int) -> int:
 
 
 def require_free(folder: Path) -> None:
-    """Raise UsageError when a session is under way in `folder`."""
+    """Raise UsageError if a session is running in `folder`."""
     if (folder / JOURNAL_FILE).is_file():
         file = os.open(folder / JOURNAL_FILE, os.O_RDONLY)
         try:
@@ -124,5 +119,5 @@ def _lock(file: int, folder: Path) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         lines = last_session_lines(folder)
-        by = f" by pid {lines[0]['pid']}" if lines else ""
-        raise UsageError(f"the output folder {folder} is in use{by}") from None
+        process = f" by pid {lines[0]['pid']}" if lines else ""
+        raise UsageError(f"the output folder {folder} is in use{process}") from None

@@ -1,4 +1,4 @@
-"""Runs as lines of the journal, and back."""
+"""Reader of events.jsonl, the journal of a session, and the format of its lines."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -20,11 +20,10 @@ JOURNAL_FORMAT = 2
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """A run that a session has taken on; `path` is the scenario's file.
+    """A run of a session that may not have started yet. `path` is the scenario file.
 
-    `digest` changes with everything the run depends on, so that an old answer is not kept for a new question. `again`
-    and `file` are as in RunFinished; they depend on where the session was started, which is no other question. `stack`
-    is as in RunResult; what it stands for is in the digest.
+    `digest` is a hash of everything that the result depends on, so that a result is reused only if nothing has changed.
+    `again` and `file` have the same meaning as in RunFinished, `stack` as in RunResult.
     """
 
     key: RunKey
@@ -36,26 +35,26 @@ class PlannedRun:
 
 
 def planned_run_to_data(run: PlannedRun) -> dict[str, Any]:
-    """A planned run as plain data."""
-    where = {"path": run.path, "file": run.file, "again": run.again, "stack": run.stack}
-    return {**asdict(run.key), **where, "digest": run.digest}
+    """Return a planned run as JSON data."""
+    source = {"path": run.path, "file": run.file, "again": run.again, "stack": run.stack}
+    return {**asdict(run.key), **source, "digest": run.digest}
 
 
 def planned_run_from_data(data: dict[str, Any]) -> PlannedRun:
-    """The run that `planned_data` described. Raises KeyError or TypeError when it is none."""
+    """Read the data of `planned_run_to_data`. Raises KeyError or TypeError if they are invalid."""
     return PlannedRun(read_key(data), data["path"], data["digest"], data["again"], data["file"], data.get("stack", ""))
 
 
 def finished_run_to_data(run: RunFinished, folder: Path) -> dict[str, Any]:
-    """An answer as plain data: its result.json and what that leaves out. Files are relative to `folder`."""
+    """Return a finished run as JSON data, with files relative to `folder`."""
     files = {name: relative(path, str(folder)) if path else "" for name, path in asdict(run.artifacts).items()}
-    about = {"wall": run.wall, "again": run.again, "file": run.file, "tags": list(run.tags)}
-    about |= {"resumed": True} if run.resumed else {}
-    return {**about, "files": files, "result": result_data(run.result)}
+    data = {"wall": run.wall, "again": run.again, "file": run.file, "tags": list(run.tags)}
+    data |= {"resumed": True} if run.resumed else {}
+    return {**data, "files": files, "result": result_data(run.result)}
 
 
 def finished_run_from_data(data: dict[str, Any], folder: Path) -> RunFinished:
-    """The answer that `run_data` described, its files now in `folder`. Raises KeyError, TypeError or ValueError."""
+    """Read the data of `finished_run_to_data`, with files in `folder`. Raises KeyError, TypeError or ValueError."""
     files = {name: str(folder / path) if path else "" for name, path in data["files"].items()}
     result, tags = from_data(data["result"]), tuple(data.get("tags", ()))
     return RunFinished(
@@ -68,49 +67,54 @@ Run = TypeVar("Run", PlannedRun, RunFinished)
 
 @dataclass(frozen=True)
 class JournaledSession:
-    """The last session in a journal: what it planned, what was answered, and which runs had at least begun.
+    """The last session in a journal.
 
-    `wall` is how many seconds after its start the last line was written.
+    Attributes:
+        planned: All runs of the session.
+        finished: Finished runs by key.
+        started: Runs that had at least started.
+        wall: Seconds from the start of the session to the last line.
+        interrupted: Whether the session ended before all runs were finished.
     """
 
     version: str
     workers: int
     planned: tuple[PlannedRun, ...]
-    answered: Mapping[RunKey, RunFinished]
-    begun: frozenset[RunKey]
+    finished: Mapping[RunKey, RunFinished]
+    started: frozenset[RunKey]
     wall: float
     interrupted: bool
 
     @property
-    def answers(self) -> list[RunFinished]:
-        """An answer for every planned run: an error where simscen ended before there was one."""
-        return [self.answered.get(run.key) or self._unanswered(run) for run in self.planned]
+    def runs(self) -> list[RunFinished]:
+        """All planned runs; those that were not finished have an error."""
+        return [self.finished.get(run.key) or self._unfinished(run) for run in self.planned]
 
-    def started(self, folder: Path) -> SessionStarted:
-        """The event that the session began with."""
+    def start_event(self, folder: Path) -> SessionStarted:
+        """Return the event at the start of the session."""
         return session_started(self.version, [run.key for run in self.planned], self.workers, folder, self.stacks)
 
     @property
     def stacks(self) -> tuple[str, ...]:
-        """The NAME=VALUE of each stack that was chosen, in their order."""
+        """NAME=VALUE of each stack that was chosen, in order."""
         return tuple(dict.fromkeys(run.stack for run in self.planned if run.stack))
 
-    def _unanswered(self, run: PlannedRun) -> RunFinished:
-        kind = "interrupted" if run.key in self.begun else "not-run"
-        why = "before it was finished" if run.key in self.begun else "before it began"
-        failure = RunFailure(kind, f"simscen ended {why}")
+    def _unfinished(self, run: PlannedRun) -> RunFinished:
+        has_started = run.key in self.started
+        kind = "interrupted" if has_started else "not-run"
+        failure = RunFailure(kind, f"simscen ended before the run {'was finished' if has_started else 'started'}")
         return RunFinished(error_result(run.key, run.path, failure, run.stack), again=run.again, file=run.file)
 
 
 def read_journal(folder: Path) -> JournaledSession:
-    """The last session of the journal in `folder`. Raises InvalidInput when there is none that can be understood."""
+    """Read the last session of the journal in `folder`. Raises InvalidInput if there is no valid one."""
     if not (folder / JOURNAL_FILE).is_file():
         hint = "name the folder that `simscen run` wrote, e.g. simscen-out/latest"
-        raise _invalid(folder, f"there is no {JOURNAL_FILE} in it", hint)
+        raise _invalid(folder, f"the folder has no {JOURNAL_FILE}", hint)
     try:
         lines = last_session_lines(folder)
         if not lines:
-            raise _invalid(folder / JOURNAL_FILE, "the session ended before it had planned its runs")
+            raise _invalid(folder / JOURNAL_FILE, "the session ended before it listed its runs")
         return _parse_session(lines, folder)
     except OSError as error:
         raise _invalid(folder / JOURNAL_FILE, f"cannot read the journal: {error.strerror}") from error
@@ -119,9 +123,9 @@ def read_journal(folder: Path) -> JournaledSession:
 
 
 def last_session_lines(folder: Path) -> list[dict[str, Any]]:
-    """The lines of the last session; a last line that was cut short is not one. Raises OSError or ValueError."""
-    whole = (folder / JOURNAL_FILE).read_bytes().split(b"\n")[:-1]
-    lines = [json.loads(line) for line in whole]
+    """Return the complete lines of the last session. Raises OSError or ValueError."""
+    complete = (folder / JOURNAL_FILE).read_bytes().split(b"\n")[:-1]
+    lines = [json.loads(line) for line in complete]
     starts = [number for number, line in enumerate(lines) if line["event"] == "planned"]
     return lines[starts[-1] :] if starts else []
 
@@ -132,28 +136,28 @@ def _parse_session(lines: list[dict[str, Any]], folder: Path) -> JournaledSessio
         raise ValueError(f"it has format {first['format']}; this version reads {JOURNAL_FORMAT}")
     cwd = first.get("cwd", "")
     planned = tuple(_relocate(planned_run_from_data(run), cwd) for run in first["runs"])
-    answered: dict[RunKey, RunFinished] = {}
-    begun: set[RunKey] = set()
+    finished: dict[RunKey, RunFinished] = {}
+    started: set[RunKey] = set()
     for line in lines[1:]:
         if line["event"] == "started":
-            begun.add(planned[line["run"]].key)
+            started.add(planned[line["run"]].key)
         elif line["event"] == "finished":
             key = planned[line["run"]].key
-            answered[key] = _relocate(finished_run_from_data(line, folder), cwd)
+            finished[key] = _relocate(finished_run_from_data(line, folder), cwd)
     last = lines[-1]
     return JournaledSession(
         version=first["version"],
         workers=first["workers"],
         planned=planned,
-        answered=answered,
-        begun=frozenset(begun),
+        finished=finished,
+        started=frozenset(started),
         wall=last["at"],
-        interrupted=len(answered) < len(planned) or bool(last.get("interrupted")),
+        interrupted=len(finished) < len(planned) or bool(last.get("interrupted")),
     )
 
 
 def _relocate(run: Run, cwd: str) -> Run:
-    """The run with its scenario's file as seen from where we are now, not from where the session was."""
+    """Return the run with the path of its scenario file relative to the current working folder."""
     return replace(run, file=relative_to_cwd(run.file, cwd))
 
 
@@ -162,59 +166,56 @@ def _invalid(path: Path, message: str, hint: str = "") -> InvalidInput:
 
 
 MAX_SESSIONS = 50
-"""So many sessions are looked back on."""
+"""Maximum number of sessions to search for failures."""
 UNDECIDED_KINDS = frozenset({"interrupted", "not-run"})
-"""Kinds of runs that say nothing of their scenario; the session before them does."""
+"""Kinds of errors after which the outcome of the previous session still counts."""
 
 
 @dataclass(frozen=True)
 class LastFailed:
-    """The `runs` whose latest outcome was none as it should be, and the newest session's `folder`."""
+    """The `runs` whose latest outcome was a failure, and the `folder` of the newest session."""
 
     folder: Path
     runs: frozenset[RunKey]
 
 
 def sessions_in(folder: Path) -> list[Path]:
-    """The output folders of sessions below `folder`, the newest first; links such as `latest` are left out."""
+    """Return the output folders of sessions in `folder`, newest first, without links such as `latest`."""
     if not folder.is_dir():
         return []
-    found = [each for each in folder.iterdir() if (each / JOURNAL_FILE).is_file() and not each.is_symlink()]
+    sessions = [each for each in folder.iterdir() if (each / JOURNAL_FILE).is_file() and not each.is_symlink()]
     return sorted(
-        found, key=lambda each: (_written(each), (each / JOURNAL_FILE).stat().st_mtime_ns, each.name), reverse=True
+        sessions, key=lambda each: (_written(each), (each / JOURNAL_FILE).stat().st_mtime_ns, each.name), reverse=True
     )
 
 
 def last_failed(folder: Path) -> LastFailed | None:
-    """What failed when it was run last, in any of the sessions of `folder`, as pytest remembers it; None = no session.
-
-    A run that later sessions left out is still as it was then.
-    """
+    """Return the runs that failed when they were last run in a session of `folder`, or None without any session."""
     sessions = sessions_in(folder)
     if not sessions:
         return None
     known: dict[RunKey, bool] = {}
     for session in islice(sessions, MAX_SESSIONS):
-        found: dict[RunKey, bool] = {}
+        outcomes: dict[RunKey, bool] = {}
         for key, good in _outcomes(session):
-            found[key.first] = found.get(key.first, True) and good
-        known = {**found, **known}
+            outcomes[key.first] = outcomes.get(key.first, True) and good
+        known = {**outcomes, **known}
     return LastFailed(sessions[0], frozenset(key for key, good in known.items() if not good))
 
 
 def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
-    """Each run that came to an end, and whether as it should; none of a journal that cannot be read."""
+    """Yield each finished run and whether it had the desired outcome. Yields nothing for an invalid journal."""
     try:
-        answers = read_journal(session).answers
+        runs = read_journal(session).runs
     except InvalidInput:
         return
-    for answer in answers:
-        if answer.result.error is None or answer.result.error.kind not in UNDECIDED_KINDS:
-            yield answer.key, answer.outcome.good
+    for run in runs:
+        if run.result.error is None or run.result.error.kind not in UNDECIDED_KINDS:
+            yield run.key, run.outcome.good
 
 
 def _written(session: Path) -> str:
-    """When run.json says that it was, in ISO 8601; "" where it does not."""
+    """Return the time of the session from run.json (ISO 8601), or "" if it is unknown."""
     try:
         document = json.loads((session / "run.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""What `simscen judge` prints: one log in full, many in a line each, or many by the same criteria as a table."""
+"""Output of `simscen judge`: details of one log, a line per log, or a table of margins for several logs."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -8,38 +8,34 @@ from simscen.core.records.session_events import RunFinished
 from simscen.core.records.verdict import Status, Verdict
 from simscen.judge.finding_text import tightest_margin
 from simscen.report.display_text import escape_control, one_line
-from simscen.report.session_lines import SIGNS, violation_lines
-from simscen.report.styled_line import Role, StyledLine, StyledText
-from simscen.report.violations import error_summary, excuse_text, reported_violations
-
-_ROLES: dict[str, Role] = {"good": "good", "bad": "bad", "odd": "odd"}
+from simscen.report.session_lines import SYMBOLS, violation_lines
+from simscen.report.styled_line import StyledLine, StyledText
+from simscen.report.violations import error_summary, excuse_text, first_violation
 
 
 def full_log_lines(run: RunFinished, name: str) -> Iterator[StyledLine]:
-    """How long it is and how it came out, then all that was violated."""
+    """Yield the length and outcome of a log, then all violations."""
     nearest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
-    beside = f"tightest: {one_line(nearest)}" if nearest else excuse_text(run)
-    yield (*_head(run.result, name), *((StyledText(f"   {beside}", "quiet"),) if beside else ()))
+    note = f"tightest: {one_line(nearest)}" if nearest else excuse_text(run)
+    yield (*_head(run.result, name), *((StyledText(f"   {note}", "quiet"),) if note else ()))
     yield from violation_lines(run)
 
 
 def short_log_line(run: RunFinished, name: str) -> StyledLine:
-    """How long it is, how near it came to failing, or the first reason why it did not pass."""
+    """Return a line with the length of a log, and its tightest margin or the first reason for the failure."""
     if run.outcome is Outcome.ERROR:
-        return (*_head(run.result, name), StyledText(f"   {error_summary(run)}", "odd"))
+        return (*_head(run.result, name), StyledText(f"   {error_summary(run)}", "warning"))
     if excuse := excuse_text(run):
         return (*_head(run.result, name), StyledText(f"   {excuse}", "quiet"))
-    told = [complaint for complaint in reported_violations(run) if not complaint.warning]
-    more = f" (and {len(told) - 1} more)" if len(told) > 1 else ""
     nearest = one_line(tightest_margin(run.result.verdicts))
-    why = f"   {told[0].message}{more}" if told else f"   tightest: {nearest}" if nearest else ""
-    return (*_head(run.result, name), StyledText(why, "quiet"))
+    reason = first_violation(run) or (f"tightest: {nearest}" if nearest else "")
+    return (*_head(run.result, name), StyledText(f"   {reason}".rstrip(), "quiet"))
 
 
 def margin_table(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[StyledLine]:
-    """The margin of each criterion in each log; then why some have none, each reason once."""
+    """Yield a table with the margin of each criterion in each log, then the reasons for missing margins."""
     ids = list(dict.fromkeys(verdict.id for _, run in runs for verdict in run.result.verdicts))
-    rows = [[one_line(name), *(_cell(run.result, name_) for name_ in ids)] for name, run in runs]
+    rows = [[one_line(name), *(_cell(run.result, verdict_id) for verdict_id in ids)] for name, run in runs]
     columns = list(zip(["log", *ids], *rows, strict=True))
     widths = [max(len(text) for text in column) for column in columns]
 
@@ -49,26 +45,26 @@ def margin_table(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[StyledLine
 
     yield (StyledText(f"    {aligned(['log', *ids])}", "quiet"),)
     for row, (_, run) in zip(rows, runs, strict=True):
-        sign, role = SIGNS[run.outcome]
-        yield (StyledText("  "), StyledText(sign, _ROLES[role]), StyledText(f" {aligned(row)}"))
+        symbol, role = SYMBOLS[run.outcome]
+        yield (StyledText("  "), StyledText(symbol, role), StyledText(f" {aligned(row)}"))
     yield from (((StyledText(f"  {text}", "quiet"),)) for text in _reasons(runs))
 
 
 def summary_line(runs: Sequence[RunFinished]) -> StyledLine:
-    """12 passed, 1 failed."""
+    """Return the numbers of outcomes, for example "12 passed, 1 failed"."""
     count = Counter(run.outcome for run in runs)
     words = [(Outcome.PASSED, "passed"), (Outcome.FAILED, "failed"), (Outcome.ERROR, "could not be judged")]
     words += [(Outcome.FAILED_AS_EXPECTED, "failed as expected"), (Outcome.SKIPPED, "skipped")]
-    told = [f"{count[outcome]} {word}" for outcome, word in words if count[outcome] or outcome is Outcome.PASSED]
-    return (StyledText(", ".join(told)),)
+    parts = [f"{count[outcome]} {word}" for outcome, word in words if count[outcome] or outcome is Outcome.PASSED]
+    return (StyledText(", ".join(parts)),)
 
 
 def _head(result: RunResult, name: str) -> tuple[StyledText, ...]:
-    sign, role = SIGNS[result.outcome]
+    symbol, role = SYMBOLS[result.outcome]
     length = f"   {result.simulated:.1f} s recorded" if result.simulated else ""
     return (
         StyledText("  "),
-        StyledText(sign, _ROLES[role]),
+        StyledText(symbol, role),
         StyledText(f" {escape_control(name)}", "name"),
         StyledText(length, "quiet"),
     )
@@ -88,24 +84,24 @@ def _cell(result: RunResult, name: str) -> str:
 
 
 def _margin(margin: float, unit: str) -> str:
-    """With its sign, which two decimals must not round away; a number of events is a whole one."""
+    """Format a margin with its sign: integers for counts, and enough digits to show that a margin is not zero."""
     if not unit and margin == round(margin):
         return f"{margin:+.0f}"
     return f"{margin:+.2f} {unit}".rstrip() if margin == 0 or abs(margin) >= 0.005 else f"{margin:+.1g} {unit}".rstrip()
 
 
 def _reasons(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[str]:
-    """Why a criterion is not decided, or a log could not be judged."""
-    told = Counter(reason for _, run in runs for verdict in run.result.verdicts for reason in _why(verdict))
-    for reason, number in told.items():
+    """Yield each reason why a criterion is undecided or a log could not be judged, once."""
+    reasons = Counter(reason for _, run in runs for verdict in run.result.verdicts for reason in _undecided(verdict))
+    for reason, number in reasons.items():
         yield f"{reason} ({number} logs)" if number > 1 else reason
     for name, run in runs:
         if run.outcome is Outcome.ERROR:
             yield one_line(f"{name}: {error_summary(run)}")
 
 
-def _why(verdict: Verdict) -> Iterator[str]:
+def _undecided(verdict: Verdict) -> Iterator[str]:
     if verdict.status in (Status.INCONCLUSIVE, Status.ERROR) and verdict.tightest is not None:
-        sign = "?" if verdict.status is Status.INCONCLUSIVE else "error:"
+        symbol = "?" if verdict.status is Status.INCONCLUSIVE else "error:"
         reasons = "; ".join(verdict.tightest.detail)
-        yield one_line(f"{sign} {verdict.id}: {verdict.tightest.measured}" + (f" ({reasons})" if reasons else ""))
+        yield one_line(f"{symbol} {verdict.id}: {verdict.tightest.measured}" + (f" ({reasons})" if reasons else ""))

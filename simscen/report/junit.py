@@ -1,7 +1,7 @@
-"""junit.xml: one testsuite for each scenario file, one testcase for each run.
+"""Writer of junit.xml, with one testsuite per scenario file and one testcase per run.
 
-The elements are those that Jenkins, GitLab, GitHub actions and junitparser agree on. Family "xunit2" leaves out what
-Jenkins' junit-10.xsd forbids: `file` and `line` of a testcase, and its properties.
+Jenkins, GitLab, GitHub actions and junitparser support all elements. The family "xunit2" omits what junit-10.xsd of
+Jenkins forbids: `file`, `line` and properties of a testcase.
 """
 
 import re
@@ -18,6 +18,7 @@ from simscen.report.violations import (
     Violation,
     error_details,
     excuse_text,
+    first_violation,
     reported_violations,
     scenario_file,
     source_location,
@@ -27,25 +28,25 @@ Family = Literal["simscen", "xunit2"]
 
 
 def to_xml(runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen") -> bytes:
-    """The whole document in UTF-8, runs sorted by file, scenario and seed; the order they ended in does not show."""
+    """Return the document in UTF-8, with runs sorted by file, scenario and seed."""
     root = Element("testsuites", {"name": escape_control(name)})
     ordered = sorted(runs, key=lambda run: (run.result.path, run.key))
     for path in sorted({run.result.path for run in ordered}):
-        own = [run for run in ordered if run.result.path == path]
-        _suite(root, scenario_file(own[0]), own, family)
+        runs_of_file = [run for run in ordered if run.result.path == path]
+        _add_suite(root, scenario_file(runs_of_file[0]), runs_of_file, family)
     _count(root, ordered)
     ElementTree.indent(root)
     body: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return body + b"\n"
 
 
-def _suite(root: Element, path: str, runs: list[RunFinished], family: Family) -> None:
+def _add_suite(root: Element, path: str, runs: list[RunFinished], family: Family) -> None:
     suite = SubElement(root, "testsuite", {"name": escape_control(path)})
     _count(suite, runs)
     suite.set("skipped", str(sum(bool(excuse_text(run)) for run in runs)))
     used: set[str] = set()
     for run in runs:
-        _case(suite, run, _unique(_case_name(run), used), family)
+        _add_case(suite, run, _unique(_case_name(run), used), family)
 
 
 def _count(element: Element, runs: Sequence[RunFinished]) -> None:
@@ -55,22 +56,21 @@ def _count(element: Element, runs: Sequence[RunFinished]) -> None:
     element.set("time", f"{sum(run.wall for run in runs):.3f}")
 
 
-def _case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
+def _add_case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
     case = SubElement(suite, "testcase", {"classname": _classname(run), "name": name, "time": f"{run.wall:.3f}"})
     if family == "simscen":
         case.set("file", escape_control(scenario_file(run)))
-        case.set(
-            "line", str(next((found.line for found in reported_violations(run) if found.line and not found.warning), 1))
-        )
-        _properties(case, run)
+        lines = (each.line for each in reported_violations(run) if each.line and not each.warning)
+        case.set("line", str(next(lines, 1)))
+        _add_properties(case, run)
     match run.outcome:
         case Outcome.FAILED:
-            _failure(case, run)
+            _add_failure(case, run)
         case Outcome.ERROR:
-            _error(case, run)
+            _add_error(case, run)
         case Outcome.SKIPPED:
             SubElement(case, "skipped", {"type": "simscen.skip", "message": escape_control(run.result.reason)})
-        case Outcome.FAILED_AS_EXPECTED:  # as pytest writes its xfail
+        case Outcome.FAILED_AS_EXPECTED:  # as pytest does for xfail
             SubElement(case, "skipped", {"type": "simscen.expected-failure", "message": excuse_text(run)})
         case Outcome.PASSED:
             pass
@@ -78,7 +78,7 @@ def _case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
         SubElement(case, "system-out").text = output
 
 
-def _properties(case: Element, run: RunFinished) -> None:
+def _add_properties(case: Element, run: RunFinished) -> None:
     properties = SubElement(case, "properties")
     values = {
         "seed": str(run.key.seed),
@@ -101,44 +101,39 @@ def _properties(case: Element, run: RunFinished) -> None:
             SubElement(properties, "property", {"name": one_line(key), "value": escape_control(value)})
 
 
-def _failure(case: Element, run: RunFinished) -> None:
-    serious = [complaint for complaint in reported_violations(run) if not complaint.warning]
-    more = f" (and {len(serious) - 1} more)" if len(serious) > 1 else ""
+def _add_failure(case: Element, run: RunFinished) -> None:
+    failures = [violation for violation in reported_violations(run) if not violation.warning]
     element = SubElement(case, "failure")
-    element.set("type", escape_control(serious[0].verdict.criterion) if serious else "criterion")
-    element.set("message", (serious[0].message if serious else "failed") + more)
-    element.text = _told(run, serious)
+    element.set("type", escape_control(failures[0].verdict.criterion) if failures else "criterion")
+    element.set("message", first_violation(run) or "failed")
+    element.text = _details(run, failures)
 
 
-def _error(case: Element, run: RunFinished) -> None:
+def _add_error(case: Element, run: RunFinished) -> None:
     kind, message, tail = error_details(run)
     element = SubElement(case, "error", {"type": escape_control(kind), "message": message})
-    disturbance_line = [
-        f"{source_location(run)}: {message}",
-        tail,
-        _told(run, [c for c in reported_violations(run) if not c.warning]),
-    ]
-    element.text = "\n".join(part for part in disturbance_line if part)
+    failures = [violation for violation in reported_violations(run) if not violation.warning]
+    parts = [f"{source_location(run)}: {message}", tail, _details(run, failures)]
+    element.text = "\n".join(part for part in parts if part)
 
 
-def _told(run: RunFinished, about: list[Violation]) -> str:
+def _details(run: RunFinished, violations: list[Violation]) -> str:
     lines = []
-    for complaint in about:
-        lines.append(f"{source_location(run, complaint.line)}: {complaint.message}")
-        lines += [f"    {text}" for text in complaint.detail]
+    for violation in violations:
+        lines.append(f"{source_location(run, violation.line)}: {violation.message}")
+        lines += [f"    {text}" for text in violation.detail]
     return "\n".join([*lines, *([f"again: {shell_command_text(run.again)}"] if run.again else [])])
 
 
 def _output(run: RunFinished) -> str:
-    """Warnings, what fired when, then attachments as Jenkins and GitLab read them."""
-    warnings = [complaint for complaint in reported_violations(run) if complaint.warning]
+    """Return warnings, disturbances, and attachments in the syntax of Jenkins and GitLab."""
+    warnings = [violation for violation in reported_violations(run) if violation.warning]
     lines = [f"{source_location(run, warning.line)}: warning: {warning.message}" for warning in warnings]
     files = (run.artifacts.picture, run.artifacts.replay, run.artifacts.mcap, run.artifacts.result)
-    lines += [
-        one_line(f"{one.ordered.kind} {disturbance_line(one, run.result.tick_rate)}") for one in run.result.disturbances
-    ]
-    told_of = [line.replace("[[ATTACHMENT|", "[ [ATTACHMENT|") for line in lines]  # names are no files to attach
-    return "\n".join([*told_of, *(f"[[ATTACHMENT|{one_line(file)}]]" for file in files if file)])
+    for each in run.result.disturbances:
+        lines.append(one_line(f"{each.ordered.kind} {disturbance_line(each, run.result.tick_rate)}"))
+    escaped = [line.replace("[[ATTACHMENT|", "[ [ATTACHMENT|") for line in lines]  # user text must not attach files
+    return "\n".join([*escaped, *(f"[[ATTACHMENT|{one_line(file)}]]" for file in files if file)])
 
 
 def _classname(run: RunFinished) -> str:

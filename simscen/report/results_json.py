@@ -1,4 +1,4 @@
-"""results.json: the session as data. No wall clock in it, so that two sessions can be compared."""
+"""Writer of results.json, without wall-clock times so that two sessions can be compared."""
 
 import json
 from collections.abc import Sequence
@@ -18,13 +18,13 @@ FORMAT = 1
 
 
 def to_json(runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None) -> str:
-    """The document; runs are sorted, artifacts are given relative to the session's `folder`."""
+    """Return the document with sorted runs. Paths of artifacts are relative to the `folder` of the session."""
     document = as_document(runs, folder, comparison)
     return json.dumps(document, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def as_document(runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None) -> dict[str, Any]:
-    """The same as plain data: counts, then one entry for each run in the form of its result.json."""
+    """Return the document as data: counts, and one entry per run in the format of its result.json."""
     ordered = in_order(runs)
     counts = {outcome.value: sum(run.outcome is outcome for run in runs) for outcome in Outcome}
     return {
@@ -58,7 +58,7 @@ def results_by_stack(runs: Sequence[RunFinished]) -> dict[str, list[RunResult]]:
 
 
 def in_order(runs: Sequence[RunFinished]) -> list[RunFinished]:
-    """By file, scenario and seed: the order they ended in does not show."""
+    """Return the runs sorted by file, scenario and seed."""
     return sorted(runs, key=lambda run: (run.result.path, run.key))
 
 
@@ -67,19 +67,20 @@ def _resumed(run: RunFinished) -> dict[str, bool]:
 
 
 def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:
-    made = run.artifacts
-    files = {"mcap": made.mcap, "picture": made.picture, "replay": made.replay, "result": made.result}
+    artifacts = run.artifacts
+    names = "mcap", "picture", "replay", "result"
+    files = {name: getattr(artifacts, name) for name in names}
     return {name: relative(path, folder) for name, path in files.items() if path}
 
 
 def relative(path: str, folder: str) -> str:
-    """The path of a file inside `folder`; of any other, the path as it is."""
+    """Return the path of a file relative to `folder` if the file is in there, otherwise the path itself."""
     inside = folder and PurePath(path).is_relative_to(folder)
     return PurePath(path).relative_to(folder).as_posix() if inside else PurePath(path).as_posix()
 
 
 def json_reporter(out: TextIO) -> Reporter:
-    """Collects the runs and writes them at the end of the session."""
+    """Return a reporter that writes the document at the end of the session."""
     return _JsonReporter(out)
 
 
@@ -97,7 +98,7 @@ class _JsonReporter:
         self._out.flush()
 
     def __call__(self, event: SessionEvent) -> None:
-        """Keep, or write."""
+        """Collect a finished run, or write the document."""
         if isinstance(event, RunFinished):
             self._runs.append(event)
         if isinstance(event, SessionFinished):

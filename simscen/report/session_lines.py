@@ -1,4 +1,4 @@
-"""A session as lines of text: what the console prints, piece by piece with the role of each piece."""
+"""Lines of text on a session: header, runs, violations, failures, and footer."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from simscen.report.violations import (
     error_details,
     error_summary,
     excuse_text,
+    first_violation,
     reported_violations,
     scenario_file,
     short_run_name,
@@ -20,23 +21,23 @@ from simscen.report.violations import (
 
 ERROR_TAIL_LINES = 12
 FIXED_COLUMNS = 33
-"""Columns that sign and times take, so that names are padded to what is left of a terminal's."""
+"""Columns of a line without the name of the run. Names are padded to the rest of the terminal."""
 MIN_NAME_COLUMNS = 16
 MAX_DISTURBANCES = 8
-SIGNS = {
+SYMBOLS: dict[Outcome, tuple[str, Role]] = {
     Outcome.PASSED: ("✓", "good"),
     Outcome.FAILED: ("✗", "bad"),
-    Outcome.ERROR: ("!", "odd"),
-    Outcome.FAILED_AS_EXPECTED: ("~", "odd"),
-    Outcome.SKIPPED: ("-", "odd"),
+    Outcome.ERROR: ("!", "warning"),
+    Outcome.FAILED_AS_EXPECTED: ("~", "warning"),
+    Outcome.SKIPPED: ("-", "warning"),
 }
 
 
 @dataclass(frozen=True)
 class RunNaming:
-    """How runs are called in the lines of a session: short, unique, and in a column of `width`.
+    """Short unique names of the runs of a session, padded to `width`.
 
-    `columns` are those of the terminal; None where there is none.
+    `every_seed` adds the seed to each name, and `prefix` is removed from IDs. `columns` is the width of the terminal.
     """
 
     every_seed: bool = False
@@ -46,26 +47,26 @@ class RunNaming:
 
     @classmethod
     def of(cls, session: SessionStarted, columns: int | None = None) -> "RunNaming":
-        """Seeds are told where a scenario runs more than once with a stack, stacks where there are several."""
+        """Choose the naming of a session. Names contain seeds and stacks only if there are several."""
         stacks = [text.partition("=")[0] for text in session.stacks] if len(session.stacks) > 1 else []
         every_seed = session.total != (len(session.ids) or session.scenarios) * max(1, len(stacks))
         prefix = _common_folder(session.ids)
-        longest = max((len(one) for one in session.ids), default=0) - len(prefix)
+        longest = max((len(scenario_id) for scenario_id in session.ids), default=0) - len(prefix)
         stack = ".".join(
             part for part in (max(stacks, key=len, default=""), REPEAT_SUFFIX if session.twice else "") if part
         )
         extra = [*(["seed 1234"] if every_seed else []), *([stack] if stack else [])]
         width = longest + (len(f" ({', '.join(extra)})") if extra else 0)
-        room = width if columns is None else max(MIN_NAME_COLUMNS, columns - FIXED_COLUMNS)
-        return cls(every_seed, prefix, min(width, room), columns)
+        available = width if columns is None else max(MIN_NAME_COLUMNS, columns - FIXED_COLUMNS)
+        return cls(every_seed, prefix, min(width, available), columns)
 
     def name(self, key: RunKey) -> str:
-        """The run's name, padded."""
+        """Return the padded name of a run."""
         return f"{short_run_name(key, self.every_seed, self.prefix):{self.width}}"
 
 
 def _common_folder(ids: Sequence[str]) -> str:
-    """The folder that all ids begin with, with its slash: "scenarios/"; "" for a single one or none."""
+    """Return the common folder of all IDs with its slash, for example "scenarios/"; "" for fewer than two IDs."""
     if len(ids) < 2:
         return ""
     shortest, longest = min(ids), max(ids)
@@ -74,7 +75,7 @@ def _common_folder(ids: Sequence[str]) -> str:
 
 
 def session_header(started: SessionStarted) -> StyledLine:
-    """simscen 0.1.0 · 14 scenarios · 2 workers."""
+    """Return the header, for example "simscen 0.1.0 · 14 scenarios · 2 workers"."""
     runs = "" if started.total == started.scenarios else f" · {_count(started.total, 'run')}"
     workers = _count(started.workers, "worker")
     head = f"simscen {started.version} · {_count(started.scenarios, 'scenario')}{_stacks_text(started.stacks)}"
@@ -82,17 +83,17 @@ def session_header(started: SessionStarted) -> StyledLine:
 
 
 def _stacks_text(stacks: Sequence[str]) -> str:
-    """The one stack that takes the place of the scenarios' own, or how many."""
-    disturbance_line = f"stack {one_line(stacks[0])}" if len(stacks) == 1 else f"{len(stacks)} stacks"
-    return f" · {disturbance_line}" if stacks else ""
+    """Return the name of the stack that was chosen, or the number of several stacks."""
+    text = f"stack {one_line(stacks[0])}" if len(stacks) == 1 else f"{len(stacks)} stacks"
+    return f" · {text}" if stacks else ""
 
 
 def run_lines(run: RunFinished, naming: RunNaming) -> Iterator[StyledLine]:
-    """One line for a run that passed; for the others also what was violated, where, and how to see it again."""
-    sign, role = SIGNS[run.outcome]
+    """Yield a line with the outcome of a run, and for failures the violations, artifacts and command to repeat it."""
+    symbol, role = SYMBOLS[run.outcome]
     yield (
         StyledText("  "),
-        StyledText(sign, _role(role)),
+        StyledText(symbol, role),
         StyledText(f" {naming.name(run.key)} ", "name"),
         *_summary(run),
     )
@@ -100,19 +101,19 @@ def run_lines(run: RunFinished, naming: RunNaming) -> Iterator[StyledLine]:
 
 
 def violation_lines(run: RunFinished) -> Iterator[StyledLine]:
-    """What was violated, where, and how to see it again; nothing but warnings for a run that passed.
+    """Yield violations, disturbances, artifacts and the command to repeat a run. If it passed, yield only warnings.
 
-    Of one that failed as expected only the reason is of interest, which stands beside its name.
+    Expected failures and skipped runs have no lines, because the reason is next to their name.
     """
     if run.outcome in (Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED):
         return
     if run.outcome is Outcome.ERROR:
         yield from _error_lines(run)
-    for complaint in reported_violations(run):
-        role = "odd" if complaint.warning or complaint.verdict.status.value != "fail" else "bad"
-        word = "warning: " if complaint.warning else ""
-        yield (StyledText("      "), StyledText(f"{word}{complaint.message}", _role(role)))
-        yield from (((StyledText(f"        {text}", "quiet")),) for text in complaint.detail)
+    for violation in reported_violations(run):
+        role: Role = "warning" if violation.warning or violation.verdict.status.value != "fail" else "bad"
+        prefix = "warning: " if violation.warning else ""
+        yield (StyledText("      "), StyledText(f"{prefix}{violation.message}", role))
+        yield from (((StyledText(f"        {text}", "quiet")),) for text in violation.detail)
     if run.outcome is not Outcome.PASSED:
         yield from _disturbance_lines(run)
         yield _scenario_line(run)
@@ -120,9 +121,9 @@ def violation_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 
 def session_footer(session: SessionFinished, left: Mapping[str, int]) -> Iterator[StyledLine]:
-    """13 passed, 1 failed · 402 s simulated in 4.1 s · simscen-out/latest/junit.xml; then the page to open.
+    """Yield a line such as "13 passed, 1 failed · 402 s simulated in 4.1 s · junit.xml", and a line with the report.
 
-    `left` are runs that were not done, by what to say of them.
+    `left` are numbers of runs that were not finished, by description.
     """
     yield (*outcome_counts(session, left), *_timing_and_junit(session))
     if session.page:
@@ -130,20 +131,23 @@ def session_footer(session: SessionFinished, left: Mapping[str, int]) -> Iterato
 
 
 def outcome_counts(session: SessionFinished, left: Mapping[str, int]) -> Iterator[StyledText]:
-    """13 passed, 1 failed, 2 errors, 3 not run: what is `left` counts as an error in the reports, but not to people."""
-    counts = [
+    """Yield the numbers of outcomes, for example "13 passed, 1 failed, 2 errors, 3 not run".
+
+    Runs in `left` have errors in the reports, but are counted separately here.
+    """
+    counts: list[tuple[int, str, Role]] = [
         (session.passed, "passed", "good"),
         (session.failed, "failed", "bad"),
-        (session.errors - sum(left.values()), "errors", "odd"),
-        (session.expected, "failed as expected", "odd"),
-        (session.skipped, "skipped", "odd"),
-        *((number, word, "odd") for word, number in left.items()),
+        (session.errors - sum(left.values()), "errors", "warning"),
+        (session.expected, "failed as expected", "warning"),
+        (session.skipped, "skipped", "warning"),
+        *((number, word, "warning") for word, number in left.items()),
     ]
     shown = [(number, word, role) for number, word, role in counts if number or word == "passed"]
     for nth, (number, word, role) in enumerate(shown):
         if nth:
             yield StyledText(", ")
-        yield StyledText(f"{number} {'error' if word == 'errors' and number == 1 else word}", _role(role))
+        yield StyledText(f"{number} {'error' if word == 'errors' and number == 1 else word}", role)
 
 
 def _timing_and_junit(session: SessionFinished) -> Iterator[StyledText]:
@@ -170,25 +174,26 @@ def _summary(run: RunFinished) -> tuple[StyledText, ...]:
 
 
 def _error_lines(run: RunFinished) -> Iterator[StyledLine]:
-    yield (StyledText("      "), StyledText(error_summary(run), "odd"))
+    yield (StyledText("      "), StyledText(error_summary(run), "warning"))
     yield from (
         (StyledText(f"        | {line}", "quiet"),) for line in error_details(run)[2].splitlines()[-ERROR_TAIL_LINES:]
     )
 
 
 def _disturbance_lines(run: RunFinished) -> Iterator[StyledLine]:
-    """What fired and when; what did not is among the complaints, or may stay away."""
-    fired = [one_line(disturbance_line(one, run.result.tick_rate)) for one in run.result.disturbances if one.happened]
+    """Yield the disturbances that happened. Missing ones are among the violations."""
+    happened = [each for each in run.result.disturbances if each.happened]
+    fired = [one_line(disturbance_line(each, run.result.tick_rate)) for each in happened]
     more = [f"and {len(fired) - MAX_DISTURBANCES} more"] if len(fired) > MAX_DISTURBANCES else []
     for number, text in enumerate((*fired[:MAX_DISTURBANCES], *more)):
         yield (StyledText(f"      {'' if number else 'happened':9} ", "quiet"), StyledText(text))
 
 
 def artifact_lines(run: RunFinished) -> Iterator[StyledLine]:
-    """Where to look at a run, and how to see it again."""
+    """Yield the paths of replay, picture or log, and the command to repeat a run."""
     files = run.artifacts
-    seen = [("replay", files.replay), ("picture", files.picture)] if files.picture else [("log", files.mcap)]
-    for name, path in seen:
+    paths = [("replay", files.replay), ("picture", files.picture)] if files.picture else [("log", files.mcap)]
+    for name, path in paths:
         if path:
             yield (_label(name), StyledText(one_line(path), file=path))
     if run.again:
@@ -196,7 +201,7 @@ def artifact_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 
 def _scenario_line(run: RunFinished) -> StyledLine:
-    first = next((complaint.line for complaint in reported_violations(run) if not complaint.warning), 0)
+    first = next((violation.line for violation in reported_violations(run) if not violation.warning), 0)
     return (_label("scenario"), StyledText(source_location(run, first), file=scenario_file(run)))
 
 
@@ -208,79 +213,71 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def _role(role: str) -> Role:
-    roles: dict[str, Role] = {"good": "good", "bad": "bad", "odd": "odd"}
-    return roles[role]
-
-
 MAX_DETAILED_FAILURES = 20
-"""Of so many failures it is told where to look; of the others the cause, as they are on the page, too."""
+"""Maximum number of failures with paths. Further failures have only their cause."""
 NONDETERMINISTIC = "nondeterministic"
 
 Name = Callable[[RunKey], str]
 
 
 def failed_runs(runs: Sequence[RunFinished], name: Name) -> Iterator[StyledLine]:
-    """Each run that did not pass: its first cause, where to look, how to repeat it.
+    """Yield each failure with its first cause, paths, and the command to repeat it.
 
-    Nothing for a run all alone, which has just said all this, and nothing twice of a run that was made twice.
+    Yields nothing for a session with a single run, whose lines were printed just before. Runs that were repeated by
+    --check-determinism are listed once.
     """
-    known = {run.key for run in runs if not run.outcome.good}
-    bad = [run for run in runs if run.key in known and (run.key == run.key.first or run.key.first not in known)]
-    if not bad or all(run.key.first == bad[0].key.first for run in runs):
+    failed = {run.key for run in runs if not run.outcome.good}
+    failures = [run for run in runs if run.key in failed and (run.key == run.key.first or run.key.first not in failed)]
+    if not failures or all(run.key.first == failures[0].key.first for run in runs):
         return
     yield (StyledText("did not pass:", "quiet"),)
-    for number, run in enumerate(bad):
-        sign, _ = SIGNS[run.outcome]
-        role: Role = "odd" if run.outcome is Outcome.ERROR else "bad"
-        yield (StyledText("  "), StyledText(sign, role), StyledText(f" {name(run.key)}", "name"))
+    for number, run in enumerate(failures):
+        symbol, _ = SYMBOLS[run.outcome]
+        role: Role = "warning" if run.outcome is Outcome.ERROR else "bad"
+        yield (StyledText("  "), StyledText(symbol, role), StyledText(f" {name(run.key)}", "name"))
         yield (StyledText("      "), StyledText(_first_cause(run), role))
         if number < MAX_DETAILED_FAILURES:
             yield from artifact_lines(run)
 
 
 def slowest_runs(runs: Sequence[RunFinished], most: int, name: Name) -> Iterator[StyledLine]:
-    """The runs that took longest, the longest first; `most` 0 = all."""
+    """Yield the runs with the longest wall time, the longest first; `most` 0 lists all."""
     ordered = sorted((run for run in runs if run.wall), key=lambda run: (-run.wall, run.key))
     yield (StyledText("slowest:", "quiet"),)
     for run in ordered[: most or None]:
-        took = f"{run.wall:8.2f} s"
+        wall = f"{run.wall:8.2f} s"
         simulated = f"   {run.result.simulated:.1f} s simulated"
-        yield (StyledText(took), StyledText(f"  {name(run.key)}", "name"), StyledText(simulated, "quiet"))
+        yield (StyledText(wall), StyledText(f"  {name(run.key)}", "name"), StyledText(simulated, "quiet"))
 
 
 def log_comparison(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
-    """What comparing second runs with first ones has said; nothing where there were none."""
+    """Yield the result of --check-determinism: whether the logs of repeated runs are equal."""
     firsts = {run.key: run for run in runs if not run.key.repeats}
     pairs = [(firsts[run.key.first], run) for run in runs if run.key.repeats and run.key.first in firsts]
     compared = [pair for pair in pairs if all(run.artifacts.mcap for run in pair)]
     if not compared:
         return
     differ = sum(any(_differs(run) for run in pair) for pair in compared)
-    told = f"{len(compared)} pair{'s' if len(compared) > 1 else ''} of runs, byte for byte"
+    pairs_text = f"{len(compared)} pair{'s' if len(compared) > 1 else ''} of runs, byte for byte"
     if differ:
-        yield (StyledText(f"logs differ: in {differ} of {told}", "odd"),)
+        yield (StyledText(f"logs differ: in {differ} of {pairs_text}", "warning"),)
     else:
-        yield (StyledText(f"logs equal: {told}", "good"),)
+        yield (StyledText(f"logs equal: {pairs_text}", "good"),)
 
 
 def interruption_lines(session: SessionFinished, left: Mapping[str, int]) -> Iterator[StyledLine]:
-    """Two lines: what there is, and how to go on. The reports list what is missing."""
-    yield (StyledText("interrupted: ", "odd"), *outcome_counts(session, left))
+    """Yield a line with the numbers of outcomes, and a line with the report and the option to resume the session."""
+    yield (StyledText("interrupted: ", "warning"), *outcome_counts(session, left))
     page = (
         [StyledText("page: ", "quiet"), StyledText(one_line(session.page), file=session.page)] if session.page else []
     )
-    go_on = StyledText(f"{'   ' if page else ''}go on with --resume {one_line(session.folder)}", "quiet")
-    yield (*page, *([go_on] if session.folder else []))
+    resume = StyledText(f"{'   ' if page else ''}resume with --resume {one_line(session.folder)}", "quiet")
+    yield (*page, *([resume] if session.folder else []))
 
 
 def _first_cause(run: RunFinished) -> str:
-    """Why it did not pass, in one line."""
-    if run.outcome is Outcome.ERROR:
-        return error_summary(run)
-    told = [complaint.message for complaint in reported_violations(run) if not complaint.warning]
-    more = f" (and {len(told) - 1} more)" if len(told) > 1 else ""
-    return f"{told[0] if told else 'failed'}{more}"
+    """Return the first reason why a run did not pass."""
+    return error_summary(run) if run.outcome is Outcome.ERROR else first_violation(run) or "failed"
 
 
 def _differs(run: RunFinished) -> bool:

@@ -1,4 +1,4 @@
-"""A line of text, piece by piece with the role of each piece."""
+"""Lines of text with roles such as "good" and "bad", wrapping of lines, and detection of terminal features."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -8,15 +8,15 @@ from typing import Literal, TextIO
 
 from simscen.report.display_text import display_width
 
-Role = Literal["plain", "name", "good", "bad", "odd", "quiet"]
+Role = Literal["plain", "name", "good", "bad", "warning", "quiet"]
 
 
 @dataclass(frozen=True)
 class StyledText:
-    """Text of one role; a reporter chooses how the role looks.
+    """Text with a role. The reporter chooses the style of the role.
 
-    `file` is what a terminal that can opens when the text is clicked; a `shell` command goes on in the next line only
-    in a way that a shell understands.
+    `file` is the target of a link in terminals with support for links. If `shell` is true, the text is a shell command,
+    and wrapped lines end with a backslash.
     """
 
     text: str
@@ -29,7 +29,7 @@ StyledLine = tuple[StyledText, ...]
 
 
 def plain_text(line: StyledLine) -> str:
-    """The line without its roles."""
+    """Return the text of a line."""
     return "".join(piece.text for piece in line).rstrip()
 
 
@@ -39,10 +39,10 @@ _LINE_CONTINUATION = " \\"
 
 
 def wrap_line(line: StyledLine, columns: int | None) -> list[StyledLine]:
-    """The line as lines of at most `columns`, those after the first set in; None = as it is.
+    """Wrap a line to at most `columns` (None = no limit). Further lines are indented.
 
-    What stands in a column of its own, behind two blanks or more, begins a new line before it is broken. A word that
-    is longer than a line stays whole: a path that is cut could not be copied.
+    Text after two or more spaces moves to a new line before it is wrapped itself. Words that are longer than a line are
+    not split, so that paths can be copied.
     """
     if columns is None or display_width(plain_text(line)) <= columns:
         return [line]
@@ -50,7 +50,7 @@ def wrap_line(line: StyledLine, columns: int | None) -> list[StyledLine]:
 
 
 def _indent(line: StyledLine) -> int:
-    """Where the text of a line begins that has a label before it; of any other, two columns behind its beginning."""
+    """Return the column of the text after a label; without a label, two columns after the start of the line."""
     first = line[0].text
     if first.strip() and first.endswith(" "):
         return display_width(first)
@@ -59,6 +59,8 @@ def _indent(line: StyledLine) -> int:
 
 
 class _LineWrapper:
+    """Wraps one line."""
+
     def __init__(self, columns: int, indent: int) -> None:
         self._columns, self._indent = columns, indent
         self._lines: list[StyledLine] = []
@@ -67,21 +69,21 @@ class _LineWrapper:
 
     def lines(self, line: StyledLine) -> list[StyledLine]:
         for number, piece in enumerate(line):
-            glued = number + 1 < len(line) and re.match(r"[^\s\w]+", line[number + 1].text)
-            self._piece(piece, display_width(glued[0]) if glued else 0)
+            punctuation = number + 1 < len(line) and re.match(r"[^\s\w]+", line[number + 1].text)
+            self._add_piece(piece, display_width(punctuation[0]) if punctuation else 0)
         self._end()
         return self._lines
 
-    def _piece(self, piece: StyledText, glued: int) -> None:
-        """`glued` columns have to be left for what follows without a blank between."""
+    def _add_piece(self, piece: StyledText, reserved: int) -> None:
+        """Add a piece, and keep `reserved` columns for the punctuation that follows it."""
         text = piece.text
-        if self._used + display_width(text.rstrip()) + glued <= self._columns:
+        if self._used + display_width(text.rstrip()) + reserved <= self._columns:
             self._put(piece, text)
-        elif text.startswith("  ") and self._indent + display_width(text.strip()) + glued <= self._columns:
+        elif text.startswith("  ") and self._indent + display_width(text.strip()) + reserved <= self._columns:
             self._next(piece, text.strip())
         else:
             for blank, word, last in _words(piece):
-                tail = glued if last else len(_LINE_CONTINUATION) if piece.shell else 0
+                tail = reserved if last else len(_LINE_CONTINUATION) if piece.shell else 0
                 if self._used + display_width(blank + word) + tail <= self._columns or not self._used:
                     self._put(piece, blank + word)
                 else:
@@ -92,7 +94,7 @@ class _LineWrapper:
         self._used += display_width(text)
 
     def _next(self, piece: StyledText, text: str, tail: int = 0) -> None:
-        """Go on in the next line; what is too long for its place there begins further to the left."""
+        """Continue in the next line. Text that is too long for the indentation starts further to the left."""
         if piece.shell and self._line and self._line[-1].shell:
             self._put(piece, _LINE_CONTINUATION)
         indent = max(0, min(self._indent, self._columns - display_width(text) - tail))
@@ -107,7 +109,7 @@ class _LineWrapper:
 
 
 def _words(piece: StyledText) -> Iterator[tuple[str, str, bool]]:
-    """Each word with the blanks before it, and whether it is the last."""
+    """Yield each word with the spaces before it, and whether it is the last one."""
     found = (_SHELL_WORD if piece.shell else _WORD).findall(piece.text)
     for number, (blank, word) in enumerate(found, start=1):
         yield blank, word, number == len(found)
@@ -115,7 +117,7 @@ def _words(piece: StyledText) -> Iterator[tuple[str, str, bool]]:
 
 @dataclass(frozen=True)
 class TerminalStyle:
-    """Whether to write in `color`, with `live` progress below the lines, and as if for a `terminal`."""
+    """Whether to use `color` and `live` progress, and whether the output is a `terminal`."""
 
     color: bool
     live: bool
@@ -123,25 +125,28 @@ class TerminalStyle:
 
     @property
     def columns(self) -> int | None:
-        """How wide the terminal is now; None = lines are as long as they are, for programs and for searching."""
+        """Current width of the terminal, or None if the output is not a terminal and lines are not wrapped."""
         return get_terminal_size().columns if self.terminal else None
 
 
 def detect_style(out: TextIO, environ: Mapping[str, str]) -> TerminalStyle:
-    """What suits `out`. NO_COLOR wins over FORCE_COLOR and CLICOLOR_FORCE, these over TERM=dumb and CLICOLOR=0."""
+    """Detect the features of `out`.
+
+    NO_COLOR takes precedence over FORCE_COLOR and CLICOLOR_FORCE, and these over TERM=dumb and CLICOLOR=0.
+    """
     terminal = out.isatty()
-    able = terminal and environ.get("TERM") not in ("dumb", "unknown")
+    is_capable = terminal and environ.get("TERM") not in ("dumb", "unknown")
     if environ.get("NO_COLOR"):
         color = False
     elif any(environ.get(name, "") not in ("", "0") for name in ("FORCE_COLOR", "CLICOLOR_FORCE")):
         color = True
     else:
-        color = able and environ.get("CLICOLOR") != "0"
-    return TerminalStyle(color and can_encode(out), able and can_encode(out), terminal)
+        color = is_capable and environ.get("CLICOLOR") != "0"
+    return TerminalStyle(color and can_encode(out), is_capable and can_encode(out), terminal)
 
 
 def can_encode(out: TextIO) -> bool:
-    """Whether `out` takes the signs that we use; others get ASCII, and nothing that moves a cursor."""
+    """Return whether `out` can encode the symbols of the reporters. Otherwise, ASCII and no live progress are used."""
     try:
         "✓✗·≤≥°".encode(getattr(out, "encoding", None) or "ascii")
     except (UnicodeEncodeError, LookupError):

@@ -1,4 +1,4 @@
-"""A session as it is told to people, event by event; its end says once more what matters most."""
+"""Formatting of session events as console lines, and the reporter for plain text."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -36,13 +36,14 @@ from simscen.report.styled_line import (
 )
 
 INTERRUPTED, NOT_RUN = "interrupted", "not-run"
-"""Kinds of runs that were not done. One by one they would bury what was."""
+"""Kinds of errors of runs that were not finished. They are counted at the end, but not printed."""
 
 
 class SessionFormatter:
-    """Turns events into lines. `slow` is how many of the slowest runs its end lists; 0 = all.
+    """Formats events as lines.
 
-    `columns` says how wide the terminal is now, None for no limit.
+    `slow` is the number of slowest runs to list at the end; 0 lists all, None lists no runs. `columns` returns the
+    current width of the terminal, or None for no limit.
     """
 
     def __init__(self, slow: int | None = None, columns: Callable[[], int | None] = lambda: None) -> None:
@@ -52,7 +53,7 @@ class SessionFormatter:
         self._warned: set[str] = set()
 
     def __call__(self, event: SessionEvent) -> list[StyledLine]:
-        """What the event is worth."""
+        """Return the lines for an event."""
         return [part for line in self._lines(event) for part in wrap_line(line, self._columns())]
 
     def _lines(self, event: SessionEvent) -> Iterator[StyledLine]:
@@ -71,16 +72,16 @@ class SessionFormatter:
                 pass
 
     def _new_warnings(self, run: RunFinished) -> Iterator[StyledLine]:
-        """Warnings of the external stack, each once in a session."""
+        """Yield the warnings of an external stack, each once in a session."""
         for text in run.warnings:
             if text not in self._warned:
                 self._warned.add(text)
-                yield (StyledText(f"      warning: {one_line(text)}", "odd"),)
+                yield (StyledText(f"      warning: {one_line(text)}", "warning"),)
 
     def _end(self, event: SessionFinished) -> Iterator[StyledLine]:
         kinds = Counter(_error_kind(run) for run in self._runs)
         if event.interrupted:
-            yield from interruption_lines(event, {"under way": kinds[INTERRUPTED], "not begun": kinds[NOT_RUN]})
+            yield from interruption_lines(event, {"unfinished": kinds[INTERRUPTED], "not started": kinds[NOT_RUN]})
             return
         if event.comparison is not None:
             yield from comparison_lines(event.comparison, self.naming.prefix, self._columns())
@@ -102,29 +103,29 @@ def _error_kind(run: RunFinished) -> str:
 
 
 class Reporter(Protocol):
-    """Listens to a session; a context, so that a terminal is left as it was whatever happens."""
+    """Receives the events of a session. It is a context manager, so that it can restore the terminal."""
 
     def __call__(self, event: SessionEvent) -> None:
-        """Take one event."""
+        """Process one event."""
         ...
 
     def __enter__(self) -> "Reporter":
-        """Begin."""
+        """Start."""
         ...
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Leave the terminal as it was."""
+        """Restore the terminal."""
         ...
 
 
 class PlainReporter:
-    """Each line as it happens: no color, no cursor movement, ASCII where the stream knows no more."""
+    """Prints lines without color and cursor movement, in ASCII if the stream supports nothing else."""
 
-    def __init__(self, out: TextIO, look: TerminalStyle, slow: int | None = None) -> None:
+    def __init__(self, out: TextIO, style: TerminalStyle, slow: int | None = None) -> None:
         self._out = out
-        self._telling = SessionFormatter(slow, lambda: look.columns)
+        self._formatter = SessionFormatter(slow, lambda: style.columns)
         self._ascii = not can_encode(out)
 
     def __enter__(self) -> "PlainReporter":
@@ -136,8 +137,8 @@ class PlainReporter:
         self._out.flush()
 
     def __call__(self, event: SessionEvent) -> None:
-        """Print what the event is worth."""
-        for line in self._telling(event):
+        """Print the lines for an event."""
+        for line in self._formatter(event):
             self._print(line)
         self._out.flush()
 

@@ -19,7 +19,7 @@ from simscen.run.live_world.pedestrians import PedestrianSimulation
 from simscen.run.live_world.ray_caster import LiveRayCaster
 from simscen.run.live_world.stage import LiveStage, body_data
 from simscen.run.lockstep import EndCondition, RobotUnderTest, RunSetup
-from simscen.run.preparation.scenario import PreparedScenario
+from simscen.run.preparation import PreparedScenario
 from simscen.run.robot_interface import (
     SensorSuite,
     TickSchedule,

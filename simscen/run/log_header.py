@@ -19,10 +19,10 @@ from simscen.core.environment.world_model import World
 from simscen.core.geometry.meshes import drivable_solids, face_normals, upward_faces
 from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.loading.plugins import fact_of, requirement_of
-from simscen.loading.resolved import resolved_text
+from simscen.loading.scenario_text import resolved_text
 from simscen.record.log_header import SCENERY_FILE as SCENERY
 from simscen.record.log_header import STACK_FACT, STACK_NAME_FACT, VARIATION_FACT, LogHeader, scenery_to_json
-from simscen.run.preparation.scenario import PreparedScenario
+from simscen.run.preparation import PreparedScenario
 from simscen.run.robot_interface import sensor_frames, sensor_kinds
 from simscen.sim.body.outline import convex_hull, footprint, outlines_in_band
 from simscen.sim.urdf.writer import to_urdf

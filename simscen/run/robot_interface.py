@@ -12,7 +12,7 @@ from simscen.model.latency import Latency
 from simscen.model.robot import Ackermann, Holonomic, Mount, RobotSpec, SensorSpec
 from simscen.model.stack import StackSpec
 from simscen.model.stack_base import StackBase
-from simscen.run.preparation.scenario import PreparedScenario
+from simscen.run.preparation import PreparedScenario
 from simscen.sensors.sensor import Sensor
 from simscen.sim.body.robot_body import RobotBody
 from simscen.stack.localizers.ground_truth import TRUTH

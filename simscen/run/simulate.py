@@ -26,7 +26,7 @@ from simscen.run.external.stack import ExternalStack
 from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
 from simscen.run.log_header import log_header
-from simscen.run.preparation.scenario import PreparedScenario, prepare
+from simscen.run.preparation import PreparedScenario, prepare
 from simscen.sim.single_robot import ROBOT_NAME
 from simscen.spec.registry import Entry
 
@@ -84,7 +84,7 @@ def _simulated(
             agent.stack.start(part.estimate, part.case.goals)
         logs = [(builders[name], written[name]) if written else (builders[name],) for name in agents]
         for agent, own in zip(setup.robots, logs, strict=True):
-            agent.logs = (backlog.before(*own),)
+            agent.logs = (backlog.sink(*own),)
         setup.robots[0].logs += tuple(attach(setup, logs[0])) if attach else ()
         end = run_lockstep(setup)
         backlog.flush()

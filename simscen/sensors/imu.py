@@ -3,8 +3,7 @@
 from simscen.core.geometry import rotated
 from simscen.core.messages.sensor_data import Imu
 from simscen.model.robot import InertialUnit
-from simscen.sensors.normal_stream import NormalStream
-from simscen.sensors.sensor import SensorSetting
+from simscen.sensors.sensor import NormalStream, SensorSetting
 
 GRAVITY = 9.81  # m/s²
 

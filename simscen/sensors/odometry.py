@@ -8,8 +8,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import UNKNOWN_POSE_COVARIANCE, Odometry
 from simscen.model.robot import Drive, Mecanum, Omnidirectional, SkidSteer, WheelOdometry
-from simscen.sensors.normal_stream import NormalStream
-from simscen.sensors.sensor import SensorSetting
+from simscen.sensors.sensor import NormalStream, SensorSetting
 
 EncoderIncrement = tuple[float, ...]
 """Difference of two values of `SensorView.encoders`."""

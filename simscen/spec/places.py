@@ -1,7 +1,7 @@
 """Names, points, poses, and references to named things in specifications.
 
 A field of type `PlaceOrPose` or `PlaceOrPoint` also accepts the name of a place. The loader replaces the name by the
-pose of the place (`loading/places.py`), so code that uses a specification only sees poses and points.
+pose of the place (`loading/known_names.py`), so code that uses a specification only sees poses and points.
 """
 
 from dataclasses import dataclass

@@ -58,16 +58,16 @@ GROUPS: dict[str, Group] = {
         "simscen.criteria.base:Criterion", "simscen.criteria.registry:AnyCriterion", ("id", "severity", "then")
     ),
     "fault": Group(
-        "simscen.faults.base:Fault", "simscen.faults.registry:AnyFault", ("sensor", "when", "for", "name", "required")
+        "simscen.faults.base:Fault", "simscen.faults.base:AnyFault", ("sensor", "when", "for", "name", "required")
     ),
     "trigger": Group(
         "simscen.triggers.base:Condition",
-        "simscen.triggers.registry:AnyCondition",
+        "simscen.triggers.base:AnyCondition",
         ("for", "robot", "edge", "delay", "times", "probability", "all", "any", "not"),
     ),
-    "action": Group("simscen.actions.base:Action", "simscen.actions.registry:AnyAction", ("robot",)),
+    "action": Group("simscen.actions.base:Action", "simscen.actions.base:AnyAction", ("robot",)),
     "sensor": Group("simscen.model.robot:SensorSpec", "simscen.model.robot:Sensor"),
-    "metric": Group("simscen.criteria.plugin_metric:Measure", "simscen.judge.metrics.catalog:ADDRESSES", ("metrics",)),
+    "metric": Group("simscen.criteria.base:Measure", "simscen.judge.metrics.catalog:ADDRESSES", ("metrics",)),
 }
 """Groups `simscen.<kind>` of entry points by kind."""
 

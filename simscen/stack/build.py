@@ -6,17 +6,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from simscen.core.clock import Clock
-from simscen.core.messages.goal_names import Mode
+from simscen.core.messages.navigation import Mode
 from simscen.core.random_streams import Streams
 from simscen.model.latency import Latency
 from simscen.model.recovery import Recovery
 from simscen.model.stack import InProcessStack, StackSpec
+from simscen.stack.behaviors.motions import BehaviorSequence
 from simscen.stack.checkers import ProgressChecker
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import CommandPipeline, VelocitySmoother
 from simscen.stack.costmap.costmaps import Costmaps
+from simscen.stack.frames import TRAIL_S, OdometryHistory
 from simscen.stack.navigator import ClearEntirely, ClearingPolicy, Navigator
-from simscen.stack.odometry_history import TRAIL_S, OdometryHistory
 from simscen.stack.plan_manager import PlanManager
 from simscen.stack.plugins.checked_components import (
     CheckedBehavior,
@@ -28,7 +29,6 @@ from simscen.stack.plugins.checked_components import (
 from simscen.stack.plugins.checked_plugin import build_component
 from simscen.stack.plugins.checked_stack import CheckedStack
 from simscen.stack.protocols import Behavior, Controller, Localizer, Planner, Surroundings
-from simscen.stack.recovery import RoundRobin
 from simscen.stack.reference import ReferenceStack
 from simscen.stack.setting import Setting
 from simscen.stack.tasks import Task
@@ -112,12 +112,12 @@ class StackBuilder:
         driving = replace(
             driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around, limit_command=monitor.allow
         )
-        planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
+        planning = replace(driving, name="planner", resolution=costmaps.global_costmap.view.resolution)
         plans = self.make_plan_manager(CheckedPlanner(spec.planner, planning), costmaps, controller)
         navigator = Navigator(
             plans,
             controller,
-            RoundRobin(_behaviors(spec.recovery, driving), spec.recovery),
+            BehaviorSequence(_behaviors(spec.recovery, driving), spec.recovery),
             build_component(CheckedGoalChecker, spec.goal_checker, driving.named("goal_checker")),
             ProgressChecker(spec.progress_checker),
             costmaps,
@@ -152,7 +152,7 @@ class StackBuilder:
         return PlanManager(
             self.spec.planner,
             planner,
-            costmaps.wide,
+            costmaps.global_costmap,
             self.plan_seed,
             self.robot.inscribed_radius,
             steered=self.robot.turning_radius > 0.0,

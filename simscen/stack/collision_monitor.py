@@ -12,9 +12,9 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import CollisionMonitor as MonitorSpec
-from simscen.stack.arcs import poses_along
-from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
+from simscen.stack.costmap.obstacle_layer import ScanWithMovingHits
 from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
+from simscen.stack.path_geometry import poses_along
 from simscen.stack.protocols import RobotModel
 
 SAMPLES = 8
@@ -210,6 +210,6 @@ def _points_within(scan: Scan, reach: float) -> Array:
     """Return the hits (n, 2) within `reach` meters of the base, in the base frame."""
     most = reach + math.hypot(scan.mount.x, scan.mount.y)
     hits = (scan.ranges >= scan.range_min) & (scan.ranges <= min(most, scan.range_max))
-    near = np.flatnonzero(hits & ~scan.moving if isinstance(scan, ScanAmongMoving) else hits)
+    near = np.flatnonzero(hits & ~scan.moving if isinstance(scan, ScanWithMovingHits) else hits)
     angles, ranges = scan.angle_min + scan.angle_increment * near, scan.ranges[near]
     return scan.mount.apply(np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles))))

@@ -7,7 +7,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Goal, Path
 from simscen.stack.controllers.path_handler import PathTracker
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import distances
 from simscen.stack.frames import Frames, transform_poses
 from simscen.stack.localizers.beams import Plane
@@ -40,11 +40,11 @@ class FollowedPlan:
         self._pose: Pose2 | None = None
         self._located = Pose2(*path.points[0].tolist())
         self._line: Plane = path.points[:, 0] + 1j * path.points[:, 1]
-        self._watch_distance = max(radius, WATCH_DISTANCE_M) + WATCH_EVERY_POINTS * self._tracker.longest
+        self._watch_distance = max(radius, WATCH_DISTANCE_M) + WATCH_EVERY_POINTS * self._tracker.longest_step
         self._revision = costmap.revision
         self.see(costmap)
 
-    def watch(self, costmap: Costmap) -> None:
+    def watch(self, costmap: LayeredCostmap) -> None:
         """Compare the plan with the costmap if that has changed near the rest of the plan."""
         ahead = self._line[self._track.index :: WATCH_EVERY_POINTS]
         if costmap.changed_near(self._revision, ahead, self._watch_distance):
@@ -78,9 +78,9 @@ class FollowedPlan:
         points: Array = self._track.points[self._track.index :]
         return points
 
-    def places(self, every: int) -> list[complex]:
+    def sampled_points(self, every: int) -> list[complex]:
         """Return every n-th point ahead as x + iy."""
-        return self._track.places(every)
+        return self._track.sampled_points(every)
 
     def missed(self, pose: Pose2) -> bool:
         """Return whether a car can no longer reach its goal on this plan."""

@@ -1,6 +1,7 @@
 """Pose of the robot in the map frame and in the odom frame, and the transform between them (REP 105)."""
 
 import math
+from bisect import bisect_left
 from typing import NamedTuple
 
 import numpy as np
@@ -50,3 +51,98 @@ def transform_polygon(frame: Pose2, polygon: Polygon) -> Polygon:
     """Return a polygon given in `frame`, expressed in its parent frame."""
     c, s = math.cos(frame.yaw), math.sin(frame.yaw)
     return tuple((frame.x + c * x - s * y, frame.y + s * x + c * y) for x, y in polygon)
+
+
+HISTORY_S = 10
+"""Time for which readings are available: the default of tf2's buffer."""
+TRAIL_S = 60
+"""Time for which poses are kept as the trail of the robot, longer than a stuck robot waits between two recoveries."""
+# Larger values, as from a broken encoder, are rejected: their squares could overflow.
+_LARGEST = 1e6
+
+
+def is_plausible(values: tuple[float, float, float]) -> bool:
+    """Return whether these values are a plausible pose or velocity: finite and not absurdly large."""
+    x, y, yaw = values
+    return -_LARGEST < x < _LARGEST and -_LARGEST < y < _LARGEST and -_LARGEST < yaw < _LARGEST
+
+
+class OdometryHistory:
+    """The odometry poses of the last HISTORY_S seconds by tick. Older ones are removed about once per second."""
+
+    def __init__(self, tick_rate: int, trail: float = HISTORY_S) -> None:
+        """Create an empty history. `trail` in s: time for which poses are kept for `trail()`."""
+        self._span, self._trail, self._capacity = HISTORY_S * tick_rate, trail * tick_rate, (trail + 1) * tick_rate
+        self.clear()
+
+    def clear(self) -> None:
+        """Remove all poses, for example to switch to another source of odometry."""
+        self._readings: list[tuple[int, Pose2]] = []
+        self._newest: float = -math.inf
+        self._prune_at: float = -math.inf
+        self.now = Pose2(0.0, 0.0)
+        """The latest pose; the origin if there is none."""
+
+    @property
+    def begun(self) -> bool:
+        """Whether there is any pose."""
+        return self._prune_at > -math.inf
+
+    def add(self, tick: int, pose: Pose2) -> bool:
+        """Add a pose. Return False if it is rejected: not plausible, or not newer than the latest."""
+        x, y, yaw = pose
+        plausible = -_LARGEST < x < _LARGEST and -_LARGEST < y < _LARGEST and -_LARGEST < yaw < _LARGEST
+        if tick <= self._newest or not plausible:
+            return False
+        self._newest, self.now = tick, pose
+        self._readings.append((tick, pose))
+        if tick > self._prune_at:
+            self._prune()
+        return True
+
+    def _prune(self) -> None:
+        """Remove poses that are too old, and determine when to do so again."""
+        del self._readings[: bisect_left(self._readings, (self._newest - self._trail,))]
+        self._prune_at = self._readings[0][0] + self._capacity
+
+    def _first(self) -> int:
+        """Return the index of the oldest pose within HISTORY_S."""
+        return bisect_left(self._readings, (self._newest - self._span,))
+
+    def trail(self) -> list[Pose2]:
+        """Return all poses that are kept, the oldest first."""
+        return [pose for _, pose in self._readings]
+
+    def reaches(self, tick: int) -> bool:
+        """Return whether there is odometry at `tick` or later."""
+        return self._newest >= tick
+
+    def held(self, tick: int) -> Pose2:
+        """Return the latest pose up to `tick` without interpolation, or the oldest pose if all are later."""
+        if tick >= self._newest:
+            return self.now
+        first = self._first()
+        return self._readings[max(first, bisect_left(self._readings, (tick + 1,), first) - 1)][1]
+
+    def at(self, tick: int) -> Pose2 | None:
+        """Return the pose at `tick`, interpolated linearly; None outside the available time."""
+        if tick == self._newest:
+            return self.now
+        first = self._first()
+        after = bisect_left(self._readings, (tick,), first)
+        if after == len(self._readings):
+            return None
+        then, there = self._readings[after]
+        if then == tick:
+            return there
+        if after == first:
+            return None
+        earlier, before = self._readings[after - 1]
+        share = (tick - earlier) / (then - earlier)
+        step = before.between(there)
+        return before.compose(Pose2(share * step.x, share * step.y, share * step.yaw))
+
+    def then(self, now: Pose2, tick: int) -> Pose2:
+        """Return the pose at `tick`, without interpolation, of a robot that is at `now`, in the frame of `now`."""
+        held = self.held(tick)
+        return now if held is self.now else now.compose(self.now.between(held))

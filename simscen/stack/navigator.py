@@ -13,13 +13,13 @@ from typing import NamedTuple, Protocol
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal
 from simscen.core.records.events import Event, EventKind, Value
+from simscen.stack.behaviors.motions import BehaviorSequence
 from simscen.stack.checkers import ProgressChecker
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.followed_plan import LocalPath
 from simscen.stack.frames import Frames
 from simscen.stack.plan_manager import PlanManager
 from simscen.stack.protocols import Behavior, Controller, GoalChecker, NavigationFailure
-from simscen.stack.recovery import RoundRobin
 
 
 class ClearingPolicy(Protocol):
@@ -64,7 +64,7 @@ class Navigator:
         self,
         plans: PlanManager,
         controller: Controller,
-        recovery: RoundRobin,
+        recovery: BehaviorSequence,
         goal_checker: GoalChecker,
         progress: ProgressChecker,
         costmaps: Costmaps,
@@ -137,7 +137,7 @@ class Navigator:
         self._replanned = False
         following = self.via[0] if self.via else goal  # the final goal may be close while intermediate goals remain
         local = self._path.update(plan, following, frames)
-        command = self._controller.command(frames.odometry, twist, self._costmaps.near.view, local)
+        command = self._controller.command(frames.odometry, twist, self._costmaps.local_costmap.view, local)
         if held:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")
         if self._progress.stuck(frames.pose, self._clock):
@@ -196,14 +196,15 @@ class Navigator:
     def _is_unreachable(self, goal: Goal, failure: NavigationFailure) -> bool:
         """Return whether a goal lies inside a mapped obstacle, so that no recovery helps."""
         return failure.code == ErrorCode.GOAL_OCCUPIED and not all(
-            self._costmaps.wide.fits_static(each.pose, each.xy_tolerance) for each in (*self.via, goal)
+            self._costmaps.global_costmap.fits_static(each.pose, each.xy_tolerance) for each in (*self.via, goal)
         )
 
     def _recover(self, tick: int, frames: Frames, behavior: Behavior) -> Step:
         """Run the current recovery behavior."""
         ended: dict[str, Value] = {"outcome": "succeeded"}
         try:
-            command = behavior.step(frames.odometry, self._costmaps.near.view, self._clock - self._behavior_since)
+            costmap = self._costmaps.local_costmap.view
+            command = behavior.step(frames.odometry, costmap, self._clock - self._behavior_since)
         except NavigationFailure as failure:
             command, ended = None, {"outcome": "failed", **_described(failure)}
         if command is not None:

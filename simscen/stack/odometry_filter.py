@@ -9,13 +9,13 @@ Import this module only where there is a filter: filterpy imports scipy.stats, w
 import math
 
 import numpy as np
-from filterpy.kalman import ExtendedKalmanFilter
+from filterpy.kalman import KalmanFilter
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.model import odometry as model
-from simscen.stack.odometry_history import is_plausible
+from simscen.stack.frames import is_plausible
 
 VX, VY, VYAW, BIAS = range(4)
 """State: the velocity of the base in its own frame (m/s, m/s, rad/s) and the bias of the gyroscope (rad/s)."""
@@ -34,8 +34,8 @@ _FORWARD_AND_GYRO = _WHEELS_AND_GYRO[[VX, VY, 3]]
 class OdometryFilter:
     """Fuses wheel odometry and the yaw rate of a gyroscope.
 
-    For each odometry reading, filterpy predicts and updates the mean velocity since the previous one. It is measured by
-    the wheels and, plus a bias, by the gyroscope. The covariances are those of the messages. The pose is this velocity
+    For each update, filterpy predicts and updates the mean velocity since the previous one. It is measured by the
+    wheels and, plus a bias, by the gyroscope. The covariances are those of the messages. The pose is this velocity
     integrated and is never corrected afterwards, so that the odom frame does not jump (REP 105). Its covariance is that
     of the integrated errors, including those that the bias causes.
     """
@@ -43,55 +43,68 @@ class OdometryFilter:
     def __init__(self, spec: model.OdometryFilter, tick_rate: int) -> None:
         """Take the parameters and the number of ticks per second."""
         self._tick_rate = tick_rate
+        self._min_ticks = tick_rate / spec.frequency
         self._process_noise = np.diag([*spec.process_noise_covariance, spec.gyro_bias_walk**2])
         self._rejection_threshold = spec.odom0_twist_rejection_threshold
         self._gyro = GyroscopeIntegral(tick_rate)
-        self._filter = ExtendedKalmanFilter(dim_x=4, dim_z=4)
-        self._filter.predict_x = _keep_state
+        self._filter = KalmanFilter(dim_x=4, dim_z=4)
         self._filter.x = np.zeros(4)
         self._filter.P = np.diag([0.0, 0.0, 0.0, spec.gyro_bias**2])
-        self._pose_covariance = np.zeros((3, 3))
-        self._pose_velocity_covariance = np.zeros((3, 4))
+        self._covariance = np.zeros((7, 7))  # of the pose and the state together
         self._pose = Pose2(0.0, 0.0)
-        self._last: Odometry | None = None
-        self._period = math.inf
+        self._last: Odometry | None = None  # reading of the last update
+        self._last_tick: int | None = None  # of the last reading
+        self._period = math.inf  # of the readings, in s
+        self._step_variances = (0.0, 0.0, 0.0)  # of the motion since the last update, in m², m², rad²
 
     def on_imu(self, imu: Imu) -> None:
         """Integrate the yaw rate until the next odometry."""
         self._gyro.add(imu.tick, imu.angular_velocity[2], imu.angular_velocity_variance)
 
     def fuse(self, odometry: Odometry) -> Odometry | None:
-        """Return the filtered odometry at the tick of a reading; None if the reading is unusable.
+        """Return the filtered odometry at the tick of a reading; None if it is unusable or no update is due.
 
         The first reading is returned as it is: the odom frame is that of the wheel odometry.
         """
-        last = self._last
-        if not is_plausible(odometry.pose) or (last is not None and odometry.tick <= last.tick):
+        last, last_tick = self._last, self._last_tick
+        if not is_plausible(odometry.pose) or (last_tick is not None and odometry.tick <= last_tick):
+            return None
+        self._last_tick = odometry.tick
+        if last is None or last_tick is None:
+            self._last, self._pose = odometry, odometry.pose
+            self._gyro.turned_until(odometry.tick)
+            return odometry
+        self._add_variances(odometry, (odometry.tick - last_tick) / self._tick_rate)
+        if odometry.tick - last.tick < self._min_ticks:
             return None
         self._last = odometry
-        turned = self._gyro.turned_until(odometry.tick)
-        if last is None:
-            self._pose = odometry.pose
-            return odometry
         seconds = (odometry.tick - last.tick) / self._tick_rate
-        self._period = min(self._period, seconds)
-        self._measure(mean_velocity(last.pose.between(odometry.pose), seconds), odometry, turned, seconds)
+        wheels = mean_velocity(last.pose.between(odometry.pose), seconds)
+        self._measure(wheels, self._gyro.turned_until(odometry.tick), seconds)
+        self._step_variances = (0.0, 0.0, 0.0)
         self._move(seconds)
         vx, vy, wz, _ = self._filter.x.tolist()
         variances = self._filter.P.diagonal().tolist()
-        covariance = tuple(self._pose_covariance.ravel().tolist())
+        covariance = tuple(self._covariance[:3, :3].ravel().tolist())
         return Odometry(
             odometry.sensor, odometry.tick, self._pose, Twist(vx, vy, wz),
             (variances[VX], variances[VY], variances[VYAW]), covariance,
         )  # fmt: skip
 
-    def _measure(self, wheels: Twist, odometry: Odometry, turned: tuple[float, float] | None, seconds: float) -> None:
+    def _add_variances(self, odometry: Odometry, gap: float) -> None:
+        """Add the variances of a reading, `gap` seconds after the previous one.
+
+        After lost messages, the gap contains the independent errors of several readings.
+        """
+        self._period = min(self._period, gap)
+        (x, y, yaw), (vx, vy, wz), factor = self._step_variances, odometry.twist_variance, self._period * gap
+        self._step_variances = x + vx * factor, y + vy * factor, yaw + wz * factor
+
+    def _measure(self, wheels: Twist, turned: tuple[float, float] | None, seconds: float) -> None:
         """Predict and update the mean velocity during the last `seconds`; `turned` is the gyroscope's measurement."""
         self._filter.Q = self._process_noise * seconds
         self._filter.predict()
-        # After lost messages, one increment contains the independent errors of several.
-        share = self._period / seconds
-        variances = [max(variance * share, MIN_VARIANCE) for variance in odometry.twist_variance]
+        variances = [max(variance / seconds**2, MIN_VARIANCE) for variance in self._step_variances]
         if turned is None:
             measurement, matrix = list(wheels), _WHEELS
         else:
@@ -102,10 +115,11 @@ class OdometryFilter:
             else:
                 measurement, matrix = [*wheels, rate], _WHEELS_AND_GYRO
                 variances.append(variance)
-        noise = np.zeros((len(variances), len(variances)))
-        noise.flat[:: len(variances) + 1] = variances
-        self._filter.update(np.array(measurement), lambda _: matrix, lambda state: matrix @ state, R=noise)
-        self._pose_velocity_covariance -= self._pose_velocity_covariance @ (self._filter.K @ matrix).T
+        self._filter.update(np.array(measurement), R=np.diag(variances), H=matrix)
+        # The update corrects the state, but not the pose: only the covariance between both changes.
+        correction = np.dot(self._filter.K, matrix)
+        self._covariance[:3, 3:] -= np.dot(self._covariance[:3, 3:], correction.T)
+        self._covariance[3:, :3] = self._covariance[:3, 3:].T
 
     def _slips(self, difference: float, variance: float) -> bool:
         """Return whether wheels and gyroscope disagree about the yaw rate by more than their errors explain."""
@@ -121,15 +135,17 @@ class OdometryFilter:
         c, s = math.cos(heading) * seconds, math.sin(heading) * seconds
         dx, dy, half = c * vx - s * vy, s * vx + c * vy, seconds / 2
         self._pose = Pose2(x + dx, y + dy, wrap(yaw + wz * seconds))
-        by_pose = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])
-        by_velocity = np.array([[c, -s, -dy * half, 0.0], [s, c, dx * half, 0.0], [0.0, 0.0, seconds, 0.0]])
-        moved = by_pose @ self._pose_velocity_covariance
-        spread = by_velocity @ self._filter.P
-        crossed = moved @ by_velocity.T
-        self._pose_covariance = (
-            by_pose @ self._pose_covariance @ by_pose.T + crossed + crossed.T + spread @ by_velocity.T
-        )
-        self._pose_velocity_covariance = moved + spread
+        jacobian = np.array((
+            (1.0, 0.0, -dy, c, -s, -dy * half, 0.0),
+            (0.0, 1.0, dx, s, c, dx * half, 0.0),
+            (0.0, 0.0, 1.0, 0.0, 0.0, seconds, 0.0),
+        ))  # fmt: skip
+        covariance = self._covariance
+        covariance[3:, 3:] = self._filter.P
+        moved = np.dot(jacobian, covariance)
+        covariance[:3, :3] = np.dot(moved, jacobian.T)
+        covariance[:3, 3:] = moved[:, 3:]
+        covariance[3:, :3] = moved[:, 3:].T
 
 
 class GyroscopeIntegral:

@@ -9,7 +9,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.model.planners import PlannerSpec
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 
@@ -58,7 +58,7 @@ class PlanManager:
         self,
         spec: PlannerSpec,
         planner: Planner,
-        costmap: Costmap,
+        costmap: LayeredCostmap,
         plan_seed: Callable[[int], int],
         radius: float,
         steered: bool = False,

@@ -1,6 +1,7 @@
 """Publishing of plans, local plans, beliefs, and costmaps: only changes, and at limited rates."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,10 +10,11 @@ import numpy as np
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Belief, Path
+from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import CostGrid
-from simscen.stack.arcs import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames, transform_poses
+from simscen.stack.path_geometry import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.protocols import Controller, CostmapView, Localizer, SupportsArc
 
 BELIEF_RATE, LOCAL_PLAN_RATE = 10.0, 5.0
@@ -81,7 +83,7 @@ class Publisher:
 
     def _costmap_updates(self, tick: int, costmaps: Costmaps) -> tuple[CostGrid, ...]:
         """Return the costmaps that are due and have changed."""
-        both = (self._global_costmap, costmaps.wide), (self._local_costmap, costmaps.near)
+        both = (self._global_costmap, costmaps.global_costmap), (self._local_costmap, costmaps.local_costmap)
         grids = (each.update(tick, costmap.view, self._tick_rate) for each, costmap in both if tick >= each.due)
         return tuple(grid for grid in grids if grid is not None)
 
@@ -105,3 +107,36 @@ class _CostmapPublisher:
         cells = np.frombuffer(view.costs.tobytes().translate(_PUBLISHED), dtype=np.int8).reshape(view.costs.shape)
         grid = OccupancyGrid(cells, view.resolution, Pose2(*view.origin))
         return CostGrid(self.name, self.frame, grid)
+
+
+REPORT_AFTER_S = 1.0
+"""Time for which the robot must wait for the same component before that is reported."""
+
+
+class StandstillReporter:
+    """Create an event when a component has held the robot for a while, and another when it no longer does."""
+
+    def __init__(self, tick_rate: int) -> None:
+        """Take the tick rate in Hz."""
+        self._after = round(REPORT_AFTER_S * tick_rate)
+        self.holds = ""
+        """Name of the component that holds the robot; empty if none does."""
+        self._since, self._is_reported = 0, False
+
+    def held(self, tick: int, by: str, why: Callable[[], str]) -> tuple[Event, ...]:
+        """Record that the robot waits for the component `by`. `why` returns the message for the event."""
+        ended: tuple[Event, ...] = ()
+        if by != self.holds:
+            ended = self.over(tick)
+            self.holds, self._since = by, tick
+        if self._is_reported or tick - self._since < self._after:
+            return ended
+        self._is_reported = True
+        return (*ended, Event(tick, EventKind.ROBOT_HELD, by, {"message": why()}))
+
+    def over(self, tick: int) -> tuple[Event, ...]:
+        """Record that nothing holds the robot any more, or that it has no goal."""
+        if not self.holds:
+            return ()
+        by, is_reported, self.holds, self._is_reported = self.holds, self._is_reported, "", False
+        return (Event(tick, EventKind.ROBOT_RELEASED, by),) if is_reported else ()

@@ -13,15 +13,13 @@ from simscen.core.records.trace import Decision
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import CommandPipeline
 from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.frames import Frames
+from simscen.stack.costmap.speed_filter import SpeedFilter
+from simscen.stack.frames import Frames, OdometryHistory, is_plausible
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.localizers.ground_truth import TRUTH
 from simscen.stack.navigator import Navigator
-from simscen.stack.odometry_history import OdometryHistory, is_plausible
 from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings, supports_pose
-from simscen.stack.publishing import NO_UPDATES, Publisher, Updates
-from simscen.stack.speed_filter import SpeedFilter
-from simscen.stack.standstill import StandstillReporter
+from simscen.stack.publishing import NO_UPDATES, Publisher, StandstillReporter, Updates
 from simscen.stack.tasks import Task
 
 if TYPE_CHECKING:
@@ -116,11 +114,13 @@ class ReferenceStack:
     @property
     def components(self) -> tuple[tuple[str, Any, tuple[str, ...]], ...]:
         """The components to measure in benchmarks: name, object, and the methods that take time."""
+        filters = () if self._odometry_filter is None else (("odometry filter", self._odometry_filter, ("fuse",)),)
         return (
+            *filters,
             ("localizer", self._localizer, ("on_odometry", "on_imu", "on_scan")),
             ("costmap", self._costmaps, ("update",)),
-            ("costmap", self._costmaps.wide, ("refresh",)),
-            ("costmap", self._costmaps.near, ("refresh",)),
+            ("costmap", self._costmaps.global_costmap, ("refresh",)),
+            ("costmap", self._costmaps.local_costmap, ("refresh",)),
             ("planner", self._navigator.plans.planner, ("plan",)),
             ("controller", self._controller, ("command", "set_path")),
             ("collision monitor", self._monitor, ("allow", "on_scan")),
@@ -211,7 +211,7 @@ class ReferenceStack:
                 case Scan():
                     scans.append(reading)
                 case Image() if reading.field_of_view > 0.0:
-                    self._costmaps.see(reading)
+                    self._costmaps.add_reading(reading)
                 case _:
                     pass
         for scan in scans:  # after all odometry of this beat, whatever the order of the readings
@@ -226,7 +226,7 @@ class ReferenceStack:
                 self._localizer.on_scan(self._localizer_scans.take())
         marking = self._on_lidar_scan(tick, scan)
         self._monitor.on_scan(marking, self._odometry.held(scan.tick), tick)
-        self._costmaps.see(marking)
+        self._costmaps.add_reading(marking)
 
     def _process_odometry(self, reading: Odometry) -> None:
         """Pass a reading to the localizer, filtered if there is a filter, and add it to the odometry history."""

@@ -1,8 +1,7 @@
 """Goal list of a navigation task, with the events and the result that an action client would see."""
 
 from simscen.core.clock import Clock
-from simscen.core.messages.goal_names import Mode
-from simscen.core.messages.navigation import ErrorCode, Goal, TaskResult
+from simscen.core.messages.navigation import ErrorCode, Goal, Mode, TaskResult
 from simscen.core.records.events import Event, EventKind, Value
 
 Events = tuple[Event, ...]

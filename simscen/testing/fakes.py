@@ -135,7 +135,6 @@ class FakeStage:
         self.done.append(("note", event))
 
 
-# MERGED: A robot that drives a circle in an empty square room, as sensors see it: closed forms, no physics.
 LINEAR_SPEED, ANGULAR_SPEED = 0.3, 0.2
 """m/s and rad/s."""
 ROOM_HALF_WIDTH_M = 4.0

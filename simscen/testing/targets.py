@@ -11,8 +11,7 @@ from typing import Any, get_type_hints
 from pydantic import RootModel, ValidationError
 
 from simscen.actions.base import Action
-from simscen.criteria.base import Criterion
-from simscen.criteria.plugin_metric import Measure
+from simscen.criteria.base import Criterion, Measure
 from simscen.faults.base import Fault
 from simscen.model.checkers import GoalCheckerSpec
 from simscen.model.localizers import LocalizerSpec

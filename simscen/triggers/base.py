@@ -1,9 +1,19 @@
-"""Base class of trigger conditions."""
+"""Base class of trigger conditions, the choice of a condition by its key, and `when`."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from simscen.core.errors import BROKEN_COMPONENT, RunError
+from simscen.spec.choice import Choice
+from simscen.spec.lazy_spec import LazySpec
+from simscen.spec.places import RobotName
+from simscen.spec.quantities import Duration, PositiveDuration, Probability
 
 if TYPE_CHECKING:
     from simscen.core.stage import Situation
@@ -21,3 +31,105 @@ class Condition(ABC):
     @abstractmethod
     def holds(self, now: Situation) -> bool:
         """Return whether the condition is true at this beat."""
+
+
+class AnyCondition(Choice):
+    """One condition, chosen by its key, or a combination of conditions."""
+
+    group: ClassVar[str] = "trigger"
+    modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot"})
+
+    time: Annotated[Condition | None, LazySpec("simscen.triggers.timing", "Time")] = None
+    robot_within: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "RobotWithin")] = None
+    robot_in: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "RobotIn")] = None
+    travelled: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "Travelled")] = None
+    speed_below: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "SpeedBelow")] = None
+    speed_above: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "SpeedAbove")] = None
+    distance_remaining: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "DistanceRemaining")] = (
+        None
+    )
+    believed_distance_remaining: Annotated[
+        Condition | None, LazySpec("simscen.triggers.robot_state", "BelievedDistanceRemaining")
+    ] = None
+    turning_below: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "TurningBelow")] = None
+    turning_above: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "TurningAbove")] = None
+    clearance_below: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "ClearanceBelow")] = None
+    scan_age: Annotated[Condition | None, LazySpec("simscen.triggers.timing", "ScanAge")] = None
+    localization_error: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "LocalizationError")] = (
+        None
+    )
+    localization_lost: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "LocalizationLost")] = None
+    goal: Annotated[Condition | None, LazySpec("simscen.triggers.events", "GoalStatus")] = None
+    waypoint: Annotated[Condition | None, LazySpec("simscen.triggers.events", "Waypoint")] = None
+    replan: Annotated[Condition | None, LazySpec("simscen.triggers.events", "Replan")] = None
+    recovery: Annotated[Condition | None, LazySpec("simscen.triggers.events", "RecoveryStatus")] = None
+    collision: Annotated[Condition | None, LazySpec("simscen.triggers.events", "Collided")] = None
+    pedestrian: Annotated[Condition | None, LazySpec("simscen.triggers.events", "PedestrianStatus")] = None
+    event: Annotated[Condition | None, LazySpec("simscen.triggers.events", "EventStatus")] = None
+    all: Annotated[list[AnyCondition], Field(min_length=1, max_length=50)] | None = None
+    """True while all of these conditions are true."""
+    any: Annotated[list[AnyCondition], Field(min_length=1, max_length=50)] | None = None
+    """True while at least one of these conditions is true."""
+    not_: AnyCondition | None = Field(default=None, alias="not")
+    """True while this condition is false."""
+    for_: PositiveDuration | None = Field(default=None, alias="for")
+    """Count the condition as true only after it has been true without interruption for this long; default: at once."""
+    robot: RobotName | None = None
+    """The robot that the condition is for, if there are several; default: the only one."""
+
+    @property
+    def inner(self) -> list[AnyCondition]:
+        """The conditions that this one combines; [] for a single condition."""
+        return self.all or self.any or ([self.not_] if self.not_ is not None else [])
+
+    def parts(self) -> Iterator[AnyCondition]:
+        """Yield this condition and, recursively, all conditions in it."""
+        yield self
+        for test in self.inner:
+            yield from test.parts()
+
+    def seen(self, now: Situation) -> Situation:
+        """Return the situation of the robot that the condition is for."""
+        return now if self.robot is None else now.of(self.robot)
+
+    def holds(self, now: Situation) -> bool:
+        """Return whether the condition is true at this beat, regardless of `for`."""
+        now = self.seen(now)
+        if self.all is not None:
+            return all_hold(self.all, now)
+        if self.any is not None:
+            return any_holds(self.any, now)
+        if self.not_ is not None:
+            return not self.not_.holds(now)
+        condition = self.chosen
+        assert isinstance(condition, Condition)
+        result: object = condition.holds(now)
+        if not isinstance(result, bool | np.bool_):
+            raise RunError(BROKEN_COMPONENT, f"a condition returned {result!r} instead of True or False{self.added_by}")
+        return bool(result)
+
+
+# `all` and `any` are fields of AnyCondition, so that its methods cannot call the built-in functions by these names.
+def all_hold(tests: list[AnyCondition], now: Situation) -> bool:
+    """Return whether all conditions are true."""
+    return all(test.holds(now) for test in tests)
+
+
+def any_holds(tests: list[AnyCondition], now: Situation) -> bool:
+    """Return whether at least one condition is true."""
+    return any(test.holds(now) for test in tests)
+
+
+class Trigger(AnyCondition):
+    """A condition and how it starts an event."""
+
+    modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot", "edge", "delay", "times", "probability"})
+
+    edge: Literal["rising", "falling"] = "rising"
+    """Start when the condition becomes true (rising) or false (falling)."""
+    delay: Duration = 0.0
+    """Delay between the edge and the start."""
+    times: Annotated[int, Field(ge=1, le=10_000)] = 1
+    """Maximum number of starts."""
+    probability: Probability = 1.0
+    """Probability that an edge starts the event, drawn from the scenario's seed."""

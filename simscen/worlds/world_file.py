@@ -1,42 +1,45 @@
-"""From a `*.world.yaml` to a world: walls with clean corners, obstacles, things that move, doors."""
+"""Conversion of world files to worlds: walls with mitered corners, obstacles, ramps, movable objects, and doors."""
 
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.motion_paths import pose_at
-from simscen.core.geometry.shapes import Body, Box, Solid
+from simscen.core.geometry.shapes import Body, Box, Extrusion, Mesh, Solid
 from simscen.model.world import Door, Movable, Obstacle, Ramp, Wall, WorldSpec
-from simscen.worlds.geometry.prisms import plan_rectangle
-from simscen.worlds.geometry.wall_prisms import wall_solids
+from simscen.worlds.geometry.prisms import bounding_rectangle
 
 
-def build_own(
+def world_from_spec(
     spec: WorldSpec,
     name: str,
     grid: OccupancyGrid | None = None,
     base: World | None = None,
     notes: tuple[str, ...] = (),
 ) -> World:
-    """The world of a specification; `name` is used where it has none.
+    """Return the world of a specification.
 
-    `grid` is the loaded `map`, which becomes walls `map_height` tall and stays the robot's map; `notes` are what its
-    loader had to say; `base` is the imported `sdf`. What the specification adds comes after theirs, and its places
-    and regions win over those of the base.
+    name:   used if the specification has none
+    grid:   loaded `map`; it becomes walls with the height `map_height`, and is the robot's map
+    base:   imported `sdf`; own solids and bodies come after its own, and own places and regions override its own
+    notes:  messages of the map's loader
     """
     base = base or World(name, ())
     solids = [*base.solids]
     if grid is not None:
-        from simscen.worlds.maps.map_walls import walls_of
+        from simscen.worlds.maps.map_walls import walls_from_map
 
-        solids += walls_of(grid, spec.map_height)
+        solids += walls_from_map(grid, spec.map_height)
     for number, wall in enumerate(spec.walls, start=1):
         solids += wall_solids(_corners(wall), wall.thickness, wall.height, wall.called(number))
-    solids += [_standing(obstacle) for obstacle in spec.obstacles]
-    solids += [_rising(ramp) for ramp in spec.ramps]
+    solids += [_obstacle(obstacle) for obstacle in spec.obstacles]
+    solids += [_ramp(ramp) for ramp in spec.ramps]
     bodies = (*base.bodies, *map(_movable, spec.objects), *map(_door, spec.doors))
     places = {**base.places, **{key: place.pose for key, place in spec.places.items()}}
     regions = {key: tuple((x, y) for x, y in corners) for key, corners in spec.regions.items()}
@@ -48,7 +51,7 @@ def build_own(
         places=places,
         regions={**base.regions, **regions},
         friction=spec.friction,
-        doors={door.name: _ways(door) for door in spec.doors},
+        doors={door.name: _panel_poses(door) for door in spec.doors},
         bounds=_bounds(solids, bodies, places.values(), grid),
         grid=grid or base.grid,
         notes=(*base.notes, *notes),
@@ -56,13 +59,13 @@ def build_own(
 
 
 def door_poses(hinge: tuple[float, float], post: tuple[float, float]) -> tuple[Pose2, Pose2]:
-    """Where the panel of a door is when closed and when open: it turns 90° anticlockwise about its hinge."""
+    """Return the poses of a closed and an open panel, which turns counterclockwise by 90° about its hinge."""
     yaw = math.atan2(post[1] - hinge[1], post[0] - hinge[0])
     return Pose2(*hinge, yaw), Pose2(*hinge, yaw).compose(Pose2(0.0, 0.0, math.pi / 2))
 
 
-def _ways(door: Door) -> tuple[Pose2, Pose2]:
-    """Where its panel is when closed and when open."""
+def _panel_poses(door: Door) -> tuple[Pose2, Pose2]:
+    """Return the poses of a door's panel when closed and when open."""
     (hx, hy), (px, py) = door.points
     closed, opened = door_poses((hx, hy), (px, py))
     if door.motion == "swing":
@@ -74,16 +77,15 @@ def _corners(wall: Wall) -> list[tuple[float, float]]:
     return [(x, y) for x, y in wall.points]
 
 
-def _standing(obstacle: Obstacle) -> Solid:
+def _obstacle(obstacle: Obstacle) -> Solid:
     solid = obstacle.solid(obstacle.name)
     return replace(solid, pose=Pose3.planar(obstacle.pose.pose, solid.pose.z), friction=obstacle.friction)
 
 
-def _rising(ramp: Ramp) -> Solid:
-    from simscen.worlds.geometry.ramp_wedges import wedge
+def _ramp(ramp: Ramp) -> Solid:
 
     (ax, ay), (bx, by) = ramp.start, ramp.end
-    return wedge((ax, ay), (bx, by), ramp.width, ramp.height, ramp.name, ramp.friction)
+    return ramp_solid((ax, ay), (bx, by), ramp.width, ramp.height, ramp.name, ramp.friction)
 
 
 def _movable(thing: Movable) -> Body:
@@ -96,7 +98,7 @@ def _movable(thing: Movable) -> Body:
 
 def _door(door: Door) -> Body:
     (hinge_x, hinge_y), (post_x, post_y) = door.points
-    closed, opened = _ways(door)
+    closed, opened = _panel_poses(door)
     width = math.hypot(post_x - hinge_x, post_y - hinge_y)
     panel = Solid(Box((width, door.thickness, door.height)), Pose3(x=width / 2, z=door.height / 2), door.name)
     return Body(door.name, (panel,), Pose3.planar(closed if door.closed else opened))
@@ -105,10 +107,10 @@ def _door(door: Door) -> Body:
 def _bounds(
     solids: Iterable[Solid], bodies: Iterable[Body], places: Iterable[Pose2], grid: OccupancyGrid | None
 ) -> tuple[float, float, float, float]:
-    """What holds all there is, as (min x, min y, max x, max y); zeros for nothing at all."""
+    """Return (min x, min y, max x, max y) of everything in m; zeros for an empty world."""
     corners = [(place.x, place.y) for place in places]
-    covered = [plan_rectangle(solid) for solid in solids]
-    covered += [plan_rectangle(solid, body.pose) for body in bodies for solid in body.solids]
+    covered = [bounding_rectangle(solid) for solid in solids]
+    covered += [bounding_rectangle(solid, body.pose) for body in bodies for solid in body.solids]
     corners += [corner for left, low, right, high in covered for corner in ((left, low), (right, high))]
     if grid is not None:
         corners += _corners_of(grid)
@@ -122,3 +124,80 @@ def _corners_of(grid: OccupancyGrid) -> list[tuple[float, float]]:
     height, width = (cells * grid.resolution for cells in grid.shape)
     local = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
     return [grid.origin.compose(Pose2(x, y))[:2] for x, y in local]
+
+
+Point = tuple[float, float]
+
+MIN_MITER_COSINE = -0.5
+"""Cosine of the greatest turn (120°) with a miter. At sharper turns, it would be longer than the wall is thick."""
+
+
+def wall_solids(points: list[Point], thickness: float, height: float, name: str) -> list[Solid]:
+    """Return one prism for each straight part of a wall along the center line `points`.
+
+    The wall is closed if the last point equals the first. Turns up to 120° are mitered, so that the prisms neither
+    overlap nor leave a notch. At sharper turns, and for parts that are too short for a miter, the prisms are extended
+    by half the thickness. Repeated points are skipped.
+    """
+    corners = [p for k, p in enumerate(points) if k == 0 or p != points[k - 1]]
+    if len(corners) < 2:
+        return []
+    ways = [_direction(a, b) for a, b in pairwise(corners)]
+    closed = len(ways) > 1 and corners[0] == corners[-1]
+    before = [ways[-1] if closed else None, *ways[:-1]]
+    after = [*ways[1:], ways[0] if closed else None]
+    solids = []
+    for (a, b), way, previous, following in zip(pairwise(corners), ways, before, after, strict=True):
+        start = _end(a, way, previous, thickness / 2, -1.0)
+        end = _end(b, way, following, thickness / 2, 1.0)
+        if any(_behind(start[side], end[side], way) for side in (0, 1)):
+            start, end = _square_end(a, way, thickness / 2, -1.0), _square_end(b, way, thickness / 2, 1.0)
+        solids.append(Solid(Extrusion((start[1], end[1], end[0], start[0]), height), name=name))
+    return solids
+
+
+def _direction(a: Point, b: Point) -> Point:
+    length = math.hypot(b[0] - a[0], b[1] - a[1])
+    return (b[0] - a[0]) / length, (b[1] - a[1]) / length
+
+
+def _behind(start: Point, end: Point, way: Point) -> bool:
+    """Return whether a side of a part would run backwards, because its miters cross."""
+    return (end[0] - start[0]) * way[0] + (end[1] - start[1]) * way[1] <= 0
+
+
+def _end(corner: Point, way: Point, other: Point | None, half: float, side: float) -> tuple[Point, Point]:
+    """Return the left and right corner of a part at one end; `side` is -1 at its start, 1 at its end."""
+    (x, y), (ux, uy) = corner, way
+    if other is None:
+        return (x - uy * half, y + ux * half), (x + uy * half, y - ux * half)
+    cosine = ux * other[0] + uy * other[1]
+    if cosine < MIN_MITER_COSINE:
+        return _square_end(corner, way, half, side)
+    left = (-uy - other[1]) * half / (1 + cosine), (ux + other[0]) * half / (1 + cosine)
+    return (x + left[0], y + left[1]), (x - left[0], y - left[1])
+
+
+def _square_end(corner: Point, way: Point, half: float, side: float) -> tuple[Point, Point]:
+    (x, y), (ux, uy) = corner, way
+    x, y = x + ux * half * side, y + uy * half * side
+    return (x - uy * half, y + ux * half), (x + uy * half, y - ux * half)
+
+
+_WEDGE_FACES = (0, 1, 3), (0, 3, 2), (0, 4, 5), (0, 5, 1), (2, 3, 5), (2, 5, 4), (0, 2, 4), (1, 5, 3)
+"""Counterclockwise as seen from outside: bottom, slope, upper end, right, left."""
+
+
+def ramp_solid(start: Point, end: Point, width: float, height: float, name: str, friction: float = 1.0) -> Solid:
+    """Return a ramp whose center line rises from the ground at `start` to `height` m at `end`.
+
+    Corners 0 and 1 are the right and left end of its foot, 2 and 3 below its upper edge, 4 and 5 on its upper edge.
+    """
+    length, half = math.dist(start, end), width / 2
+    corners = np.array(
+        [[0, -half, 0], [0, half, 0], [length, -half, 0], [length, half, 0], [length, -half, height],
+         [length, half, height]]
+    )  # fmt: skip
+    yaw = math.atan2(end[1] - start[1], end[0] - start[0])
+    wedge = Mesh(corners, np.array(_WEDGE_FACES, dtype=np.int32))
+    return Solid(wedge, Pose3.planar(Pose2(*start, yaw)), name, friction)

@@ -35,7 +35,7 @@ def main() -> None:
         pages = {"replay-failure": [failed], "replay-against": [failed, passed]}
         for name, logs in pages.items():
             page = Path(folder) / f"{name}.html"
-            read = [read_run(log, looks=True) for log in logs]
+            read = [read_run(log, with_sensors=True) for log in logs]
             write_replay(page, [(log, from_json(log.result)) for log in read])
             _shoot(running, page, name, "#t=20" if len(logs) > 1 else "")
 

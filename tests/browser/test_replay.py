@@ -29,7 +29,7 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 def made(page: Path, logs: list[Path]) -> Path:
-    read = [read_run(log, looks=True) for log in logs]
+    read = [read_run(log, with_sensors=True) for log in logs]
     write_replay(page, [(log, from_json(log.result)) for log in read])
     return page
 

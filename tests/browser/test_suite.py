@@ -153,7 +153,7 @@ def test_a_page_of_a_session_that_goes_on_comes_anew_until_it_is_over(
     answers = [run("a/first"), run("a/second", left=-0.1)]
     page.write_text(to_html(Session(answers[:1], live=RunningSession(2, (answers[1].key,)))), encoding="utf-8")
     opened = open_page(page)
-    assert "1 of 2 runs done, under way: a/second, seed 1" in opened.page.locator("#live").inner_text()
+    assert "1 of 2 runs done, running: a/second, seed 1" in opened.page.locator("#live").inner_text()
     page.write_text(to_html(Session(answers)), encoding="utf-8")
     opened.page.locator(".run").nth(1).wait_for(state="attached")
     assert opened.page.locator("#live").count() == 0

@@ -111,11 +111,11 @@ def test_94_ctrl_c_while_it_starts_ends_it_without_a_traceback(folder: Path, mod
 def test_95_a_log_without_truth_is_no_usable_log(simscen, folder: Path, command: str) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
     (log,) = folder.rglob("run.mcap")
-    with Recorder(folder / "empty.mcap", Clock(240), read_log(log).about) as recorder:
+    with Recorder(folder / "empty.mcap", Clock(240), read_log(log).header) as recorder:
         recorder.close(0)
     ended = simscen(command, "empty.mcap")
     assert ended.code == 2
-    assert ended.err.startswith("empty.mcap: error[SC803] the log holds no truth")
+    assert ended.err.startswith("empty.mcap: error[SC803] the log has no ground truth")
 
 
 @pytest.mark.parametrize("command", ["judge", "plot", "log recover"])

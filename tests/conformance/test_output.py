@@ -75,6 +75,7 @@ def test_73_a_disk_that_fills_up_is_an_error_that_says_so_of_every_run_it_hits(m
     for name in "bc":
         assert runs[name]["error"]["kind"] == "output"
         assert re.match("no space left (on device )?writing ", runs[name]["error"]["message"].lower())
+        assert "Traceback" not in json.dumps(runs[name])
     (log,) = (folder / "saved").rglob("a/*/run.mcap")
     assert read_log(log).complete
 

@@ -18,14 +18,14 @@ from simscen.model.robot import RobotSpec
 from simscen.sensors.factory import build_sensors
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.single_robot import SingleRobotSimulation
-from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 ROBOTS = Path(__file__).parents[2] / "simscen/data/robots"
 CAMERA = {"camera": {"rate": 5.0, "width": 32, "height": 24, "mount": {"z": 0.4}}}
 WALLS = [Solid(Box(size), Pose3(x, y, 0.5), "wall") for x, y, size in (
     (4.05, 0, (0.1, 8, 1)), (-4.05, 0, (0.1, 8, 1)), (0, 4.05, (8, 0.1, 1)), (0, -4.05, (8, 0.1, 1)))]  # fmt: skip
-ROOM = fuse(WALLS)
+ROOM = merge_solids(WALLS)
 
 
 def load(name):

@@ -6,15 +6,15 @@ from collections.abc import Iterator
 import pytest
 import yaml
 
-from simscen.actions.registry import AnyAction
+from simscen.actions.base import AnyAction
 from simscen.criteria.registry import AnyCriterion
-from simscen.faults.registry import AnyFault
+from simscen.faults.base import AnyFault
 from simscen.model.robot import Bumper, Camera, InertialUnit, Lidar, WheelOdometry
 from simscen.spec.choice import Choice
 from simscen.spec.lazy_spec import annotation_of
 from simscen.testing import Promise, promises_of
 from simscen.testing.targets import promises_of_target
-from simscen.triggers.registry import Trigger
+from simscen.triggers.base import Trigger
 
 
 def examples(choice: type[Choice], below: str = "", skipped: tuple[str, ...] = ()) -> Iterator[Promise]:

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simscen.cli.main import app
-from simscen.loading.files.kinds import check_file
+from simscen.loading.checks.files import check_file
 from simscen.loading.stacks.userconfig import load_config
 
 ROOT = Path(__file__).parents[2]

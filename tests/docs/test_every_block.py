@@ -13,7 +13,7 @@ import pytest
 import typer
 
 from simscen.cli.main import app
-from simscen.loading.files.kinds import check_file
+from simscen.loading.checks.files import check_file
 from simscen.loading.stacks.userconfig import load_config
 
 if sys.version_info >= (3, 11):

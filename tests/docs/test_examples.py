@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.loading.files.kinds import check_file, file_kind
+from simscen.loading.checks.files import check_file, file_kind
 
 ROOT = Path(__file__).parents[2]
 # Those on packages of one's own are done step by step: test_own_packages.py.

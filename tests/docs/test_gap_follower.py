@@ -12,7 +12,7 @@ from simscen.core.external_command import ExternalCommand
 from simscen.core.records.run_result import Outcome
 from simscen.loading.scenario import load_scenario
 from simscen.model.stack_files import ExternalStackSpec
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 ROOT = Path(__file__).parents[2]

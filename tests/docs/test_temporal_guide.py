@@ -41,5 +41,5 @@ def test_its_scenario_runs_and_every_criterion_is_decided_with_a_witness(tmp_pat
         assert verdict["findings"][0]["time"] is not None
     log = read_log(next(out.rglob("run.mcap")))
     criteria = [AnyCriterion.model_validate(entry) for entry in yaml.safe_load(BLOCKS[0])["pass"]]
-    again = judge(criteria, log.trace, log.about.case)
+    again = judge(criteria, log.trace, log.header.case)
     assert [verdict_data(v, 0, log.trace.tick_rate) for v in again] == [{**v, "line": 0} for v in run["verdicts"]]

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from simscen.actions.registry import AnyAction
+from simscen.actions.base import AnyAction
 from simscen.criteria.registry import AnyCriterion
-from simscen.faults.registry import AnyFault
-from simscen.triggers.registry import Trigger
+from simscen.faults.base import AnyFault
+from simscen.triggers.base import Trigger
 
 GUIDE = (Path(__file__).parents[2] / "docs" / "guides" / "words.md").read_text(encoding="utf-8")
 PARTS = dict(re.findall(r"^## ([^\n]+)\n(.*?)(?=^## |\Z)", GUIDE, re.MULTILINE | re.DOTALL))

@@ -15,17 +15,17 @@ from pydantic import BaseModel
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from everyfield import every_value
 
-from simscen.actions.registry import AnyAction
+from simscen.actions.base import AnyAction
 from simscen.cli.catalog.json_schema import MODELS
 from simscen.cli.catalog.topics import Topic, fields_of, topics
 from simscen.core.version import PACKAGE
 from simscen.criteria.registry import AnyCriterion
-from simscen.faults.registry import AnyFault
+from simscen.faults.base import AnyFault
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.robot import Sensor
 from simscen.spec.choice import Choice
 from simscen.spec.registry import GROUPS, entries
-from simscen.triggers.registry import AnyCondition as Condition
+from simscen.triggers.base import AnyCondition as Condition
 
 ROOT = Path(__file__).parents[2]
 SCHEMAS = PACKAGE / "data" / "schemas"

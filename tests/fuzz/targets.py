@@ -14,12 +14,11 @@ from mutate import mutant
 from simscen.cli.session.selection import Checks
 from simscen.core.errors import InvalidInput, Problem
 from simscen.judge.evaluation import judge
-from simscen.loading.resolved import spec_of_text
+from simscen.loading.scenario_text import spec_of_text
 from simscen.record.log_file import RecordReader
-from simscen.record.log_reader.read import read_run
-from simscen.record.log_reader.recover import recover
+from simscen.record.log_reader.read import read_run, recover
 from simscen.record.mcap_writer import Channel, McapWriter, MessageType
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 
 CORPUS = Path(__file__).parent / "corpus"
 SCENARIO = """\
@@ -88,8 +87,8 @@ def read_log(path: Path) -> list[Problem]:
     with contextlib.suppress(InvalidInput):
         recover(path)
     read = read_run(path)
-    spec = spec_of_text(read.about.scenario, str(path))
-    verdicts = judge(spec.pass_, read.trace, read.about.case)
+    spec = spec_of_text(read.header.scenario, str(path))
+    verdicts = judge(spec.pass_, read.trace, read.header.case)
     assert isinstance(verdicts, tuple)
     return []
 
@@ -118,10 +117,10 @@ def damaged_log(corpus: list[bytes], rng: random.Random) -> tuple[int, bytes]:
                     channels[record.channel_id].write(record.log_time, damaged(record.data))
                 case records.Attachment():
                     data = mutant([record.data], rng)[1] if rng.random() < 0.2 else record.data
-                    writer.attach(record.name, record.media_type, data)
+                    writer.add_attachment(record.name, record.media_type, data)
                 case records.Metadata():
                     values = {k: damaged(v.encode()).decode("utf-8", "replace") for k, v in record.metadata.items()}
-                    writer.note(record.name, values)
+                    writer.add_metadata(record.name, values)
         writer.finish()
     return 0, out.getvalue()
 

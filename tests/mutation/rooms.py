@@ -15,10 +15,11 @@ TEMPORAL = ["golden", "always", "eventually", "until", "whenever"]
 _STL, _SIGNALS, _METRICS = "tests/unit/criteria/stl", "tests/unit/criteria/trace_signals", "tests/unit/judge/metrics"
 CONCERNED = {
     "criteria/clearance": [["golden", "clearance"], ["golden", "personal_space"], EVERY_CRITERION],
-    "criteria/localization_error": [
+    "criteria/localization": [
         ["golden", "localization_error"],
         ["golden", "relocalized_within"],
-        EVERY_CRITERION,
+        ["golden", "localization_consistency"],
+        ["tests/unit/criteria/test_smoothness_and_consistency.py", *EVERY_CRITERION],
     ],
     "criteria/stopping": [
         ["golden", "stopped_within"],
@@ -40,10 +41,6 @@ CONCERNED = {
         ["golden", "error_code"],
         ["golden", "no_false_success"],
         EVERY_CRITERION,
-    ],
-    "criteria/localization_consistency": [
-        ["golden", "localization_consistency"],
-        ["tests/unit/criteria/test_smoothness_and_consistency.py", *EVERY_CRITERION],
     ],
     "criteria/stl/condition": [[f"{_STL}/test_condition.py"], [f"{_STL}/test_decision_horizon.py"], TEMPORAL],
     "criteria/stl/robustness": [TEMPORAL, [f"{_STL}/test_robustness.py"]],

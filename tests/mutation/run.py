@@ -21,7 +21,7 @@ TABLE = ROOT / "docs/design/mutation.md"
 BEGIN, END = "<!-- table -->\n", "<!-- end of table -->\n"
 WARM = ("numpy", "pydantic", "hypothesis", "shapely", "shapely.affinity", "yaml", "_pytest.assertion.rewrite",
         "evo.core.metrics", "evo.core.trajectory", "filterpy.stats", "_hypothesis_pytestplugin",
-        "simscen.core.records.trace", "simscen.core.records.case", "simscen.core.geometry.separation")  # fmt: skip
+        "simscen.core.records.trace", "simscen.core.records.case", "simscen.core.geometry.polygons")  # fmt: skip
 """What every trial would import again."""
 
 

@@ -13,7 +13,7 @@ from simscen.advanced.planners.spec import MedialAxisPlanner
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Path
 from simscen.model.planners import Navfn, OmplPlanner, PlannerSpec, Smac2d
-from simscen.stack.planners import build, grid_planner
+from simscen.stack.planners import grid_planner, ompl_planner
 from simscen.stack.planners.endpoints import find_endpoints
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
@@ -67,7 +67,7 @@ class Way:
 def built(spec: PlannerSpec) -> Planner:
     """The planner of a specification."""
     if isinstance(spec, OmplPlanner):
-        return build.ompl_planner(spec, setting(ROBOT))
+        return ompl_planner.ompl_planner(spec, setting(ROBOT))
     if isinstance(spec, Navfn):
         return grid_planner.navfn(spec, setting(ROBOT))
     if isinstance(spec, MedialAxisPlanner):

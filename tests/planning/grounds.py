@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import dijkstra
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot
@@ -110,7 +110,7 @@ def view_of(
     """The costmap of a world between (0, 0) and (width, height)."""
     bounds = (-0.5, -0.5, math.ceil(width) + 0.5, math.ceil(height) + 0.5)
     spec = CostmapSpec(resolution=resolution, **options)
-    return Costmap(spec, Surroundings(robot, world.grid(bounds, resolution), RATE)).view
+    return LayeredCostmap(spec, Surroundings(robot, world.grid(bounds, resolution), RATE)).view
 
 
 def pair(rates: TraversalCosts, reachable: Array, rng: np.random.Generator) -> tuple[Pose2, Pose2]:

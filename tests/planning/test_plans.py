@@ -8,14 +8,13 @@ import pytest
 from grounds import ROBOT, cheapest, forest, large_maze, maze, pair, rooms, view_of
 
 from simscen.advanced.planners import informed_set, medial_axis_planner, search_regions
-from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner
+from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner, dear_until
 from simscen.advanced.planners.path_refinement import refined
 from simscen.advanced.planners.spec import MedialAxisPlanner as MedialAxisSpec
-from simscen.advanced.planners.straight_line import dear_until
 from simscen.core.geometry import Pose2
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as Spec
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.planners.endpoints import find_endpoints
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.planners.traversal_costs import TraversalCosts
@@ -92,7 +91,7 @@ def test_a_plan_takes_the_cheaper_one_of_two_ways_that_cost_nearly_the_same(kind
 
 def test_the_way_through_a_maze_of_fifty_meters_is_found() -> None:
     """There were too many samples for the iterations of one search: NO_VALID_PATH, where there was a way."""
-    view = Costmap(CostmapSpec(), Surroundings(ROBOT, large_maze(2, 40, 27), RATE)).view
+    view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, large_maze(2, 40, 27), RATE)).view
     path = medial_axis().plan(view, Pose2(0.7, 0.7), Pose2(53.3, 53.3), 1)
     rates = TraversalCosts(view, ROBOT, 2.0, True)
     assert np.isfinite(rates.at(path.points[:, :2])).all()
@@ -106,9 +105,9 @@ def test_in_a_maze_of_large_blocks_and_too_many_samples_the_first_search_finds_t
     """One of a hundred meters has them: places on the way over its blocks lay too far apart to be joined, and the
     corridor was searched instead, for seconds. This one has fifteen meters, and may have few blocks and samples.
     """
-    monkeypatch.setattr(informed_set, "MOST_PRICED", 2500)
+    monkeypatch.setattr(informed_set, "MAX_COST_BLOCKS", 2500)
     monkeypatch.setattr(search_regions, "MAX_SAMPLES", 300)
-    view = Costmap(CostmapSpec(), Surroundings(ROBOT, large_maze(number, 11, 27), RATE)).view
+    view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, large_maze(number, 11, 27), RATE)).view
     rates, start, goal = TraversalCosts(view, ROBOT, 2.0, True), Pose2(0.7, 0.7), Pose2(14.15, 14.15)
     least = cheapest(rates, start, goal)
     for seed in range(3):

@@ -11,9 +11,9 @@ from simscen.core.geometry import Array, Pose2
 from simscen.model.planners import Navfn, Smac2d
 from simscen.model.planners import OmplPlanner as Spec
 from simscen.stack.footprint import Footprint
-from simscen.stack.planners.build import ompl_planner
 from simscen.stack.planners.endpoints import find_endpoints
 from simscen.stack.planners.grid_planner import navfn, smac_2d
+from simscen.stack.planners.ompl_planner import ompl_planner
 from simscen.stack.planners.path_postprocessing import spaced
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, RobotModel

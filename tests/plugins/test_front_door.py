@@ -97,7 +97,7 @@ def test_a_run_uses_what_the_package_adds_and_every_report_knows_it(ran) -> None
     yard = ran
     log = read_log(yard / "out/runs/door/seed-1/run.mcap")
     result = json.loads((yard / "out/runs/door/seed-1/result.json").read_text())
-    told = {name: fact for name, fact in log.about.facts.items() if name.startswith("plugin.")}
+    told = {name: fact for name, fact in log.header.facts.items() if name.startswith("plugin.")}
     kinds = ["action.turn_robot", "criterion.dwell", "fault.crosstalk", "metric.reversed_length", "sensor.sonar"]
     kinds.append("trigger.reversing")
     assert told == {f"plugin.{kind}": "yardwork==1.2" for kind in kinds}

@@ -38,7 +38,7 @@ from simscen.core.messages.sensor_data import Bump, Scan
 from simscen.core.stage import Effect
 from simscen.core.records.verdict import Finding, Status
 from simscen.criteria.base import Criterion
-from simscen.criteria.plugin_metric import Measure
+from simscen.criteria.base import Measure
 from simscen.faults.base import Disturbance, Fault
 from simscen.model.robot import SensorSpec
 from simscen.spec.base import Spec

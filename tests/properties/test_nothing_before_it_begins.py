@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simscen.actions.registry import AnyAction
+from simscen.actions.base import AnyAction
 from simscen.core.records.events import KIND_BY_INSTANCE, MAP, EventKind
 from simscen.core.records.trace import Moment
-from simscen.faults.registry import AnyFault
+from simscen.faults.base import AnyFault
 from simscen.loading.checks.faults import instances, unfit_faults, unknown_sensors
 from simscen.loading.checks.registry import NameScope
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 from simscen.spec.choice import Choice
 from simscen.spec.lazy_spec import annotation_of

@@ -8,9 +8,9 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simscen.loading.files.worldfile import world_text
-from simscen.loading.resolved import resolved_text, spec_of_text
+from simscen.loading.files.single_files import world_text
 from simscen.loading.scenario import load_scenario
+from simscen.loading.scenario_text import resolved_text, spec_of_text
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.scalars import to_yaml
 from simscen.loading.yaml.textfile import read_text

@@ -13,7 +13,7 @@ import yaml
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import Status
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 ROOT = Path(__file__).parents[2]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 ROBOT = """\

@@ -6,7 +6,7 @@ import pytest
 
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 HEAD = """\

@@ -7,7 +7,7 @@ import pytest
 from simscen.bench.navigation.experiments import narrow_fields
 from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import PreparedScenario, prepare
+from simscen.run.preparation import PreparedScenario, prepare
 from simscen.run.simulate import simulate
 
 SLIPPING = """\

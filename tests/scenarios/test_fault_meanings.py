@@ -13,11 +13,11 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.trace import Moment
 from simscen.judge.result_json import to_json
 from simscen.judge.run_result import judge_run
-from simscen.loading.resolved import spec_of_text
 from simscen.loading.scenario import load_scenario
+from simscen.loading.scenario_text import spec_of_text
 from simscen.record.log_reader.read import read_log
 from simscen.record.trace_difference import first_difference
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 ROOM = """\
@@ -213,8 +213,8 @@ def test_a_log_of_what_no_sensor_should_say_is_judged_again_as_it_was(tmp_path, 
     file.write_text(f"{ROOM}time_limit: 4 s\nfaults:\n{faults}{criteria}")
     run = simulate(prepare(load_scenario(file, tmp_path)), log=tmp_path / "run.mcap")
     log = read_log(tmp_path / "run.mcap")
-    written = spec_of_text(log.about.scenario, file.name).pass_
-    again = judge_run(run.result.key, run.result.path, written, log.trace, log.about.case, run.result.lines)
+    written = spec_of_text(log.header.scenario, file.name).pass_
+    again = judge_run(run.result.key, run.result.path, written, log.trace, log.header.case, run.result.lines)
     assert to_json(again) == to_json(run.result)
     assert first_difference(run.trace, log.trace) is None
 

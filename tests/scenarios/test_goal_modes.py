@@ -10,7 +10,7 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import Status
 from simscen.loading.scenario import load_scenario
 from simscen.run.external.build import with_external_reference
-from simscen.run.preparation.scenario import PreparedScenario, prepare
+from simscen.run.preparation import PreparedScenario, prepare
 from simscen.run.simulate import simulate
 
 HEAD = """\

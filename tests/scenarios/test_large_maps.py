@@ -3,7 +3,7 @@
 import numpy as np
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 CELLS, CELL = 800, 0.05

@@ -10,8 +10,8 @@ import pytest
 import simscen
 from simscen.cli.main import main
 from simscen.core.errors import InvalidInput
+from simscen.loading.checks.scene_runner import check_in_world
 from simscen.loading.scenario import load_scenario
-from simscen.run.worldchecks.runner import check_in_world
 
 SCENARIO = """\
 simscen: 1

@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 
 from simscen.loading.scenario import load_scenario
 from simscen.run.external.build import with_external_reference
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 ROOT = Path(__file__).parents[2]

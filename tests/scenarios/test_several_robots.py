@@ -13,10 +13,10 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import Status
 from simscen.judge.result_json import from_json, to_json
 from simscen.judge.run_result import combine_robots, judge_run
-from simscen.loading.resolved import criteria_of_text
 from simscen.loading.scenario import load_scenario
+from simscen.loading.scenario_text import criteria_of_text
 from simscen.record.log_reader.read import read_log
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 WORLD = """\
@@ -104,13 +104,13 @@ def test_a_log_says_the_same_of_each_robot_as_the_run_did(run):
     log = read_log(done.log)
     assert list(log.robots) == ["a", "b"]
     for name, one in log.robots.items():
-        assert one.about.case == done.robots[name].case
+        assert one.header.case == done.robots[name].case
         assert one.trace.truth.values.tobytes() == done.robots[name].trace.truth.values.tobytes()
         assert one.trace.events == done.robots[name].trace.events
     results = {
         name: judge_run(
-            one.about.key, "log", criteria_of_text(one.about.scenario, "log", one.about.facts, name).pass_,
-            one.trace, one.about.case,
+            one.header.key, "log", criteria_of_text(one.header.scenario, "log", one.header.facts, name).pass_,
+            one.trace, one.header.case,
         )
         for name, one in log.robots.items()
     }  # fmt: skip

@@ -12,7 +12,7 @@ import pytest
 from simscen.judge import run_result
 from simscen.judge.result_json import read_result, to_json
 from simscen.judge.run_result import judge_run
-from simscen.loading.resolved import criteria_of_text, spec_of_text
+from simscen.loading.scenario_text import criteria_of_text, spec_of_text
 from simscen.record.log_reader.read import read_log
 from simscen.record.trace_difference import first_difference
 
@@ -79,13 +79,13 @@ def test_verdicts_live_replayed_and_judged_again_are_the_same(together, every: i
 def judged_again(live, log, name):
     """The result by what the log says alone; of several robots from those of each."""
     if not log.robots:
-        criteria = spec_of_text(log.about.scenario, name).pass_
-        return judge_run(live.key, live.path, criteria, log.trace, log.about.case, live.lines)
+        criteria = spec_of_text(log.header.scenario, name).pass_
+        return judge_run(live.key, live.path, criteria, log.trace, log.header.case, live.lines)
     results, lines = {}, list(live.lines)
     for robot, one in log.robots.items():
-        criteria = criteria_of_text(log.about.scenario, name, log.about.facts, robot).pass_
+        criteria = criteria_of_text(log.header.scenario, name, log.header.facts, robot).pass_
         own, lines = tuple(lines[: len(criteria)]), lines[len(criteria) :]
-        results[robot] = judge_run(live.key, live.path, criteria, one.trace, one.about.case, own)
+        results[robot] = judge_run(live.key, live.path, criteria, one.trace, one.header.case, own)
     return run_result.combine_robots(results, {robot: one.trace for robot, one in log.robots.items()})
 
 

@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
 from simscen.run.lockstep import RobotUnderTest
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 from simscen.stack.plugins.checked_stack import CheckedStack
 from simscen.stack.reference import ReferenceStack

@@ -6,10 +6,10 @@ import pytest
 
 from simscen.judge.result_json import to_json
 from simscen.judge.run_result import judge_run
-from simscen.loading.resolved import spec_of_text
 from simscen.loading.scenario import load_scenario
+from simscen.loading.scenario_text import spec_of_text
 from simscen.record.log_reader.read import read_log
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 HEAD = """\
@@ -78,6 +78,6 @@ def test_the_cause_stands_before_the_symptom_live_and_judged_again(name, tmp_pat
 
 def again(log: Path, result) -> str:
     read = read_log(log)
-    criteria = spec_of_text(read.about.scenario, "log").pass_
+    criteria = spec_of_text(read.header.scenario, "log").pass_
     lines = result.lines[-len(criteria) :]
-    return to_json(judge_run(result.key, result.path, criteria, read.trace, read.about.case, lines))
+    return to_json(judge_run(result.key, result.path, criteria, read.trace, read.header.case, lines))

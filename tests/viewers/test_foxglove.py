@@ -92,7 +92,7 @@ def test_what_changes_is_shown_from_then_on(log: Path, seen_by_viewers: Seen) ->
 
 def test_the_layout_of_most_logs_is_that_of_a_log_with_one_lidar(log: Path) -> None:
     if log.parent.name.startswith("one"):
-        assert foxglove_layout() == foxglove_layout(read_run(log, looks=True))
+        assert foxglove_layout() == foxglove_layout(read_run(log, with_sensors=True))
 
 
 def test_rviz_is_shown_topics_that_the_layout_shows(log: Path) -> None:

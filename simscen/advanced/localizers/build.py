@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from simscen.advanced.localizers import spec as model
 from simscen.advanced.localizers.global_search import GlobalSearch
 from simscen.advanced.localizers.map_residuals import MapResiduals
-from simscen.advanced.localizers.map_trust import NEAR, MapTrust
+from simscen.advanced.localizers.map_trust import FIT_DISTANCE_M, MapTrust
 from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter
 from simscen.advanced.localizers.scan_matching_amcl import ScanMatchingAmclLocalizer
 from simscen.advanced.localizers.tempered_likelihood import TemperedLikelihoodField, beyond_the_map
@@ -55,7 +55,7 @@ def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
     """Return the models of a map; cached with the map, since a map of 100 x 100 m takes 0.3 s."""
     grid = replace(grid)  # the cache belongs to the original, which must not be kept alive by its own cache
     field, unmapped = obstacle_field(grid, spec.laser_likelihood_max_dist), beyond_the_map(grid).ravel()
-    fit_field = field if spec.laser_likelihood_max_dist > NEAR else obstacle_field(grid, 2 * NEAR)
+    fit_field = field if spec.laser_likelihood_max_dist > FIT_DISTANCE_M else obstacle_field(grid, 2 * FIT_DISTANCE_M)
     if spec.laser_model_type == "likelihood_field_prob":
         sensor: SensorModel = TemperedLikelihoodField(
             field, spec.z_hit, spec.z_rand, spec.sigma_hit, beam_skipping(spec), spec.likelihood_exponent,
@@ -74,4 +74,4 @@ def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
 
 def precompute(spec: model.ScanMatchingAmcl, grid: OccupancyGrid) -> None:
     """Compute the models of a map and the tables of its search before runs are forked."""
-    map_models(grid, spec).search.ready()
+    map_models(grid, spec).search.precompute()

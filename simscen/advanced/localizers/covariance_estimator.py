@@ -1,4 +1,4 @@
-"""How far off a pose may be: by how the poses of the last meters scatter, and by how badly scans fit the map."""
+"""Covariance of a pose estimate, from the scatter of recent poses and from the residuals of scans."""
 
 import math
 from collections import deque
@@ -6,161 +6,176 @@ from collections import deque
 import numpy as np
 
 from simscen.advanced.localizers.map_residuals import ScanResiduals
-from simscen.advanced.localizers.scan_matcher import FLOOR
-from simscen.advanced.localizers.scan_memory import METERS_A_RAD
+from simscen.advanced.localizers.scan_matcher import COVARIANCE_FLOOR
+from simscen.advanced.localizers.scan_memory import METERS_PER_RAD
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.stack.localizers.planar_motion import swing, turn
+from simscen.stack.localizers.planar_motion import propagate_covariance, rotation_matrix
 
-COUNTED = 36
-"""Corrections whose poses are opinions of where the robot is now: some 9 m of driving."""
-LASTS = np.array((2.0, 2.0, 1.1))
-"""m driven, turns included, in which errors ahead, aside and of the heading become others: those of poses 4 m apart
-are correlated by 0.4, 0.4 and 0.1, whether everything is as mapped or furniture was moved."""
-DRIFT = np.square((0.002, 0.002, 0.0016))
-"""m, m, rad: squares of what matched scans drift by in one meter where they see enough."""
-FORGOTTEN = 0.99
-"""How much of what was learned before counts still, after each correction."""
-PRIOR, BEFORE = np.array((1.7, 1.7, 1.0)), 20.0
-"""Standard deviations ahead, aside and of the heading, over those of the particles, where beams are as far off as
-`sigma_hit` says: before anything has scattered, and the corrections that this counts for."""
-EXPECTED = 0.05
-"""Opinions, far apart, that what beams and PRIOR say counts for: those of a robot that hardly moved say nothing."""
-FREEDOM = 6.0
-"""Degrees of freedom of a covariance that is told from so few opinions which hang together."""
-WHEELS = 0.05, 0.05
-"""Standard deviations of odometry before it was compared with steps that were seen: m and rad for each meter."""
-COMPARED = 0.2
-"""m²: squares of steps that these count for: three."""
-LEAST = np.diag(np.square((1e-3, 1e-3, 1e-3)))
-"""m, m, rad: nothing is known better, so that no covariance is singular."""
+WINDOW = 36
+"""Number of recent corrections that are compared, about 9 m of driving."""
+CORRELATION_LENGTHS_M = np.array((2.0, 2.0, 1.1))
+"""Correlation length of the errors (longitudinal, lateral, yaw) in m driven, rotations included.
+
+The errors of poses 4 m apart have the correlations 0.4, 0.4 and 0.1, both with correct maps and with moved furniture.
+"""
+DRIFT_VARIANCE = np.square((0.002, 0.002, 0.0016))
+"""Variance (m², m², rad²) of the drift of scan matching per meter, if scans show enough."""
+FORGETTING_FACTOR = 0.99
+"""Factor of the weight of everything learned, for each correction."""
+PRIOR_RATIO, PRIOR_WEIGHT = np.array((1.7, 1.7, 1.0)), 20.0
+"""Prior of the ratio of the true standard deviations (longitudinal, lateral, yaw) to those of the particles, for beams
+whose residuals are as large as `sigma_hit`, and its weight in corrections."""
+EXPECTED_WEIGHT = 0.05
+"""Weight of the ratio that residuals and prior give, in independent corrections. It decides if the robot hardly moves,
+because the poses of one place share their errors."""
+DEGREES_OF_FREEDOM = 6.0
+"""Degrees of freedom of a covariance that is estimated from few, correlated corrections."""
+ODOMETRY_STD = 0.05, 0.05
+"""Prior standard deviations of odometry in m and rad per meter."""
+ODOMETRY_STD_WEIGHT = 0.2
+"""Weight of this prior, as sum of squared steps in m²: about three steps."""
+MIN_COVARIANCE = np.diag(np.square((1e-3, 1e-3, 1e-3)))
+"""Added to each covariance (m², m², rad²), so that none is singular."""
 
 
 class CovarianceEstimator:
-    """Widens or narrows the covariance of particles, which take each scan for news and each beam for independent.
+    """Scales the covariance of the particles to the errors that they really have.
 
-    What stands elsewhere than the map shows it, and cells that are half a cell off, pull scan after scan the same way
-    for as long as they are in sight: the particles agree, and are wrong together. Two things tell, for each axis of
-    the robot, how many times further off they are than their covariance says. One is how they scatter: scans that are
-    matched with each other know nothing of the map, so each of the last COUNTED poses, carried on to the present by
-    them, is an opinion of where the robot is, that differs from the one that is told by both errors, as far as they
-    are not the same, and by what the matches drift. The other one is how far off the beams are that the map explains
-    (in the adjustment of observations: the variance of unit weight): errors that all poses share do not scatter. How
-    much a beam that is off means for the pose is learned from the first. The two are averaged. Where the map explains
-    only some of the beams it does so by chance, too: the fewer, the wider. And a covariance that is estimated makes
-    errors over it Student's, whose squares are larger by FREEDOM / (FREEDOM - 2).
-    Between corrections it grows as odometry has been seen to err.
+    A particle filter treats the errors of all beams and scans as independent. But furniture that was moved, or a map
+    that is half a cell off, shifts the pose in the same direction for as long as it is in sight, so that the
+    covariance of the particles is too small. Two measurements show by which ratio, along each axis of the robot:
+
+    - The scatter of the last WINDOW poses. Scan matching, which does not use the map, propagates each of them to the
+      present. Their differences are due to the errors of both poses, as far as these are independent, and to the
+      drift of scan matching.
+    - The residuals of the beams that the map explains (the variance of unit weight of a least-squares adjustment).
+      They also show errors that all poses share. How residuals translate to errors of the pose is learned from the
+      scatter.
+
+    The ratio is the mean of both, divided by the share of the beams that the map explains, because some of these fit by
+    chance. As the covariance is estimated, errors have a Student's t-distribution, whose variance is greater by
+    DEGREES_OF_FREEDOM / (DEGREES_OF_FREEDOM - 2). Between corrections, the covariance grows by the errors of
+    odometry that scan matching has observed.
     """
 
     def __init__(self) -> None:
-        self._meant, self._counts = PRIOR * BEFORE, BEFORE
-        self._off, self._turned, self._squares = WHEELS[0] ** 2 * COMPARED, WHEELS[1] ** 2 * COMPARED, COMPARED
-        self.forget()
+        weight = ODOMETRY_STD_WEIGHT
+        self._ratio_sum, self._ratio_weight = PRIOR_RATIO * PRIOR_WEIGHT, PRIOR_WEIGHT
+        self._odometry_square, self._yaw_square = ODOMETRY_STD[0] ** 2 * weight, ODOMETRY_STD[1] ** 2 * weight
+        self._step_square = weight
+        self.forget_poses()
 
-    def forget(self) -> None:
-        """The robot is elsewhere than was thought: opinions are void, but not what was learned of them."""
+    def forget_poses(self) -> None:
+        """Forget the poses, after the robot was found elsewhere, but keep everything learned from them."""
         self._poses: Array = np.empty((0, 3))
         self._bases: Array = np.empty((0, 3))
-        self._drifts: Array = np.empty((0, 3, 3))  # since each opinion, in the frame of the bases
-        self._ways, self._weights = np.empty(0), np.empty(0)
-        self._misfits: deque[ScanResiduals] = deque(maxlen=COUNTED)
+        self._drifts: Array = np.empty((0, 3, 3))  # since each pose, in the frame of the bases
+        self._distances, self._weights = np.empty(0), np.empty(0)
+        self._residuals: deque[ScanResiduals] = deque(maxlen=WINDOW)
         self._base: Pose2 | None = None
 
-    def compare(self, seen: Pose2, odometry: Pose2) -> None:
-        """Take in what the scans show of a step of which odometry says something else: by more than they err alone."""
-        x, y, yaw = odometry.between(seen)
-        self._off = max(0.0, FORGOTTEN * self._off + (x * x + y * y - FLOOR[0] - FLOOR[1]) / 2)
-        self._turned = max(0.0, FORGOTTEN * self._turned + yaw * yaw - FLOOR[2])
-        self._squares = FORGOTTEN * self._squares + _way(odometry) ** 2
+    def compare(self, matched: Pose2, odometry: Pose2) -> None:
+        """Learn the error of odometry from a step of scan matching, without the latter's own variance."""
+        x, y, yaw = odometry.between(matched)
+        self._odometry_square = max(
+            0.0,
+            FORGETTING_FACTOR * self._odometry_square + (x * x + y * y - COVARIANCE_FLOOR[0] - COVARIANCE_FLOOR[1]) / 2,
+        )
+        self._yaw_square = max(0.0, FORGETTING_FACTOR * self._yaw_square + yaw * yaw - COVARIANCE_FLOOR[2])
+        self._step_square = FORGETTING_FACTOR * self._step_square + _distance(odometry) ** 2
 
-    def carry(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """The covariance (3, 3) after `delta` of odometry, which errs as it did, of a pose with heading `yaw`."""
-        c, s, share = math.cos(yaw), math.sin(yaw), _way(delta) ** 2 / self._squares
-        aside = self._off * share
-        noise = aside, 0.0, 0.0, aside, 0.0, self._turned * share
-        return swing(covariance, c * delta.x - s * delta.y, s * delta.x + c * delta.y, noise)
+    def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
+        """Return the covariance (3, 3) of a pose with heading `yaw` after `delta`, measured by odometry."""
+        c, s, share = math.cos(yaw), math.sin(yaw), _distance(delta) ** 2 / self._step_square
+        aside = self._odometry_square * share
+        noise = aside, 0.0, 0.0, aside, 0.0, self._yaw_square * share
+        return propagate_covariance(covariance, c * delta.x - s * delta.y, s * delta.x + c * delta.y, noise)
 
-    def drive(self, base: Pose2, doubt: Array | None) -> None:
-        """The robot is at `base` in a frame that drifts slowly: what its scans say without the map.
+    def drive(self, base: Pose2, step_covariance: Array | None) -> None:
+        """Propagate all poses to `base`, the robot's pose in the scan matcher's frame.
 
-        `doubt` (3, 3) is the covariance of the step there, in the frame of the base before it, as its scans were
-        matched; None where they were not, and wheels told it.
+        `step_covariance` (3, 3) is that of the step, in the base frame before it; None if odometry measured the step.
         """
         last, self._base = self._base or base, base
         step = last.between(base)
-        way = _way(step)
-        if doubt is None:
-            share = way**2 / self._squares
-            doubt = np.diag((self._off * share, self._off * share, self._turned * share))
+        distance = _distance(step)
+        if step_covariance is None:
+            share = distance**2 / self._step_square
+            step_covariance = np.diag(
+                (self._odometry_square * share, self._odometry_square * share, self._yaw_square * share)
+            )
         else:
-            doubt = doubt - np.diag(FLOOR)  # what steps are off by about the way does not add up along it
-        frame = turn(last.yaw)
+            step_covariance = step_covariance - np.diag(COVARIANCE_FLOOR)  # these errors do not add up over steps
+        frame = rotation_matrix(last.yaw)
         swung = np.array(((1.0, 0.0, last.y - base.y), (0.0, 1.0, base.x - last.x), (0.0, 0.0, 1.0)))
-        self._drifts = swung @ self._drifts @ swung.T + frame @ (doubt + np.diag(DRIFT * way)) @ frame.T
-        self._ways = self._ways + way
+        self._drifts = (
+            swung @ self._drifts @ swung.T + frame @ (step_covariance + np.diag(DRIFT_VARIANCE * distance)) @ frame.T
+        )
+        self._distances = self._distances + distance
 
-    def widened(self, pose: Pose2, covariance: Array, misfit: ScanResiduals | None) -> Array:
-        """The covariance (3, 3) of `pose` after a correction at the base that was driven to.
+    def estimate(self, pose: Pose2, covariance: Array, residuals: ScanResiduals | None) -> Array:
+        """Return the covariance (3, 3) of `pose` after a correction at the base of the last `drive`.
 
-        The particles say `covariance`; `misfit` is that of the scan.
+        `covariance` is that of the particles; `residuals` are those of the scan, None if the map explains nothing.
         """
-        own = covariance + LEAST
+        own = covariance + MIN_COVARIANCE
         self._add(pose, 1.0 / float(own[0, 0] + own[1, 1]))
-        if misfit is not None:
-            self._misfits.append(misfit)
-        fits, off = self._beams()
-        axes = turn(pose.yaw).T
-        told = axes @ own @ axes.T
-        meant = self._meant / self._counts
-        scattered = self._scattered(np.diag(told), np.square(meant * off))
-        self._meant = FORGOTTEN * self._meant + scattered / off
-        self._counts = FORGOTTEN * self._counts + 1.0
-        expected = off * self._meant / self._counts
-        times = (scattered + expected) / 2.0 / fits * math.sqrt(FREEDOM / (FREEDOM - 2.0))
-        widened: Array = axes.T @ (told * np.outer(times, times)) @ axes
-        return widened
+        if residuals is not None:
+            self._residuals.append(residuals)
+        explained, residual = self._mean_residuals()
+        axes = rotation_matrix(pose.yaw).T
+        rotated = axes @ own @ axes.T
+        learned = self._ratio_sum / self._ratio_weight
+        scattered = self._scatter_ratio(np.diag(rotated), np.square(learned * residual))
+        self._ratio_sum = FORGETTING_FACTOR * self._ratio_sum + scattered / residual
+        self._ratio_weight = FORGETTING_FACTOR * self._ratio_weight + 1.0
+        expected = residual * self._ratio_sum / self._ratio_weight
+        student = math.sqrt(DEGREES_OF_FREEDOM / (DEGREES_OF_FREEDOM - 2.0))
+        ratio = (scattered + expected) / 2.0 / explained * student
+        scaled: Array = axes.T @ (rotated * np.outer(ratio, ratio)) @ axes
+        return scaled
 
     def _add(self, pose: Pose2, weight: float) -> None:
-        """One more opinion; `weight` (1/m²) is how sure its particles were of it."""
-        assert self._base is not None  # every correction is driven to
-        kept = slice(1 - COUNTED, None)
+        """Add a pose; `weight` in 1/m² is the inverse variance of its particles."""
+        assert self._base is not None  # `drive` precedes every correction
+        kept = slice(1 - WINDOW, None)
         self._poses = np.vstack((self._poses[kept], pose))
         self._bases = np.vstack((self._bases[kept], self._base))
         self._drifts = np.concatenate((self._drifts[kept], np.zeros((1, 3, 3))))
-        self._ways = np.append(self._ways[kept], 0.0)
+        self._distances = np.append(self._distances[kept], 0.0)
         self._weights = np.append(self._weights[kept], weight)
 
-    def _beams(self) -> tuple[float, float]:
-        """The share of the beams of the last scans that the map explains, and how far off these are, in standard
-        deviations of a beam."""
-        if not self._misfits:
+    def _mean_residuals(self) -> tuple[float, float]:
+        """Return the share of explained beams in the last scans, and their root mean square residual in `sigma_hit`."""
+        if not self._residuals:
             return 1.0, 1.0
-        fits, squares = (sum(values) / len(self._misfits) for values in zip(*self._misfits, strict=True))
-        return fits, math.sqrt(max(squares / fits, 1e-3))
+        explained, square = (sum(values) / len(self._residuals) for values in zip(*self._residuals, strict=True))
+        return explained, math.sqrt(max(square / explained, 1e-3))
 
-    def _scattered(self, own: Array, expected: Array) -> Array:
-        """How many times further off poses are than variances `own` (3,) say, ahead, aside and in heading: (3,).
+    def _scatter_ratio(self, own: Array, expected: Array) -> Array:
+        """Return the ratio (3,) of the poses' scatter to their own standard deviations (longitudinal, lateral, yaw).
 
-        By what the opinions differ from the newest one: the less, the more of that is drift. `expected` (3,) are the
-        squares that are thought before any says anything.
+        `own` (3,) are the variances of the particles. A pose's difference from the newest pose has the less weight,
+        the more of it is drift. `expected` (3,) are the squared ratios to assume without poses.
         """
         x, y, yaw = self._poses[-1]
         turned = self._poses[:, 2] - self._bases[:, 2]
-        carried = np.exp(1j * turned) * ((self._bases[-1] - self._bases)[:, :2] @ (1.0, 1j))
-        away = (self._poses[:, :2] @ (1.0, 1j) + carried - complex(x, y)) * np.exp(-1j * yaw)
+        driven = np.exp(1j * turned) * ((self._bases[-1] - self._bases)[:, :2] @ (1.0, 1j))
+        away = (self._poses[:, :2] @ (1.0, 1j) + driven - complex(x, y)) * np.exp(-1j * yaw)
         off = np.column_stack((away.real, away.imag, wrap_array(turned - turned[-1])))
         c, s = math.cos(self._bases[-1, 2]), math.sin(self._bases[-1, 2])
         (xx, xy, _), (_, yy, _), (_, _, aa) = self._drifts.transpose(1, 2, 0)
         drift = np.column_stack(
             (c * c * xx + 2 * c * s * xy + s * s * yy, s * s * xx - 2 * c * s * xy + c * c * yy, aa)
         )
-        telling = np.square(own / (own + drift)) * (self._weights / self._weights.sum())[:, np.newaxis]
-        past = self._ways[:, np.newaxis] / LASTS
-        apart = 2.0 * (1.0 - (1.0 + past) * np.exp(-past))  # Matérn's correlation, of errors that change smoothly
-        squares = (telling * np.square(off)).sum(axis=0) / own + EXPECTED * expected
-        times: Array = np.sqrt(squares / ((telling * apart).sum(axis=0) + EXPECTED))
-        return times
+        weights = np.square(own / (own + drift)) * (self._weights / self._weights.sum())[:, np.newaxis]
+        past = self._distances[:, np.newaxis] / CORRELATION_LENGTHS_M
+        independent = 2.0 * (1.0 - (1.0 + past) * np.exp(-past))  # by Matérn's correlation of smooth errors
+        squares = (weights * np.square(off)).sum(axis=0) / own + EXPECTED_WEIGHT * expected
+        ratio: Array = np.sqrt(squares / ((weights * independent).sum(axis=0) + EXPECTED_WEIGHT))
+        return ratio
 
 
-def _way(step: Pose2) -> float:
-    """Meters, turns included."""
-    return math.hypot(step.x, step.y) + METERS_A_RAD * abs(step.yaw)
+def _distance(step: Pose2) -> float:
+    """Return the length of a step in m, rotations included."""
+    return math.hypot(step.x, step.y) + METERS_PER_RAD * abs(step.yaw)

@@ -1,4 +1,4 @@
-"""How badly the map explains the beams that it explains at all."""
+"""Residuals of a scan: the distances of its endpoints from the obstacles of the map."""
 
 from typing import NamedTuple
 
@@ -11,31 +11,34 @@ from simscen.stack.localizers.distance_field import DistanceField
 
 
 class ScanResiduals(NamedTuple):
-    """Of one scan: `fits`, the share of the beams that the map explains, and `squares`, the mean square of what they
-    are off by, over the variance that was expected of a beam; the other beams count as off by nothing."""
+    """Residuals of one scan.
 
-    fits: float
-    squares: float
+    explained:    share of the beams that the map explains
+    mean_square:  of the distances of these beams' endpoints from obstacles, over `sigma_hit`²; others count as 0
+    """
+
+    explained: float
+    mean_square: float
 
 
 class MapResiduals:
-    """Compares the ends of beams with what the map shows next to them.
+    """Measures how well the map explains scans.
 
-    A beam whose end is d from the nearest obstacle is one of those that hit it with probability hit / (hit + random),
-    the two parts of its likelihood. So far it pulls the robot, and only so far does it say how far off the map is:
-    people's legs do not, cupboards that were moved by a hand's breadth do.
+    A beam hit the obstacle next to its endpoint with the probability hit / (hit + random), the two parts of its
+    likelihood. Its residual is weighted by this probability, so that furniture that was moved a little increases the
+    residuals, but people who are not on the map do not.
     """
 
     def __init__(
         self, field: DistanceField, beyond: npt.NDArray[np.bool_], z_hit: float, z_rand: float, sigma_hit: float
     ) -> None:
-        """Of beams that end `beyond` (flat, as the field's table) the map says nothing."""
+        """Create residuals of a map. `beyond` (flat, as the field's table) marks cells outside the mapped area."""
         self._field, self._beyond = field, beyond
         self._z_hit, self._z_rand, self._sigma_hit = z_hit, z_rand, sigma_hit
 
     def of(self, beams: Beams, pose: Pose2) -> ScanResiduals | None:
-        """That of a scan taken at `pose`; None where the map says nothing of any of its beams, or explains none."""
-        cells = self._field.cells_seen(np.array([pose]), beams.ends)[0]
+        """Return the residuals of a scan taken at `pose`; None if the map explains none of its beams."""
+        cells = self._field.endpoint_cells(np.array([pose]), beams.ends)[0]
         away = self._field.table.take(cells, mode="clip")[~self._beyond.take(cells, mode="clip")] / self._sigma_hit
         hit = self._z_hit * np.exp(-0.5 * np.square(away, dtype=np.float64))
         if not len(hit) or not hit.any():

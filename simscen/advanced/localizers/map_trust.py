@@ -1,4 +1,4 @@
-"""How much a map is worth where the robot is: rooms are rebuilt, furniture is moved, and nobody draws it anew."""
+"""Weight of scans by how well the map agrees with them, because maps become outdated."""
 
 from typing import NamedTuple
 
@@ -7,27 +7,30 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.stack.localizers.beams import Beams, Cells, Plane
-from simscen.stack.localizers.distance_field import BLOCK, DistanceField
+from simscen.stack.localizers.distance_field import BLOCK_POSES, DistanceField
 from simscen.stack.localizers.particles import Particles
 
-NEAR = 0.3
-"""m: a beam fits that ends this near to what the map shows."""
-TOGETHER = 1.0
-"""m: particles all within this of their mean know where they are; others are not asked what fits."""
-ASKED = 50
-"""Particles."""
-TELLING = 0.1, 0.8
-"""Shares of the beams that end where the map says anything: up to the first a scan counts for nothing, from the second
-on in full. A few beams that reach back over the end of a map fit a wall of it from many places."""
-MOSTLY = 0.5
-"""Share of the particles."""
-_NOTHING, _FITS, _FITS_NOT = 0, 1, 2
-"""What the map says of a beam that ends in a cell."""
+FIT_DISTANCE_M = 0.3
+"""A beam fits if it ends this near to an obstacle of the map."""
+CLUSTER_RADIUS_M = 1.0
+"""Particles that are all within this distance of their mean are one narrow cluster."""
+SAMPLED_PARTICLES = 50
+"""Number of particles at which beams are compared with the map."""
+MAPPED_SHARE = 0.1, 0.8
+"""Shares of the beams that end on the mapped area: up to the first, a scan is ignored; from the second on, it has its
+full weight. A few beams that reach back over the edge of the map fit one of its walls from many poses."""
+MIN_PARTICLE_SHARE = 0.5
+"""Share of the particles for which a beam must end on the mapped area to be used."""
+_UNMAPPED, _FITS, _MISSES = 0, 1, 2
+"""Classes of cells for the endpoint of a beam."""
 
 
-class Worth(NamedTuple):
-    """The `exponent` of a scan's likelihood, 0 … 1; the share of its beams that are `fitting`, of those that end where
-    the map says anything; and which of them count (b,), None for all."""
+class ScanWeight(NamedTuple):
+    """Weight of a scan.
+
+    `exponent` of its likelihood in 0 … 1; share of beams that are `fitting`, of those that end on the mapped area; and
+    which of the beams are used, `counting` (b,), None for all.
+    """
 
     exponent: float
     fitting: float
@@ -35,62 +38,66 @@ class Worth(NamedTuple):
 
 
 class MapTrust:
-    """The exponent of a scan's likelihood: small where the map does not show what is seen.
+    """Determines the weight of scans: small where the map does not agree with them.
 
-    Particles that are one narrow group are right about where they are, or the whole map must be searched; then beams
-    that do not fit are the map's fault, and those that do may fit by chance and pull the group astray. Particles that
-    spread where there is no map are led astray by the first beams that touch it, so what nothing tells of never counts.
+    If the particles are one narrow cluster, the pose is right, or the relocalization will find that it is wrong. Beams
+    that do not fit then show that the map is outdated, and beams that do fit may do so by chance and move the cluster.
+    If the particles have spread outside the map, the first beams that touch the map would attract them to a wrong pose,
+    so beams that end outside the mapped area are never used.
     """
 
     def __init__(self, field: DistanceField, beyond: npt.NDArray[np.bool_], none: float, full: float) -> None:
-        """`beyond` (flat, as the field's table) are the places of which the map says nothing.
+        """Classify the cells of a map. `beyond` (flat, as the field's table) marks cells outside the mapped area.
 
-        A scan counts for nothing up to the share `none` of beams that fit, and in full from the share `full` on.
+        A scan is ignored up to the share `none` of beams that fit, and has its full weight from the share `full` on.
         """
         self._field, self._none, self._full = field, none, full
-        self._says = np.where(beyond, _NOTHING, np.where(field.table < NEAR, _FITS, _FITS_NOT)).astype(np.uint8)
+        mapped = np.where(field.table < FIT_DISTANCE_M, _FITS, _MISSES)
+        self._class_table = np.where(beyond, _UNMAPPED, mapped).astype(np.uint8)
 
-    def of(self, particles: Particles, beams: Beams) -> Worth:
-        """What the ends of beams are worth.
+    def of(self, particles: Particles, beams: Beams) -> ScanWeight:
+        """Return the weight of a scan.
 
-        Of a narrow group each beam counts that ends where the map says something for most
-        particles: what it has in unknown space, less than a hit and more than a miss, draws them into the map or out.
+        For a narrow cluster, only beams that end on the mapped area for most particles are used. The others would move
+        the particles into the map or out of it, because their likelihood is between that of a hit and that of a miss.
         """
-        said = self._said(self._seen(particles.poses, beams))
-        told, fitting = _told(said)
-        exponent = _between(told, *TELLING)
-        if not particles.within(TOGETHER):
-            return Worth(exponent, fitting, None)
-        counting = None if told == 1.0 else np.add.reduce(said != _NOTHING, axis=0) > MOSTLY * len(said)
-        return Worth(exponent * _between(fitting, self._none, self._full), fitting, counting)
+        classes = self._classes(self._endpoint_cells(particles.poses, beams))
+        known_share, fitting = _shares(classes)
+        exponent = _ramp(known_share, *MAPPED_SHARE)
+        if not particles.within(CLUSTER_RADIUS_M):
+            return ScanWeight(exponent, fitting, None)
+        counting = None
+        if known_share < 1.0:
+            counting = np.add.reduce(classes != _UNMAPPED, axis=0) > MIN_PARTICLE_SHARE * len(classes)
+        return ScanWeight(exponent * _ramp(fitting, self._none, self._full), fitting, counting)
 
-    def fit(self, poses: Array, ends: Plane, telling: float) -> float | None:
-        """The share of the beams that fit at `poses` (n, 3), of those that end where the map says anything.
+    def fit(self, poses: Array, ends: Plane, min_mapped: float) -> float | None:
+        """Return the share of the beams that fit at `poses` (n, 3), of those that end on the mapped area.
 
-        None when these are less than the share `telling`.
+        None if fewer than the share `min_mapped` end there.
         """
-        told, fitting = _told(self._said(self._field.cells_seen(poses, ends)))
-        return fitting if told and told >= telling else None
+        known_share, fitting = _shares(self._classes(self._field.endpoint_cells(poses, ends)))
+        return fitting if known_share and known_share >= min_mapped else None
 
-    def _seen(self, poses: Array, beams: Beams) -> Cells:
-        """Where the beams end at some of `poses`; of few, that is known at all of them in a moment anyway."""
-        step = -(-len(poses) // ASKED)
-        if len(poses) <= BLOCK:
+    def _endpoint_cells(self, poses: Array, beams: Beams) -> Cells:
+        """Return the cells of the endpoints for some of the `poses`. For few poses, all are cached anyway."""
+        step = -(-len(poses) // SAMPLED_PARTICLES)
+        if len(poses) <= BLOCK_POSES:
             return beams.cells(self._field, poses)[::step]
-        return self._field.cells_seen(poses[::step], beams.ends)
+        return self._field.endpoint_cells(poses[::step], beams.ends)
 
-    def _said(self, cells: Cells) -> npt.NDArray[np.uint8]:
-        """What the map says of what ends in these cells."""
-        said: npt.NDArray[np.uint8] = self._says.take(cells, mode="wrap")
-        return said
-
-
-def _told(said: npt.NDArray[np.uint8]) -> tuple[float, float]:
-    """The share of the beams that end where the map says anything, and the share of those that fit."""
-    told, fit = int(np.count_nonzero(said)), int(np.count_nonzero(said == _FITS))
-    return told / max(said.size, 1), fit / max(told, 1)
+    def _classes(self, cells: Cells) -> npt.NDArray[np.uint8]:
+        """Return the classes of cells."""
+        classes: npt.NDArray[np.uint8] = self._class_table.take(cells, mode="wrap")
+        return classes
 
 
-def _between(value: float, none: float, full: float) -> float:
-    """0 up to `none`, 1 from `full` on, in between in proportion."""
+def _shares(classes: npt.NDArray[np.uint8]) -> tuple[float, float]:
+    """Return the share of beams that end on the mapped area, and the share of these that fit."""
+    known_share, fit = int(np.count_nonzero(classes)), int(np.count_nonzero(classes == _FITS))
+    return known_share / max(classes.size, 1), fit / max(known_share, 1)
+
+
+def _ramp(value: float, none: float, full: float) -> float:
+    """Return 0 up to `none`, 1 from `full` on, and linear values in between."""
     return 1.0 if value >= full else max(0.0, (value - none) / (full - none))

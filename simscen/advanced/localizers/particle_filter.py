@@ -5,14 +5,14 @@ import math
 import numpy as np
 
 from simscen.advanced.localizers.map_trust import MapTrust
-from simscen.advanced.localizers.relocalization import around
-from simscen.advanced.localizers.scan_matcher import Step, moved
-from simscen.advanced.localizers.scan_memory import METERS_A_RAD
+from simscen.advanced.localizers.relocalization import sample_around
+from simscen.advanced.localizers.scan_matcher import Step, apply_step
+from simscen.advanced.localizers.scan_memory import METERS_PER_RAD
 from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.stack.localizers.beams import Beams
-from simscen.stack.localizers.clusters import in_touch, summarize
+from simscen.stack.localizers.clusters import are_compact, summarize
 from simscen.stack.localizers.likelihood_field import SensorModel
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
@@ -66,11 +66,11 @@ class ScanMatchingParticleFilter(ParticleFilter):
         says, and the map decides, unless it does not show the surroundings. All rotate as the scans show.
         """
         self._settle(delta)
-        poses = moved(self.particles.poses, seen, self._rng)
+        poses = apply_step(self.particles.poses, seen, self._rng)
         if self._map_weight > 0 and not seen.agrees(delta):
             some = self._rng.random(len(poses)) < ODOMETRY_SHARE
             driven = Step(Pose2(delta.x, delta.y, seen.delta.yaw), seen.covariance)
-            poses[some] = moved(self.particles.poses[some], driven, self._rng)
+            poses[some] = apply_step(self.particles.poses[some], driven, self._rng)
         self.particles = Particles(poses, self.particles.weights)
 
     def _settle(self, delta: Pose2) -> None:
@@ -79,25 +79,25 @@ class ScanMatchingParticleFilter(ParticleFilter):
         One scan of a room fits many poses; several rooms together do not. Until then the initial pose counts more.
         """
         if self._scan_weight < 1.0:
-            distance = math.hypot(delta.x, delta.y) + METERS_A_RAD * abs(delta.yaw)
+            distance = math.hypot(delta.x, delta.y) + METERS_PER_RAD * abs(delta.yaw)
             self._scan_weight = min(1.0, self._scan_weight + distance / self._spec.settling_distance)
 
     def redistribute(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:
         """Put all particles around `poses` (k, 3), each with its share (k,). Return the new pose and covariance."""
-        drawn = around(poses, shares, self._bound.most, self._rng)
+        drawn = sample_around(poses, shares, self._bound.most, self._rng)
         self.particles = Particles.equal(drawn)
         self._random = self._descendants = None
         self._scan_weight = 1.0
-        return summarize(self.particles, self._sensor.peak)
+        return summarize(self.particles, self._sensor.peak_power)
 
     def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
         """Return the exponent of the scan's likelihood by map trust and settling, and the beams the map covers."""
         if self._trust is not None and len(beams.ends):
             self._map_weight, self.fitting, counting = self._trust.of(self.particles, beams)
             if counting is not None and self._map_weight > 0:
-                beams = beams.of_hits(counting)
+                beams = beams.keeping_hits(counting)
         return self._map_weight * self._scan_weight, beams
 
     def _resample(self) -> None:
-        self._is_one_group = in_touch(self.particles)
+        self._is_one_group = are_compact(self.particles)
         super()._resample()

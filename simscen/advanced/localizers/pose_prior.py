@@ -1,4 +1,4 @@
-"""Where a robot can be: not far from where it last was sure to be, carried on by how it saw itself go."""
+"""Prior of a pose: the last certain pose, propagated by the motion that scans and wheels have measured since."""
 
 import math
 from dataclasses import dataclass, replace
@@ -7,91 +7,102 @@ import numpy as np
 
 from simscen.advanced.localizers.scan_matcher import Step
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.clusters import errors_about
-from simscen.stack.localizers.planar_motion import Noise, swing, turn, turned
+from simscen.stack.localizers.clusters import pose_errors
+from simscen.stack.localizers.planar_motion import Noise, propagate_covariance, rotate_covariance, rotation_matrix
 
-AROUND = (0.1, 0.1, 0.05)
-"""m, m, rad: standard deviations of a robot about a place where it is sure to be."""
-DRIFT = (0.03, 0.01)
-"""m and rad: what it may drift by for each meter, turns included, where no scan says how it went."""
-LED = 0.1, 0.5
-"""m, and of the way by wheels: where scans say so much less or more of a step, what they show goes along, as people do;
-wheels that slip are 40 % off at most, but for those that spin on the spot, where nothing new is to be seen."""
-TOLD = 0.012
-"""m: by how much more than this the standard deviation of a step is larger, a robot drifts: along a corridor that looks
-the same everywhere the wheels have their way, and slip for a while, so that such steps err together."""
+CERTAIN_STD = (0.1, 0.1, 0.05)
+"""Standard deviations (m, m, rad) of a certain pose."""
+ODOMETRY_DRIFT = (0.03, 0.01)
+"""Drift of odometry in m and rad per meter driven, rotations included, if scans do not show the motion."""
+MOVING_SCENE = 0.1, 0.5
+"""Difference between a step by scans and by wheels, in m and as share of the latter, that slip does not explain.
+
+Then people walk beside the robot, and the scans show them. Slipping wheels differ by at most 40 %, except if they spin
+on the spot, where scans show nothing new.
+"""
+KNOWN_STEP_STD_M = 0.012
+"""Standard deviation of a step above which scans do not determine it.
+
+Along a corridor that looks the same everywhere, the wheels determine the step. Their slip lasts for some time, so that
+the errors of such steps add up in one direction.
+"""
 
 
-CERTAIN: Noise = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_NOISE: Noise = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class ObservedMotion:
-    """A way from one correction to the next: a `step` as scans show it, if they do.
+    """Motion from one correction to the next.
 
-    What scans and wheels say of it is `torn` apart, where they do not agree: then one of them errs by as much. Wheels
-    slip, or people walk along with the robot. The last scan showed hardly anything of what those before it did if they
-    `parted`, None when nobody can say.
+    disagreement:  of scan matching from odometry, if they disagree; one of them is wrong by this
+    step:          by scan matching; None if scans do not show the motion
+    was_carried:   the last scan hardly overlaps with earlier ones; None if unknown
     """
 
-    torn: Pose2 = Pose2(0.0, 0.0, 0.0)
+    disagreement: Pose2 = Pose2(0.0, 0.0, 0.0)
     step: Step | None = None
-    parted: bool | None = None
+    was_carried: bool | None = None
 
     @property
-    def led(self) -> bool:
-        """Whether scans and wheels differ by more than wheels slip."""
-        apart = math.hypot(self.torn.x, self.torn.y)
-        if self.step is None or apart < LED[0]:
+    def is_scene_moving(self) -> bool:
+        """Scans and wheels differ by more than slip explains, so that what the scans show moves."""
+        apart = math.hypot(self.disagreement.x, self.disagreement.y)
+        if self.step is None or apart < MOVING_SCENE[0]:
             return False
-        wheels = self.step.delta.compose(self.torn.inverse())
-        return apart > LED[1] * math.hypot(wheels.x, wheels.y)
+        wheels = self.step.delta.compose(self.disagreement.inverse())
+        return apart > MOVING_SCENE[1] * math.hypot(wheels.x, wheels.y)
 
-    def together(self, meters: float) -> tuple[float, float]:
-        """m and rad by which this way and others like it may err in one direction."""
+    def systematic_error(self, meters: float) -> tuple[float, float]:
+        """Return the errors in m and rad that have the same direction in this motion and similar ones.
+
+        `meters` is the distance driven, rotations included.
+        """
         if self.step is None:
-            return DRIFT[0] * meters, DRIFT[1] * meters
+            return ODOMETRY_DRIFT[0] * meters, ODOMETRY_DRIFT[1] * meters
         (xx, _, _), (_, yy, _), _ = self.step.covariance.tolist()
-        untold = max(0.0, math.sqrt(max(xx, yy)) - TOLD)
-        return untold + math.hypot(self.torn.x, self.torn.y), abs(self.torn.yaw)
+        unknown = max(0.0, math.sqrt(max(xx, yy)) - KNOWN_STEP_STD_M)
+        return unknown + math.hypot(self.disagreement.x, self.disagreement.y), abs(self.disagreement.yaw)
 
 
 @dataclass(frozen=True, eq=False)
 class PosePrior:
-    """A robot was at `pose` when its base was at `base` in a frame that drifts.
+    """A certain pose and the errors of the motion since then.
 
-    `std` (3,) are the standard deviations of the pose in m, m and rad; `covariance` (3, 3) is that of how the robot saw
-    itself go since, in the frame that drifts, and `together` in m and rad what may err in one direction besides.
+    pose:              in the map, when the base was at `base` in a frame that drifts slowly
+    std (3,):          standard deviations of the pose in m, m and rad
+    covariance (3, 3): of the motion since then, in the frame that drifts, from independent errors
+    systematic:        sum of the errors with the same direction, in m and rad
     """
 
     pose: Pose2
     base: Pose2
     std: Array
     covariance: Array
-    together: tuple[float, float] = (0.0, 0.0)
+    systematic: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def at(cls, pose: Array, base: Pose2, std: Array | tuple[float, float, float] = AROUND) -> "PosePrior":
-        """Sure by what was seen, or by what was told if that says how much."""
+    def at(cls, pose: Array, base: Pose2, std: Array | tuple[float, float, float] = CERTAIN_STD) -> "PosePrior":
+        """Return the prior of a pose (3,) with standard deviations `std`."""
         return cls(Pose2(*pose.tolist()), base, np.array(std), np.zeros((3, 3)))
 
-    def after(self, before: Pose2, base: Pose2, meters: float, way: ObservedMotion) -> "PosePrior":
-        """The same, when the base went on from `before`."""
-        meter, rad = way.together(meters)
-        noise = CERTAIN if way.step is None else turned(way.step.covariance, before.yaw)
-        covariance = swing(self.covariance, base.x - before.x, base.y - before.y, noise)
-        return replace(self, covariance=covariance, together=(self.together[0] + meter, self.together[1] + rad))
+    def after(self, before: Pose2, base: Pose2, meters: float, motion: ObservedMotion) -> "PosePrior":
+        """Return the prior after `motion`, in which the base drove `meters`, rotations included, from `before`."""
+        meter, rad = motion.systematic_error(meters)
+        noise = NO_NOISE if motion.step is None else rotate_covariance(motion.step.covariance, before.yaw)
+        covariance = propagate_covariance(self.covariance, base.x - before.x, base.y - before.y, noise)
+        return replace(self, covariance=covariance, systematic=(self.systematic[0] + meter, self.systematic[1] + rad))
 
     def expected(self, base: Pose2) -> Array:
-        """The pose (3,) where the robot is if it has not drifted."""
+        """Return the pose (3,) in the map if there was no drift."""
         return np.array(self.pose.compose(self.base.between(base)))
 
-    def unlikely(self, poses: Array, base: Pose2) -> Array:
-        """The logarithm of how many times unlikelier than the expected pose each of `poses` (n, 3) is: (n,)."""
-        frame = turn(self.pose.yaw - self.base.yaw)
-        meter, rad = self.together
+    def negative_log_likelihood(self, poses: Array, base: Pose2) -> Array:
+        """Return the negative log-likelihood (n,) of each of the `poses` (n, 3), relative to the expected pose."""
+        frame = rotation_matrix(self.pose.yaw - self.base.yaw)
+        meter, rad = self.systematic
         std = np.square(self.std + np.array((meter, meter, rad)))
-        off = errors_about(self.expected(base), poses)
+        off = pose_errors(self.expected(base), poses)
         information = np.linalg.inv(frame @ self.covariance @ frame.T + np.diag(std))
-        far: Array = 0.5 * np.einsum("ni,ij,nj->n", off, information, off)
-        return far
+        negative: Array = 0.5 * np.einsum("ni,ij,nj->n", off, information, off)
+        return negative

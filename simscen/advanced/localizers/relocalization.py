@@ -1,246 +1,260 @@
-"""When a particle filter is lost, and where its robot may be instead."""
+"""Relocalization: detects that the particle filter is lost, and searches the map for the robot."""
 
 import math
 from collections import deque
 
 import numpy as np
 
-from simscen.advanced.localizers.global_search import APART, GlobalSearch, View
+from simscen.advanced.localizers.global_search import DISTINCT, GlobalSearch, View
 from simscen.advanced.localizers.map_trust import MapTrust
-from simscen.advanced.localizers.pose_prior import AROUND, ObservedMotion, PosePrior
-from simscen.advanced.localizers.scan_memory import ScanMemory, travelled
+from simscen.advanced.localizers.pose_prior import CERTAIN_STD, ObservedMotion, PosePrior
+from simscen.advanced.localizers.scan_memory import ScanMemory, traveled
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane
-from simscen.stack.localizers.clusters import errors_about
+from simscen.stack.localizers.clusters import pose_errors
 
-RECENT, DOUBTFUL = 5, 0.6
-"""Over so many scans that corrected the share of the beams that fit is averaged, and below this the robot may be lost.
+# All distances driven include rotations (scan_memory.METERS_PER_RAD). A score is that of GlobalSearch.fit.
+
+RECENT_SCANS, MIN_FIT = 5, 0.6
+"""The robot may be lost if the mean share of fitting beams in this many scans is below the second value."""
+MIN_MAPPED = 0.6
+"""Share of the beams that must end on the mapped area for the fit of a scan to be known."""
+SEARCH_INTERVAL_M, MAX_SEARCH_INTERVAL_M = 0.7, 8.0
+"""Distance driven between two searches of the map; doubled after each search without a result, up to the maximum."""
+MIN_LENGTH_M, MIN_LEAD = 2.0, 0.05
+"""A robot without initial pose is found if the score of scans over this distance exceeds that of any other pose by
+this much."""
+MIN_GAIN, MIN_SCORE = 0.1, 0.75
+"""A robot that had a pose is found elsewhere if, in addition, the score exceeds that of its pose by MIN_GAIN and is at
+least MIN_SCORE, in two searches that agree."""
+CHECK_INTERVAL_M, CERTAIN_SCORE = 1.5, 0.85
+"""Distance driven after which the poses near the current one are searched, if its score is below CERTAIN_SCORE."""
+MIN_NEAR_SCORE, CERTAIN_GAIN = 0.82, 0.04
+"""The robot is moved to a pose nearby with this score that leads by MIN_LEAD and exceeds the current score by MIN_GAIN,
+or by CERTAIN_GAIN if its score exceeds CERTAIN_SCORE.
+
+Scores are reduced by SCORE_SCALE times the negative log-likelihood of the drift since the last certain pose, because in
+a changed corridor a pose one meter away may have a better score by chance.
 """
-TELLING = 0.6
-"""Share of the beams that must end where the map says anything, for a scan to count."""
-BETWEEN, MOST_BETWEEN = 0.7, 8.0
-"""m between two searches, turns included; doubled up to the most while the robot has a place and nothing better is
-found."""
-ENOUGH, PLAIN, BETTER, GOOD = 2.0, 0.05, 0.1, 0.75
-"""A robot that was told nothing is where scans of ENOUGH meters fit by PLAIN better than anywhere else; one that had a
-place is elsewhere when they fit there so, and GOOD, and by BETTER better than where it was, in two searches that agree.
-"""
-CHECKED, FITS = 1.5, 0.85
-"""m, turns included, after each of which a robot that has a place is compared with its neighborhood, if what it saw
-fits less than that."""
-NEAR_GOOD, NEAR_BETTER = 0.82, 0.04
-"""It is moved to a place nearby that fits so and BETTER than where it is, or more than FITS and so much better, and by
-PLAIN better than any other. Each fit counts less by SHARPNESS for each e times that it is unlikely to have drifted
-there since it was last sure of its place: rebuilt corridors fit a meter further on by chance, better than here."""
-UNREACHED = 0.1
-"""At most: where it was sure it may have been wrong."""
-LIKELIER = 3.0
-"""While a told place counts: the logarithm of how many times likelier another place nearby must be for a robot to be
-moved there, by what was told and all that was seen since."""
-AGREE = 0.7, 0.3
-"""m, rad: two searches agree that find places so near to each other, the way between them taken off."""
-AGREED = 2.0
-"""m, turns included, over which searches must agree."""
-ASTRAY, BACK_GOOD, BACK_PLAIN = 20, 0.9, 0.1
-"""So many scans that correct without a beam that the map could tell anything of, and a robot is sought on the map, too:
-what it saw since says it is back if it fits so, and by so much better than anywhere else, in two searches that agree.
-Rooms that nobody mapped often look like one that somebody did, though less than that."""
-SHARPNESS = 0.02
-"""Of two places that fit so much better or worse, the better is e times as likely, and gets as many more particles."""
-UNSEEN = ObservedMotion()
-"""Of a robot that does not see how it goes."""
+MAX_REDUCTION = 0.1
+"""Maximum reduction of a score, because the last certain pose may be wrong."""
+MIN_LOG_RATIO = 3.0
+"""Log-likelihood ratio by which another pose must exceed the current one while the initial pose counts."""
+SAME_POSE = 0.7, 0.3
+"""Maximum difference (m, rad) of the poses found by two searches that agree."""
+AGREEMENT_LENGTH_M = 2.0
+"""Distance driven over which searches must agree."""
+UNMAPPED_SCANS, RETURN_SCORE, RETURN_LEAD = 20, 0.9, 0.1
+"""After this many scans outside the mapped area, the map is searched, too. The robot has returned if score and lead
+have these values. They are higher because unmapped rooms often resemble mapped ones."""
+SCORE_SCALE = 0.02
+"""Difference of two scores for which one pose is e times as likely as the other, and gets e times as many particles."""
+NO_MOTION = ObservedMotion()
+"""The motion of a robot without scan matching."""
 
 
 class Relocalizer:
-    """Watches how well scans fit where the robot is believed to be, and searches the whole map when they do not.
+    """Compares scans with the map at the estimated pose, and searches the whole map if they do not fit.
 
-    The search takes the scans of the last meters together, so that one room of many that look alike is told from the
-    others. Until it is plain where a robot is that was told nothing, its particles lie at all places that fit; a robot
-    that was told a place is moved only by what is plainly better.
+    The search uses the scans of the last meters together, which distinguishes rooms that look alike. A robot without
+    initial pose has particles at all poses that fit until one of them is clearly the best. A robot with an initial pose
+    is moved only to a clearly better one.
     """
 
-    def __init__(self, search: GlobalSearch, trust: MapTrust, told: Estimate, settling: float) -> None:
-        """What was `told` counts for the first `settling` m, turns included."""
+    def __init__(self, search: GlobalSearch, trust: MapTrust, estimate: Estimate, settling: float) -> None:
+        """Create the relocalizer. The initial `estimate` is used for the first `settling` m driven."""
         self._search, self._trust, self._memory = search, trust, ScanMemory()
-        self._known, self._told, self._settling = told.pose is not None, told, settling
-        self._begun: PosePrior | None = None
-        self._sure: PosePrior | None = None
-        self._fits: deque[float] = deque(maxlen=RECENT)
-        self._way, self._wait, self._driven, self._unchecked, self._doubted = 0.0, 0.0, 0.0, 0.0, False
+        self._has_pose, self._estimate, self._settling = estimate.pose is not None, estimate, settling
+        self._initial: PosePrior | None = None
+        self._certain: PosePrior | None = None
+        self._fits: deque[float] = deque(maxlen=RECENT_SCANS)
+        self._driven, self._since_search, self._since_check, self._since_candidate = 0.0, 0.0, 0.0, 0.0
+        self._interval, self._was_in_doubt = 0.0, False
         self._last: Pose2 | None = None
-        self._suspected: tuple[Pose2, Pose2] | None = None
-        self._since, self._astray, self._continuous = 0.0, 0, False
+        self._candidate: tuple[Pose2, Pose2] | None = None  # pose found by the last search, and the base there
+        self._unmapped_scans, self._knows_overlap = 0, False
 
-    def places(
-        self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float], way: ObservedMotion = UNSEEN,
-        fit: float | None = None,
+    def update(
+        self, scan: Scan, base: Pose2, estimated: Pose2, limits: tuple[float, float],
+        motion: ObservedMotion = NO_MOTION, fit: float | None = None,
     ) -> tuple[Array, Array] | None:  # fmt: skip
-        """Poses (k, 3) where the robot may be and the share of each (k,); None to leave it where it is believed to be.
+        """Return poses (k, 3) where the robot may be, with their shares (k,); None if the estimate should be kept.
 
-        `base` is where it was when it took the scan, in a frame that drifts; `limits` are the ranges that count, and
-        `way` is how it came there since the last scan. `fit` is the share of the beams that fit where it is believed to
-        be, if anyone knows.
+        base:       pose of the robot when the scan was taken, in a frame that drifts slowly
+        estimated:  pose of the robot in the map
+        limits:     minimum and maximum range of beams to use, in m
+        motion:     motion since the last scan
+        fit:        share of the beams that fit at the estimated pose, if it is already known
         """
-        ends = self.passed(scan, base, limits, way)
+        ends = self.add_scan(scan, base, limits, motion)
         if not len(ends):
             return None
-        here = np.array([believed])
-        if (
-            self._begun is not None
-            and self._way < self._settling
-            and (settled := self._as_told(self._begun, base, here)) is not None
-        ):
-            return settled
+        here = np.array([estimated])
+        if self._initial is not None and self._driven < self._settling:
+            by_initial_pose = self._search_by_initial_pose(self._initial, base, here)
+            if by_initial_pose is not None:
+                return by_initial_pose
         if fit is None:
-            fit = self._trust.fit(here, ends, TELLING)
+            fit = self._trust.fit(here, ends, MIN_MAPPED)
         if fit is not None:
             self._fits.append(fit)
-        self._astray = self._astray + 1 if fit is None else 0
-        if self._known and (near := self._nearby(base, here)) is not None:
+        self._unmapped_scans = self._unmapped_scans + 1 if fit is None else 0
+        if self._has_pose and (near := self._search_nearby(base, here)) is not None:
             return near
-        if self._known and not (self._in_doubt() or self._astray >= ASTRAY):
+        if self._has_pose and not (self._is_in_doubt() or self._unmapped_scans >= UNMAPPED_SCANS):
             return None
-        if self._driven < self._wait:
+        if self._since_search < self._interval:
             return None
-        return self._sought(self._memory.about(base), base, here)
+        return self._search_map(self._memory.view_from(base), base, here)
 
-    def passed(self, scan: Scan, base: Pose2, limits: tuple[float, float], way: ObservedMotion) -> Plane:
-        """Remember a scan, and ask nothing; where it ended, about the base. As `places` otherwise."""
-        self._moved(base, way)
+    def add_scan(self, scan: Scan, base: Pose2, limits: tuple[float, float], motion: ObservedMotion) -> Plane:
+        """Add a scan without checking the pose. Return its endpoints in the base frame. Arguments as in `update`."""
+        self._propagate(base, motion)
         return self._memory.add(scan, base, *limits)
 
-    def _moved(self, base: Pose2, way: ObservedMotion) -> None:
-        """Carry on what is known of where the robot is; nothing is when it no longer sees what it saw."""
+    def _propagate(self, base: Pose2, motion: ObservedMotion) -> None:
+        """Propagate the priors of the pose. If the robot was carried, they are forgotten."""
         last, self._last = self._last, base
         if last is None:
-            if self._told.pose is not None:
-                std = np.maximum(self._told.std, AROUND)
-                self._begun = self._sure = PosePrior.at(np.array(self._told.pose), base, std)
+            if self._estimate.pose is not None:
+                std = np.maximum(self._estimate.std, CERTAIN_STD)
+                self._initial = self._certain = PosePrior.at(np.array(self._estimate.pose), base, std)
             return
-        self._continuous = way.parted is not None
-        moved = travelled(last, base)
-        self._driven += moved
-        self._unchecked += moved
-        self._way += moved
-        self._since += moved
-        if way.parted or way.led:
+        self._knows_overlap = motion.was_carried is not None
+        distance = traveled(last, base)
+        self._since_search += distance
+        self._since_check += distance
+        self._driven += distance
+        self._since_candidate += distance
+        if motion.was_carried or motion.is_scene_moving:
             self._memory.forget(0)
-        if way.parted:
-            self._begun = self._sure = None
-        self._begun = self._begun and self._begun.after(last, base, moved, way)
-        self._sure = self._sure and self._sure.after(last, base, moved, way)
+        if motion.was_carried:
+            self._initial = self._certain = None
+        self._initial = self._initial and self._initial.after(last, base, distance, motion)
+        self._certain = self._certain and self._certain.after(last, base, distance, motion)
 
-    def _as_told(self, begun: PosePrior, base: Pose2, here: Array) -> tuple[Array, Array] | None:
-        """Where the robot is by what it was told and all that it saw since, where particles settled elsewhere.
+    def _search_by_initial_pose(self, initial: PosePrior, base: Pose2, here: Array) -> tuple[Array, Array] | None:
+        """Return the pose that the initial pose and all scans since give, if the particles are elsewhere.
 
-        A scan of a room whose furniture was moved fits another place of it, and the next scans, which show the same,
-        confirm that. Seen together, and with the ways to what was seen, which must be free, they often do not. Where
-        the map shows little of it, and is soon fitted by chance, the told place is asked alone.
+        In a room whose furniture was moved, one scan may fit a wrong pose, and the next scans, which show the same,
+        confirm it. All scans together, with the beams' paths, which must be free, often show that it is wrong. If the
+        map shows little of the scans, so that many poses fit by chance, only the expected pose is considered.
         """
         if not self._memory.length:
             return None
-        view, expected = self._memory.about(base), begun.expected(base)[None]
-        if not len(view.ends) or (fit := self._search.fit(here, view))[0] > FITS:
+        view, expected = self._memory.view_from(base), initial.expected(base)[None]
+        if not len(view.ends) or (score := self._search.fit(here, view))[0] > CERTAIN_SCORE:
             return None
-        shown = self._trust.fit(expected, view.ends, TELLING) is not None
-        poses, fits = self._search.near(view, expected[0]) if shown else (expected, self._search.fit(expected, view))
-        likely = fits / SHARPNESS - begun.unlikely(poses, base)
-        own = fit[0] / SHARPNESS - begun.unlikely(here, base)[0]
-        best = int(likely.argmax())
-        off = errors_about(here[0], poses[best : best + 1])[0]
-        if likely[best] - own < LIKELIER or (math.hypot(off[0], off[1]) < APART[0] and abs(off[2]) < APART[1]):
+        is_mapped = self._trust.fit(expected, view.ends, MIN_MAPPED) is not None
+        poses, scores = (
+            self._search.near(view, expected[0]) if is_mapped else (expected, self._search.fit(expected, view))
+        )
+        likelihoods = scores / SCORE_SCALE - initial.negative_log_likelihood(poses, base)
+        own = score[0] / SCORE_SCALE - initial.negative_log_likelihood(here, base)[0]
+        best = int(likelihoods.argmax())
+        off = pose_errors(here[0], poses[best : best + 1])[0]
+        if likelihoods[best] - own < MIN_LOG_RATIO or (
+            math.hypot(off[0], off[1]) < DISTINCT[0] and abs(off[2]) < DISTINCT[1]
+        ):
             return None
         self._fits.clear()
         return poses[best : best + 1], np.ones(1)
 
-    def _nearby(self, base: Pose2, here: Array) -> tuple[Array, Array] | None:
-        """Where the robot is that is only somewhat off: it was told so, or drifted where there was no map."""
-        if min(self._unchecked, self._memory.length) < CHECKED:
+    def _search_nearby(self, base: Pose2, here: Array) -> tuple[Array, Array] | None:
+        """Return the pose if it is near the current one, after an inexact initial pose or after drift without a map."""
+        if min(self._since_check, self._memory.length) < CHECK_INTERVAL_M:
             return None
-        self._unchecked, view = 0.0, self._memory.about(base)
-        if not len(view.ends) or self._trust.fit(here, view.ends, TELLING) is None:
+        self._since_check, view = 0.0, self._memory.view_from(base)
+        if not len(view.ends) or self._trust.fit(here, view.ends, MIN_MAPPED) is None:
             return None
-        fit = float(self._reached(here, self._search.fit(here, view), base)[0])
-        if fit > FITS:
-            self._sure = PosePrior.at(here[0], base)
+        score = float(self._reduced(self._search.fit(here, view), here, base)[0])
+        if score > CERTAIN_SCORE:
+            self._certain = PosePrior.at(here[0], base)
             return None
-        poses, fits = self._search.near(view, here[0])
-        fits = self._reached(poses, fits, base)
-        order = np.argsort(-fits, kind="stable")
-        poses, fits = poses[order], fits[order]
-        plain = len(fits) == 1 or fits[0] - fits[1] > PLAIN
-        better = NEAR_BETTER if fits[0] > FITS else BETTER
-        if not plain or fits[0] < max(NEAR_GOOD, fit + better):
+        poses, scores = self._sorted(*self._search.near(view, here[0]), base)
+        gain = CERTAIN_GAIN if scores[0] > CERTAIN_SCORE else MIN_GAIN
+        if not _leads(scores, MIN_LEAD) or scores[0] < max(MIN_NEAR_SCORE, score + gain):
             return None
         return self._found(poses[:1], base)
 
-    def _reached(self, poses: Array, fits: Array, base: Pose2) -> Array:
-        """How well `poses` (n, 3) fit, less what it takes to have drifted there."""
-        if self._sure is None:
-            return fits
-        return fits - np.minimum(SHARPNESS * self._sure.unlikely(poses, base), UNREACHED)
+    def _sorted(self, poses: Array, scores: Array, base: Pose2) -> tuple[Array, Array]:
+        """Return poses (n, 3) and their reduced scores (n,), best first."""
+        reduced = self._reduced(scores, poses, base)
+        order = np.argsort(-reduced, kind="stable")
+        return poses[order], reduced[order]
 
-    def _found(self, places: Array, base: Pose2) -> tuple[Array, Array]:
-        """The one of `places` (1, 3) with all particles."""
+    def _reduced(self, scores: Array, poses: Array, base: Pose2) -> Array:
+        """Return the scores (n,) of `poses` (n, 3), reduced by how unlikely the drift to them is."""
+        if self._certain is None:
+            return scores
+        return scores - np.minimum(SCORE_SCALE * self._certain.negative_log_likelihood(poses, base), MAX_REDUCTION)
+
+    def _found(self, poses: Array, base: Pose2) -> tuple[Array, Array]:
+        """Return `poses` (1, 3) with all particles, and mark it as certain."""
         self._fits.clear()
-        self._sure = PosePrior.at(places[0], base)
-        return places, np.ones(1)
+        self._certain = PosePrior.at(poses[0], base)
+        return poses, np.ones(1)
 
-    def _in_doubt(self) -> bool:
-        """Whether recent scans do not fit. When that begins, what was seen before may be of another place."""
-        before, self._doubted = self._doubted, len(self._fits) == RECENT and sum(self._fits) < RECENT * DOUBTFUL
-        if self._doubted and not before:
-            if not self._continuous:
+    def _is_in_doubt(self) -> bool:
+        """Return whether recent scans do not fit. At the begin of doubt, earlier scans may be from another place."""
+        is_in_doubt = len(self._fits) == RECENT_SCANS and sum(self._fits) < RECENT_SCANS * MIN_FIT
+        if is_in_doubt and not self._was_in_doubt:
+            if not self._knows_overlap:
                 self._memory.forget(1)
-            self._wait = 0.0
-        return self._doubted
+            self._interval = 0.0
+        self._was_in_doubt = is_in_doubt
+        return is_in_doubt
 
     @property
-    def _strayed(self) -> bool:
-        """Whether it is where the map shows nothing, and went there: who was carried off may be anywhere."""
-        return self._astray >= ASTRAY and self._sure is not None
+    def _has_left_map(self) -> bool:
+        """The robot drove out of the mapped area. If it had been carried there, it could be anywhere."""
+        return self._unmapped_scans >= UNMAPPED_SCANS and self._certain is not None
 
-    def _sought(self, view: View, base: Pose2, here: Array) -> tuple[Array, Array] | None:
-        poses, fits = self._search.places(view)
-        waited, self._wait, self._driven = self._wait, BETWEEN, 0.0
+    def _search_map(self, view: View, base: Pose2, here: Array) -> tuple[Array, Array] | None:
+        """Return the poses that fit, or for a robot that had a pose, the one that two searches agree on."""
+        poses, scores = self._search.places(view)
+        last_interval, self._interval, self._since_search = self._interval, SEARCH_INTERVAL_M, 0.0
         if not len(poses):
             return None
-        good, clear = (BACK_GOOD, BACK_PLAIN) if self._strayed else (GOOD, PLAIN)
-        if self._known:
-            order = np.argsort(-(fits := self._reached(poses, fits, base)), kind="stable")
-            poses, fits = poses[order], fits[order]
-        plain = len(fits) == 1 or fits[0] - fits[1] > clear
-        if not self._known:
-            self._known = plain and self._memory.length >= ENOUGH
-            if self._known:
-                self._sure = PosePrior.at(poses[0], base)
-            shares = np.exp((fits - fits[0]) / SHARPNESS)
+        if not self._has_pose:
+            self._has_pose = _leads(scores, MIN_LEAD) and self._memory.length >= MIN_LENGTH_M
+            if self._has_pose:
+                self._certain = PosePrior.at(poses[0], base)
+            shares = np.exp((scores - scores[0]) / SCORE_SCALE)
             return poses, shares / shares.sum()
-        if plain and fits[0] > good and fits[0] > self._reached(here, self._search.fit(here, view), base)[0] + BETTER:
+        min_score, lead = (RETURN_SCORE, RETURN_LEAD) if self._has_left_map else (MIN_SCORE, MIN_LEAD)
+        poses, scores = self._sorted(poses, scores, base)
+        own = self._reduced(self._search.fit(here, view), here, base)[0]
+        if _leads(scores, lead) and scores[0] > min_score and scores[0] > own + MIN_GAIN:
             found = Pose2(*poses[0].tolist())
-            if self._suspected is None or not _agree(*self._suspected, found, base):
-                self._suspected, self._since = (found, base), 0.0
-            elif self._since >= AGREED:
-                self._suspected = None
-                self._astray = 0
+            if self._candidate is None or not _agree(*self._candidate, found, base):
+                self._candidate, self._since_candidate = (found, base), 0.0
+            elif self._since_candidate >= AGREEMENT_LENGTH_M:
+                self._candidate = None
+                self._unmapped_scans = 0
                 return self._found(poses[:1], base)
         else:
-            more = MOST_BETWEEN if self._strayed else 2 * max(waited, BETWEEN)
-            self._suspected, self._wait = None, min(MOST_BETWEEN, more)
+            interval = MAX_SEARCH_INTERVAL_M if self._has_left_map else 2 * max(last_interval, SEARCH_INTERVAL_M)
+            self._candidate, self._interval = None, min(MAX_SEARCH_INTERVAL_M, interval)
         return None
 
 
-def _agree(first: Pose2, then: Pose2, second: Pose2, now: Pose2) -> bool:
-    """Whether a robot that was `first` when its base was at `then` is `second` when it is at `now`."""
-    off = first.compose(then.between(now)).between(second)
-    return math.hypot(off.x, off.y) < AGREE[0] and abs(off.yaw) < AGREE[1]
+def _leads(scores: Array, lead: float) -> bool:
+    """Return whether the first of the scores exceeds the second by `lead`."""
+    return len(scores) == 1 or bool(scores[0] - scores[1] > lead)
 
 
-def around(poses: Array, shares: Array, count: int, rng: np.random.Generator) -> Array:
-    """Particles (count, 3) about `poses` (k, 3), each with its share."""
+def _agree(first: Pose2, first_base: Pose2, second: Pose2, second_base: Pose2) -> bool:
+    """Return whether the motion of the base leads from the first pose to the second."""
+    off = first.compose(first_base.between(second_base)).between(second)
+    return math.hypot(off.x, off.y) < SAME_POSE[0] and abs(off.yaw) < SAME_POSE[1]
+
+
+def sample_around(poses: Array, shares: Array, count: int, rng: np.random.Generator) -> Array:
+    """Return particles (count, 3) around `poses` (k, 3), each with its share (k,)."""
     chosen = rng.choice(len(poses), count, p=shares)
-    drawn: Array = poses[chosen] + rng.normal(0.0, AROUND, (count, 3))
+    drawn: Array = poses[chosen] + rng.normal(0.0, CERTAIN_STD, (count, 3))
     drawn[:, 2] = wrap_array(drawn[:, 2])
     return drawn

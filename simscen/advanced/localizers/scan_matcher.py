@@ -1,8 +1,8 @@
-"""How far a robot went between two scans, from what it saw: odometry is the guess, and what the scans leave open.
+"""Scan matching: the motion between two scans, with odometry as the initial guess.
 
-Iterated closest points with a point-to-line metric (Censi, An ICP variant using a point-to-line metric, ICRA 2008),
-against the scans of the last meters; the guess counts as a measurement too, so that along a corridor, which looks the
-same everywhere, odometry has its way (Gauss and Newton with a prior).
+Source: Censi, An ICP variant using a point-to-line metric (ICRA 2008). A scan is matched with the scans of the last
+meters. The guess is also a measurement (Gauss-Newton with a prior), so that odometry decides where scans cannot, e.g.
+along a corridor that looks the same everywhere.
 """
 
 import cmath
@@ -18,66 +18,77 @@ from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.particles import columns, wrapped
 
-FRAMES = 4
-"""Scans that a new one is matched with."""
-REFERENCE, MATCHED = 120, 90
-"""Beams kept of each of those, and of the new one."""
-GATES, ITERATIONS = (0.5, 0.35, 0.25, 0.15, 0.1), 6
-"""m: what is further from its nearest neighbor counts for nothing, in one iteration after the other; and the most."""
-SETTLED, STILL = (0.02, 0.01), (0.002, 0.001)
-"""m, rad: after an iteration that moved the scan less the last gate comes next; after one that moved it less, none."""
-LOOSE, LOOSER = 0.1, 1.5
-"""m, and of the root mean square of all gaps, whichever is more: what is so far from its neighbor counts a quarter,
-what is further soon nothing (Geman & McClure). Where most points fit, who walks along and what comes into sight beside
-a thing are no reason to doubt them; where none does, the robot went elsewhere than its wheels say."""
-SIGMA = 0.03
-"""m: the standard deviation of points from surfaces, correlations included."""
-ALIKE = 0.7
-"""The cosine between two normals that may be of one surface, at least."""
-LEAST = 12
-"""Points that must be matched for an answer."""
-DOUBT = (0.15, 0.02, 0.15, 0.03)
-"""Standard deviations of the guess: of each meter driven, and m; of each rad turned, and rad."""
-COARSEST = 0.04
-"""rad between two beams: of a lidar whose beams are further apart nobody can tell which points are of one surface."""
-AGREES = (0.03, 0.1, 0.03, 0.1)
-"""m, and of each meter; rad, and of each rad: within this the match and odometry say the same."""
-AGAIN = 0.3
-"""Share of what a scan shows that the ones before it must have shown: less, and the robot was carried elsewhere."""
-INFLATED, FLOOR = 0.5, (0.004**2, 0.003**2, 0.0015**2)
-"""Of the covariance that the match itself gives, and what is added (m, m, rad): neighboring frames share the errors of
-their surfaces."""
+REFERENCE_SCANS = 4
+"""Number of scans that a new one is matched with."""
+REFERENCE_POINTS, SCAN_POINTS = 120, 90
+"""Maximum number of points of each of these scans, and of the new one."""
+GATES_M, MAX_ITERATIONS = (0.5, 0.35, 0.25, 0.15, 0.1), 6
+"""Maximum distance of a point from its nearest neighbor, for each iteration, and maximum number of iterations."""
+LAST_GATE_STEP, CONVERGED_STEP = (0.02, 0.01), (0.002, 0.001)
+"""Motion (m, rad) of an iteration below which the last gate is next, and below which the iterations end."""
+OUTLIER_DISTANCE_M, OUTLIER_RATIO = 0.1, 1.5
+"""Distance from its neighbor at which a point has a quarter of its weight (Geman-McClure): the first, or the second
+times the root mean square of all distances if that is more.
+
+If most points fit, a person who walks along does not change the match. If none fits, the robot's motion differs from
+that of its wheels, and all points must keep their weight.
+"""
+POINT_STD_M = 0.03
+"""Standard deviation of the distance of points from surfaces, including correlations."""
+MIN_NORMAL_COSINE = 0.7
+"""Minimum cosine of the angle between the normals of two points on the same surface."""
+MIN_MATCHED_POINTS = 12
+GUESS_STD = (0.15, 0.02, 0.15, 0.03)
+"""Standard deviation of the guess: share of the distance and m, share of the rotation and rad."""
+MAX_BEAM_ANGLE_RAD = 0.04
+"""Maximum angle between two beams. With a larger one, the normals of surfaces are unknown."""
+AGREEMENT = (0.03, 0.1, 0.03, 0.1)
+"""Difference up to which scan matching and odometry agree: m and share of the distance, rad and share of the rotation.
+"""
+MIN_OVERLAP = 0.3
+"""Share of a scan's points that earlier scans showed, below which the robot was carried elsewhere."""
+MAX_OVERLAP_STEP = 0.75, 0.75
+"""Longest step between two scans (m, rad) after which a small overlap means that the robot was carried elsewhere.
+
+After a longer one, e.g. around a corner between sparse scans, the scans may share little anyway.
+"""
+COVARIANCE_SCALE, COVARIANCE_FLOOR = 0.5, (0.004**2, 0.003**2, 0.0015**2)
+"""Factor of the match's own covariance, and variances (m², m², rad²) added to it.
+
+They are fitted to observed errors: consecutive scans share the errors of their surfaces.
+"""
 
 
 Symmetric = tuple[float, float, float, float, float, float]
-"""The upper triangle of a symmetric matrix (3, 3) by rows: nine numbers are too few for arrays."""
+"""Upper triangle of a symmetric matrix (3, 3) by rows. A tuple is faster than an array of this size."""
 Equations = tuple[tuple[float, float, float, float], ...]
-"""Normal equations of x, y and yaw, right-hand side last, in units of 1 / SIGMA²."""
+"""Normal equations of x, y and yaw, right-hand side last, in units of 1 / POINT_STD_M²."""
 
 
 class _Reference:
-    """What earlier scans saw, to match a new one with.
+    """Surfaces of earlier scans, with which a new scan is matched.
 
-    Of so few points each is compared with each, in one product and one `argmax`: a tree takes longer to build.
+    The nearest neighbors are found by comparing all pairs of points in one matrix product. For so few points, this
+    takes less time than building a k-d tree.
     """
 
     def __init__(self, frames: Iterable[Surface], middle: complex) -> None:
-        """`middle` is about where the robot is, so that squares are small however far it went."""
+        """Combine scans. `middle` is a point near the robot, which keeps rounding errors of squares small."""
         seen = list(frames)
         self._points = np.concatenate([frame.points for frame in seen])
         self._normals = np.concatenate([frame.normals for frame in seen])
-        self.again = 0.0
-        """The share of the points of the last scan that was pulled which it did not see for the first time."""
+        self.overlap = 0.0
+        """Share of the last matched scan's points that have a neighbor in the earlier scans."""
         self._middle, around = middle, self._points - middle
-        # a·b - b²/2 is greatest for the b that is nearest to a
+        # The b nearest to a has the greatest a·b - b²/2.
         self._compared = np.empty((3, len(around)))
         self._compared[0], self._compared[1] = around.real, around.imag
         self._compared[2] = (around * around.conj()).real * -0.5
 
-    def pull(self, own: Surface, pose: Pose2, gate: float) -> Equations | None:
-        """How a scan that is placed at `pose` is drawn: its normal equations.
+    def equations(self, own: Surface, pose: Pose2, gate: float) -> Equations | None:
+        """Return the normal equations of a scan at `pose`.
 
-        None when too few points have a neighbor within `gate` m that faces as they do.
+        None if too few points have a neighbor within `gate` m with a similar normal.
         """
         turn = cmath.rect(1.0, pose.yaw)
         about = own.points * turn
@@ -88,14 +99,14 @@ class _Reference:
         gap = self._points.take(nearest)
         gap -= ends
         against = self._normals.take(nearest).conj()
-        matched = (own.normals * turn * against).real > ALIKE
+        matched = (own.normals * turn * against).real > MIN_NORMAL_COSINE
         squares = (gap * gap.conj()).real
         matched &= squares < gate * gate
         count = int(np.count_nonzero(matched))
-        self.again = count / len(ends)
-        if count < LEAST:
+        self.overlap = count / len(ends)
+        if count < MIN_MATCHED_POINTS:
             return None
-        squares /= max(LOOSE**2, LOOSER**2 * squares.dot(matched).item() / count)
+        squares /= max(OUTLIER_DISTANCE_M**2, OUTLIER_RATIO**2 * squares.dot(matched).item() / count)
         squares += 1.0
         against *= matched / squares
         slope = np.empty((4, len(ends)))
@@ -109,20 +120,23 @@ class _Reference:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A motion in the base frame before it, and its covariance (3, 3) in that frame."""
+    """Motion between two scans in the base frame of the first, with its covariance (3, 3)."""
 
     delta: Pose2
     covariance: Array
 
     def agrees(self, odometry: Pose2) -> bool:
-        """Whether odometry says about the same of it."""
+        """Return whether odometry measured nearly the same motion."""
         off = odometry.between(self.delta)
         far, turned = math.hypot(odometry.x, odometry.y), abs(odometry.yaw)
-        return math.hypot(off.x, off.y) < AGREES[0] + AGREES[1] * far and abs(off.yaw) < AGREES[2] + AGREES[3] * turned
+        return (
+            math.hypot(off.x, off.y) < AGREEMENT[0] + AGREEMENT[1] * far
+            and abs(off.yaw) < AGREEMENT[2] + AGREEMENT[3] * turned
+        )
 
 
-def moved(poses: Array, step: Step, rng: np.random.Generator) -> Array:
-    """Each of `poses` (n, 3) moved by its own copy of a step."""
+def apply_step(poses: Array, step: Step, rng: np.random.Generator) -> Array:
+    """Return `poses` (n, 3), each moved by its own sample of a step."""
     ahead, left, turn = np.dot(_root(step.covariance), rng.standard_normal((3, len(poses))))
     ahead += step.delta.x
     left += step.delta.y
@@ -137,39 +151,45 @@ def moved(poses: Array, step: Step, rng: np.random.Generator) -> Array:
 
 
 class ScanMatcher:
-    """Follows one lidar; `pose` is the base's in a frame that begins at the first scan, and drifts slowly."""
+    """Estimates the motion of the base from the scans of one lidar.
+
+    `pose` is that of the base in a frame that begins at the first scan and drifts slowly.
+    """
 
     def __init__(self) -> None:
-        self._frames: deque[Surface] = deque(maxlen=FRAMES)
+        self._frames: deque[Surface] = deque(maxlen=REFERENCE_SCANS)
         self.pose = Pose2(0.0, 0.0, 0.0)
-        self.again: float | None = None
-        """The share of what the last scan shows that those before it showed; None when nobody can say."""
+        self.overlap: float | None = None
+        """Share of the last scan's points that earlier scans showed; None if unknown."""
 
     @property
-    def parted(self) -> bool | None:
-        """Whether the last scan shows hardly anything of what those before it did; None when nobody can say."""
-        return None if self.again is None else self.again < AGAIN
+    def was_carried(self) -> bool | None:
+        """Whether the robot was carried elsewhere, because the last scan overlaps little; None if unknown."""
+        return None if self.overlap is None else self.overlap < MIN_OVERLAP
 
     def step(self, scan: Scan, guess: Pose2) -> Step | None:
-        """How the base moved since the last scan, where odometry says `guess`; None when the scans do not say."""
-        self.again = None
-        if abs(scan.angle_increment) > COARSEST:
+        """Return the motion of the base since the last scan; None if scans do not show it. `guess` is by odometry."""
+        self.overlap = None
+        if abs(scan.angle_increment) > MAX_BEAM_ANGLE_RAD:
             self.pose = self.pose.compose(guess)
             return None
         seen = surfaces_of(scan)
         found = self._matched(seen, guess) if len(seen.points) and any(len(f.points) for f in self._frames) else None
+        is_long = math.hypot(guess.x, guess.y) > MAX_OVERLAP_STEP[0] or abs(guess.yaw) > MAX_OVERLAP_STEP[1]
+        if self.was_carried and is_long:
+            self.overlap = None
         last, self.pose = self.pose, found[0] if found else self.pose.compose(guess)
-        self._frames.append(seen.thinned(REFERENCE).placed(self.pose))
-        return Step(last.between(self.pose), _seen_from(last.yaw, found[1])) if found else None
+        self._frames.append(seen.thinned(REFERENCE_POINTS).placed(self.pose))
+        return Step(last.between(self.pose), _step_covariance(last.yaw, found[1])) if found else None
 
     def _matched(self, seen: Surface, guess: Pose2) -> tuple[Pose2, Symmetric] | None:
-        """The pose in the matcher's frame, and the inverse of its information, which is in units of 1 / SIGMA²."""
+        """Return the pose in the matcher's frame, and its covariance in units of POINT_STD_M²."""
         guessed = pose = self.pose.compose(guess)
-        reference, own = _Reference(self._frames, complex(pose.x, pose.y)), seen.thinned(MATCHED)
-        (place, heading), gate, last = _trust(guess), 0, len(GATES) - 1
-        for _ in range(ITERATIONS):
-            if (equations := reference.pull(own, pose, GATES[gate])) is None:
-                self.again = 0.0
+        reference, own = _Reference(self._frames, complex(pose.x, pose.y)), seen.thinned(SCAN_POINTS)
+        (place, heading), gate, last = _prior_information(guess), 0, len(GATES_M) - 1
+        for _ in range(MAX_ITERATIONS):
+            if (equations := reference.equations(own, pose, GATES_M[gate])) is None:
+                self.overlap = 0.0
                 return None
             (xx, xy, xa, right), (_, yy, ya, up), (_, _, aa, around), _ = equations
             inverse = _inverse((xx + place, xy, xa, yy + place, ya, aa + heading))
@@ -182,21 +202,23 @@ class ScanMatcher:
             turn = xa * right + ya * up + aa * around
             pose = Pose2(pose.x + dx, pose.y + dy, pose.yaw + turn)
             step = math.hypot(dx, dy), abs(turn)
-            if gate == last and _within(step, STILL):
+            if gate == last and _within(step, CONVERGED_STEP):
                 break
-            gate = last if _within(step, SETTLED) else min(gate + 1, last)
-        self.again = reference.again
+            gate = last if _within(step, LAST_GATE_STEP) else min(gate + 1, last)
+        self.overlap = reference.overlap
         return pose, inverse
 
 
-def _trust(guess: Pose2) -> tuple[float, float]:
-    """What is known by the guess of each coordinate of the place and of the heading, in units of 1 / SIGMA²."""
+def _prior_information(guess: Pose2) -> tuple[float, float]:
+    """Return the information of the guess about each coordinate and about the yaw, in units of 1 / POINT_STD_M²."""
     far, turned = math.hypot(guess.x, guess.y), abs(guess.yaw)
-    return (SIGMA / (DOUBT[0] * far + DOUBT[1])) ** 2, (SIGMA / (DOUBT[2] * turned + DOUBT[3])) ** 2
+    return (POINT_STD_M / (GUESS_STD[0] * far + GUESS_STD[1])) ** 2, (
+        POINT_STD_M / (GUESS_STD[2] * turned + GUESS_STD[3])
+    ) ** 2
 
 
 def _inverse(matrix: Symmetric) -> Symmetric:
-    """That of a positive definite matrix."""
+    """Return the inverse of a positive definite matrix."""
     xx, xy, xa, yy, ya, aa = matrix
     of_xx, of_xy, of_xa = yy * aa - ya * ya, xa * ya - xy * aa, xy * ya - xa * yy
     each = 1 / (xx * of_xx + xy * of_xy + xa * of_xa)
@@ -204,20 +226,21 @@ def _inverse(matrix: Symmetric) -> Symmetric:
     return of_xx * each, of_xy * each, of_xa * each, *rest
 
 
-def _seen_from(yaw: float, inverse: Symmetric) -> Array:
-    """The covariance (3, 3) of a step, in the frame of a base with heading `yaw`."""
-    c, s, scale = math.cos(yaw), math.sin(yaw), INFLATED * SIGMA**2
+def _step_covariance(yaw: float, inverse: Symmetric) -> Array:
+    """Return the covariance (3, 3) of a step in the frame of a base with heading `yaw`."""
+    c, s, scale = math.cos(yaw), math.sin(yaw), COVARIANCE_SCALE * POINT_STD_M**2
     xx, xy, xa, yy, ya, aa = (scale * value for value in inverse)
     crossed = c * s * (yy - xx) + (c * c - s * s) * xy
     ahead, left = c * xa + s * ya, c * ya - s * xa
     along, aside = c * c * xx + 2 * c * s * xy + s * s * yy, s * s * xx - 2 * c * s * xy + c * c * yy
+    floor_x, floor_y, floor_yaw = COVARIANCE_FLOOR
     return np.array((
-        (along + FLOOR[0], crossed, ahead), (crossed, aside + FLOOR[1], left), (ahead, left, aa + FLOOR[2]),
+        (along + floor_x, crossed, ahead), (crossed, aside + floor_y, left), (ahead, left, aa + floor_yaw),
     ))  # fmt: skip
 
 
 def _root(covariance: Array) -> Array:
-    """The lower triangle (3, 3) whose product with its own transpose is `covariance` (Cholesky)."""
+    """Return the Cholesky factor (3, 3), lower triangle, of a covariance."""
     (xx, _, _), (xy, yy, _), (xa, ya, aa) = covariance.tolist()
     x = math.sqrt(xx)
     y_x, a_x = xy / x, xa / x

@@ -5,10 +5,10 @@ from dataclasses import replace
 from simscen.advanced.localizers.covariance_estimator import CovarianceEstimator
 from simscen.advanced.localizers.global_search import GlobalSearch
 from simscen.advanced.localizers.map_residuals import MapResiduals
-from simscen.advanced.localizers.map_trust import TOGETHER, MapTrust
+from simscen.advanced.localizers.map_trust import CLUSTER_RADIUS_M, MapTrust
 from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter
 from simscen.advanced.localizers.pose_prior import ObservedMotion
-from simscen.advanced.localizers.relocalization import UNSEEN, Relocalizer
+from simscen.advanced.localizers.relocalization import NO_MOTION, Relocalizer
 from simscen.advanced.localizers.scan_matcher import ScanMatcher, Step
 from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
@@ -63,7 +63,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         estimates_covariance = self._residuals is not None and self._matcher is not None
         self._covariance_estimator = CovarianceEstimator() if estimates_covariance else None
         self._matched: tuple[str, Pose2] | None = None  # lidar and odometry of the last matched scan
-        self._motion_seen = UNSEEN  # the motion since the last update
+        self._motion_observed = NO_MOTION  # the motion since the last update
         self._consistent_updates = 0  # consecutive updates in which map, scans and wheels agreed
         self._skipped = 0  # consecutive scans that were not compared with the map
 
@@ -76,13 +76,13 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
     def _update(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
         """Move the particles as the scans show, and weigh them unless the robot is certain of its pose."""
         matched = None if self._matcher is None else self._match(self._matcher, scan, odometry)
-        parted = None if self._matcher is None else self._matcher.parted
-        self._motion_seen = ObservedMotion(step=matched, parted=parted)
+        was_carried = None if self._matcher is None else self._matcher.was_carried
+        self._motion_observed = ObservedMotion(step=matched, was_carried=was_carried)
         agreed = False
         if delta is not None and matched is not None:
             self._filter.follow(matched, delta)
             if not (agreed := matched.agrees(delta)):
-                self._motion_seen = replace(self._motion_seen, torn=delta.between(matched.delta))
+                self._motion_observed = replace(self._motion_observed, disagreement=delta.between(matched.delta))
             if self._covariance_estimator is not None:
                 self._covariance_estimator.compare(matched.delta, delta)
         elif delta is not None:
@@ -90,14 +90,14 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         if self._covariance_estimator is not None:
             self._covariance_estimator.drive(self._base(odometry), None if matched is None else matched.covariance)
         self._mark_updated(scan, odometry)
-        certain = agreed and not parted and self._consistent_updates >= CERTAIN_AFTER_UPDATES
+        certain = agreed and not was_carried and self._consistent_updates >= CERTAIN_AFTER_UPDATES
         self._skipped = self._skipped + 1 if certain and self._skipped + 1 < self._update_interval else 0
         estimate = None if self._skipped or self._is_view_blocked else self._filter.correct(scan)
         if estimate is not None:
             pose, covariance = estimate
             if self._covariance_estimator is not None and self._residuals is not None:
                 residuals = self._residuals.of(self._filter.beams(scan), pose)
-                covariance = self._covariance_estimator.widened(pose, covariance, residuals)
+                covariance = self._covariance_estimator.estimate(pose, covariance, residuals)
             self._correction = Correction(pose, covariance, odometry, scan.tick)
         else:
             last = self._correction
@@ -111,8 +111,8 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
     @property
     def _is_view_blocked(self) -> bool:
         """The last scan shows little of what earlier scans showed, and the particles are spread widely."""
-        overlap = None if self._matcher is None else self._matcher.again
-        return overlap is not None and overlap < MIN_OVERLAP and not self._filter.particles.within(TOGETHER)
+        overlap = None if self._matcher is None else self._matcher.overlap
+        return overlap is not None and overlap < MIN_OVERLAP and not self._filter.particles.within(CLUSTER_RADIUS_M)
 
     def _match(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
         """Return the motion since the last update by scan matching of the first lidar; None if it cannot tell."""
@@ -128,16 +128,16 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         range_limits = self._spec.laser_min_range, self._spec.farthest
         base = self._base(odometry)
         if self._skipped:
-            relocalizer.passed(scan, base, range_limits, self._motion_seen)
+            relocalizer.add_scan(scan, base, range_limits, self._motion_observed)
             return
         believed = self._correction.map_from_odom.compose(odometry)
         fit = self._filter.fitting if self._consistent_updates else None
-        places = relocalizer.places(scan, base, believed, range_limits, self._motion_seen, fit)
+        places = relocalizer.update(scan, base, believed, range_limits, self._motion_observed, fit)
         if places is not None:
             self._correction = Correction(*self._filter.redistribute(*places), odometry, scan.tick)
             self._last_update, self._belief, self._consistent_updates = odometry, None, 0
             if self._covariance_estimator is not None:
-                self._covariance_estimator.forget()
+                self._covariance_estimator.forget_poses()
 
     def _base(self, odometry: Pose2) -> Pose2:
         """Return the robot's pose in the scan matcher's frame, which drifts less than odometry."""
@@ -147,4 +147,4 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
 
     def _propagated_covariance(self, last: Correction, delta: Pose2) -> Array:
         """Return the covariance (3, 3) after `delta`, by the observed odometry errors if they are estimated."""
-        return (self._covariance_estimator or self._motion).carry(last.covariance, last.pose.yaw, delta)
+        return (self._covariance_estimator or self._motion).propagate(last.covariance, last.pose.yaw, delta)

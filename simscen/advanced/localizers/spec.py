@@ -23,8 +23,6 @@ class ScanMatchingAmcl(AmclParameters):
     type: Literal["scan_matching_amcl"] = "scan_matching_amcl"
     parameters: Literal["default", "consistent"] = "default"
     """Set of default values. `consistent` estimates a covariance that agrees with the true error."""
-    laser_model_type: Literal["likelihood_field", "likelihood_field_prob", "beam"] = "likelihood_field_prob"
-    """Sensor model. `likelihood_field` tolerates more obstacles that are not on the map, but is less accurate."""
     sigma_hit: Annotated[Length, Field(ge=0.001)] = 0.1
     """Standard deviation of the endpoints of beams that hit an obstacle of the map."""
     match_scans: bool = True

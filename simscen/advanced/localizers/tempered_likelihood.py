@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.environment.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
-from simscen.stack.distance_transform import MAX_REACH_CELLS, squared_distances_within
+from simscen.stack.costmap.distance_transform import MAX_REACH_CELLS, squared_distances_within
 from simscen.stack.localizers.distance_field import DistanceField, Float32
 from simscen.stack.localizers.likelihood_field import BeamSkipping, LikelihoodFieldProb
 

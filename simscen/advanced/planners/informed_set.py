@@ -1,47 +1,48 @@
-"""Where a near-shortest path can be: Gammell et al.'s informed set (2014), measured through the maze.
+"""Informed set: the region that near-shortest paths can pass, measured along a coarse grid.
 
-Their ellipse is the set of points x with |start x| + |x goal| ≤ c. Between walls straight distances say little, so both
-are measured along a coarse grid here. OMPL's planners then search only where a path at most `slack` longer than the
-coarse one can pass: a tree planner cannot lose itself in a wrong room, and finds that way sooner as well.
+Source: Gammell et al., Informed RRT* (2014). Their informed set is the ellipse of points x with |start x| + |x goal| ≤
+c. Between walls, straight distances are too short, so both are measured along a coarse grid here. OMPL's planners
+sample only in this region, and so find a path sooner.
 
-The grid is no `ways.Lattice`: that one steps between free cells, while a block here is passed where free cells touch
-across its borders, so that a gap narrower than a block stays open and a wall thinner than one stays shut.
+Two blocks of the grid are connected if free cells touch across their border. A gap narrower than a block therefore
+stays open, and a wall thinner than a block stays closed.
 """
 
 import math
+from functools import reduce
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from simscen.advanced.planners.blocks import pooled, roomiest
 from simscen.core.geometry import Array
 from simscen.stack.planners.ompl_search import Point
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView
 
-BLOCK, PRICED_BLOCK = 0.2, 0.15
-"""Meters, about: the coarse grid's resolution."""
-MOST_BLOCKS, MOST_PRICED = 40_000, 20_000
-"""Larger maps get larger blocks: Dijkstra on 40 000 takes 10 ms. None is wider than the robot, though, for in one that
-holds a wall both sides of the wall would be one place."""
-SPARSE = 0.45
-"""Meters between the places of a way where there is room: every third block, or every one on a large map."""
-LEG = 30.0
-"""Meters of a way that are searched in one go."""
+BLOCK_M, COST_BLOCK_M = 0.2, 0.15
+"""Approximate size of the blocks, for lengths and for costs."""
+MAX_BLOCKS, MAX_COST_BLOCKS = 40_000, 20_000
+"""Maximum number of blocks; Dijkstra's algorithm takes 10 ms for 40 000. Blocks of larger maps are larger, but not
+wider than the robot, because both sides of a wall inside a block would be the same place."""
+PATH_SPACING_M = 0.45
+"""Distance between the points of a path where there is much clearance."""
+MAX_LEG_M = 30.0
+"""Maximum length of a path that is searched at once."""
 Mask = npt.NDArray[np.bool_]
 
 
 class InformedSet:
-    """The points on near-shortest ways from start to goal; `length` is about that of the shortest, in meters.
+    """Points on near-shortest paths from start to goal; `length` is the approximate length of the shortest in m.
 
-    Distances are those of king's and knight's moves, at most 2.8 % too long (8.2 % without the knight).
+    A path goes to the 16 nearest neighbors of a block (a king's and a knight's moves in chess), so that its length is
+    at most 2.8 % too long.
     """
 
     def __init__(self, rates: TraversalCosts, start: Point, goal: Point, priced: bool = False) -> None:
-        """`priced`: by what ways cost, in meters of free ground, rather than by their lengths."""
-        size, most = (PRICED_BLOCK, MOST_PRICED) if priced else (BLOCK, MOST_BLOCKS)
+        """Search the shortest paths, or with `priced` the cheapest ones, whose cost is in m of free ground."""
+        size, most = (COST_BLOCK_M, MAX_COST_BLOCKS) if priced else (BLOCK_M, MAX_BLOCKS)
         widest = max(1, int(2.0 * rates.inscribed / rates.resolution))
         fewest = min(math.ceil(math.sqrt(rates.height * rates.width / most)), widest)
         self._factor = max(1, round(size / rates.resolution), fewest)
@@ -59,9 +60,10 @@ class InformedSet:
         self._inside = b"\1" * len(self._sum)
 
     def narrow(self, slack: float, leg: tuple[float, float] = (0.0, math.inf)) -> None:
-        """Keep the blocks on ways at most `slack` (ratio) longer than the shortest, and a block's diagonal more.
+        """Keep only blocks on paths that are longer than the shortest by at most the ratio `slack` and a block's
+        diagonal.
 
-        `leg` keeps those only that are so many meters along such a way.
+        `leg` is the range of distances in m along such a path to keep.
         """
         more = 2 * math.sqrt(2.0) * self._size
         inside = self._sum <= self.length * (1.0 + slack) + more
@@ -71,42 +73,45 @@ class InformedSet:
         self._inside = inside.tobytes()
 
     def holds(self, points: Array) -> Mask:
-        """Which of the points (n, 2) lie in the set."""
+        """Return which of the points (n, 2) are in the set."""
         held: Mask = np.frombuffer(self._inside, dtype=bool)[self._blocks(points)]
         return held
 
     def through(self, points: Array) -> Array:
-        """How long the shortest ways through each of the points (n, 2) are, or what they cost."""
+        """Return the lengths, or the costs, of the shortest paths through each of the points (n, 2)."""
         return np.asarray(self._sum[self._blocks(points)])
 
     def _blocks(self, points: Array) -> npt.NDArray[np.int64]:
         columns, rows = ((points - self._origin) / self._size).astype(np.int64).T
         return np.asarray(rows * self._width + columns)
 
-    def way(self, costmap: CostmapView, roomy: float) -> Array:
-        """The places (n, 2) with most room in the blocks of the way itself, but those of its ends; where there is as
-        much as `roomy` meters, those `SPARSE` meters apart only.
+    def path(self, costmap: CostmapView, ample_clearance: float) -> Array:
+        """Return the points (n, 2) with the most clearance in the blocks of the shortest path, without its ends.
+
+        Where the clearance is at least `ample_clearance` m, the points are PATH_SPACING_M apart.
         """
         blocks = [int(self._before[0, self._end])]
         while blocks[-1] >= 0:
             blocks.append(int(self._before[0, blocks[-1]]))
         between = np.array(blocks[:-2], dtype=np.int64)
-        rows, columns = roomiest(costmap.distance, np.column_stack(np.divmod(between, self._width)), self._factor)
-        every = max(1, round(SPARSE / self._size))
-        kept = (costmap.distance[rows, columns] < roomy) | (np.arange(len(rows)) % every == 0)
+        rows, columns = cells_with_most_clearance(
+            costmap.distance, np.column_stack(np.divmod(between, self._width)), self._factor
+        )
+        every = max(1, round(PATH_SPACING_M / self._size))
+        kept = (costmap.distance[rows, columns] < ample_clearance) | (np.arange(len(rows)) % every == 0)
         places: Array = (np.column_stack((columns, rows))[kept] + 0.5) * costmap.resolution + self._origin
         return places
 
     def stops(self, costmap: CostmapView) -> list[tuple[Point, float]]:
-        """Points of a near-shortest way to search between, at most LEG meters apart, and how far along they are.
+        """Return points that divide a near-shortest path, at most MAX_LEG_M apart, with their distances along it.
 
-        A tree that fills 20 m in a hundred samples needs many thousands for 200 m with a door each ten.
+        A tree planner needs far fewer samples for several short legs than for one long path through many doors.
         """
-        legs = math.ceil(self.length / LEG) if math.isfinite(self.length) else 1
-        return [self._roomiest(costmap, self.length * leg / legs) for leg in range(1, legs)]
+        legs = math.ceil(self.length / MAX_LEG_M) if math.isfinite(self.length) else 1
+        return [self._point_with_most_clearance(costmap, self.length * leg / legs) for leg in range(1, legs)]
 
-    def _roomiest(self, costmap: CostmapView, along: float) -> tuple[Point, float]:
-        """The place with most room in the blocks of the shortest ways that are so far along."""
+    def _point_with_most_clearance(self, costmap: CostmapView, along: float) -> tuple[Point, float]:
+        """Return the point with the most clearance at the distance `along` of the shortest paths, and `along`."""
         on_way = self._sum <= self.length + 2 * self._size
         blocks = np.flatnonzero(on_way & (np.abs(self._along - along) <= self._size)).tolist()
         cells = [self._best_cell(costmap, *divmod(block, self._width)) for block in blocks]
@@ -121,7 +126,7 @@ class InformedSet:
         return float(part.flat[best]), top + best // width, left + best % width
 
     def bounds(self) -> tuple[float, float, float, float]:
-        """(min x, min y, max x, max y) of the set."""
+        """Return (min x, min y, max x, max y) of the set in m."""
         rows, columns = np.nonzero(np.frombuffer(self._inside, dtype=bool).reshape(self._height, self._width))
         x, y, size = self._origin[0], self._origin[1], self._size
         return (
@@ -132,7 +137,7 @@ class InformedSet:
         )
 
     def has(self, x: float, y: float) -> bool:
-        """Whether a point lies in the set."""
+        """Return whether a point is in the set."""
         return bool(self._inside[self._index(x, y)])
 
     def _index(self, x: float, y: float) -> int:
@@ -141,8 +146,8 @@ class InformedSet:
         return int(row * self._width + column)
 
 
-def _cut(free: Mask, factor: int) -> Mask:
-    """The cells cut to blocks (rows, columns, factor, factor), with blocked ones added to fill the last."""
+def _blocks_of(free: Mask, factor: int) -> Mask:
+    """Return the cells as blocks (rows, columns, factor, factor); the last blocks are filled with occupied cells."""
     height, width = (-(-side // factor) * factor for side in free.shape)
     padded = np.zeros((height, width), dtype=bool)
     padded[: free.shape[0], : free.shape[1]] = free
@@ -150,31 +155,31 @@ def _cut(free: Mask, factor: int) -> Mask:
 
 
 def _steps(blocks: Mask) -> dict[tuple[int, int], Mask]:
-    """For each king's and knight's move (rows, columns) the blocks from which it can be made.
+    """Return for each move (rows, columns) to one of 16 neighbors the blocks from which it is possible.
 
-    To the next block over one of four sides: where free cells touch on both sides of the border. Any other move: if
-    the blocks it passes can be crossed so; a knight needs both ways around.
+    A move to one of the four adjacent blocks is possible if free cells touch on both sides of the border. Other moves
+    are possible if the blocks between can be crossed in this way; a knight's move needs both ways around.
     """
     right, up = np.zeros(blocks.shape[:2], dtype=bool), np.zeros(blocks.shape[:2], dtype=bool)
     right[:, :-1] = (blocks[:, :-1, :, -1] & blocks[:, 1:, :, 0]).any(axis=2)
     up[:-1] = (blocks[:-1, :, -1] & blocks[1:, :, 0]).any(axis=2)
-    left = _at(right, 0, -1)
-    right_up = (right & _at(up, 0, 1)) | (up & _at(right, 1, 0))
-    left_up = (left & _at(up, 0, -1)) | (up & _at(left, 1, 0))
+    left = _shifted(right, 0, -1)
+    right_up = (right & _shifted(up, 0, 1)) | (up & _shifted(right, 1, 0))
+    left_up = (left & _shifted(up, 0, -1)) | (up & _shifted(left, 1, 0))
     return {
         (0, 1): right,
         (1, 0): up,
         (1, 1): right_up,
         (1, -1): left_up,
-        (1, 2): right & _at(right_up, 0, 1) & right_up & _at(right, 1, 1),
-        (2, 1): up & _at(right_up, 1, 0) & right_up & _at(up, 1, 1),
-        (1, -2): left & _at(left_up, 0, -1) & left_up & _at(left, 1, -1),
-        (2, -1): up & _at(left_up, 1, 0) & left_up & _at(up, 1, -1),
+        (1, 2): right & _shifted(right_up, 0, 1) & right_up & _shifted(right, 1, 1),
+        (2, 1): up & _shifted(right_up, 1, 0) & right_up & _shifted(up, 1, 1),
+        (1, -2): left & _shifted(left_up, 0, -1) & left_up & _shifted(left, 1, -1),
+        (2, -1): up & _shifted(left_up, 1, 0) & left_up & _shifted(up, 1, -1),
     }
 
 
-def _at(mask: Mask, rows: int, columns: int) -> Mask:
-    """The mask as seen from blocks so many rows and columns before; False beyond its edge."""
+def _shifted(mask: Mask, rows: int, columns: int) -> Mask:
+    """Return the mask shifted by `rows` and `columns`, with False beyond its edge."""
     moved = np.zeros_like(mask)
     height, width = mask.shape
     left = max(0, -columns)
@@ -183,8 +188,8 @@ def _at(mask: Mask, rows: int, columns: int) -> Mask:
 
 
 def _graph(rates: TraversalCosts, factor: int, priced: bool) -> csr_matrix:
-    """Edges between blocks a move apart, as long as the move in blocks, or times what both cost."""
-    blocks = _cut(rates.free, factor)
+    """Return the edges between blocks, with the length of the move in blocks, times the mean cost if `priced`."""
+    blocks = _blocks_of(rates.free, factor)
     height, width = blocks.shape[:2]
     steps = _steps(blocks)
     moves = sorted(steps, key=lambda move: move[0] * width + move[1])
@@ -194,7 +199,7 @@ def _graph(rates: TraversalCosts, factor: int, priced: bool) -> csr_matrix:
     at, move = possible.nonzero()  # block by block, as the matrix has them
     to = at + onward[move]
     if priced:
-        price = _prices(rates, factor)
+        price = _block_costs(rates, factor)
         length = (0.5 * lengths).astype(np.float32)[move] * (price[at] + price[to])
     else:
         length = lengths[move]
@@ -202,13 +207,38 @@ def _graph(rates: TraversalCosts, factor: int, priced: bool) -> csr_matrix:
     return csr_matrix((length, to, begin), shape=(height * width, height * width))
 
 
-def _prices(rates: TraversalCosts, factor: int) -> Array:
-    """What a meter costs in each block, flat: between its best cell and the mean of those where the robot can be.
+def _block_costs(rates: TraversalCosts, factor: int) -> Array:
+    """Return the cost per m of each block, flat: the mean of its cheapest cell and its average over free cells.
 
-    The best alone makes nothing of what is dear for a cell or two, the mean makes a gap dearer than its middle.
+    The cheapest cell alone ignores expensive cells, and the average alone makes a gap more expensive than its middle.
     """
     finite = np.isfinite(rates.rates)
-    least = pooled(rates.rates, factor, np.minimum, np.inf)
-    total = pooled(np.where(finite, rates.rates, np.float32(0.0)), factor, np.add, 0.0)
-    prices: Array = 0.5 * (least + total / np.maximum(pooled(finite, factor, np.add, 0.0), 1.0))
+    least = pool_blocks(rates.rates, factor, np.minimum, np.inf)
+    total = pool_blocks(np.where(finite, rates.rates, np.float32(0.0)), factor, np.add, 0.0)
+    prices: Array = 0.5 * (least + total / np.maximum(pool_blocks(finite, factor, np.add, 0.0), 1.0))
     return prices.reshape(-1)
+
+
+Numbers = npt.NDArray[np.float32]
+
+
+def pool_blocks(cells: Numbers | npt.NDArray[np.bool_], factor: int, choice: np.ufunc, beyond: float) -> Numbers:
+    """Reduce each block of `factor` x `factor` cells by `choice`; the last blocks are filled with `beyond`."""
+    height, width = (-(-side // factor) * factor for side in cells.shape)
+    padded = np.full((height, width), beyond, dtype=np.float32)
+    padded[: cells.shape[0], : cells.shape[1]] = cells
+    parts = [padded[row::factor, column::factor] for row in range(factor) for column in range(factor)]
+    left: Numbers = reduce(choice, parts)
+    return left
+
+
+def cells_with_most_clearance(
+    room: Numbers, blocks: npt.NDArray[np.int64], factor: int
+) -> tuple[npt.NDArray[np.int64], ...]:
+    """Return row and column of the cell with the most clearance in each of the blocks (n, 2)."""
+    inner = np.arange(factor)
+    rows = np.minimum(blocks[:, 0, None] * factor + np.repeat(inner, factor), room.shape[0] - 1)
+    columns = np.minimum(blocks[:, 1, None] * factor + np.tile(inner, factor), room.shape[1] - 1)
+    best = room[rows, columns].argmax(axis=1)
+    which = np.arange(len(blocks))
+    return rows[which, best], columns[which, best]

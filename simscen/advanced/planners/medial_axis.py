@@ -9,7 +9,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from simscen.advanced.planners.blocks import pooled, roomiest
+from simscen.advanced.planners.informed_set import cells_with_most_clearance, pool_blocks
 from simscen.core.geometry import Array
 from simscen.stack.protocols import CostmapView
 
@@ -30,7 +30,7 @@ def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: in
     factor = max(1, round(BLOCK / costmap.resolution)) if density == 1 else 1
     size = factor * costmap.resolution
     room = np.where(free, costmap.distance, np.float32(0.0))
-    most = pooled(room, factor, np.maximum, 0.0)
+    most = pool_blocks(room, factor, np.maximum, 0.0)
     open_ground = most >= room.max() - 1e-6
     axis = _ridges(most, max(1, round(BESIDE / size)), 0.4 * size)
     tight = axis & (most < room[free].min(initial=np.inf) + TIGHT)
@@ -40,7 +40,7 @@ def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: in
         _thinned(open_ground, IN_THE_OPEN / density / size, rng),
         _thinned((most > 0) & ~open_ground, IN_THE_OPEN / density / size, rng),
     ]
-    rows, columns = roomiest(room, np.concatenate(chosen), factor)
+    rows, columns = cells_with_most_clearance(room, np.concatenate(chosen), factor)
     x = costmap.origin[0] + (columns + 0.5) * costmap.resolution
     y = costmap.origin[1] + (rows + 0.5) * costmap.resolution
     return np.column_stack((x, y))

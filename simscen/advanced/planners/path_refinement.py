@@ -1,8 +1,7 @@
-"""From a path to the cheapest one beside it: shortcuts, then dynamic programming in a tube that gets finer.
+"""Refinement of a path to the cheapest one nearby: shortcuts, then dynamic programming with ever finer steps.
 
-Points are set across the path at each of its stations, and Viterbi's algorithm finds the cheapest way through them all
-that takes one at each. A tree's path is a few per cent from there; which side of an obstacle it passes was the tree's
-choice, and stays it.
+At each of several stations along the path, points are placed across it. Viterbi's algorithm finds the cheapest path
+through one point of each station. The path stays on the same side of each obstacle.
 """
 
 import math
@@ -17,20 +16,20 @@ from simscen.stack.planners.path_postprocessing import smoothed
 from simscen.stack.planners.traversal_costs import SAMPLE_SPACING_CELLS, TraversalCosts
 
 ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
-"""Meters between stations, meters to either side, points across."""
-LEAST_LEGS = 2
-"""So that there is a station to move."""
+"""Rounds of refinement: distance between stations in m, maximum offset in m, and number of points across."""
+MIN_SEGMENTS = 2
+"""Minimum number of segments, so that there is a station to move."""
 Costs = npt.NDArray[np.float32]
 
 
 def refined(rates: TraversalCosts, points: Array) -> Array:
-    """The path (n, 2) moved to where it costs least, with its ends kept, and smoothed."""
-    points = _cut_short(rates, points)
+    """Return the cheapest path near a path (n, 2) with the same ends, smoothed."""
+    points = _with_shortcuts(rates, points)
     cost = rates.along(points)
     for station, side, across in ROUNDS:
         for stride in (rates.stride, SAMPLE_SPACING_CELLS * rates.resolution):
-            other = _through(
-                rates, resample_polyline(points, station, LEAST_LEGS), np.linspace(-side, side, across), stride
+            other = _cheapest_through(
+                rates, resample_polyline(points, station, MIN_SEGMENTS), np.linspace(-side, side, across), stride
             )
             if math.isfinite(moved := rates.along(other)):
                 break
@@ -39,9 +38,9 @@ def refined(rates: TraversalCosts, points: Array) -> Array:
     return smoothed(rates, points)
 
 
-def _cut_short(rates: TraversalCosts, points: Array) -> Array:
-    """From each kept point straight on to the farthest that it costs no more to go straight to, found by doubling."""
-    places = resample_polyline(points, ROUNDS[0][0], LEAST_LEGS)
+def _with_shortcuts(rates: TraversalCosts, points: Array) -> Array:
+    """Return the path with shortcuts: straight lines to the farthest point to which they are not more expensive."""
+    places = resample_polyline(points, ROUNDS[0][0], MIN_SEGMENTS)
     rows = places.tolist()
     cost = [0.0]
     for (ax, ay), (bx, by) in pairwise(rows):
@@ -61,10 +60,10 @@ def _cut_short(rates: TraversalCosts, points: Array) -> Array:
     return places[kept]
 
 
-def _through(rates: TraversalCosts, stations: Array, offsets: Array, stride: float) -> Array:
-    """The cheapest way through points at `offsets` to the left of each station but the first and last.
+def _cheapest_through(rates: TraversalCosts, stations: Array, offsets: Array, stride: float) -> Array:
+    """Return the cheapest path through points at `offsets` m to the left of each station except the first and last.
 
-    Costs are looked at every `stride` meters.
+    Costs are sampled every `stride` m.
     """
     ahead = np.empty_like(stations)
     ahead[1:-1] = stations[2:] - stations[:-2]
@@ -87,15 +86,15 @@ def _through(rates: TraversalCosts, stations: Array, offsets: Array, stride: flo
 
 
 def _step_costs(rates: TraversalCosts, points: Array, stride: float) -> Costs:
-    """What it costs (n - 1, k, k) to go from each point of one station to each of the next, given points (n, k, 2)."""
+    """Return the costs (n - 1, k, k) from each point of a station to each of the next; `points` (n, k, 2)."""
     before = ((points[:-1] - rates.origin) / rates.resolution).astype(np.float32)[:, :, None]
     step = ((points[1:] - rates.origin) / rates.resolution).astype(np.float32)[:, None] - before
-    looks = math.ceil(float(np.hypot(*(points[1:, 0] - points[:-1, 0]).T).max()) / stride)
+    samples = math.ceil(float(np.hypot(*(points[1:, 0] - points[:-1, 0]).T).max()) / stride)
     flat, total = rates.rates.reshape(-1), np.zeros(step.shape[:-1], dtype=np.float32)
-    for look in range(looks):
-        at = before + np.float32((look + 0.5) / looks) * step
+    for sample in range(samples):
+        at = before + np.float32((sample + 0.5) / samples) * step
         columns = np.clip(at[..., 0], 0, rates.width - 1).astype(np.int32)
         total += flat[np.clip(at[..., 1], 0, rates.height - 1).astype(np.int32) * rates.width + columns]
-    lengths = np.sqrt(step[..., 0] ** 2 + step[..., 1] ** 2) * np.float32(rates.resolution / looks)
+    lengths = np.sqrt(step[..., 0] ** 2 + step[..., 1] ** 2) * np.float32(rates.resolution / samples)
     costs: Costs = total * lengths
     return costs

@@ -2,9 +2,9 @@
 
 import math
 
-from simscen.advanced.prediction.clusters import BOTH, Piece, Places, fitted
+from simscen.advanced.prediction.clusters import BOTH, Cluster, Places, fit_circle
 from simscen.advanced.prediction.scan_outline import LidarPose
-from simscen.advanced.prediction.track import Track
+from simscen.advanced.prediction.tracks import Track
 from simscen.core.decorators import fast_dataclass
 
 NOISE, RELATIVE, HALF_SEEN = 0.02, 0.004, 0.10
@@ -22,7 +22,7 @@ RADIUS_GAIN = 0.3
 
 
 @fast_dataclass(eq=False)
-class Seen:
+class ScanClusters:
     """The clusters of a scan with their hits `places` (m,), seen by a lidar at `lidar` in the odom frame.
 
     `came` tells which of them are where earlier scans saw free space, `stood` which are where something was hit before.
@@ -30,7 +30,7 @@ class Seen:
 
     tick: int
     places: Places
-    pieces: list[Piece]
+    pieces: list[Cluster]
     lidar: LidarPose
     came: list[bool]
     stood: list[bool]
@@ -40,7 +40,7 @@ class Seen:
         return self.stood[piece] and not self.came[piece]
 
 
-def associate(tracks: list[Track], seen: Seen) -> set[int]:
+def associate(tracks: list[Track], seen: ScanClusters) -> set[int]:
     """Update each track with the nearest cluster, nearest pairs first. Return the indices of the clusters used."""
     pieces, lidar = seen.pieces, seen.lidar
     if not tracks or not pieces:
@@ -70,7 +70,7 @@ def _stood(track: Track, center: complex, lidar: LidarPose, hidden: float) -> bo
     return abs(lidar.into(track.lately[-1].place) - center) <= GATE + hidden
 
 
-def _update(given: list[tuple[Track, int]], seen: Seen) -> None:
+def _update(given: list[tuple[Track, int]], seen: ScanClusters) -> None:
     """Update tracks with their clusters."""
     lidar = seen.lidar
     for track, number in given:
@@ -79,13 +79,13 @@ def _update(given: list[tuple[Track, int]], seen: Seen) -> None:
             track.radius += RADIUS_GAIN * (radius - track.radius)
         else:
             guess = lidar.into(track.place)
-        center = fitted(seen.places[first : last + 1].tolist(), track.radius, guess)
+        center = fit_circle(seen.places[first : last + 1].tolist(), track.radius, guess)
         hidden = 0.0 if edges == BOTH else HALF_SEEN
         track.correct(lidar.out(center), NOISE + RELATIVE * abs(center) + hidden)
         track.note(seen.tick, seen.came[number], seen.stood[number], edges, track.place_deviation)
 
 
-def begin(tracks: list[Track], seen: Seen, taken: set[int]) -> None:
+def start_tracks(tracks: list[Track], seen: ScanClusters, taken: set[int]) -> None:
     """Start tracks for unused clusters that are in formerly free space."""
     # While something moves, it may have hidden the free space in which another obstacle appears.
     least = LEAST_RADIUS if any(track.moving for track in tracks) else math.inf

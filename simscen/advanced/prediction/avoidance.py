@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from simscen.advanced.prediction.rollouts import HORIZON, TIMES, Followed, Repertoire, Rollouts, arc
+from simscen.advanced.prediction.rollouts import HORIZON, TIMES, FollowedPath, Rollouts, TrajectorySampler, arc
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.guards import Prediction
@@ -56,9 +56,9 @@ class Avoidance:
         self._last: Twist | None = None
 
     @cached_property
-    def _repertoire(self) -> Repertoire:
+    def _repertoire(self) -> TrajectorySampler:
         """Candidate velocities; built on first use because most runs do not need them."""
-        return Repertoire(self._robot, self._speed)
+        return TrajectorySampler(self._robot, self._speed)
 
     def rest(self) -> None:
         """Reset, because nothing moves."""
@@ -71,7 +71,7 @@ class Avoidance:
         twist: Twist,
         moving: MovingObstacles,
         costmap: CostmapView,
-        path: Followed | None,
+        path: FollowedPath | None,
         home: Pose2 | None = None,
     ) -> Twist:
         """Return the command to send instead of `wanted`; the same object if that is safe.
@@ -92,7 +92,9 @@ class Avoidance:
         self._last = self._best(self._own(wanted, pose, twist, path, SLOWER), pose, twist, near, costmap, path, home)
         return self._last
 
-    def _clear(self, wanted: Twist, pose: Pose2, twist: Twist, moving: MovingObstacles, path: Followed | None) -> bool:
+    def _clear(
+        self, wanted: Twist, pose: Pose2, twist: Twist, moving: MovingObstacles, path: FollowedPath | None
+    ) -> bool:
         """Return True if a quick check shows that the controller's trajectory comes close to nothing."""
         if path is None or len(path) < 2 or wanted.vx == 0.0:
             return False
@@ -106,7 +108,7 @@ class Avoidance:
         twist: Twist,
         moving: MovingObstacles,
         costmap: CostmapView,
-        path: Followed | None,
+        path: FollowedPath | None,
         home: Pose2 | None,
     ) -> Twist:
         """Return the first command of the trajectory with the lowest cost; the first one of several.
@@ -155,7 +157,7 @@ class Avoidance:
         return cost
 
     def _own(
-        self, wanted: Twist, pose: Pose2, twist: Twist, path: Followed | None, parts: tuple[float, ...]
+        self, wanted: Twist, pose: Pose2, twist: Twist, path: FollowedPath | None, parts: tuple[float, ...]
     ) -> Rollouts:
         """Return the controller's own trajectory at fractions of its speed."""
         if path is None or len(path) < 2 or wanted.vx == 0.0:
@@ -179,7 +181,7 @@ class Avoidance:
         """Return the distances in m of trajectories from static obstacles at some of their times."""
         return np.asarray(self._discs.clearance(costmap, ways.x[some], ways.y[some], ways.yaw[some]))
 
-    def _goal(self, pose: Pose2, path: Followed | None, home: Pose2 | None) -> tuple[float, float]:
+    def _goal(self, pose: Pose2, path: FollowedPath | None, home: Pose2 | None) -> tuple[float, float]:
         """Return the position that the robot should approach."""
         if path is not None:
             return path.ahead(pose, self._speed * HORIZON)

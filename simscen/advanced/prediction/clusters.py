@@ -78,7 +78,7 @@ class Runs:
         return bool((runs[few - 1 :] == runs[: 1 - few]).any())
 
 
-class Piece(NamedTuple):
+class Cluster(NamedTuple):
     """Cluster of the hits `first` … `last` of a scan, in the lidar frame.
 
     `center` (x + iy) and `radius` in m are those of the cylinder that covers the same angle at the same distance.
@@ -97,7 +97,7 @@ class Piece(NamedTuple):
         return self.last - self.first + 1
 
 
-def answers(ranges: Array, places: Places, step: float, least: float, most: float) -> Hits:
+def valid_hits(ranges: Array, places: Places, step: float, least: float, most: float) -> Hits:
     """Return the hits of a scan with ranges between `least` and `most` m.
 
     `places` (n,) are the ends of the beams, which are `step` rad apart.
@@ -117,7 +117,7 @@ def runs(hits: Hits) -> Runs:
     return Runs(hits, *_between(apart.nonzero()[0], len(ranges)))
 
 
-def clusters(found: Runs, scanned: Array, start: float, step: float, largest: float) -> list[Piece]:
+def clusters(found: Runs, scanned: Array, start: float, step: float, largest: float) -> list[Cluster]:
     """Return the clusters with a radius up to `largest` in a scan with ranges `scanned` and these runs.
 
     The first beam points along `start`; beams are `step` rad apart.
@@ -129,7 +129,7 @@ def clusters(found: Runs, scanned: Array, start: float, step: float, largest: fl
     first, last = _parted(hits.ranges, found.first, found.last)
     nearest = np.minimum.reduceat(hits.ranges, first).tolist()
     full = abs(len(scanned) * wide - 2 * math.pi) < wide
-    pieces: list[Piece] = []
+    pieces: list[Cluster] = []
     begin, end = hits.beams.take(first).tolist(), hits.beams.take(last).tolist()
     for one, other, near, low, high in zip(first, last, nearest, begin, end, strict=True):
         if other - one + 1 < FEWEST:
@@ -139,7 +139,7 @@ def clusters(found: Runs, scanned: Array, start: float, step: float, largest: fl
         if radius <= largest:
             center = cmath.rect(near + radius, start + (0.5 * step) * (low + high))
             edges = _clear(scanned, low, low - 1, full) + _clear(scanned, high, high + 1, full)
-            pieces.append(Piece(one, other, center, radius, edges))
+            pieces.append(Cluster(one, other, center, radius, edges))
     return pieces
 
 
@@ -152,7 +152,7 @@ def _clear(ranges: Array, beam: int, beside: int, full_circle: bool) -> bool:
     return bool(ranges[beside] > ranges[beam])
 
 
-def shares(pieces: list[Piece], which: Mask) -> list[tuple[int, int]]:
+def marked_hits(pieces: list[Cluster], which: Mask) -> list[tuple[int, int]]:
     """Return for each cluster how many of its hits are marked in `which` (m,), and how many it has."""
     told = which.tobytes()
     return [(told.count(1, first, last + 1), last + 1 - first) for first, last, *_ in pieces]
@@ -207,7 +207,7 @@ def _parts(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]:
     return parts
 
 
-def fitted(arc: list[complex], radius: float, center: complex) -> complex:
+def fit_circle(arc: list[complex], radius: float, center: complex) -> complex:
     """Return the center of the circle with this radius that fits points x + iy best; `center` is the initial guess.
 
     Computed with scalars, because a dozen points are too few for arrays.

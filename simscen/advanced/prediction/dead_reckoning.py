@@ -10,7 +10,7 @@ from math import cos, remainder, sin, tau
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.messages.sensor_data import Imu, Odometry
-from simscen.stack.odometry_history import HISTORY_S
+from simscen.stack.frames import HISTORY_S
 
 FASTEST = 100.0
 """Turn rates above this (rad/s) come from a broken gyroscope."""

@@ -4,14 +4,14 @@ import math
 
 from simscen.advanced.prediction.avoidance import Avoidance, StandPosition
 from simscen.advanced.prediction.dead_reckoning import DeadReckoning
-from simscen.advanced.prediction.rollouts import Followed
+from simscen.advanced.prediction.rollouts import FollowedPath
 from simscen.advanced.prediction.tracker import Tracker
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import Path
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
-from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
+from simscen.stack.costmap.obstacle_layer import ScanWithMovingHits
 from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
 from simscen.stack.protocols import CostmapView, RobotModel
 
@@ -40,7 +40,7 @@ class MotionPrediction:
         self._foretold: tuple[int, MovingObstacles] | None = None
         self._told: tuple[MovingObstacles, Pose2, Pose2, MovingObstacles] | None = None
         self._plan: Path | None = None
-        self._followed: Followed | None = None
+        self._followed: FollowedPath | None = None
         self.take = self._rolled.take
         """Process an odometry or IMU reading."""
         self.calm = not self._trackers
@@ -67,7 +67,7 @@ class MotionPrediction:
         tracker = self._trackers.get(scan.sensor)
         if tracker is None or tracker.hits is None or tracker.tick != scan.tick:
             return scan
-        return ScanAmongMoving(**vars(scan), moving=tracker.hits)
+        return ScanWithMovingHits(**vars(scan), moving=tracker.hits)
 
     def moving(self, tick: int) -> MovingObstacles:
         """Return the moving obstacles at a tick in the frame of DeadReckoning, from all lidars."""
@@ -98,7 +98,7 @@ class MotionPrediction:
         if not self._seeing:
             return wanted if self.calm else _limit_speed(wanted)
         if plan is not self._plan:
-            self._plan, self._followed = plan, None if plan is None else Followed(plan.points)
+            self._plan, self._followed = plan, None if plan is None else FollowedPath(plan.points)
         return self._avoidance.steer(wanted, pose, twist, self.seen_from(tick, pose), costmap, self._followed)
 
     def settle(self) -> None:

@@ -41,7 +41,7 @@ class Rollouts:
     commands: Array
 
 
-class Repertoire:
+class TrajectorySampler:
     """All candidate sequences of two velocities, reached with the accelerations of the robot."""
 
     def __init__(self, robot: RobotModel, full_speed: float) -> None:
@@ -69,7 +69,7 @@ class Repertoire:
         self._speeds, self._speed = np.unique(plan[:, (0, 2, 3)], axis=0, return_inverse=True)
         self._turns, self._turn = np.unique(plan[:, (1, 2, 4)], axis=0, return_inverse=True)
 
-    def roll(self, pose: Pose2, twist: Twist) -> "Fan":
+    def roll(self, pose: Pose2, twist: Twist) -> "TrajectoryFan":
         """Return all trajectories from a pose and velocity."""
         robot, speeds, turns = self._robot, self._speeds, self._turns
         first, lasts, then = (speeds[:, k : k + 1] for k in range(3))
@@ -78,11 +78,11 @@ class Repertoire:
         wz = _ramped(twist.wz, first, lasts, then, robot.angular_acceleration, robot.angular_acceleration)
         yaw = pose.yaw + np.cumsum(wz, axis=1) * STEP
         middle = yaw - 0.5 * STEP * wz
-        return Fan(pose, vx, yaw, np.cos(middle), np.sin(middle), self._speed, self._turn, self.commands)
+        return TrajectoryFan(pose, vx, yaw, np.cos(middle), np.sin(middle), self._speed, self._turn, self.commands)
 
 
 @dataclass(frozen=True, eq=False)
-class Fan:
+class TrajectoryFan:
     """Many trajectories, as combinations of few speed profiles and few turn profiles with indices `speed` and `turn`
     (n,).
 
@@ -123,7 +123,7 @@ def _ramped(now: float, first: Array, lasts: Array, then: Array, faster: float, 
     return ramped
 
 
-class Followed:
+class FollowedPath:
     """Path that a controller follows, for predicting its trajectory."""
 
     def __init__(self, path: Array) -> None:

@@ -9,8 +9,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from simscen.advanced.prediction.clusters import Places
-from simscen.advanced.prediction.track import Track
-from simscen.advanced.prediction.visibility import SAME, Earlier
+from simscen.advanced.prediction.tracks import Track
+from simscen.advanced.prediction.visibility import SAME, EarlierScan
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
 
@@ -38,13 +38,13 @@ class LidarPose(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class CurrentScan:
     """A scan with its beam ends (n,) in the lidar frame, the pose `at` of the lidar, and an earlier scan `before`."""
 
     scan: Scan
     ends: Places
     at: Pose2
-    before: Earlier | None
+    before: EarlierScan | None
 
     @cached_property
     def lidar(self) -> LidarPose:

@@ -7,12 +7,11 @@ visible, later if it is hidden.
 
 import numpy as np
 
-from simscen.advanced.prediction.association import Seen, associate, begin
-from simscen.advanced.prediction.clusters import Hits, Mask, Places, Runs, answers, clusters, runs, shares
-from simscen.advanced.prediction.scan_outline import Sight
-from simscen.advanced.prediction.track import Track
-from simscen.advanced.prediction.track_lifecycle import TrackLifecycle
-from simscen.advanced.prediction.visibility import FARTHEST, Earlier, FreeSpaceMemory
+from simscen.advanced.prediction.association import ScanClusters, associate, start_tracks
+from simscen.advanced.prediction.clusters import Hits, Mask, Places, Runs, clusters, marked_hits, runs, valid_hits
+from simscen.advanced.prediction.scan_outline import CurrentScan
+from simscen.advanced.prediction.tracks import Track, TrackLifecycle
+from simscen.advanced.prediction.visibility import FARTHEST, EarlierScan, FreeSpaceMemory
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
@@ -67,7 +66,7 @@ class Tracker:
         self.hits, self.moving = None, self._nothing
         before = self._memory.before(scan.tick)
         if self._tracks or (before is not None and (self._restless or self._suspicious(scan, lidar, before))):
-            self._follow(Sight(scan, _ends(scan.ranges, self._towards), lidar, before))
+            self._follow(CurrentScan(scan, _ends(scan.ranges, self._towards), lidar, before))
         self._memory.remember(scan, lidar)
 
     def _look_along(self, scan: Scan) -> None:
@@ -76,7 +75,7 @@ class Tracker:
         self._towards = np.exp(1j * scan.angles())
         self._towards_some = self._towards[:: self._every].copy()
 
-    def _suspicious(self, scan: Scan, lidar: Pose2, before: Earlier) -> bool:
+    def _suspicious(self, scan: Scan, lidar: Pose2, before: EarlierScan) -> bool:
         """Return whether one of the checked beams hits something new."""
         ranges = scan.ranges[:: self._every]
         looked = before.looked(_ends(ranges, self._towards_some), lidar)
@@ -89,12 +88,12 @@ class Tracker:
     def _farthest(self, scan: Scan) -> float:
         return min(scan.range_max, self._spec.max_range)
 
-    def _follow(self, sight: Sight) -> None:
+    def _follow(self, sight: CurrentScan) -> None:
         seen = self._seen(sight)
         if seen is None:
             return
         tracks, going, tick = self._tracks, self._going, sight.scan.tick
-        begin(tracks, seen, associate(tracks, seen))
+        start_tracks(tracks, seen, associate(tracks, seen))
         followed: list[Track] = []
         for track in tracks:
             going.settle(track, tick, tracks, sight.left)
@@ -104,10 +103,10 @@ class Tracker:
         if moving := [track for track in followed if track.moving]:
             self._tell(moving, sight)
 
-    def _seen(self, sight: Sight) -> Seen | None:
+    def _seen(self, sight: CurrentScan) -> ScanClusters | None:
         """Return the clusters of the scan compared with an earlier one; None if there is no track and none starts."""
         scan, before, tracks = sight.scan, sight.before, self._tracks
-        hits = answers(scan.ranges, sight.ends, scan.angle_increment, scan.range_min, self._farthest(scan))
+        hits = valid_hits(scan.ranges, sight.ends, scan.angle_increment, scan.range_min, self._farthest(scan))
         looked = None if before is None or not len(hits.beams) else before.looked(hits.places, sight.at)
         free = None if looked is None else looked.free()
         if not tracks and (free is None or not self._may_begin(hits, free)):
@@ -119,10 +118,10 @@ class Tracker:
         pieces = clusters(found, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius)
         came = stood = [False] * len(pieces)
         if looked is not None and appeared is not None and pieces:
-            came = [count >= max(FEW, APPEARED * every) for count, every in shares(pieces, appeared)]
+            came = [count >= max(FEW, APPEARED * every) for count, every in marked_hits(pieces, appeared)]
             if tracks:
-                stood = [count > STANDS * every for count, every in shares(pieces, looked.stood())]
-        return Seen(scan.tick, hits.places, pieces, sight.lidar, came, stood)
+                stood = [count > STANDS * every for count, every in marked_hits(pieces, looked.stood())]
+        return ScanClusters(scan.tick, hits.places, pieces, sight.lidar, came, stood)
 
     def _may_begin(self, hits: Hits, free: Mask) -> bool:
         """Return whether enough hits in formerly free space may belong to one obstacle."""
@@ -134,7 +133,7 @@ class Tracker:
         """Return whether enough hits of a run are new, including one of the checked beams."""
         return found.together(appeared, FEW) and bool((found.hits.beams[appeared] % self._every == 0).any())
 
-    def _tell(self, moving: list[Track], sight: Sight) -> None:
+    def _tell(self, moving: list[Track], sight: CurrentScan) -> None:
         """Update the moving obstacles, and the beams that hit them."""
         scan, ends, lidar = sight.scan, sight.ends, sight.lidar
         things = [

@@ -41,7 +41,7 @@ FARTHEST = 1e5
 
 
 @dataclass(frozen=True)
-class View:
+class ScanGeometry:
     """Directions of the beams of a lidar: `count` beams, `increment` rad apart, the first along `start`."""
 
     count: int
@@ -108,21 +108,21 @@ def _least(values: Array, width: int) -> Array:
 
 
 @fast_dataclass(eq=False)
-class Earlier:
+class EarlierScan:
     """Free space of an earlier scan, and the pose of its lidar in the odom frame."""
 
     tick: int
     lidar: Pose2
-    view: View
+    view: ScanGeometry
     lengths: Array
     free: Array
 
-    def looked(self, places: Places, lidar: Pose2) -> "Looked":
+    def looked(self, places: Places, lidar: Pose2) -> "BeamComparison":
         """Compare places (n,), given in the frame of a lidar at `lidar`, with this scan."""
         moved, ahead = self.lidar.between(lidar), self.view.middle
         turned = places * cmath.rect(1.0, moved.yaw - ahead)
         way = complex(moved.x, moved.y) * cmath.rect(1.0, -ahead)
-        return Looked(self, turned, way, *self.towards(turned + way))
+        return BeamComparison(self, turned, way, *self.towards(turned + way))
 
     def towards(self, places: Places) -> tuple[Indices, Array]:
         """Return the indices in `free` of the beams (…,) toward places, and the distances of the places.
@@ -140,14 +140,14 @@ class Earlier:
 
 
 @fast_dataclass(eq=False)
-class Looked:
+class BeamComparison:
     """Beams (n,) of an earlier scan toward places, with the distances of the places in m.
 
     `turned` are the places relative to the current lidar in the earlier orientation; `way` is the displacement between
     both lidar poses.
     """
 
-    earlier: Earlier
+    earlier: EarlierScan
     turned: Places
     way: complex
     beam: Indices
@@ -180,8 +180,8 @@ class FreeSpaceMemory:
         """Take the tick rate in Hz."""
         self._ago, self._at_least = round(AGO * tick_rate), round(AT_LEAST * tick_rate)
         self._every = round(EVERY * tick_rate)
-        self._scans: deque[Earlier] = deque(maxlen=KEPT)
-        self._view = View(0, 0.0, 0.0)
+        self._scans: deque[EarlierScan] = deque(maxlen=KEPT)
+        self._view = ScanGeometry(0, 0.0, 0.0)
 
     def remember(self, scan: Scan, lidar: Pose2) -> None:
         """Keep a scan, taken with the lidar at a pose."""
@@ -191,11 +191,11 @@ class FreeSpaceMemory:
         if count < FEWEST_BEAMS or scan.angle_increment <= 0.0:
             return
         if (view.count, view.start, view.increment) != (count, scan.angle_min, scan.angle_increment):
-            self._view = view = View(count, scan.angle_min, scan.angle_increment)
+            self._view = view = ScanGeometry(count, scan.angle_min, scan.angle_increment)
         lengths = view.lengths(scan)
-        self._scans.append(Earlier(scan.tick, lidar, view, lengths, view.free(lengths)))
+        self._scans.append(EarlierScan(scan.tick, lidar, view, lengths, view.free(lengths)))
 
-    def before(self, tick: int) -> Earlier | None:
+    def before(self, tick: int) -> EarlierScan | None:
         """Return the scan that is about AGO old, or None if there is none older than AT_LEAST."""
         scans, ago = self._scans, tick - self._ago
         while len(scans) > 1 and scans[1].tick <= ago:

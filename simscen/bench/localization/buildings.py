@@ -1,4 +1,4 @@
-"""Walls with openings and other boxes, seen from above."""
+"""Generated office floors for the localization benchmark: walls, glass, and furniture as boxes seen from above."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -9,21 +9,24 @@ import numpy as np
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Box, Solid, TriangleMesh
 from simscen.core.random_streams import Streams
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 
-HEIGHT = 1.0
-"""Of everything, in m: the lidar looks along the floor."""
+HEIGHT_M = 1.0
+"""Height of all walls and furniture. The lidar measures in a horizontal plane, so it does not matter."""
 
 
 def boxes(rows: Iterable[Sequence[float]]) -> Array:
-    """An array (n, 4) of left, bottom, right, top in m."""
+    """Return boxes as an array (n, 4) of left, bottom, right, top in m."""
     return np.array(list(rows), dtype=np.float64).reshape(-1, 4)
 
 
-def wall(
+def wall_boxes(
     start: tuple[float, float], end: tuple[float, float], thickness: float, openings: Sequence[tuple[float, float]] = ()
 ) -> Array:
-    """Boxes (n, 4) of a wall along x or y; `openings` are (from, to) in m along it, in order."""
+    """Return the boxes (n, 4) of a wall along x or y.
+
+    `openings` are sorted intervals (from, to) along the wall, in m from its start.
+    """
     along = 0 if start[1] == end[1] else 1
     edges = [start[along], *(start[along] + edge for opening in openings for edge in opening), end[along]]
     across = start[1 - along] - thickness / 2, start[1 - along] + thickness / 2
@@ -33,40 +36,42 @@ def wall(
     return boxes((across[0], a, across[1], b) for a, b in pieces)
 
 
-def mesh_of(*parts: Array) -> TriangleMesh:
-    """What stands on all these boxes (n, 4)."""
+def extruded_mesh(*parts: Array) -> TriangleMesh:
+    """Return the mesh of boxes (n, 4) from the floor to HEIGHT_M."""
     rows = np.concatenate(parts).tolist()
-    return fuse(Solid(Box((r - x, t - y, HEIGHT)), Pose3((x + r) / 2, (y + t) / 2, HEIGHT / 2)) for x, y, r, t in rows)
+    return merge_solids(
+        Solid(Box((r - x, t - y, HEIGHT_M)), Pose3((x + r) / 2, (y + t) / 2, HEIGHT_M / 2)) for x, y, r, t in rows
+    )
 
 
-def distance_to(rows: Array, point: Sequence[float]) -> Array:
-    """How far a point is from each of the boxes (n, 4): (n,) in m, 0 inside."""
+def box_distances(rows: Array, point: Sequence[float]) -> Array:
+    """Return the distance (n,) in m from a point to each box (n, 4); 0 inside."""
     x, y = point
-    away: Array = np.hypot(
+    distances: Array = np.hypot(
         np.maximum(0, np.maximum(rows[:, 0] - x, x - rows[:, 2])),
         np.maximum(0, np.maximum(rows[:, 1] - y, y - rows[:, 3])),
     )
-    return away
+    return distances
 
 
-LENGTH, DEPTH, CORRIDOR = (41.0, 48.0), (17.0, 24.0), (1.8, 2.6)
-"""Of a floor and of its corridor in m: least and most."""
-ROOM, DOOR, THICKNESS = (3.2, 8.5), (0.95, 1.3), (0.12, 0.2)
-GLAZED = 0.15
-"""Share of the rooms whose wall to the corridor is of glass."""
-CONNECTED = 0.3
+FLOOR_LENGTH_M, FLOOR_DEPTH_M, CORRIDOR_WIDTH_M = (41.0, 48.0), (17.0, 24.0), (1.8, 2.6)
+"""Smallest and largest value of each size."""
+ROOM_WIDTH_M, DOOR_WIDTH_M, WALL_THICKNESS_M = (3.2, 8.5), (0.95, 1.3), (0.12, 0.2)
+GLASS_WALL_SHARE = 0.15
+"""Share of the rooms with a glass wall to the corridor."""
+CONNECTING_DOOR_SHARE = 0.3
 """Share of neighboring rooms with a door between them."""
-SWINGS = 0.8
-"""m around a door in which nothing stands."""
-MOVED, TAKEN, BROUGHT = 0.25, 0.1, 0.15
-"""Shares of the furniture that was moved, taken away and brought since the map was made."""
+DOOR_CLEARANCE_M = 0.8
+"""Radius around a door without furniture."""
+MOVED_SHARE, REMOVED_SHARE, ADDED_SHARE = 0.25, 0.1, 0.15
+"""Shares of the furniture that was moved, removed, and added since the map was made."""
 
 
 @dataclass(frozen=True, eq=False)
 class Building:
-    """A floor: `size` in m, boxes (n, 4) of `walls`, `glass` and `furniture`, the middles (r, 2) of its `rooms`.
+    """An office floor: boxes (n, 4) of `walls`, `glass` and `furniture`, and the centers of `rooms` and `doors` (n, 2).
 
-    `middle` is the x of the wall between its two halves, which only the corridor crosses.
+    `size` is in m. `middle` is the x of the wall between the two halves of the floor, which only the corridor crosses.
     """
 
     size: tuple[float, float]
@@ -78,23 +83,24 @@ class Building:
     doors: Array
 
 
-def building(number: int, rebuilt: int = 0) -> Building:
-    """The floor of a number: always the same. `rebuilt` ones have other rooms and furniture right of the middle."""
+def generate_building(number: int, rebuilt: int = 0) -> Building:
+    """Return the building with this number, the same every time.
+
+    A number `rebuilt` other than 0 changes the rooms and the furniture right of the middle.
+    """
     streams = Streams(number)
     rng = streams.generator("floor")
-    length, depth = rng.uniform(*LENGTH), rng.uniform(*DEPTH)
-    width = rng.uniform(*CORRIDOR)
+    length, depth = rng.uniform(*FLOOR_LENGTH_M), rng.uniform(*FLOOR_DEPTH_M)
+    width = rng.uniform(*CORRIDOR_WIDTH_M)
     low = rng.uniform(0.35, 0.6) * (depth - width)
     middle = rng.uniform(0.45, 0.55) * length
-    thickness = rng.uniform(*THICKNESS)
+    thickness = rng.uniform(*WALL_THICKNESS_M)
     halves = [
         _half(streams.generator(name), ends, (0.0, low, low + width, depth), thickness)
         for name, ends in (("left", (0.0, middle)), (f"right {rebuilt}" if rebuilt else "right", (middle, length)))
     ]
-    hull = [
-        wall((0, 0), (length, 0), 0.3), wall((0, depth), (length, depth), 0.3), wall((0, 0), (0, depth), 0.3),
-        wall((length, 0), (length, depth), 0.3),
-    ]  # fmt: skip
+    corners = ((0, 0), (length, 0), (length, depth), (0, depth))
+    hull = [wall_boxes(corners[a], corners[b], 0.3) for a, b in ((0, 1), (3, 2), (0, 3), (1, 2))]
     walls, glass, furniture, rooms, doors = (np.concatenate(part) for part in zip(*halves, strict=True))
     return Building((length, depth), middle, np.concatenate((*hull, walls)), glass, furniture, rooms, doors)
 
@@ -102,43 +108,45 @@ def building(number: int, rebuilt: int = 0) -> Building:
 def _half(
     rng: np.random.Generator, ends: tuple[float, float], levels: tuple[float, ...], thickness: float
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Walls, glass, furniture, rooms and doors of one half; `levels` are the y of outer and corridor walls."""
+    """Return walls, glass, furniture, rooms and doors of one half of a floor.
+
+    `ends` are its smallest and largest x. `levels` are the y of the outer walls and of the corridor walls, in order.
+    """
     walls, glass, furniture, rooms, doors = ([np.empty((0, k))] for k in (4, 4, 4, 2, 2))
     for outer, inner in ((levels[0], levels[1]), (levels[3], levels[2])):
-        cuts = _cuts(rng, *ends)
-        for a, b in pairwise(cuts):
+        for a, b in pairwise(_room_bounds(rng, *ends)):
             back = outer + np.sign(inner - outer) * (rng.uniform(0.5, 1.5) if rng.random() < 0.4 else 0.0)
             if back != outer:
-                walls.append(wall((a, back), (b, back), thickness))
+                walls.append(wall_boxes((a, back), (b, back), thickness))
             opening = _opening(rng, b - a)
-            front = wall((a, inner), (b, inner), thickness, [opening])
-            (glass if rng.random() < GLAZED else walls).append(front)
+            front = wall_boxes((a, inner), (b, inner), thickness, [opening])
+            (glass if rng.random() < GLASS_WALL_SHARE else walls).append(front)
             low, high = sorted((back, inner))
             door = np.array([[a + sum(opening) / 2, inner]])
-            if b < ends[1] and rng.random() < CONNECTED:
+            if b < ends[1] and rng.random() < CONNECTING_DOOR_SHARE:
                 gap = _opening(rng, high - low)
-                walls.append(wall((b, low), (b, high), thickness, [gap]))
+                walls.append(wall_boxes((b, low), (b, high), thickness, [gap]))
                 door = np.concatenate((door, [[b, low + sum(gap) / 2]]))
             else:
-                walls.append(wall((b, low), (b, high), thickness))
+                walls.append(wall_boxes((b, low), (b, high), thickness))
             doors.append(door)
             rooms.append(np.array([[(a + b) / 2, (low + high) / 2]]))
             furniture.append(boxes(_furniture(rng, (a, low, b, high), np.concatenate(doors))))
-    furniture.append(boxes(_along_corridor(rng, ends, levels[1:3], np.concatenate(doors))))
+    furniture.append(boxes(_corridor_furniture(rng, ends, levels[1:3], np.concatenate(doors))))
     return tuple(np.concatenate(part) for part in (walls, glass, furniture, rooms, doors))  # type: ignore[return-value]
 
 
-def _cuts(rng: np.random.Generator, begin: float, end: float) -> list[float]:
-    """Where walls between rooms stand, the ends of the row included."""
-    cuts = [begin]
-    while end - cuts[-1] > ROOM[1]:
-        cuts.append(min(cuts[-1] + rng.uniform(*ROOM), end - ROOM[0]))
-    return [*cuts, end]
+def _room_bounds(rng: np.random.Generator, begin: float, end: float) -> list[float]:
+    """Return the x of the walls between the rooms of a row, with both ends of the row."""
+    bounds = [begin]
+    while end - bounds[-1] > ROOM_WIDTH_M[1]:
+        bounds.append(min(bounds[-1] + rng.uniform(*ROOM_WIDTH_M), end - ROOM_WIDTH_M[0]))
+    return [*bounds, end]
 
 
 def _opening(rng: np.random.Generator, length: float) -> tuple[float, float]:
-    """A door in a wall of this length."""
-    width = rng.uniform(*DOOR)
+    """Return the interval of a door in a wall of this length, in m."""
+    width = rng.uniform(*DOOR_WIDTH_M)
     begin = rng.uniform(0.3, length - width - 0.3)
     return begin, begin + width
 
@@ -146,7 +154,7 @@ def _opening(rng: np.random.Generator, length: float) -> tuple[float, float]:
 def _furniture(
     rng: np.random.Generator, room: tuple[float, float, float, float], doors: Array
 ) -> Iterator[tuple[float, float, float, float]]:
-    """Desks and shelves along the walls of a room, some things in the middle."""
+    """Yield boxes of furniture in a room: most along its walls, some in the middle."""
     left, low, right, high = room
     for _ in range(int((right - left) * (high - low) / rng.uniform(4, 9))):
         a, b = rng.uniform((0.5, 0.3), (1.8, 0.8))
@@ -155,37 +163,37 @@ def _furniture(
         x, y = rng.uniform((left, low), (right - a, high - b))
         if rng.random() < 0.7:
             x, y = ((left, y), (right - a, y), (x, low), (x, high - b))[rng.integers(4)]
-        if _clear_of(doors, (x, y, x + a, y + b)):
+        if _is_clear_of(doors, (x, y, x + a, y + b)):
             yield x, y, x + a, y + b
 
 
-def _along_corridor(
+def _corridor_furniture(
     rng: np.random.Generator, ends: tuple[float, float], levels: tuple[float, ...], doors: Array
 ) -> Iterator[tuple[float, float, float, float]]:
-    """Cupboards and copiers against the walls of the corridor."""
+    """Yield boxes of furniture along the walls of the corridor."""
     for _ in range(int(rng.integers(2, 6))):
         a, b = rng.uniform((0.5, 0.25), (1.6, 0.45))
         x = rng.uniform(ends[0], ends[1] - a)
         y = levels[0] if rng.random() < 0.5 else levels[1] - b
-        if _clear_of(doors, (x, y, x + a, y + b)):
+        if _is_clear_of(doors, (x, y, x + a, y + b)):
             yield x, y, x + a, y + b
 
 
-def _clear_of(doors: Array, box: tuple[float, float, float, float]) -> bool:
-    return all(distance_to(boxes([box]), door)[0] > SWINGS for door in doors.tolist())
+def _is_clear_of(doors: Array, box: tuple[float, float, float, float]) -> bool:
+    return all(box_distances(boxes([box]), door)[0] > DOOR_CLEARANCE_M for door in doors.tolist())
 
 
-def lived_in(floor: Building, rng: np.random.Generator) -> Array:
-    """The furniture (n, 4) as it stands now: some of it moved, some taken away, some brought."""
-    stays = rng.random(len(floor.furniture))
-    now = floor.furniture[stays > TAKEN].copy()
-    moved = stays[stays > TAKEN] < TAKEN + MOVED
+def rearranged_furniture(floor: Building, rng: np.random.Generator) -> Array:
+    """Return the furniture (n, 4) after some of it was moved, removed, and added since the map was made."""
+    draws = rng.random(len(floor.furniture))
+    now = floor.furniture[draws > REMOVED_SHARE].copy()
+    moved = draws[draws > REMOVED_SHARE] < REMOVED_SHARE + MOVED_SHARE
     shift = rng.normal(0, 0.6, (int(moved.sum()), 2))
     now[moved] += np.hstack((shift, shift))
-    brought = []
-    for _ in range(int(BROUGHT * len(floor.furniture))):
+    added = []
+    for _ in range(int(ADDED_SHARE * len(floor.furniture))):
         x, y = floor.rooms[rng.integers(len(floor.rooms))] + rng.normal(0, 1.2, 2)
         a, b = rng.uniform(0.3, 0.9, 2)
-        if _clear_of(floor.doors, (x, y, x + a, y + b)):
-            brought.append((x, y, x + a, y + b))
-    return np.concatenate((now, boxes(brought)))
+        if _is_clear_of(floor.doors, (x, y, x + a, y + b)):
+            added.append((x, y, x + a, y + b))
+    return np.concatenate((now, boxes(added)))

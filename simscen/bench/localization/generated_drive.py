@@ -1,4 +1,4 @@
-"""Where a robot truly goes: from room to room, on shortest ways, as a person with a joystick would drive it."""
+"""Simulated drive through a generated building: true poses, wheel odometry, people, and lidar ranges."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,56 +6,61 @@ from itertools import pairwise
 
 import numpy as np
 
-from simscen.bench.localization.buildings import HEIGHT, Building, mesh_of
+from simscen.bench.localization.buildings import HEIGHT_M, Building, extruded_mesh
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.model.robot import Lidar, WheelOdometry
 from simscen.worlds.raycasting.ray_scene import RayScene
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
-STEP = 0.075
-"""Seconds between two poses, and between two readings of the odometry."""
-CLEARANCE = 0.35
-"""m that the robot's middle keeps from everything."""
-SPEED, TURN_RATE = 0.6, 1.0
-"""m/s and rad/s: the most."""
-FINEST = 0.1
-"""m; cells of the search for ways."""
-MOST_FAILURES = 30
-"""Places in rooms that are tried as the next goal."""
+STEP_S = 0.075
+"""Time between two poses, and between two odometry messages."""
+CLEARANCE_M = 0.35
+"""Distance from the center of the robot to all obstacles."""
+MAX_SPEED_M_S, MAX_TURN_RATE_RAD_S = 0.6, 1.0
+SEARCH_CELL_M = 0.1
+"""Cell size of the path search."""
+MAX_FAILED_GOALS = 30
+"""Number of unreachable goals in a row after which the robot counts as enclosed."""
 
 
-class ShutIn(ValueError):
-    """No way leads out of the room in which the drive would begin."""
+class EnclosedStart(ValueError):
+    """No path leads out of the room in which the drive would begin."""
 
 
-def drive(floor: Building, furniture: Array, seconds: float, rng: np.random.Generator, alternate: bool) -> Array:
-    """True poses (k, 3), STEP apart, between rooms drawn anywhere; if `alternate`, in the left half and the right one.
+def drive_between_rooms(
+    floor: Building, furniture: Array, seconds: float, rng: np.random.Generator, alternate: bool
+) -> Array:
+    """Return true poses (k, 3), STEP_S apart, of a drive on shortest paths between random points in rooms.
 
-    Such a drive begins in the left half.
+    With `alternate`, the rooms lie in the left and the right half in turn, starting on the left. Raises EnclosedStart.
     """
-    ways = ShortestPaths(
-        mesh_of(floor.walls, floor.glass, furniture), (0.0, 0.0, *floor.size), CLEARANCE, finest=FINEST
+    paths = ShortestPaths(
+        extruded_mesh(floor.walls, floor.glass, furniture),
+        (0.0, 0.0, *floor.size),
+        CLEARANCE_M,
+        finest=SEARCH_CELL_M,
     )
-    corners = _corners(floor, ways, rng, alternate)
-    before, goal = next(corners), next(corners)
-    x, y = before.tolist()
-    pose = Pose2(x, y, float(np.arctan2(*(goal - before)[::-1])))
+    waypoints = _waypoints(floor, paths, rng, alternate)
+    start, goal = next(waypoints), next(waypoints)
+    x, y = start.tolist()
+    pose = Pose2(x, y, float(np.arctan2(*(goal - start)[::-1])))
     truth: list[Pose2] = []
-    while len(truth) < seconds / STEP:
+    while len(truth) < seconds / STEP_S:
         truth.append(pose)
         if np.hypot(*(goal - pose[:2])) < 0.15:
-            goal = next(corners)
+            goal = next(waypoints)
         x, y, _ = pose.between(Pose2(*goal))
         error = float(np.arctan2(y, x))
-        turn = float(np.clip(2 * error, -TURN_RATE, TURN_RATE)) * STEP
-        ahead = min(SPEED * STEP, float(np.hypot(x, y))) * max(0.0, float(np.cos(error))) ** 16
-        pose = pose.compose(Pose2(ahead * np.cos(turn / 2), ahead * np.sin(turn / 2), turn))
+        turn = float(np.clip(2 * error, -MAX_TURN_RATE_RAD_S, MAX_TURN_RATE_RAD_S)) * STEP_S
+        # The power makes the robot nearly stop for turns, as a person with a joystick would drive.
+        forward = min(MAX_SPEED_M_S * STEP_S, float(np.hypot(x, y))) * max(0.0, float(np.cos(error))) ** 16
+        pose = pose.compose(Pose2(forward * np.cos(turn / 2), forward * np.sin(turn / 2), turn))
     return np.array(truth)
 
 
-def _corners(floor: Building, ways: ShortestPaths, rng: np.random.Generator, alternate: bool) -> Iterator[Array]:
-    """Places to turn at, without end, on the shortest ways between places in rooms."""
+def _waypoints(floor: Building, paths: ShortestPaths, rng: np.random.Generator, alternate: bool) -> Iterator[Array]:
+    """Yield the corners of shortest paths between random points in rooms, without end."""
     here: Array | None = None
     right, failed = False, 0
     while True:
@@ -63,44 +68,46 @@ def _corners(floor: Building, ways: ShortestPaths, rng: np.random.Generator, alt
         rooms = floor.rooms[side] if alternate else floor.rooms
         target = rooms[rng.integers(len(rooms))] + rng.normal(0, 0.8, 2)
         start = target if here is None else here
-        way = ways.way(Pose2(*start), Pose2(*target))
-        failed = failed + 1 if way is None else 0
-        if failed > MOST_FAILURES:  # furniture stands before the door of this room
-            raise ShutIn(tuple(start))
-        if way is not None:
-            yield from way[:1] if here is None else way[1:]
-            here, right = way[-1], not right
+        path = paths.way(Pose2(*start), Pose2(*target))
+        failed = failed + 1 if path is None else 0
+        if failed > MAX_FAILED_GOALS:  # furniture blocks the door of this room
+            raise EnclosedStart(tuple(start))
+        if path is not None:
+            yield from path[:1] if here is None else path[1:]
+            here, right = path[-1], not right
 
 
-def tour(floor: Building) -> Array:
-    """Poses (k, 3) half a meter apart on ways from room to room of an empty floor, none left out that has a door."""
-    ways = ShortestPaths(mesh_of(floor.walls, floor.glass), (0.0, 0.0, *floor.size), CLEARANCE, finest=FINEST)
+def mapping_tour(floor: Building) -> Array:
+    """Return poses (k, 3), 0.5 m apart, on paths through all reachable rooms of an unfurnished floor."""
+    mesh = extruded_mesh(floor.walls, floor.glass)
+    paths = ShortestPaths(mesh, (0.0, 0.0, *floor.size), CLEARANCE_M, finest=SEARCH_CELL_M)
     order = floor.rooms[np.argsort(floor.rooms[:, 0], kind="stable")]
-    places, here = [order[:1]], order[0]
+    points, here = [order[:1]], order[0]
     for room in order[1:]:
-        way = ways.way(Pose2(*here), Pose2(*room))
-        if way is None:
+        path = paths.way(Pose2(*here), Pose2(*room))
+        if path is None:
             continue
-        far = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
-        at = np.arange(0.0, far[-1], 0.5)
-        places.append(np.column_stack([np.interp(at, far, axis) for axis in way.T]))
+        length = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))))
+        samples = np.arange(0.0, length[-1], 0.5)
+        points.append(np.column_stack([np.interp(samples, length, axis) for axis in path.T]))
         here = room
-    found = np.concatenate(places)
+    found = np.concatenate(points)
     return np.column_stack((found, np.zeros(len(found))))
 
 
-STUMBLES_EACH = 25.0
-"""Seconds between two stretches of slipping wheels, on average."""
-STUMBLE = (0.3, 1.5)
-"""Seconds that one lasts."""
+MEAN_SLIP_INTERVAL_S = 25.0
+"""Mean time between two intervals of slipping wheels."""
+SLIP_DURATION_S = (0.3, 1.5)
+"""Shortest and longest interval of slipping wheels."""
 
 
 @dataclass(frozen=True)
-class Wheels:
-    """Standard deviations, over bases, of the constant errors of dead reckoning; whether wheels slip besides.
+class OdometryErrors:
+    """Standard deviations, over robots, of the constant errors of wheel odometry, and whether the wheels slip.
 
-    `scale` of distances (wheels' radius), `turn` of angles (wheel base), `bend` in rad/m (wheels of unequal size):
-    Borenstein and Feng, Measurement and correction of systematic odometry errors in mobile robots, T-RA 12 (1996).
+    `scale` is the relative error of distances (wheel radius), `turn` that of angles (wheel separation), and `bend` the
+    curvature error in rad/m (unequal wheels). See Borenstein and Feng, Measurement and correction of systematic
+    odometry errors in mobile robots, T-RA 12 (1996).
     """
 
     scale: float = 0.015
@@ -109,53 +116,56 @@ class Wheels:
     slips: bool = True
 
 
-CLEAN = Wheels(0.0, 0.0, 0.0, False)
-"""Wheels with nothing but the random errors of the simulator's sensor."""
+RANDOM_ERRORS_ONLY = OdometryErrors(0.0, 0.0, 0.0, False)
+"""Wheels with only the random errors of the simulated odometry sensor."""
 
 
-def reckoned(truth: Array, seconds: float, wheels: Wheels, spec: WheelOdometry, rng: np.random.Generator) -> Array:
-    """Poses (k, 3) in the odom frame for true poses (k, 3), `seconds` apart."""
+def simulate_odometry(
+    truth: Array, seconds: float, errors: OdometryErrors, spec: WheelOdometry, rng: np.random.Generator
+) -> Array:
+    """Return poses (k, 3) in the odom frame for true poses (k, 3) that are `seconds` apart."""
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(Pose2(*row) for row in truth))])
-    way = np.hypot(steps[:, 0], steps[:, 1])
+    distance = np.hypot(steps[:, 0], steps[:, 1])
     scale, turn, bend = (
-        1 + rng.normal(0, wheels.scale),
-        1 + rng.normal(0, wheels.turn),
-        rng.normal(0, wheels.bend),
+        1 + rng.normal(0, errors.scale),
+        1 + rng.normal(0, errors.turn),
+        rng.normal(0, errors.bend),
     )
-    along, around = rng.standard_normal((2, len(steps)))
-    stretch = scale * _slip(len(steps), seconds, wheels.slips, rng)
-    stretch[way > 0] += spec.translation_noise * along[way > 0] / np.sqrt(way[way > 0])
-    heading = np.sqrt(spec.rotation_noise**2 * np.abs(steps[:, 2]) + spec.drift_noise**2 * way)
-    spun = _slip(len(steps), seconds, wheels.slips, rng)
-    turned = steps[:, 2] * turn * spun + bend * way + heading * around
+    translation_draws, rotation_draws = rng.standard_normal((2, len(steps)))
+    stretch = scale * _slip_factors(len(steps), seconds, errors.slips, rng)
+    moving = distance > 0
+    stretch[moving] += spec.translation_noise * translation_draws[moving] / np.sqrt(distance[moving])
+    heading_std = np.sqrt(spec.rotation_noise**2 * np.abs(steps[:, 2]) + spec.drift_noise**2 * distance)
+    turn_slip = _slip_factors(len(steps), seconds, errors.slips, rng)
+    turned = steps[:, 2] * turn * turn_slip + bend * distance + heading_std * rotation_draws
     poses = [Pose2(0.0, 0.0, 0.0)]
     for x, y, yaw in np.column_stack((steps[:, 0] * stretch, steps[:, 1] * stretch, turned))[1:].tolist():
         poses.append(poses[-1].compose(Pose2(x, y, yaw)))
     return np.array(poses)
 
 
-def _slip(count: int, seconds: float, slips: bool, rng: np.random.Generator) -> Array:
-    """How much further than the base the wheels turn (count,): 1, and for short stretches 0.9 … 1.4."""
+def _slip_factors(count: int, seconds: float, slips: bool, rng: np.random.Generator) -> Array:
+    """Return the ratio (count,) of wheel to robot motion: 1, and 0.9 … 1.4 in short intervals if the wheels slip."""
     factor = np.ones(count)
     if not slips:
         return factor
-    row = int(rng.exponential(STUMBLES_EACH) / seconds)
+    row = int(rng.exponential(MEAN_SLIP_INTERVAL_S) / seconds)
     while row < count:
-        end = row + max(1, int(rng.uniform(*STUMBLE) / seconds))
+        end = row + max(1, int(rng.uniform(*SLIP_DURATION_S) / seconds))
         factor[row:end] = rng.uniform(0.9, 1.4)
-        row = end + int(rng.exponential(STUMBLES_EACH) / seconds)
+        row = end + int(rng.exponential(MEAN_SLIP_INTERVAL_S) / seconds)
     return factor
 
 
-# MERGED: People who walk about a floor.
-WANDERS = 2.5
-"""m: how far from the middle of a room people who are in it walk, and from the corridor's middle never."""
+ROOM_WALK_M = 2.5
+"""Side of the square around the center of a room in which a person walks."""
+WALKING_SPEED_M_S = 1.1
 
 
-def people_in(floor: Building, count: int, seconds: float, people: int, rng: np.random.Generator) -> Array:
-    """Poses (count, people, 3), `seconds` apart: half of them up and down the corridor, the others about in rooms.
+def simulate_people(floor: Building, count: int, seconds: float, people: int, rng: np.random.Generator) -> Array:
+    """Return poses (count, people, 3), `seconds` apart: half of the people walk in the corridor, half in rooms.
 
-    Nobody gets out of the robot's way, and they walk through furniture.
+    Each person walks back and forth on a line, ignores the robot, and walks through furniture.
     """
     times = np.arange(count) * seconds
     corridor = float(np.median(floor.doors[:, 1]))
@@ -164,76 +174,73 @@ def people_in(floor: Building, count: int, seconds: float, people: int, rng: np.
         if person % 2:
             ends = np.array([[2.0, corridor], [floor.size[0] - 2.0, corridor]]) + rng.normal(0, 0.2, (2, 2))
         else:
-            middle = floor.rooms[rng.integers(len(floor.rooms))]
-            ends = middle + rng.uniform(-WANDERS, WANDERS, (2, 2)) / 2
-        apart = float(np.hypot(*(ends[1] - ends[0])))
-        walked = times * WALKING * rng.uniform(0.4, 1.2) + rng.uniform(0, 2 * apart)
-        back = walked % (2 * apart) > apart
-        along = np.abs(walked % (2 * apart) - 2 * apart * back)
-        heading = np.arctan2(*(ends[1] - ends[0])[::-1]) + np.pi * back
-        places = ends[0] + np.outer(along / apart, ends[1] - ends[0])
-        tracks.append(np.column_stack((places, heading)))
+            center = floor.rooms[rng.integers(len(floor.rooms))]
+            ends = center + rng.uniform(-ROOM_WALK_M, ROOM_WALK_M, (2, 2)) / 2
+        length = float(np.hypot(*(ends[1] - ends[0])))
+        walked = times * WALKING_SPEED_M_S * rng.uniform(0.4, 1.2) + rng.uniform(0, 2 * length)
+        returning = walked % (2 * length) > length
+        along = np.abs(walked % (2 * length) - 2 * length * returning)
+        heading = np.arctan2(*(ends[1] - ends[0])[::-1]) + np.pi * returning
+        points = ends[0] + np.outer(along / length, ends[1] - ends[0])
+        tracks.append(np.column_stack((points, heading)))
     return np.stack(tracks, axis=1)
 
 
-LEG, STRIDE = 0.07, 0.14
-"""m: the radius of a leg, and how far legs are from the middle between them."""
-WALKING = 1.1
-"""m/s."""
-THROUGH = 0.8
-"""Share of the beams that go through glass."""
+LEG_RADIUS_M, LEG_OFFSET_M = 0.07, 0.14
+"""Radius of a leg, and its distance from the center of the person."""
+LEG_RANGE_M = 15.0
+"""Distance beyond which legs are ignored."""
+GLASS_TRANSMISSION = 0.8
+"""Share of the lidar beams that pass through glass."""
 
 
-@dataclass(frozen=True, eq=False)
-class Sight:
-    """What there is to see: without glass and with it."""
+class PartlyTransparentScene:
+    """Ray caster for a building in which most beams pass through glass."""
 
-    opaque: RayScene
-    all: RayScene
+    def __init__(self, opaque: TriangleMesh, everything: TriangleMesh) -> None:
+        self._opaque, self._everything = RayScene(opaque), RayScene(everything)
 
-    @classmethod
-    def of(cls, opaque: TriangleMesh, everything: TriangleMesh) -> "Sight":
-        """Of two meshes."""
-        return cls(RayScene(opaque), RayScene(everything))
-
-    def distances(self, poses: Array, angles: Array, reach: float, rng: np.random.Generator) -> Array:
-        """True ranges (n, b) from `poses` (n, 3) of the lidar along `angles` (b,); inf beyond `reach`."""
+    def distances(self, poses: Array, angles: Array, max_range: float, rng: np.random.Generator) -> Array:
+        """Return true ranges (n, b) from lidar `poses` (n, 3) along `angles` (b,); inf beyond `max_range`."""
         heading = (poses[:, 2:] + angles).ravel()
-        origins = np.column_stack((np.repeat(poses[:, :2], len(angles), axis=0), np.full(len(heading), HEIGHT / 2)))
+        origins = np.column_stack((np.repeat(poses[:, :2], len(angles), axis=0), np.full(len(heading), HEIGHT_M / 2)))
         directions = np.column_stack((np.cos(heading), np.sin(heading), np.zeros(len(heading))))
-        seen, behind = (scene.cast(origins, directions, reach) for scene in (self.all, self.opaque))
-        through = rng.random(len(heading)) < THROUGH
-        distances: Array = np.where(through, behind, seen).reshape(len(poses), len(angles))
+        with_glass, without_glass = (
+            scene.cast(origins, directions, max_range) for scene in (self._everything, self._opaque)
+        )
+        transmitted = rng.random(len(heading)) < GLASS_TRANSMISSION
+        distances: Array = np.where(transmitted, without_glass, with_glass).reshape(len(poses), len(angles))
         return distances
 
 
-def angles_of(spec: Lidar) -> Array:
-    """Directions (b,) of the beams in the lidar's frame."""
+def beam_angles(spec: Lidar) -> Array:
+    """Return the directions (b,) of the beams in the lidar frame, in rad."""
     full = spec.field_of_view >= 2 * np.pi - 1e-9
     increment = spec.field_of_view / (spec.beams if full else spec.beams - 1)
     angles: Array = -spec.field_of_view / 2 + increment * np.arange(spec.beams, dtype=np.float64)
     return angles
 
 
-def hidden_by(people: Array, poses: Array, angles: Array, ranges: Array) -> Array:
-    """Ranges (n, b) where `people` (n, p, 3) x, y, heading stand in the way of beams from `poses` (n, 3)."""
-    aside = np.stack((-np.sin(people[..., 2]), np.cos(people[..., 2])), axis=-1) * STRIDE
-    legs = np.concatenate((people[..., :2] + aside, people[..., :2] - aside), axis=1) - poses[:, None, :2]
+def occlude_by_people(people: Array, poses: Array, angles: Array, ranges: Array) -> Array:
+    """Return the ranges (n, b) shortened where the legs of `people` (n, p, 3) block beams from `poses` (n, 3)."""
+    offset = np.stack((-np.sin(people[..., 2]), np.cos(people[..., 2])), axis=-1) * LEG_OFFSET_M
+    legs = np.concatenate((people[..., :2] + offset, people[..., :2] - offset), axis=1) - poses[:, None, :2]
     heading = poses[:, 2:] + angles
     c, s = np.cos(heading), np.sin(heading)
-    seen: Array = np.array(ranges)
+    result: Array = np.array(ranges)
     for leg in range(legs.shape[1]):
         x, y = legs[:, leg, :1], legs[:, leg, 1:]
-        near = np.hypot(x, y)[:, 0] < 15.0
-        ahead = c[near] * x[near] + s[near] * y[near]
-        inside = LEG**2 - np.square(x[near]) - np.square(y[near]) + np.square(ahead)
-        hit = np.where((inside >= 0) & (ahead > 0), ahead - np.sqrt(np.maximum(inside, 0)), np.inf)
-        seen[near] = np.minimum(seen[near], np.where(hit > 0, hit, np.inf))
-    return seen
+        near = np.hypot(x, y)[:, 0] < LEG_RANGE_M
+        along = c[near] * x[near] + s[near] * y[near]
+        half_chord_squared = LEG_RADIUS_M**2 - np.square(x[near]) - np.square(y[near]) + np.square(along)
+        hits = (half_chord_squared >= 0) & (along > 0)
+        distance = np.where(hits, along - np.sqrt(np.maximum(half_chord_squared, 0)), np.inf)
+        result[near] = np.minimum(result[near], np.where(distance > 0, distance, np.inf))
+    return result
 
 
-def measured(distances: Array, spec: Lidar, rng: np.random.Generator) -> Array:
-    """What the electronics make of true distances: the simulator's lidar."""
+def add_lidar_noise(distances: Array, spec: Lidar, rng: np.random.Generator) -> Array:
+    """Return measured ranges for true distances, with the noise, resolution and limits of the simulated lidar."""
     ranges: Array = (
         np.round((distances + rng.normal(0, spec.noise, distances.shape)) / spec.resolution) * spec.resolution
     )

@@ -1,4 +1,4 @@
-"""A recorded drive through the localizer alone: how far its belief is from a reference."""
+"""Evaluation of a localizer on a recorded drive: run the log through it, and compare its beliefs with a reference."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from simscen.stack.plugins.checked_components import CheckedLocalizer
 from simscen.stack.protocols import Surroundings
 from simscen.stack.setting import Setting
 
-LONGEST_GAP = TICK_RATE_HZ
-"""Ticks between two poses of the reference above which nothing is said in between."""
-NEAR_S = 0.05
-"""A belief this near in time to a pose of the reference is compared with it, whatever the gaps."""
+MAX_GAP_S = 1.0
+"""Longest gap between two poses of the reference over which it is interpolated."""
+MAX_TIME_DIFFERENCE_S = 0.05
+"""Beliefs this close in time to a pose of the reference are compared with it even next to a longer gap."""
 
 
 @dataclass(frozen=True, eq=False)
 class Localized:
-    """What the localizer believed: `times` (n,) in s and `poses` (n, 3) in the map; `scans` were used.
+    """Beliefs of the localizer: `times` (n,) in s, `poses` (n, 3) in the map frame, and `covariances` (n, 3, 3).
 
-    `covariances` (n, 3, 3) are those of the poses. `cpu` is the processor's time in s that all of it took, and
-    `slowest` that of the scan that took longest, which no two runs share.
+    `scans` is the number of processed scans. `cpu` is the total CPU time in s, and `slowest` that of the slowest
+    message; both differ between runs.
     """
 
     times: Array
@@ -42,8 +42,8 @@ class Localized:
 
 
 @dataclass(frozen=True)
-class Lost:
-    """The belief was further off than allowed from a time in s on, `until` it was not; None = to the end."""
+class LostInterval:
+    """Interval in s in which the error exceeded the limit; `until` is None if it lasts to the end."""
 
     since: float
     until: float | None
@@ -51,25 +51,24 @@ class Lost:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Distances (n,) in m and heading errors (n,) in rad at `times` (n,) in s, and when the robot was lost.
+    """Errors at `times` (n,) in s: `distance` (n,) in m and `yaw` (n,) in rad, and the intervals with a lost robot.
 
-    `compared` is the share of all beliefs for which the reference says something.
+    `compared` is the share of the beliefs at times at which there is a reference.
     """
 
     times: Array
     distance: Array
     yaw: Array
-    lost: Sequence[Lost]
+    lost: Sequence[LostInterval]
     compared: float
 
     def figures(self) -> dict[str, float]:
-        """Median, RMSE, largest and last distance in m; RMSE of the heading in rad."""
-        off = self.distance
+        """Return median, RMSE, largest and last distance in m, and the RMSE of the heading in rad."""
         return {
-            "median": float(np.median(off)),
-            "rmse": float(np.sqrt(np.mean(off**2))),
-            "max": float(off.max()),
-            "final": float(off[-1]),
+            "median": float(np.median(self.distance)),
+            "rmse": float(np.sqrt(np.mean(self.distance**2))),
+            "max": float(self.distance.max()),
+            "final": float(self.distance[-1]),
             "yaw_rmse": float(np.sqrt(np.mean(self.yaw**2))),
         }
 
@@ -77,15 +76,15 @@ class Errors:
 def localize(
     sensed: LocalizationLog, spec: StackSpec, surroundings: Surroundings, estimate: Estimate, seed: int
 ) -> Localized:
-    """Feed a log to the localizer of a stack, reading by reading; the belief is taken after each odometry.
+    """Pass all readings of a log to the localizer of a stack, and return its belief after each odometry message.
 
-    The same arguments give the same beliefs, and those of a run of that seed: the localizer is begun as a stack does.
+    The same arguments give the same beliefs, which are also those of a run with this seed.
     """
     localizer = CheckedLocalizer(spec.localizer, Setting(surroundings, "localizer", Streams(seed)))
     localizer.reset(estimate)
     times, poses, covariances, scans, cpu, slowest = [], [], [], 0, 0.0, 0.0
     for reading in sensed.readings:
-        began = time.process_time()
+        start = time.process_time()
         match reading:
             case Scan():
                 localizer.on_scan(reading)
@@ -95,24 +94,27 @@ def localize(
                 times.append(reading.tick / TICK_RATE_HZ)
                 poses.append(tuple(localizer.belief.pose))
                 covariances.append(localizer.belief.covariance)
-        took = time.process_time() - began
-        cpu, slowest = cpu + took, max(slowest, took)
+        elapsed = time.process_time() - start
+        cpu, slowest = cpu + elapsed, max(slowest, elapsed)
     return Localized(np.array(times), np.array(poses), np.array(covariances), scans, cpu, slowest)
 
 
-def errors_of(localized: Localized, sensed: LocalizationLog, far: float) -> Errors | None:
-    """How far off the belief was wherever the reference says something; None where it never does.
+def compare_with_reference(localized: Localized, sensed: LocalizationLog, lost_distance: float) -> Errors | None:
+    """Return the errors at all times with a reference, or None if there are none.
 
-    The reference is interpolated, not over gaps; within a gap, only beliefs at its ends count.
-    The robot is lost where the belief is more than `far` m off.
+    The reference is interpolated, except over gaps longer than MAX_GAP_S; within a gap, only beliefs at its ends count.
+    The robot is lost while the error exceeds `lost_distance` in m.
     """
     if len(sensed.ticks) < 2:
         return None
     known = sensed.ticks / TICK_RATE_HZ
     inside = (localized.times >= known[0]) & (localized.times <= known[-1])
     after = np.clip(np.searchsorted(known, localized.times), 1, len(known) - 1)
-    near = np.minimum(np.abs(known[after] - localized.times), np.abs(localized.times - known[after - 1])) <= NEAR_S
-    inside &= near | (known[after] - known[after - 1] <= LONGEST_GAP / TICK_RATE_HZ)
+    near = (
+        np.minimum(np.abs(known[after] - localized.times), np.abs(localized.times - known[after - 1]))
+        <= MAX_TIME_DIFFERENCE_S
+    )
+    inside &= near | (known[after] - known[after - 1] <= MAX_GAP_S)
     times = localized.times[inside]
     if not len(times):
         return None
@@ -124,15 +126,15 @@ def errors_of(localized: Localized, sensed: LocalizationLog, far: float) -> Erro
         times,
         distance,
         wrap_array(poses[:, 2] - heading),
-        lost_times(times, distance > far),
+        lost_intervals(times, distance > lost_distance),
         len(times) / len(localized.times),
     )
 
 
-def lost_times(times: Array, far: Array) -> list[Lost]:
-    """The stretches in which the robot was lost."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], far.astype(np.int8), [0]))))
+def lost_intervals(times: Array, lost: Array) -> list[LostInterval]:
+    """Return the intervals in which `lost` (n,) is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], lost.astype(np.int8), [0]))))
     return [
-        Lost(float(times[begin]), float(times[end]) if end < len(times) else None)
+        LostInterval(float(times[begin]), float(times[end]) if end < len(times) else None)
         for begin, end in zip(edges[::2], edges[1::2], strict=True)
     ]

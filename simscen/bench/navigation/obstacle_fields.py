@@ -109,11 +109,11 @@ def _crossable(centers: Array, gap: float, too_wide: float | None) -> bool:
 
 
 def _shortest(centers: Array, gap: float) -> float:
-    from simscen.worlds.geometry.triangulation import fuse
+    from simscen.worlds.geometry.triangulation import merge_solids
     from simscen.worlds.routes.shortest_paths import ShortestPaths
 
     pillar = Cylinder(CELL / 2, HEIGHT)
-    mesh = fuse(tuple(Solid(pillar, Pose3(x, y, HEIGHT / 2), "") for x, y in centers.tolist()))
+    mesh = merge_solids(tuple(Solid(pillar, Pose3(x, y, HEIGHT / 2), "") for x, y in centers.tolist()))
     # As wide as the lane, so that no way leads around its walls: those end where the field ends.
     bounds = (-COLUMNS * CELL, 0.0, 0.0, GOAL.y + 1.0)
     return ShortestPaths(mesh, bounds, gap).length(START, GOAL)

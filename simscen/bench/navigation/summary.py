@@ -138,7 +138,6 @@ def mean(values: Sequence[float | None]) -> float | None:
     return sum(known) / len(known) if known else None
 
 
-# MERGED: What drives say of worlds like theirs: drives in one world are no independent evidence of others.
 Interval = tuple[float, float]
 
 
@@ -192,7 +191,6 @@ class ClusteredMean:
         return means.pop() if len(self.of_worlds) >= MIN_PAIRS and len(means) == 1 else None
 
 
-# MERGED: A stack against another in the same drives: nothing but their differences counts, world by world.
 Pair = tuple[Trial, Trial]
 
 

@@ -1,4 +1,4 @@
-"""What a simulated second costs in worlds as people have them, each held against the patrol of a small house."""
+"""Cost of a simulated second in large worlds, compared with the patrol of a small house."""
 
 import gc
 import math
@@ -18,15 +18,15 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGri
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Solid
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import prepare
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.run.preparation import prepare
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.ros_map import save_map
 
 HOUSE = Path(__file__).parents[2] / "data" / "bench" / "house.scenario.yaml"
 MOVABLE = 40
-STANDING, MOVING = 4980, 20
-"""What the warehouse holds."""
-EDGE = 2000
+STATIC, MOVING = 4980, 20
+"""Numbers of objects in the warehouse."""
+SIDE_CELLS = 2000
 """Cells of 5 cm along each side of the map: 100 x 100 m."""
 SCENARIO = """\
 simscen: 1
@@ -42,9 +42,13 @@ pass:
 
 @dataclass(frozen=True)
 class Cost:
-    """A world of so many triangles that stay, and things that can move: CPU ms for each simulated second.
+    """Cost of runs in a world.
 
-    `preparing` is CPU seconds once for all runs; `memory` is the most that this process has used so far, in MB.
+    triangles:    of static solids
+    movable:      number of movable bodies
+    milliseconds: CPU time per simulated second
+    preparing:    CPU time in s, once for all runs
+    memory:       maximum memory of this process so far in MB
     """
 
     name: str
@@ -57,11 +61,11 @@ class Cost:
 
 
 def measure_worlds(rounds: int) -> Iterator[Cost]:
-    """The house, a hall with movable meshes, a warehouse, a map of 100 x 100 m: the median of several runs each."""
+    """Yield the costs of a house, a hall with movable meshes, a warehouse, and a map of 100 x 100 m."""
     with TemporaryDirectory() as folder:
         yield _measured("house, patrol of five rooms", HOUSE, rounds)
         yield _measured(f"hall, {MOVABLE} movable meshes", write_hall(Path(folder, "hall")), rounds)
-        objects = f"{STANDING + MOVING} objects, {MOVING} moving"
+        objects = f"{STATIC + MOVING} objects, {MOVING} moving"
         yield _measured(f"warehouse, {objects}", write_warehouse(Path(folder, "warehouse")), rounds)
         yield _measured("map of 100 x 100 m", write_arena(Path(folder, "arena")), rounds)
 
@@ -69,7 +73,7 @@ def measure_worlds(rounds: int) -> Iterator[Cost]:
 def _measured(name: str, file: Path, rounds: int) -> Cost:
     import time
 
-    gc.collect()  # what was there of the last world would count as memory of this one
+    gc.collect()  # the last world must not count as memory of this one
     begun = time.process_time()
     prepared = prepare(load_scenario(file, file.parent))
     preparing = time.process_time() - begun
@@ -93,7 +97,7 @@ def _most_memory() -> float:
 
 
 def write_hall(folder: Path) -> Path:
-    """A hall of 30 x 20 m as an SDF world, with chairs in five rows: movable meshes of 432 triangles; its scenario."""
+    """Write a hall of 30 x 20 m with chairs, movable meshes of 432 triangles, as an SDF world; return its scenario."""
     folder.mkdir()
     for number in range(4):
         (folder / f"mesh_{number}.obj").write_text(_obj(_chair(0.4 + 0.05 * number)))
@@ -113,7 +117,7 @@ def write_hall(folder: Path) -> Path:
 
 
 def _chair(width: float) -> list[Solid]:
-    """Slats of a seat and a back on four legs, from the ground up."""
+    """Return a chair: slats of a seat and of a back, on four legs."""
     half, slats = width / 2 - 0.02, np.linspace(-1, 1, 16).tolist()
     parts = [((width, width / 20, 0.04), (0.0, half * place, 0.46)) for place in slats]
     parts += [((0.04, width / 20, 0.5), (-half, half * place, 0.73)) for place in slats]
@@ -122,7 +126,7 @@ def _chair(width: float) -> list[Solid]:
 
 
 def _obj(solids: list[Solid]) -> str:
-    mesh = fuse(solids)
+    mesh = merge_solids(solids)
     corners = [f"v {x} {y} {z}" for x, y, z in mesh.vertices.tolist()]
     return "\n".join([*corners, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces.tolist())]) + "\n"
 
@@ -145,9 +149,9 @@ def _box_model(name: str, x: float, y: float, length: float, width: float) -> st
 
 
 def write_warehouse(folder: Path) -> Path:
-    """A warehouse of 100 x 100 m: 4980 boxes and drums in rows, and 20 carts on the move; its scenario.
+    """Write a warehouse of 100 x 100 m with boxes and drums in rows, and moving carts; return its scenario.
 
-    Aisles of 2.4 m between the rows and one of 8 m across them; half of the carts drive where the robot passes.
+    The aisles are 2.4 m wide, the cross aisle 8 m. Half of the carts move where the robot drives.
     """
     folder.mkdir()
     rng = np.random.default_rng(12)
@@ -156,7 +160,7 @@ def write_warehouse(folder: Path) -> Path:
     stock = [
         f"  - {{name: unit {n}, {_unit(n)}, pose: {{x: {bays[bay][0]:.2f}, y: {bays[bay][1]:.2f}, yaw: {turn:.2f}}}}}"
         for n, (bay, turn) in enumerate(
-            zip(rng.permutation(len(bays))[:STANDING].tolist(), rng.uniform(-0.2, 0.2, STANDING), strict=True)
+            zip(rng.permutation(len(bays))[:STATIC].tolist(), rng.uniform(-0.2, 0.2, STATIC), strict=True)
         )
     ]
     carts = [
@@ -171,21 +175,23 @@ def write_warehouse(folder: Path) -> Path:
 
 
 def _unit(number: int) -> str:
-    """A box between 0.5 and 0.65 m wide; every fourth is a drum."""
+    """Return a box between 0.5 and 0.65 m wide, or every fourth time a drum."""
     width = 0.5 + 0.05 * (number % 4)
     return f"cylinder: [{width / 2:.3f}, 1.0]" if number % 4 == 0 else f"box: [{width:.2f}, {width:.2f}, 1.2]"
 
 
 def write_arena(folder: Path) -> Path:
-    """A ROS map of 100 x 100 m at 5 cm with 400 blocks and 0.5 % of noise, as from SLAM; its scenario."""
+    """Write a ROS map of 100 x 100 m with 400 blocks and 0.5 % noise, as from SLAM; return its scenario."""
     folder.mkdir()
     rng = np.random.default_rng(7)
-    cells = np.full((EDGE, EDGE), FREE, dtype=np.int8)
-    cells[rng.random((EDGE, EDGE)) < 0.005] = OCCUPIED
+    cells = np.full((SIDE_CELLS, SIDE_CELLS), FREE, dtype=np.int8)
+    cells[rng.random((SIDE_CELLS, SIDE_CELLS)) < 0.005] = OCCUPIED
     cells[:4] = cells[-4:] = cells[:, :4] = cells[:, -4:] = OCCUPIED
-    for column, row, width, depth in rng.integers((10, 10, 8, 8), (EDGE - 60, EDGE - 60, 50, 50), (400, 4)).tolist():
+    for column, row, width, depth in rng.integers(
+        (10, 10, 8, 8), (SIDE_CELLS - 60, SIDE_CELLS - 60, 50, 50), (400, 4)
+    ).tolist():
         cells[row : row + depth, column : column + width] = OCCUPIED
-    middle = EDGE // 2
+    middle = SIDE_CELLS // 2
     cells[middle - 12 : middle + 12, 60:-60] = FREE
     save_map(OccupancyGrid(cells, 0.05, Pose2(0.0, 0.0)), folder / "arena.yaml")
     return _scenario(folder, "arena.yaml", ((5.0, 50.0), (25.0, 50.0), (50.0, 50.0)))
@@ -199,6 +205,6 @@ def _scenario(folder: Path, world: str, way: tuple[tuple[float, float], ...]) ->
 
 
 def _headed(way: tuple[tuple[float, float], ...]) -> Iterator[tuple[float, float, float]]:
-    """The places of a way after its first, with the heading in which one comes to them."""
+    """Yield the points of a path after the first, with the yaw of arrival."""
     for (ax, ay), (bx, by) in pairwise(way):
         yield bx, by, math.atan2(by - ay, bx - ax)

@@ -1,4 +1,4 @@
-"""A figure of a benchmark, and what it varied by."""
+"""Measured figures of a benchmark, and a stopwatch for the parts of a run."""
 
 import statistics
 import time
@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Measurement:
-    """A measured number: `value` in `unit`, and what each of the `rounds` gave that it is the median of, if several."""
+    """Measured `value` in `unit`: the median of `rounds`, if there were several."""
 
     value: float
     unit: str
@@ -18,27 +18,26 @@ class Measurement:
 
     @classmethod
     def of(cls, rounds: Sequence[float], unit: str, *, more_is_better: bool = False) -> "Measurement":
-        """The median of several rounds."""
+        """Return the median of several rounds."""
         return cls(statistics.median(rounds), unit, tuple(rounds), more_is_better)
 
 
 Measurements = dict[str, Measurement]
-"""By name, in the order in which they are shown."""
+"""Figures by name, in the printed order."""
 
 
-# MERGED: Where the time of a run goes: exclusive time for each part.
 @dataclass
 class Stopwatch:
-    """Measures methods by wrapping them on their instances; what a part calls in another counts for the other.
+    """Measures the wall time of methods by wrapping them on their instances.
 
-    `seconds` by part, in the order in which the parts were named.
+    Time in a nested part counts only for this part. `seconds` has the parts in the order of their first `watch`.
     """
 
     seconds: dict[str, float] = field(default_factory=dict)
     _under_way: list[float] = field(default_factory=list)
 
     def watch(self, part: str, thing: object, *methods: str) -> None:
-        """Count what these methods of `thing` take as `part`."""
+        """Measure these methods of `thing` as `part`."""
         self.seconds.setdefault(part, 0.0)
         for name in methods:
             setattr(thing, name, self._timed(part, getattr(thing, name)))

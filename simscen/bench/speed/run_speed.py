@@ -1,4 +1,4 @@
-"""Speed, measured: a whole run, its parts, and PyBullet alone in the same world."""
+"""Speed of a whole run and its parts, compared with PyBullet alone in the same world."""
 
 import gc
 import statistics
@@ -18,26 +18,28 @@ from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.loading.scenario import load_scenario
 from simscen.record.recorder import MomentSink
 from simscen.run.lockstep import RunSetup
-from simscen.run.preparation.scenario import PreparedScenario, lidar_height, prepare
+from simscen.run.preparation import PreparedScenario, lidar_height, prepare
 from simscen.run.simulate import GC_THRESHOLD, simulate
 from simscen.sim.bullet.baseline import PyBulletBaseline
 from simscen.stack.plugins.checked_stack import CheckedStack
 from simscen.stack.reference import ReferenceStack
-from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 PATROL = Path(__file__).parents[2] / "data" / "bench" / "patrol.scenario.yaml"
 SEED = 1
 ProgressCallback = Callable[[str], None]
-"""Is told what is being measured."""
+"""Receives the name of the present measurement."""
 BEAMS = 720
 
 
 @dataclass(frozen=True)
 class Patrol:
-    """A run of `simulated` seconds: CPU seconds in all, by part, and for PyBullet alone to step and scan as often.
+    """CPU times in s of a run with `simulated` seconds.
 
-    Medians; `cpus`, `bares` and `parted` (by part) are what they are of: PyBullet alone had its turn after each run.
+    cpu, cpus:      whole run, median and all rounds
+    parts, parted:  by part, median and all rounds
+    bare, bares:    PyBullet alone with the same steps and scans, median and all rounds; measured after each run
     """
 
     simulated: float
@@ -50,26 +52,23 @@ class Patrol:
 
     @property
     def ratios(self) -> tuple[float, ...]:
-        """How many times as long as PyBullet alone each run took."""
+        """Ratio of each run to PyBullet alone."""
         return tuple(cpu / bare for cpu, bare in zip(self.cpus, self.bares, strict=True))
 
     @property
     def ratio(self) -> float:
-        """Their median: a machine that is slow for a while is so for both."""
+        """Median of the ratios. A slow phase of the machine affects both times of a ratio."""
         return statistics.median(self.ratios)
 
     @property
     def factor(self) -> float:
-        """Simulated seconds for each second of one core."""
+        """Simulated seconds per CPU second."""
         return self.simulated / self.cpu
 
 
 @dataclass(frozen=True)
 class Field:
-    """A field of obstacles: ms for a scan of 720 beams and µs for a step, in simscen and in PyBullet alone.
-
-    PyBullet alone has a body for each obstacle, as one would write it.
-    """
+    """Time of a scan with 720 beams and of a step among obstacles, in simscen and in PyBullet with one body each."""
 
     obstacles: int
     scan_ms: float
@@ -79,11 +78,11 @@ class Field:
 
 
 def no_progress(_: str) -> None:
-    """Is told for nothing."""
+    """Ignore the progress."""
 
 
 def measure_patrol(rounds: int, tell: ProgressCallback = no_progress) -> Patrol:
-    """The median of several runs of the patrol, recorded as always; then half as many more, taken apart."""
+    """Measure several runs of the patrol with a log, then the parts of half as many more runs."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     simulated, *_ = timed_run(prepared)  # the first run pays for imports and caches
     cpus, bares = list[float](), list[float]()
@@ -92,15 +91,15 @@ def measure_patrol(rounds: int, tell: ProgressCallback = no_progress) -> Patrol:
         cpus.append(timed_run(prepared)[1])
         bares.append(bare_patrol(prepared, simulated))
     cpu = statistics.median(cpus)
-    tell("patrol, taken apart")
-    taken = [_taken_apart(prepared, cpu) for _ in range((rounds + 1) // 2)]
-    parted = {name: tuple(one[name] for one in taken) for name in taken[0]}
+    tell("parts of the patrol")
+    measured = [_measure_parts(prepared, cpu) for _ in range((rounds + 1) // 2)]
+    parted = {name: tuple(one[name] for one in measured) for name in measured[0]}
     parts = {name: statistics.median(each) for name, each in parted.items()}
     return Patrol(simulated, cpu, parts, statistics.median(bares), tuple(cpus), tuple(bares), parted)
 
 
-def _taken_apart(prepared: PreparedScenario, cpu: float) -> dict[str, float]:
-    """Seconds of a run's parts. The stopwatch sees wall time and costs some itself: scaled to a run without it."""
+def _measure_parts(prepared: PreparedScenario, cpu: float) -> dict[str, float]:
+    """Return the CPU time in s of each part. The wall times of the stopwatch are scaled to a run without stopwatch."""
     watch = Stopwatch()
     _, _, whole = timed_run(prepared, watch)
     parts = {name: seconds * cpu / whole for name, seconds in watch.seconds.items()}
@@ -109,9 +108,9 @@ def _taken_apart(prepared: PreparedScenario, cpu: float) -> dict[str, float]:
 
 
 def timed_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> tuple[float, float, float]:
-    """Simulated, CPU and wall seconds of one run, from setting up to the verdicts; `watch` takes it apart."""
+    """Return simulated, CPU, and wall seconds of a run from setup to verdicts. `watch` measures its parts."""
     gc.collect()
-    gc.freeze()  # as what hands out runs does: what was here before them is not looked through for garbage
+    gc.freeze()  # as the warm process does, so that older objects are not searched for garbage
     before = gc.get_threshold()
     gc.set_threshold(GC_THRESHOLD)  # as a run's own process does
     with TemporaryDirectory() as folder:
@@ -124,7 +123,7 @@ def timed_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> tup
 
 
 def _watched(watch: Stopwatch, setup: RunSetup, own: Sequence[MomentSink]) -> Sequence[MomentSink]:
-    """Watch the parts of the setup, and the log and the trace that are its `own` listeners."""
+    """Measure the parts of a run, and its `own` listeners: trace and log."""
     (agent,) = setup.robots
     watch.watch("physics", setup.simulation, "step")
     watch.watch("physics", agent.robot, "drive")
@@ -135,13 +134,13 @@ def _watched(watch: Stopwatch, setup: RunSetup, own: Sequence[MomentSink]) -> Se
         for name, component, methods in agent.stack.inner.components:
             watch.watch(name, component, *methods)
     watch.watch("navigator", agent.stack, "decide")
-    for name, listener, methods in zip(("trace", "log"), own, (("append",), ("append", "settle")), strict=True):
+    for name, listener, methods in zip(("trace", "log"), own, (("append",), ("append", "flush_if_due")), strict=True):
         watch.watch(name, listener, *methods)
     return ()
 
 
 def bare_patrol(prepared: PreparedScenario, simulated: float) -> float:
-    """CPU seconds that PyBullet takes to step and scan as often in the same world, and nothing else."""
+    """Return the CPU seconds that PyBullet alone takes for as many steps and scans in the same world."""
     lidar = next(sensor.lidar for sensor in prepared.robot.sensors.values() if sensor.lidar)
     bare = PyBulletBaseline(prepared.built.mesh, prepared.body, prepared.start, triangulate)
     around = _circle(lidar.beams)
@@ -155,10 +154,10 @@ def bare_patrol(prepared: PreparedScenario, simulated: float) -> float:
 
 
 def measure_field(obstacles: int) -> Field:
-    """Scan and step in a field of cylinders as dense as a BARN world (0.9 of them to the square meter)."""
+    """Measure scans and steps among cylinders, as dense as in a BARN world (0.9 per square meter)."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     solids = cylinders(obstacles)
-    mesh, start, height = fuse(solids), Pose2(0.0, 0.0, 0.0), lidar_height(prepared.robot)
+    mesh, start, height = merge_solids(solids), Pose2(0.0, 0.0, 0.0), lidar_height(prepared.robot)
     rays = RayScene(mesh)
     around = _circle(BEAMS)
     directions = np.column_stack((around, np.zeros(BEAMS)))
@@ -178,13 +177,13 @@ def measure_field(obstacles: int) -> Field:
 
 
 def _circle(beams: int) -> Array:
-    """Directions (beams, 2) all around."""
+    """Return evenly spaced directions (beams, 2)."""
     angles = np.linspace(-np.pi, np.pi, beams, endpoint=False)
     return np.column_stack((np.cos(angles), np.sin(angles)))
 
 
 def cylinders(count: int) -> list[Solid]:
-    """So many cylinders of 7.5 cm radius, at random but for a free disc of 1 m about the origin."""
+    """Return `count` random cylinders with a radius of 7.5 cm, none within 1 m of the origin."""
     rng = np.random.default_rng(SEED)
     edge = (count / 0.9) ** 0.5 / 2
     places = rng.uniform(-edge, edge, (4 * count + 40, 2))
@@ -193,7 +192,7 @@ def cylinders(count: int) -> list[Solid]:
 
 
 def _each(what: Callable[[], Any], times: int) -> float:
-    """The median over five rounds of the CPU seconds for one call."""
+    """Return the CPU seconds of one call, as median of five rounds."""
     rounds = []
     for _ in range(5):
         begun = time.process_time()

@@ -1,4 +1,4 @@
-"""How the cost of a simulated second grows with what there is: the patrol, with more of one thing at a time."""
+"""Growth of the cost of a simulated second: the patrol with more of one thing at a time."""
 
 import json
 import re
@@ -8,12 +8,12 @@ from tempfile import TemporaryDirectory
 
 from simscen.bench.speed.measurement import Measurement, Measurements
 from simscen.bench.speed.run_speed import PATROL, ProgressCallback, no_progress, timed_run
+from simscen.loading.goals import scenario_goals
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.goals import scenario_goals
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 
-SECONDS = 15
-"""Of the patrol."""
+DURATION_S = 15
+"""Simulated time of each run."""
 AXES = {
     "obstacles": (0, 100, 1000),
     "objects": (20, 100),
@@ -22,15 +22,15 @@ AXES = {
     "particles": (500, 2000, 8000),
     "robots": (2, 4),
 }
-"""What there is more of, and how much."""
+"""Quantities and their values."""
 ROBOT = PATROL.parent.parent / "robots" / "turtlebot.robot.yaml"
-ROW = 25
-"""Things side by side behind the patrol's hall, 0.6 m apart."""
+OBJECTS_PER_ROW = 25
+"""Objects in a row behind the patrol's hall, 0.6 m apart."""
 UNIT = "ms a simulated second"
 
 
 def measure_growth(rounds: int, tell: ProgressCallback = no_progress) -> Measurements:
-    """The medians of several runs each."""
+    """Return the CPU time per simulated second for each value, as median of several runs."""
     figures: Measurements = {}
     with TemporaryDirectory() as folder:
         for axis, counts in AXES.items():
@@ -44,8 +44,8 @@ def measure_growth(rounds: int, tell: ProgressCallback = no_progress) -> Measure
 
 
 def write_more(folder: Path, axis: str, count: int) -> Path:
-    """The patrol as a scenario file with so much of something."""
-    text = PATROL.read_text(encoding="utf-8").replace("time_limit: 60 s", f"time_limit: {SECONDS} s")
+    """Write the patrol as a scenario file with `count` of the quantity `axis`."""
+    text = PATROL.read_text(encoding="utf-8").replace("time_limit: 60 s", f"time_limit: {DURATION_S} s")
     match axis:
         case "obstacles":
             text = text.replace("  obstacles:\n", "  obstacles:\n" + _crates(count, ""))
@@ -79,12 +79,12 @@ def _crates(count: int, more: str) -> str:
 
 def _places(count: int) -> Iterator[tuple[int, float, float]]:
     for number in range(count):
-        row, column = divmod(number, ROW)
+        row, column = divmod(number, OBJECTS_PER_ROW)
         yield number, round(0.5 + 0.6 * column, 2), round(11.0 + 0.6 * row, 2)
 
 
 def _robots(count: int) -> str:
-    """So many robots that begin one behind the other; each patrols the same goals, from another one on."""
+    """Return `count` robots that start one behind the other. Each begins with another goal of the patrol."""
     goals = scenario_goals(load_scenario(PATROL, PATROL.parent).spec)
     poses = [{"x": goal.pose.x, "y": goal.pose.y, "yaw": goal.pose.yaw} for goal in goals]
     robots = {

@@ -1,4 +1,4 @@
-"""What a run costs beyond its simulation, and what has to be paid before the first one."""
+"""Overhead of a run, of the start of a session, of a suite of runs, and of an external stack."""
 
 import gc
 import statistics
@@ -11,7 +11,7 @@ from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 from tempfile import TemporaryDirectory
 
-from simscen.bench.speed.measurement import Measurement, Measurements
+from simscen.bench.speed.measurement import Measurement, Measurements, Stopwatch
 from simscen.bench.speed.run_speed import PATROL, SEED, ProgressCallback, bare_patrol, no_progress
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import RunFinished
@@ -20,8 +20,9 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.loading.scenario import load_scenario
 from simscen.record.recorder import MomentSink
+from simscen.run.external.build import with_external_reference
 from simscen.run.lockstep import RunSetup
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import PreparedScenario, prepare
 from simscen.run.process.isolation import plugin_path_arguments
 from simscen.run.process.jobs import Job, ProcessEnd
 from simscen.run.process.supervisor import Ended, supervise
@@ -30,20 +31,24 @@ from simscen.run.sessions.results import finished_run
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs
 from simscen.run.simulate import simulate
 
-SHORT = 0.1
-"""Simulated seconds of a run that is hardly more than what surrounds it."""
-WALL_LIMIT = 300.0
+SHORT_RUN_S = 0.1
+"""Simulated time of a run that is nearly only overhead."""
+WALL_LIMIT_S = 300.0
 MILLISECONDS, MEGABYTES = "ms", "MB"
 
 
 @dataclass(frozen=True)
 class Overhead:
-    """Each of several rounds: CPU ms but where it says wall, MB.
+    """Overhead in several rounds: CPU time in ms.
 
-    `run`: a run of SHORT in this process. `beyond`: what of that lies outside of its beats: assembling, the log's
-    beginning and end, verdicts. `process`: the same run as a session does it, from the fork on, with its picture;
-    `wall` is how long that takes, `memory` the most that its process has used. `preparing`: world, map and ways, once
-    for all runs. `start`: importing the engines, once a session. `validate`: the command.
+    run:        a run of SHORT_RUN_S in this process
+    beyond:     its time before the first and after the last cycle: setup, begin and end of the log, verdicts
+    process:    the same run in a session, from the fork on, with its picture
+    wall:       wall time of this process in ms
+    memory:     maximum memory of this process in MB
+    preparing:  world, map, and shortest paths, once for all runs
+    start:      import of the engines, once per session
+    validate:   `simscen validate`
     """
 
     run: tuple[float, ...]
@@ -57,9 +62,9 @@ class Overhead:
 
     @property
     def figures(self) -> Measurements:
-        """Their medians."""
+        """The medians by name."""
         return {
-            f"a run of {SHORT} s": Measurement.of(self.run, MILLISECONDS),
+            f"a run of {SHORT_RUN_S} s": Measurement.of(self.run, MILLISECONDS),
             "of that beyond its simulation": Measurement.of(self.beyond, MILLISECONDS),
             "the same as a process": Measurement.of(self.process, MILLISECONDS),
             "the same as a process, wall time": Measurement.of(self.wall, MILLISECONDS),
@@ -70,49 +75,49 @@ class Overhead:
         }
 
 
-class _Beats:
-    """CPU ms that a run takes from its first beat to its last: its simulation, with the first plan."""
+class _SimulationTimer:
+    """Log that measures the CPU time in ms from the first to the last cycle of a run, including the first plan."""
 
     def attach(self, rig: RunSetup, own: Sequence[MomentSink]) -> Sequence[MomentSink]:
-        """The run begins."""
+        """Start the timer at the begin of a run."""
         self.begun = self.ended = time.process_time()
         return (self,)
 
     def append(self, moment: Moment) -> None:
-        """Another beat has passed."""
+        """Update the end of the run."""
         self.ended = time.process_time()
 
     @property
-    def took(self) -> float:
-        """Of the last run."""
+    def duration(self) -> float:
+        """CPU time of the last run in ms."""
         return 1e3 * (self.ended - self.begun)
 
 
 def measure_overhead(rounds: int, entry: Sequence[str], tell: ProgressCallback = no_progress) -> Overhead:
-    """Runs of the patrol that end at once. `entry` is how Python is called to be a session's warm process."""
-    tell("what surrounds a run")
+    """Measure short runs of the patrol. `entry` are the arguments with which Python becomes a warm process."""
+    tell("overhead of a run")
     with TemporaryDirectory() as folder:
         file = short_patrol(Path(folder))
         loaded = load_scenario(file, file.parent)
         prepared = prepare(loaded)
         log = Path(folder, "run.mcap")
 
-        beats = _Beats()
+        timer = _SimulationTimer()
 
         def run() -> object:
             log.unlink(missing_ok=True)
-            return simulate(prepared, SEED, log=log, attach=beats.attach)
+            return simulate(prepared, SEED, log=log, attach=timer.attach)
 
         run()
-        each = [(_cpu(run), beats.took) for _ in range(rounds)]
+        each = [(_cpu(run), timer.duration) for _ in range(rounds)]
         keys = [RunKey(loaded.id, seed + 1) for seed in range(rounds + 1)]
-        jobs = [Job(n, loaded, key, run_folder(Path(folder), key), WALL_LIMIT) for n, key in enumerate(keys)]
+        jobs = [Job(n, loaded, key, run_folder(Path(folder), key), WALL_LIMIT_S) for n, key in enumerate(keys)]
         ends = [
             end
             for happening in supervise(jobs, 1, entry, lambda: True)
             if isinstance(happening, Ended) and isinstance(end := happening.end, ProcessEnd)
         ]
-        others = ends[1:]  # the first waits for the engines to be imported
+        others = ends[1:]  # the first run includes the import of the engines
         return Overhead(
             run=tuple(whole for whole, _ in each),
             beyond=tuple(whole - simulated for whole, simulated in each),
@@ -125,15 +130,15 @@ def measure_overhead(rounds: int, entry: Sequence[str], tell: ProgressCallback =
         )
 
 
-def short_patrol(folder: Path, seconds: float = SHORT) -> Path:
-    """The patrol with another time limit."""
+def short_patrol(folder: Path, seconds: float = SHORT_RUN_S) -> Path:
+    """Write the patrol with another time limit."""
     file = folder / "short.scenario.yaml"
     file.write_text(PATROL.read_text(encoding="utf-8").replace("time_limit: 60 s", f"time_limit: {seconds} s"))
     return file
 
 
 def _cpu(what: Callable[[], object]) -> float:
-    """CPU ms of this process for a call."""
+    """Return the CPU time of a call in ms."""
     gc.collect()
     begun = time.process_time()
     what()
@@ -141,24 +146,26 @@ def _cpu(what: Callable[[], object]) -> float:
 
 
 def _child(*arguments: str) -> float:
-    """CPU ms of a Python called so."""
+    """Return the CPU time in ms of a Python process with these arguments."""
     before = getrusage(RUSAGE_CHILDREN)
     subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
     after = getrusage(RUSAGE_CHILDREN)
     return 1e3 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
 
 
-# MERGED: How fast a suite of scenarios is run on all cores, beside PyBullet stepping and scanning as long.
 BARE_SECONDS = 60.0
 
 
 @dataclass(frozen=True)
 class Suite:
-    """So many runs of so many `simulated` seconds in all, on `workers` cores, from the session's start to its end.
+    """A session with several runs.
 
-    `wall` and `cpu` in seconds, the latter of all runs; `memory` is the most that each run's process has used, in MB;
-    `bare` is the CPU seconds that PyBullet alone takes on one core for a simulated second of the patrol, measured
-    before and after. `unfinished` are the runs that broke off.
+    simulated:  simulated time of all runs in s
+    wall:       wall time of the session in s
+    cpu:        CPU time of all runs in s
+    memory:     maximum memory of each run's process in MB
+    bare:       CPU time in s of PyBullet alone per simulated second of the patrol, measured before and after
+    unfinished: runs that ended with an error
     """
 
     runs: int
@@ -172,7 +179,7 @@ class Suite:
 
     @property
     def figures(self) -> Measurements:
-        """What is compared."""
+        """The figures that are printed and compared."""
         alone = self.bare * self.simulated
         return {
             "suite: runs a minute": Measurement(60 * self.runs / self.wall, "", more_is_better=True),
@@ -185,7 +192,7 @@ class Suite:
 
 
 def evenly_spaced(scenarios: Sequence[LoadedScenario], most: int) -> list[LoadedScenario]:
-    """At most so many, evenly taken from all."""
+    """Return at most `most` scenarios, evenly selected."""
     if len(scenarios) <= most:
         return list(scenarios)
     return [scenarios[number * len(scenarios) // most] for number in range(most)]
@@ -198,7 +205,7 @@ def measure_suite(
     entry: Sequence[str],
     tell: ProgressCallback = no_progress,
 ) -> Suite:
-    """Run each scenario once, recorded as always. `entry` is how Python is called to be the warm process."""
+    """Run each scenario once with a log. `entry` are the arguments with which Python becomes a warm process."""
     patrol = prepare(load_scenario(PATROL, PATROL.parent))
     bares = [bare_patrol(patrol, BARE_SECONDS)]
     begun = time.perf_counter()
@@ -223,3 +230,52 @@ def measure_suite(
         memory=tuple(end.peak_bytes / 1e6 for end in ends),
         bare=statistics.mean(bares) / BARE_SECONDS,
     )
+
+
+@dataclass(frozen=True)
+class ExternalStackCost:
+    """Wall time in µs that the engine waits for the stack in each cycle.
+
+    `here_us` is with the stack in the process of the engine, `there_us` with the stack as an external process.
+    """
+
+    beats: int
+    here_us: float
+    there_us: float
+
+    @property
+    def ratio(self) -> float:
+        """Ratio of both times."""
+        return self.there_us / self.here_us
+
+
+def measure_external(rounds: int) -> ExternalStackCost:
+    """Measure several patrols without a log, with the stack in this process and as an external process."""
+    prepared = prepare(load_scenario(PATROL, PATROL.parent))
+    here = [_each_beat(prepared) for _ in range(rounds)]
+    there = [_each_beat(with_external_reference(prepared)) for _ in range(rounds)]
+    return ExternalStackCost(
+        here[0][0], statistics.median(us for _, us in here), statistics.median(us for _, us in there)
+    )
+
+
+def _each_beat(prepared: PreparedScenario) -> tuple[int, float]:
+    watch, beats = Stopwatch(), _CycleCounter()
+
+    def attach(setup: RunSetup, _: Sequence[MomentSink]) -> Sequence[MomentSink]:
+        watch.watch("stack", setup.robots[0].stack, "decide")
+        return (beats,)
+
+    simulate(prepared, SEED, attach=attach)
+    return beats.count, 1e6 * watch.seconds["stack"] / beats.count
+
+
+class _CycleCounter:
+    """Log that counts the cycles of a run."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def append(self, moment: Moment) -> None:
+        """Count a cycle."""
+        self.count += 1

@@ -18,8 +18,7 @@ from simscen.loading.schema.messages import quoted
 from simscen.report.styled_line import detect_style
 
 if TYPE_CHECKING:
-    from simscen.bench.localization.campaign import Interval, Row, Share, Sureness
-    from simscen.bench.localization.trial import Trial
+    from simscen.bench.localization.campaign import Consistency, Interval, Row, Share, Trial
 
 
 class Format(str, Enum):
@@ -50,19 +49,23 @@ def command(
     simscen's defaults, and parameters for a consistent covariance. Intervals are by bootstrap over buildings. Lost
     robots are listed on standard error. Takes a few minutes on two cores.
     """
-    from simscen.bench.localization.campaign import PARAMETERS, drive, summed_up
+    from simscen.bench.localization.campaign import PARAMETER_SETS, run_buildings, summarize
 
-    names = [name for name in PARAMETERS if not only or any(part.casefold() in name.casefold() for part in only)]
+    names = [name for name in PARAMETER_SETS if not only or any(part.casefold() in name.casefold() for part in only)]
     if not names:
-        raise NothingSelected("no set of parameters matches --only; available: " + ", ".join(map(quoted, PARAMETERS)))
+        raise NothingSelected(
+            "no set of parameters matches --only; available: " + ", ".join(map(quoted, PARAMETER_SETS))
+        )
     trials: dict[str, list[Trial]] = {name: [] for name in names}
     numbers = range(first, first + buildings)
-    for done, of_one in enumerate(drive(numbers, names, min(buildings, workers or len(os.sched_getaffinity(0)))), 1):
+    for done, of_one in enumerate(
+        run_buildings(numbers, names, min(buildings, workers or len(os.sched_getaffinity(0)))), 1
+    ):
         for name, some in of_one.items():
             trials[name] += some
-            _tell(name, some)
+            _print_failures(name, some)
         print_progress(f"{done} of {buildings} buildings" if done < buildings else "")
-    rows = [summed_up(name, some) for name, some in trials.items()]
+    rows = [summarize(name, some) for name, some in trials.items()]
     if format_ is Format.JSON:
         logs = {name: [asdict(trial) for trial in some] for name, some in trials.items()}
         print(json.dumps({"rows": [asdict(row) for row in rows], "logs": logs}, indent=2))
@@ -70,11 +73,9 @@ def command(
         print_text(as_text(rows, detect_style(sys.stdout, os.environ).columns))
 
 
-def _tell(name: str, trials: "Sequence[Trial]") -> None:
-    from simscen.bench.localization.campaign import well
-
+def _print_failures(name: str, trials: "Sequence[Trial]") -> None:
     for one in trials:
-        if not well(one):
+        if not one.succeeded:
             place = f"building {one.building}, log {one.number}, {one.circumstance}"
             print_progress("")
             found = "not found" if one.found is None else f"found after {one.found:.1f} s"
@@ -117,13 +118,13 @@ def _between(interval: "Interval", form: str = ".3f") -> str:
 
 
 def _consistency_lines(row: "Row") -> list[str]:
-    from simscen.bench.localization.trial import MOMENTS
+    from simscen.bench.localization.campaign import MOMENTS_S
 
-    def lines(name: str, sure: "Sureness") -> list[str]:
+    def lines(name: str, sure: "Consistency") -> list[str]:
         within = (
             "" if sure.bounds is None else f"; right on average: {sure.bounds[0]:.2f} … {sure.bounds[1]:.2f} (95 %)"
         )
-        moments = ", ".join(f"{value:.2f} at {when:g} s" for when, value in zip(MOMENTS, sure.moments, strict=True))
+        moments = ", ".join(f"{value:.2f} at {when:g} s" for when, value in zip(MOMENTS_S, sure.moments, strict=True))
         low, high = sure.moment_bounds
         return [
             f"  ANEES {name}: {sure.anees:.2f}{within}; in the 95 % ellipsoid: {sure.inside:.1%}",

@@ -174,11 +174,12 @@ def _buildings(folder: Path, numbers: Sequence[int]) -> Mapping[str, BuiltWorld]
 
 def _built(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, BuiltWorld]:
     """Return the built worlds by the names that scenarios in `folder` use for them."""
-    from simscen.loading.files.worldfile import load_world_file
-    from simscen.run.preparation.loaders import world_from_file
-    from simscen.worlds.build import build
+    from simscen.loading.builders import world_from_file
+    from simscen.loading.files.single_files import load_world_file
+    from simscen.worlds.built_world import build_world_and_map
 
     folder.mkdir(parents=True, exist_ok=True)
     return {
-        file: build(world_from_file(load_world_file(worlds / file, worlds), worlds), LIDAR_HEIGHT) for file in files
+        file: build_world_and_map(world_from_file(load_world_file(worlds / file, worlds), worlds), LIDAR_HEIGHT)
+        for file in files
     }

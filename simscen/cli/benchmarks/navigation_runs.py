@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from simscen.bench.localization.trial import anees, bounds, nees_at
+from simscen.bench.localization.campaign import anees, anees_bounds, nees_at
 from simscen.bench.navigation.experiments import Drive, Experiment
 from simscen.bench.navigation.summary import Row, Trial, mean, summarize
 from simscen.cli.benchmarks.results import print_progress
@@ -167,5 +167,5 @@ def _localized(trials: list[Trial]) -> Localized:
         rmse=mean(errors),
         worst_rmse=max(errors, default=None),
         anees={seconds: anees(values) for seconds, values in at.items() if values},
-        bounds=bounds(max(1, len(traces))),
+        bounds=anees_bounds(max(1, len(traces))),
     )

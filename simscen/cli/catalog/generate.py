@@ -9,7 +9,7 @@ from simscen.cli.catalog.json_schema import MODELS, as_text, schema_of
 from simscen.cli.catalog.reference_topics import metrics_page, signals_page
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, topics
 from simscen.cli.main import COMMANDS
-from simscen.criteria.plugin_metric import AnyMeasure
+from simscen.criteria.base import AnyMeasure
 from simscen.loading.codes import CODES
 from simscen.spec.quantities import UNITS
 

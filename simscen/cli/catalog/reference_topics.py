@@ -9,7 +9,7 @@ from simscen.cli.catalog.json_schema import MODELS
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, fields_of, topics
 from simscen.core.errors import BROKEN_COMPONENT
 from simscen.core.messages.navigation import ErrorCode
-from simscen.criteria.plugin_metric import AnyMeasure
+from simscen.criteria.base import AnyMeasure
 from simscen.criteria.trace_signals.catalog import SIGNALS, Signal
 from simscen.judge.metrics.catalog import METRICS, Metric
 from simscen.loading.codes import CODES

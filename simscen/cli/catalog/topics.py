@@ -11,10 +11,10 @@ from pydantic import BaseModel, RootModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from simscen.actions.registry import AnyAction
+from simscen.actions.base import AnyAction
 from simscen.advanced.planners.spec import MedialAxisPlanner
 from simscen.criteria.registry import AnyCriterion
-from simscen.faults.registry import AnyFault
+from simscen.faults.base import AnyFault
 from simscen.model import (
     checkers,
     controllers,
@@ -45,7 +45,7 @@ from simscen.spec.lazy_spec import LazySpec, annotation_of
 from simscen.spec.places import PlaceAllowed, PlaceShorthand, PoseSpec
 from simscen.spec.quantities import UNITS, Quantity
 from simscen.spec.speed_mask import SpeedMask
-from simscen.triggers.registry import AnyCondition, Trigger
+from simscen.triggers.base import AnyCondition, Trigger
 
 _EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
 OPTIONAL = "–"

@@ -11,9 +11,8 @@ from simscen.cli.benchmarks import localization, navigation, results, speed
 from simscen.cli.benchmarks.results import COMPARE_HELP, Format, Result, load_baseline, print_progress, print_result
 
 if TYPE_CHECKING:
-    from simscen.bench.speed.external_stack import ExternalStackCost
     from simscen.bench.speed.run_speed import Field, Patrol
-    from simscen.bench.speed.session_speed import Overhead
+    from simscen.bench.speed.session_speed import ExternalStackCost, Overhead
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False)
 app.command("suite")(speed.suite_command)
@@ -51,8 +50,7 @@ def command(
     before = load_baseline(compare)
     with engine_output_on_stderr():
         from simscen.bench.speed import run_speed
-        from simscen.bench.speed.external_stack import measure_external
-        from simscen.bench.speed.session_speed import measure_overhead
+        from simscen.bench.speed.session_speed import measure_external, measure_overhead
 
         patrol = run_speed.measure_patrol(rounds, print_progress)
         overhead = measure_overhead(rounds, WARM_PROCESS, print_progress)

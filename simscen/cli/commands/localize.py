@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from simscen.bench.localization.recorded_drive import Errors, Localized, errors_of, localize
+from simscen.bench.localization.recorded_drive import Errors, Localized, compare_with_reference, localize
 from simscen.cli.diagnostics import escaped, from_here, print_text
 from simscen.cli.session.output_files import save
 from simscen.core.environment.occupancy_grid import OccupancyGrid
@@ -17,8 +17,7 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import LARGEST_SEED
 from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
-from simscen.loading.files.robotfile import load_robot_file
-from simscen.loading.files.worldfile import load_world_file
+from simscen.loading.files.single_files import load_robot_file, load_world_file
 from simscen.loading.yaml.tree import value_position
 from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.read import LocalizationLog, read_localization_log
@@ -71,7 +70,7 @@ def command(
     grid = grid.refined(spec.costmap.resolution)
     estimate = _estimate(start, sensed)
     localized = localize(sensed, spec, Surroundings(model, grid, TICK_RATE_HZ), estimate, seed)
-    errors = errors_of(localized, sensed, lost)
+    errors = compare_with_reference(localized, sensed, lost)
     for note in sensed.notes:
         print_text(f"note: {escaped(note)}", sys.stderr)
     if picture is not None:
@@ -88,7 +87,7 @@ def command(
 def _given(
     scenario: Path | None, map_: Path, robot: str, root: Path | None
 ) -> tuple[StackSpec, OccupancyGrid, RobotModel]:
-    from simscen.run.preparation.loaders import load_map, robot_from_file
+    from simscen.loading.builders import load_map, robot_from_file
     from simscen.run.robot_interface import robot_model
 
     spec = StackSpec()
@@ -133,9 +132,9 @@ def _estimate(start: str | None, sensed: LocalizationLog) -> Estimate:
     if start is None:
         if len(sensed.truth):
             return Estimate(Pose2(*sensed.truth[0].tolist()))
-        if sensed.told is None:
+        if sensed.initial_pose is None:
             raise UsageError("the log has no initial pose; use --start X,Y,YAW or --start unknown")
-        return Estimate(sensed.told)
+        return Estimate(sensed.initial_pose)
     try:
         x, y, yaw = (float(part) for part in start.split(","))
     except ValueError as error:

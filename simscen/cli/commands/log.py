@@ -11,7 +11,7 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.output_files import save
 from simscen.core.errors import UsageError
-from simscen.record.log_reader.recover import recover as recover_log
+from simscen.record.log_reader.read import recover as recover_log
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
 
@@ -60,7 +60,7 @@ def layout(
 
     if rviz and log is not None:
         raise UsageError("--rviz takes no log: the RViz configuration is the same for all logs")
-    text = rviz_config() if rviz else foxglove_layout(read_log(log, looks=True) if log else None)
+    text = rviz_config() if rviz else foxglove_layout(read_log(log, with_sensors=True) if log else None)
     if out is None:
         print(text, end="", file=sys.stdout)
     else:

@@ -37,16 +37,16 @@ def _draw(log: Log, file: Path, picture: Path) -> None:
     from simscen.report.picture.scene import Scene, scene_with_robots
 
     try:
-        scenery = scenery_from_header(log.about)
-        map_ = scenery.map.grid if scenery.map else log.about.map or _unknown_map(log)
+        scenery = scenery_from_header(log.header)
+        map_ = scenery.map.grid if scenery.map else log.header.map or _unknown_map(log)
     except ValueError as error:
         raise invalid_log(file, "SC802", f"the log is damaged: {error}") from error
-    scene = Scene(log.trace, log.about.case, map_, recorded_result(log, file), scenery)
-    robots = {name: (one.trace, one.about.case) for name, one in log.robots.items()}
+    scene = Scene(log.trace, log.header.case, map_, recorded_result(log, file), scenery)
+    robots = {name: (one.trace, one.header.case) for name, one in log.robots.items()}
     save(picture, lambda path: write_picture(scene_with_robots(scene, robots), path), [file])
 
 
 def _unknown_map(log: Log) -> OccupancyGrid:
     """Return a map of one unknown cell at the start of the robot, for a robot without a map."""
-    start = log.about.case.start
+    start = log.header.case.start
     return OccupancyGrid(np.full((1, 1), UNKNOWN, dtype=np.int8), 0.05, Pose2(start.x, start.y))

@@ -38,9 +38,9 @@ def command(
     require_free(folder)
     require_writable(junit, folder)
     reports = Reports(folder, junit, junit_family.value, only=junit is not None)
-    answers = past.answers
+    answers = past.runs
     with screen(format_) as output:
-        output(past.started(folder))
+        output(past.start_event(folder))
         for answer in answers:
             output(answer)
         comparison = compare_stacks((answer.result for answer in answers), past.stacks)

@@ -14,11 +14,11 @@ from simscen.cli.diagnostics import as_text, escaped, from_here, print_text
 from simscen.cli.session.output_files import save
 from simscen.core.errors import Exit, InvalidInput
 from simscen.loading.files.discovery import default_root
-from simscen.loading.files.robotfile import RobotFile, load_robot_file
+from simscen.loading.files.single_files import RobotFile, load_robot_file
 
 if TYPE_CHECKING:
-    from simscen.run.robot_check.drive_checks import DriveCheck, RobotCheckResult
-    from simscen.run.robot_check.trial_drive import Motion, Trial
+    from simscen.run.robot_check import DriveCheck, RobotCheckResult
+    from simscen.run.trial_drive import Motion, Trial
     from simscen.sim.body.robot_body import RobotBody
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
@@ -59,9 +59,9 @@ def check(
 
 def _checked(file: RobotFile, named: str, picture: Path | None, as_json: bool) -> int:
     from simscen.cli.process import engine_output_on_stderr
-    from simscen.run.preparation.loaders import robot_from_file
-    from simscen.run.robot_check.drive_checks import check_robot
-    from simscen.run.robot_check.geometry import geometry_warnings
+    from simscen.loading.builders import robot_from_file
+    from simscen.loading.checks.robot_geometry import geometry_warnings
+    from simscen.run.robot_check import check_robot
 
     spec, body = robot_from_file(file.robot, file.roots)
     library = file.library

@@ -14,8 +14,8 @@ from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, prin
 from simscen.cli.session.selection import Checks
 from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import Exit, Problem
+from simscen.loading.checks.files import STACKS, check_file, file_kind
 from simscen.loading.files.discovery import BASE, ROBOT, SCENARIO, STACK, WORLD, default_root, discover
-from simscen.loading.files.kinds import STACKS, check_file, file_kind
 
 
 class Format(str, Enum):

@@ -14,16 +14,16 @@ from simscen.cli.diagnostics import as_text, escaped, from_here, print_text
 from simscen.cli.session.output_files import save
 from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput, Problem
+from simscen.loading.builders import world_from_file
+from simscen.loading.checks.scene_runner import world_reader_notes
 from simscen.loading.files.discovery import default_root
-from simscen.loading.files.worldfile import load_world_file, world_text
+from simscen.loading.files.single_files import load_world_file, world_text
 from simscen.loading.loaded import LoadedWorld
 from simscen.model.world import WorldSpec
-from simscen.run.preparation.loaders import world_from_file
 from simscen.run.sessions.output_folder import write_atomically
-from simscen.run.worldchecks.runner import world_reader_notes
 
 if TYPE_CHECKING:
-    from simscen.worlds.inspection import Inspection, Item
+    from simscen.worlds.built_world import WorldItem, WorldSummary
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
 
@@ -55,12 +55,12 @@ def inspect(
 
     Exit code 0; 2: the file or something in it is unusable.
     """
-    from simscen.worlds.build import build
-    from simscen.worlds.inspection import inspect as inspected
+    from simscen.worlds.built_world import build_world_and_map
+    from simscen.worlds.built_world import inspect_world as inspected
 
     home = root or default_root([path])
     source = load_world_file(path, home, world_path or ())
-    built = build(_built(source, home, world_path or [], lenient), height)
+    built = build_world_and_map(_built(source, home, world_path or [], lenient), height)
     found = inspected(built)
     if as_json:
         print(json.dumps(asdict(found), indent=2))
@@ -70,9 +70,9 @@ def inspect(
         if warnings:
             print_text(as_text(warnings))
     if png is not None:
-        from simscen.worlds.maps.world_picture import picture
+        from simscen.worlds.maps.world_picture import draw_world
 
-        save(png, lambda file: picture(built, height).save(file, format="PNG"), [path])
+        save(png, lambda file: draw_world(built, height).save(file, format="PNG"), [path])
 
 
 @app.command()
@@ -90,12 +90,12 @@ def export(
     A world with its own map keeps the resolution of that map. Exit code 0; 2: the world is unusable or the map cannot
     be written.
     """
-    from simscen.worlds.build import build
+    from simscen.worlds.built_world import build_world_and_map
     from simscen.worlds.maps.ros_map import save_map
 
     home = root or default_root([path])
     source = load_world_file(path, home, world_path or ())
-    grid = build(_built(source, home, world_path or [], lenient), height, resolution).map
+    grid = build_world_and_map(_built(source, home, world_path or [], lenient), height, resolution).map
     save(map_, lambda file: save_map(grid, file), [path])
     rows, columns = grid.shape
     print_text(f"{escaped(str(map_))}: {columns} x {rows} cells of {grid.resolution:g} m")
@@ -135,12 +135,12 @@ def _converted(
     spec = source.spec or WorldSpec(simscen=1, name=source.name)
     if source.sdf is None:
         return spec, []
-    from simscen.worlds.export.conversion import convert as converted
+    from simscen.worlds.conversion import convert_world as converted
 
     world = _built(replace(source, spec=None, map=None), home, world_path, lenient)
     try:
         done = converted(world, height)
-        return done.onto(spec), [*done.changes, *world.notes]
+        return done.merged_into(spec), [*done.changes, *world.notes]
     except ValidationError as error:
         details = "; ".join(f"{'.'.join(map(str, found['loc']))}: {found['msg']}" for found in error.errors()[:3])
         message = f"the world cannot be written as a world file: {details}"
@@ -163,7 +163,7 @@ MAX_SOLIDS = 20
 MAX_NAME_LENGTH = 44
 
 
-def described(found: "Inspection", height: float, everything: bool) -> Iterator[str]:
+def described(found: "WorldSummary", height: float, everything: bool) -> Iterator[str]:
     """Yield the lines of an inspection, with the first MAX_SOLIDS solids, or all of them if `everything`."""
     x0, y0, x1, y1 = found.bounds
     yield f"  bounds    x {x0:.2f} … {x1:.2f} m, y {y0:.2f} … {y1:.2f} m ({x1 - x0:.2f} x {y1 - y0:.2f} m)"
@@ -183,7 +183,7 @@ def described(found: "Inspection", height: float, everything: bool) -> Iterator[
             yield f"  {title:9} {escaped(', '.join(names))}"
 
 
-def _items(title: str, items: "Sequence[Item]", most: int) -> Iterator[str]:
+def _items(title: str, items: "Sequence[WorldItem]", most: int) -> Iterator[str]:
     if items:
         yield f"  {title}"
     width = max((min(len(escaped(item.name)), MAX_NAME_LENGTH) for item in items[:most]), default=0)
@@ -192,7 +192,7 @@ def _items(title: str, items: "Sequence[Item]", most: int) -> Iterator[str]:
         yield f"    … and {len(items) - most} more (--all lists them)"
 
 
-def _item(item: "Item", width: int) -> str:
+def _item(item: "WorldItem", width: int) -> str:
     x0, y0, z0, x1, y1, z1 = item.extent
     name = escaped(item.name)
     shown = name if len(name) <= MAX_NAME_LENGTH else f"…{name[1 - MAX_NAME_LENGTH :]}"

@@ -18,7 +18,7 @@ from simscen.core.records.verdict import Evidence, LogCoverage
 from simscen.judge.run_result import combine_robots, judge_run
 from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
-from simscen.loading.resolved import criteria_of_text
+from simscen.loading.scenario_text import criteria_of_text
 from simscen.model.criteria_file import expected_failure
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import is_simscen_log
@@ -65,22 +65,22 @@ class LogJudge:
     def judge_for_replay(self, log: Path) -> tuple[Log, RunResult]:
         """Return a log with all data for a replay, and its result. Raises InvalidInput."""
         if _may_be_own(log) and is_simscen_log(log):
-            own = read_run(log, looks=True)
+            own = read_run(log, with_sensors=True)
             return own, recorded_result(own, log) if self._criteria is None else self._judge_own_log(log).result
         self.foreign += 1
         if self._criteria is None:
-            foreign, case = read_foreign_log(log, self._wanted, looks=True), Case(Pose2(0.0, 0.0), ())
+            foreign, case = read_foreign_log(log, self._wanted, with_sensors=True), Case(Pose2(0.0, 0.0), ())
             result = skipped_result(RunKey(log.stem, 0), "", "not evaluated; set criteria with --scenario")
             result = replace(
                 result, simulated=foreign.trace.seconds(foreign.trace.end), tick_rate=foreign.trace.tick_rate
             )
         else:
-            foreign, result = self._judge_foreign_log(log, looks=True)
+            foreign, result = self._judge_foreign_log(log, with_sensors=True)
             case = self._foreign_case()
         self.notes += [f"{log}: {note}" for note in foreign.notes]
         text = "" if self._scenario is None else self._scenario.read_text(encoding="utf-8")
-        about = LogHeader(log.stem, 0, case, text, foreign.map)
-        return Log(about, foreign.trace, "", complete=True, seen=foreign.seen), result
+        header = LogHeader(log.stem, 0, case, text, foreign.map)
+        return Log(header, foreign.trace, "", complete=True, sensors=foreign.sensors), result
 
     def _judge_own_log(self, log: Path) -> RunFinished:
         read = read_run(log)
@@ -88,17 +88,17 @@ class LogJudge:
             return self._judge_robot(log, read, "")
         runs = {name: self._judge_robot(log, one, name) for name, one in read.robots.items()}
         traces = {name: one.trace for name, one in read.robots.items()}
-        recorded = criteria_of_text(read.about.scenario, str(log), read.about.facts)
+        recorded = criteria_of_text(read.header.scenario, str(log), read.header.facts)
         expected = expected_failure(recorded if self._criteria is None else self._criteria.spec)
         result = combine_robots({name: run.result for name, run in runs.items()}, traces, expected)
         return replace(next(iter(runs.values())), result=result)
 
     def _judge_robot(self, log: Path, read: Log, robot: str) -> RunFinished:
         """Evaluate the log of the only robot, or of one of several."""
-        about, case = read.about, read.about.case
-        key = about.key
+        header, case = read.header, read.header.case
+        key = header.key
         if self._criteria is None:
-            spec = criteria_of_text(about.scenario, str(log), about.facts, robot)
+            spec = criteria_of_text(header.scenario, str(log), header.facts, robot)
             expected = expected_failure(spec)
             result = judge_run(key, str(log), spec.pass_, read.trace, case, (), read.coverage, spec.metrics, expected)
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
@@ -118,14 +118,14 @@ class LogJudge:
         self.notes += [f"{log}: {note}" for note in read.notes]
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(self._scenario))
 
-    def _judge_foreign_log(self, log: Path, looks: bool = False) -> tuple[ForeignLog, RunResult]:
+    def _judge_foreign_log(self, log: Path, with_sensors: bool = False) -> tuple[ForeignLog, RunResult]:
         """Return a foreign log and its result by the criteria file."""
         assert self._criteria is not None
         with _scenario_errors(self._criteria):
             criteria = self._criteria.of("")
         case = self._foreign_case()
         goals = tuple(goal.name for goal in case.goals if not goal.via)
-        read = read_foreign_log(log, replace(self._wanted, goals=goals), looks)
+        read = read_foreign_log(log, replace(self._wanted, goals=goals), with_sensors)
         missing = dict(read.coverage.missing)
         if case.footprint:
             del missing[Evidence.FOOTPRINT]
@@ -136,7 +136,7 @@ class LogJudge:
         """Return the filter masks that the criteria use; those of the criteria file are read once."""
         if criteria is self._criteria and self._named is not None:
             return self._named
-        from simscen.run.preparation.foreign_logs import masks_from_criteria
+        from simscen.run.preparation import masks_from_criteria
 
         with _scenario_errors(criteria):
             named = masks_from_criteria(criteria) if criteria.masks else {}
@@ -147,7 +147,7 @@ class LogJudge:
         """Return the surroundings of the robot according to the criteria file, which is read once."""
         assert self._criteria is not None
         if self._case is None:
-            from simscen.run.preparation.foreign_logs import case_from_criteria
+            from simscen.run.preparation import case_from_criteria
 
             with _scenario_errors(self._criteria):
                 self._case = case_from_criteria(self._criteria, self._world_path)
@@ -186,7 +186,7 @@ def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
         (str(run_folder(folder, answer.key)), _without_log(answer))
         for folder in folders
         if (folder / JOURNAL_FILE).is_file()
-        for answer in read_journal(folder).answers
+        for answer in read_journal(folder).runs
         if not any((run_folder(folder, answer.key) / log).exists() for log in (COMPLETE_LOG, PARTIAL_LOG))
     ]
 

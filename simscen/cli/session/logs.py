@@ -9,7 +9,7 @@ from simscen.core.records.run_result import RunResult
 from simscen.judge.result_json import from_json
 from simscen.judge.run_result import combine_robots, judge_run
 from simscen.loading.files.paths import is_folder
-from simscen.loading.resolved import criteria_of_text
+from simscen.loading.scenario_text import criteria_of_text
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 from simscen.record.log_reader.read import Log
@@ -78,6 +78,6 @@ def recorded_result(log: Log, file: Path) -> RunResult:
 
 
 def _evaluate(log: Log, file: Path, robot: str) -> RunResult:
-    about = log.about
-    spec = criteria_of_text(about.scenario, str(file), about.facts, robot)
-    return judge_run(about.key, about.name, spec.pass_, log.trace, about.case, (), log.coverage, spec.metrics)
+    header = log.header
+    spec = criteria_of_text(header.scenario, str(file), header.facts, robot)
+    return judge_run(header.key, header.name, spec.pass_, log.trace, header.case, (), log.coverage, spec.metrics)

@@ -30,7 +30,7 @@ from simscen.report.junit import Family, to_xml
 from simscen.report.results_json import to_json
 from simscen.report.suite import RunningSession, Session, to_html
 from simscen.report.suite.history import PastSession, past_sessions
-from simscen.run.reproducibility.environment import arithmetic_fingerprints, cpu_flags, software_versions
+from simscen.run.reproducibility import arithmetic_fingerprints, cpu_flags, software_versions
 from simscen.run.sessions.output_folder import RUNS_FOLDER, probe_writable, write_atomically
 
 PAGE = "report.html"

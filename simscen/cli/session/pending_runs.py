@@ -14,7 +14,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun, last_failed, read_journal
 from simscen.run.process.jobs import Job
-from simscen.run.reproducibility.digest import scenario_digest
+from simscen.run.reproducibility import scenario_digest
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER
 from simscen.run.sessions.results import repeat_command, shown
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
@@ -79,7 +79,7 @@ def _previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
         past = read_journal(journal.folder)
     except InvalidInput:  # a new folder
         return {}
-    answers = {run: past.answered[run.key] for run in past.planned if run.key in past.answered}
+    answers = {run: past.finished[run.key] for run in past.planned if run.key in past.finished}
     return {run: answer for run, answer in answers.items() if answer.outcome is not Outcome.ERROR and _has_log(answer)}
 
 

@@ -23,7 +23,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.report.journal import Journal, require_free
 from simscen.report.journal_reader import read_journal
-from simscen.run.reproducibility.environment import plugin_packages
+from simscen.run.reproducibility import plugin_packages
 from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session, scenario_seeds
 
@@ -151,7 +151,7 @@ def output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]
         require_free(out)
     folder = resume or create_output_folder(out)
     try:
-        return folder, Journal(folder, goes_on=resume is not None)
+        return folder, Journal(folder, resume=resume is not None)
     except OSError as error:
         raise UsageError(f"cannot use the output folder {folder}: {error.strerror}") from error
 

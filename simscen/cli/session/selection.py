@@ -9,20 +9,19 @@ from simscen.cli.diagnostics import escaped, from_here
 from simscen.cli.session.stacks import Stacks, stacks_of
 from simscen.core.errors import InvalidInput, NothingSelected, Problem, UsageError
 from simscen.core.files import collect_read_files
+from simscen.loading.builders import world_from_file
+from simscen.loading.checks.built_world import check_built_world
+from simscen.loading.checks.robot_geometry import robot_problems
+from simscen.loading.checks.scene_runner import check_in_world, world_reader_notes
 from simscen.loading.files.discovery import default_root, discover
-from simscen.loading.files.robotfile import load_robot_file
-from simscen.loading.files.worldfile import load_world_file
+from simscen.loading.files.single_files import load_robot_file, load_world_file
 from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.stacks.choice import StackChoice
-from simscen.loading.variations.problems import VariationProblems, merge_problems
-from simscen.run.caching.world_cache import WorldCache
-from simscen.run.preparation.loaders import world_from_file
-from simscen.run.robot_check.geometry import robot_problems
-from simscen.run.worldchecks.runner import check_in_world, world_reader_notes
-from simscen.run.worldchecks.world_file import check_built_world
+from simscen.loading.variations.naming import VariationProblems, merge_problems
+from simscen.loading.world_cache import WorldCache
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import TextIO
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.session_events import SessionEvent
-from simscen.report.console import text_reporter
+from simscen.report.console_reporter import text_reporter
 from simscen.report.github import github_reporter
 from simscen.report.results_json import json_reporter
 from simscen.report.text_reporters import Reporter

@@ -16,15 +16,15 @@ from simscen.core.records.case import Run
 from simscen.record.log_reader.read import read_run
 from simscen.report.picture.map_picture import write_picture
 from simscen.report.picture.scene import Scene, scene_with_robots
-from simscen.run.caching.disk_cache import DiskCache, cache_folder
-from simscen.run.caching.scenario_cache import CachedWorldBuilder, ScenarioCache
+from simscen.run.disk_cache import DiskCache, cache_folder
 from simscen.run.log_header import log_header, world_scenery
-from simscen.run.preparation.scenario import PreparedScenario
-from simscen.run.preparation.warm_up import import_components, precompute
+from simscen.run.preparation import PreparedScenario
 from simscen.run.process.fork_server import ForkServer
 from simscen.run.process.isolation import MAX_MEMORY_BYTES, apply_plugin_path
 from simscen.run.process.jobs import Job, ReplayMode
+from simscen.run.process.warm_up import import_components, precompute
 from simscen.run.process.worker import ProgressReporter
+from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
 from simscen.run.simulate import execute_run
 from simscen.sim.bullet.client_pool import CLIENT_POOL
 
@@ -72,7 +72,7 @@ def _finish(prepared: PreparedScenario, run: Run, folder: Path, replay: ReplayMo
     if replay.wants(run.result.outcome) and run.log is not None:
         from simscen.report.replay import write_replay
 
-        write_replay(folder / "replay.html", [(read_run(run.log, looks=True), run.result)])
+        write_replay(folder / "replay.html", [(read_run(run.log, with_sensors=True), run.result)])
 
 
 if __name__ == "__main__":

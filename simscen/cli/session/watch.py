@@ -19,7 +19,7 @@ from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, Usage
 from simscen.core.records.session_events import RunFinished, SessionEvent
 from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.reproducibility.digest import scenario_files
+from simscen.run.reproducibility import scenario_files
 
 FileStamps = dict[Path, tuple[int, int, int] | None]
 

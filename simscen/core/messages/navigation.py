@@ -1,7 +1,8 @@
-"""Goals, paths, results (with the names and numbers of Nav2), and the belief of a localizer."""
+"""Goals and their names, paths, results (with the names and numbers of Nav2), and the belief of a localizer."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 from typing import Literal
@@ -124,3 +125,27 @@ class Belief:
     map_from_odom: Pose2 = Pose2(0.0, 0.0, 0.0)
     particles: Array = field(default_factory=lambda: np.empty((0, 4)))
     updated: int = 0
+
+
+Mode = Literal["navigate_to_pose", "navigate_through_poses", "follow_waypoints"]
+"""Nav2's navigation actions: one goal after the other, all goals in one drive, or waypoints with a task at each."""
+
+FAILED = "failed"
+"""Expected end of a goal that fails with any error code."""
+
+
+def loop_goal_name(name: str, loop: int) -> str:
+    """Return the name of a goal in the given loop over the list of goals, counted from 1."""
+    return name if loop == 1 else f"{name}#{loop}"
+
+
+LOOP_NAME = re.compile(r"(.+)#[0-9]+")
+"""Name of a goal in a loop after the first."""
+
+
+def matches_goal_name(name: str, asked: str | None) -> bool:
+    """Return whether a goal matches a name: `shelf` matches in every loop, `shelf#2` only in the second."""
+    if asked is None or name == asked:
+        return True
+    loop = LOOP_NAME.fullmatch(name)
+    return loop is not None and loop[1] == asked

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.geometry.separation import separation
+from simscen.core.geometry.polygons import separation
 from simscen.core.records.events import EventKind
 from simscen.criteria.trace_signals.ground_truth import check_samples
 from simscen.criteria.trace_signals.readers import goal_distance, poses_of

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.messages.goal_names import matches_goal_name
+from simscen.core.messages.navigation import matches_goal_name
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Samples, Ticks
 from simscen.criteria.timeline import spans

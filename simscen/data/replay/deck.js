@@ -89,7 +89,7 @@ export class Deck {
     const boxes = known.map((name) => el("label", {}, el("input", { type: "checkbox", checked: firstShown(this.runs).includes(name), onchange: (event) => (event.target.checked ? this.#add(name) : this.#drop(name), act.laidOut()) }), ` ${name.replaceAll("_", " ")}`));
     return el("div", { class: "controls" },
       button("To the start", icon("start"), act.begin, "Home"), button("Previous event", icon("previous"), act.previous, "p"), button("Back 0.1 s", icon("back"), act.back, "←"), this.play,
-      button("On 0.1 s", icon("on"), act.on, "→"), button("Next event", icon("next"), act.next, "n"), button("To the end", icon("end"), act.end, "End"), this.clock,
+      button("Forward 0.1 s", icon("on"), act.on, "→"), button("Next event", icon("next"), act.next, "n"), button("To the end", icon("end"), act.end, "End"), this.clock,
       el("span", { class: "push" }), this.runs.some((run) => run.failures.length) ? el("button", { type: "button", class: "to-failure", title: "To the next failure (f)", onclick: act.failure }, icon("failure"), " Failure") : null,
       button("Slower", "−", act.slower, "<"), this.speed, button("Faster", "+", act.faster, ">"),
       el("details", { class: "menu" }, el("summary", {}, "Signals"), el("div", { class: "choice" }, ...boxes)));

@@ -135,11 +135,11 @@ class Page {
 
   #head() {
     const [run, other] = this.runs, [first] = run.failures;
-    const told_ = (one) => [`seed ${one.seed}`, one.stack && `stack ${one.stack}`, clockText(one.seconds), one.complete ? one.ended : "the log breaks off"].filter(Boolean).join(" · ");
+    const told_ = (one) => [`seed ${one.seed}`, one.stack && `stack ${one.stack}`, clockText(one.seconds), one.complete ? one.ended : "truncated log"].filter(Boolean).join(" · ");
     const heading = (one) => [el("span", { class: `pill ${one.outcome}` }, one.letter ? `${one.letter} ${one.outcome}` : one.outcome.replaceAll("-", " ")), el("h1", {}, one.title), el("span", { class: "quiet" }, told_(one))];
     const why = !other && first ? el("span", { class: "why" }, `${first.finding.what}: ${first.finding.said}`) : null;
     return [...heading(run), ...(other ? heading(other) : [why]), el("span", { class: "push" }),
-      el("button", { type: "button", onclick: () => this.#theme(), title: "Dark or light (d)", "aria-label": "Dark or light" }, icon("theme")),
+      el("button", { type: "button", onclick: () => this.#theme(), title: "Dark or light theme (d)", "aria-label": "Dark or light theme" }, icon("theme")),
       el("button", { type: "button", onclick: () => this.help.showModal(), title: "Keys (?)", "aria-label": "Keys" }, "?")];
   }
 
@@ -151,7 +151,7 @@ class Page {
       return el("label", { title: `Alt+${layer.key}` }, box, el("span", { class: `swatch ${layer.sign ?? ""} ${layer.id}`, "aria-hidden": "true" }), layer.name);
     });
     const tool = (name, sign, act) => el("button", { type: "button", "aria-label": name, title: name, onclick: act }, sign);
-    this.follow = el("button", { type: "button", "aria-pressed": "false", title: "The map follows the robot (c)", onclick: () => this.#follow() }, "Follow");
+    this.follow = el("button", { type: "button", "aria-pressed": "false", title: "Keep the robot in view (c)", onclick: () => this.#follow() }, "Follow");
     return el("div", { class: "tools" }, tool("Nearer (+)", "+", () => this.maps[0].zoom(1.4)), tool("Further (−)", "−", () => this.maps[0].zoom(1 / 1.4)), tool("Fit all (0)", "Fit", () => this.fit()), this.follow,
       el("details", { class: "menu" }, el("summary", {}, "Layers"), el("div", { class: "choice" }, ...boxes, this.#missing())));
   }

@@ -3,7 +3,7 @@ import { clockText, el, fill } from "./dom.js";
 import { isShown, told } from "./lanes.js";
 
 const SIGNS = { pass: "✓", fail: "✗", inconclusive: "?", error: "!" };
-const WORDS = { pass: "held", fail: "failed", inconclusive: "undecided", error: "broke down" };
+const WORDS = { pass: "passed", fail: "failed", inconclusive: "undecided", error: "error" };
 
 /** Verdicts above, and three views of the rest below; `chosen` is called with what is clicked on. */
 export class Panel {
@@ -151,10 +151,10 @@ export class Panel {
     const facts = [
       ["goal", goal?.name ?? "none"],
       ["true pose", pose ? poseText(pose) : "not recorded"],
-      ["belief", belief ? poseText(belief) : "none yet"],
-      ["off by", value("localization_error")],
+      ["belief", belief ? poseText(belief) : "none"],
+      ["localization error", value("localization_error")],
       ["speed", value("speed")],
-      ["commanded", value("command_speed")],
+      ["commanded speed", value("command_speed")],
       ["clearance", value("clearance")],
       ["faults", names("faults")],
       ["recovery", names("recoveries")],

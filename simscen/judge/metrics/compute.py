@@ -13,11 +13,11 @@ from simscen.core.records.case import CLEARANCE_RANGE, Case
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import COMPLETE_COVERAGE, Evidence, LogCoverage, Status
+from simscen.criteria.base import AnyMeasure
 from simscen.criteria.efficiency import shortest_way
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
 from simscen.criteria.goal_outcomes import goal_outcomes
 from simscen.criteria.goals_reached import GoalsReached
-from simscen.criteria.plugin_metric import AnyMeasure
 from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M, pedestrian_gap
 from simscen.criteria.trace_signals.ground_truth import clearance, drive, speed, truth, turn_rate

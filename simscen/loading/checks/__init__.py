@@ -1,1 +1,1 @@
-"""Semantic checks of a scenario that need no built world."""
+"""Semantic checks of scenarios and other files: as written, and in the built world."""

@@ -6,13 +6,13 @@ from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
-from simscen.core.messages.goal_names import matches_goal_name
+from simscen.core.messages.navigation import matches_goal_name
 from simscen.loading.checks.registry import MEANING, Finding, Keys
 from simscen.loading.known_names import own_goal_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.disturbances import SequenceStep
 from simscen.model.stack import StackSpec
-from simscen.triggers.registry import AnyCondition, Trigger
+from simscen.triggers.base import AnyCondition, Trigger
 
 Reason = tuple[Keys, str]
 """Keys of what keeps a trigger from firing, and the reason as words after "can never happen: "."""

@@ -12,7 +12,7 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import RobotSpec
 from simscen.model.stack import StackSpec
-from simscen.triggers.registry import Trigger
+from simscen.triggers.base import Trigger
 
 NOUNS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
 RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})

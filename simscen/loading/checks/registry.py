@@ -14,7 +14,8 @@ Stages, in the order in which they run (a scenario with errors does not reach th
 | WORLD_FILE | a world file | nothing |
 | NAMES | one robot's view of the scenario | the files that it names |
 | MEANING | one robot's view of the scenario | the files that it names |
-| WORLD, ROUTES (`simscen.run.worldchecks`) | the scenario in its world | the built world |
+| BUILT_WORLD (`built_world.py`) | a world file | the built world |
+| WORLD, TIMING (`scene.py`) | one robot's view of the scenario | the built world and the size of the robot |
 """
 
 from collections.abc import Callable, Iterable, Iterator

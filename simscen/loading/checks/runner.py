@@ -4,13 +4,13 @@ from collections.abc import Iterable
 
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
-from simscen.loading.checks import actions, criteria, events, faults, ineffective, names, robots, settings, world_file
+from simscen.loading.checks import actions, criteria, events, faults, names, settings, world_file
 from simscen.loading.checks.registry import MEANING, NAMES, ROBOT_NAMES, WORLD_FILE, NameScope, WrittenScenario
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.loading.yaml.tree import MappingNode
 from simscen.model.scenario import ScenarioSpec
 
-MODULES = (actions, criteria, events, faults, ineffective, names, robots, settings, world_file)
+MODULES = (actions, criteria, events, faults, names, settings, world_file)
 """Modules that register checks when they are imported."""
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from simscen.core.errors import UsageError
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.resolved import unexpanded_text
+from simscen.loading.scenario_text import unexpanded_text
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
 

@@ -8,8 +8,8 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.loading import multirobot
 from simscen.loading.files.assets import Assets, load_judged_masks
 from simscen.loading.files.paths import PathSandbox
+from simscen.loading.known_names import NO_WORLD, place_references, places_of, resolve_places, unknown_places
 from simscen.loading.loaded import JudgedMask, LoadedRobot, LoadedWorld
-from simscen.loading.places import NO_WORLD, place_references, places_of, resolve_places, unknown_places
 from simscen.loading.schema.messages import quoted
 from simscen.loading.schema.validate import check
 from simscen.loading.yaml.library import Library

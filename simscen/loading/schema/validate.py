@@ -24,7 +24,7 @@ from simscen.loading.yaml.tree import (
     value_position,
 )
 from simscen.spec.choice import Choice
-from simscen.triggers.registry import AnyCondition, Trigger
+from simscen.triggers.base import AnyCondition, Trigger
 
 Model = TypeVar("Model", bound=BaseModel)
 LANGUAGE_VERSION = 1

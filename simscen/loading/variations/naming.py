@@ -1,12 +1,18 @@
-"""Names of variations: short, unique, valid as folder names, derived from the values that differ."""
+"""Names of variations, derived from the values that differ, and their use in merged problems.
+
+Names are short, unique, and valid as folder names.
+"""
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
+from simscen.core.errors import Problem
 from simscen.loading.schema.messages import quoted
 from simscen.loading.variations.paths import Target, split_path
-from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
+from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, SequenceNode
 
 MAX_NAME_CHARS, _LONGEST_VALUE = 100, 40
 _GIVEN = re.compile(r"[^\W][\w.,=+%-]*")
@@ -83,3 +89,32 @@ def _value(node: Node) -> str:
 
 def _safe(text: str) -> str:
     return _UNSAFE.sub("_", text.replace(" ", "")).strip("_")
+
+
+class VariationProblems(NamedTuple):
+    """Problems of one variation; `set_by` is the path that set a value, by the position of the value."""
+
+    name: str
+    set_by: Mapping[Position, str]
+    problems: Sequence[Problem]
+
+
+def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
+    """Return the problems of all variations; those shared by all and not caused by a varied value are not annotated."""
+    if len(variations) == 1 and not variations[0].name:
+        return list(dict.fromkeys(variations[0].problems))
+    having: dict[Problem, list[VariationProblems]] = {}
+    for one in variations:
+        for problem in dict.fromkeys(one.problems):
+            having.setdefault(problem, []).append(one)
+    return sorted(_named(problem, those, len(variations)) for problem, those in having.items())
+
+
+def _named(problem: Problem, having: Sequence[VariationProblems], all_of_them: int) -> Problem:
+    path = having[0].set_by.get(Position(problem.path, problem.line, problem.col))
+    names = [one.name for one in having if one.name]
+    if not names or (path is None and len(names) == all_of_them):
+        return problem
+    several = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    where = "in all variations" if len(names) == all_of_them else f"in the variation {quoted(names[0])}{several}"
+    return replace(problem, message=f"{problem.message} ({f'{quoted(path)}, ' if path else ''}{where})")

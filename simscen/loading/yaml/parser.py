@@ -20,6 +20,7 @@ MAX_VALUES = 100_000
 
 # libyaml, if PyYAML was built with it, yields the same events ten times faster.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_LIBYAML_TOO_DEEP = "exceeded maximum nesting depth"
 
 
 class _Refused(Exception):
@@ -77,10 +78,20 @@ class _Composer:
             raise _Refused(self._problem(after, "SC004", message, "put each scenario into its own file"))
         return root
 
-    def _parse(self) -> Iterator[ev.Event]:
+    def _parse(self, end: int | None = None, skip: int = 0) -> Iterator[ev.Event]:
+        """Yield the events of the text up to the index `end`, without the first `skip` events.
+
+        libyaml reads ahead of its events, and since 0.2.6 it fails at a depth of 1000. The text before that place is
+        then parsed again, because its events show where it becomes deeper than MAX_DEPTH.
+        """
+        count = 0
         try:
-            yield from yaml.parse(self.text, Loader=_Loader)
+            for count, event in enumerate(yaml.parse(self.text[:end], Loader=_Loader), 1):
+                if count > skip:
+                    yield event
         except yaml.MarkedYAMLError as error:
+            if end is None and error.problem == _LIBYAML_TOO_DEEP and error.problem_mark:
+                yield from self._parse(error.problem_mark.index, count)
             raise _Refused(self._syntax_problem(error)) from None
         except yaml.YAMLError as error:
             raise _Refused(self._problem(None, "SC003", str(error).splitlines()[0])) from None

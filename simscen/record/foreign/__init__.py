@@ -1,1 +1,1 @@
-"""Logs of real robots: MCAP files and rosbag2 folders with the standard topics, read into a Trace as far as they go."""
+"""Reader of logs of real robots: MCAP files and rosbag2 folders with standard topics are converted to a Trace."""

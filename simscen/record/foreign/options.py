@@ -1,4 +1,4 @@
-"""What is looked for in a log of others, and under which names."""
+"""Options for reading logs of real robots: topics, ground truth, and clock."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,19 +14,23 @@ TOPICS = {
     "tf_static": "/tf_static",
     "status": "/navigate_to_pose/_action/status",
 }
-"""The standard topics, by what `--topic NAME=TOPIC` calls them. The action's status says what became of goals."""
+"""Default topics by their names in `--topic NAME=TOPIC`. The status topic of the action gives the results of goals."""
 
 Clock = Literal["header", "log"]
+"""Source of times: the stamps of messages, or the time of logging."""
 
 
 @dataclass(frozen=True)
 class ForeignLogOptions:
-    """How to read a log of others.
+    """Options for reading a log.
 
-    `truth` is what counts as the truth: a topic, or two frames as `map:base_link`; None = nothing does. `topics` are
-    the names that differ from TOPICS. Times become ticks of 1/`tick_rate` s; they are those of the messages' headers,
-    or when they were logged (`clock`). With `same_frame`, the truth's frame is that of the belief, whatever it is
-    called. `goals` are the names of the goals that the robot was sent to, in order.
+    Attributes:
+        truth: Ground truth: a topic, or two frames such as `map:base_link`. None if there is no ground truth.
+        topics: Names of topics that differ from TOPICS.
+        tick_rate: Ticks per second of the trace.
+        clock: Source of times.
+        same_frame: Treat the frame of the ground truth as the map frame, even if its name differs.
+        goals: Names of the goals that the robot was sent to, in order.
     """
 
     truth: str | None = None
@@ -37,12 +41,12 @@ class ForeignLogOptions:
     goals: tuple[str, ...] = ()
 
     def topic(self, role: str) -> str:
-        """The name of a standard topic in this log."""
+        """Return the name of a topic in this log."""
         return self.topics.get(role, TOPICS[role])
 
     @property
     def frames(self) -> tuple[str, str] | None:
-        """The frames between which tf tells the truth, outer first."""
+        """The parent and child frame if the ground truth is a transform of tf, otherwise None."""
         if self.truth is None or self.truth.startswith("/") or ":" not in self.truth:
             return None
         outer, inner = self.truth.split(":", 1)

@@ -1,4 +1,4 @@
-"""Why a log of others cannot be used at all."""
+"""Iteration over the serialized messages of MCAP files and rosbag2 folders."""
 
 import re
 from collections.abc import Container, Iterator
@@ -12,7 +12,7 @@ from simscen.record.mcap_writer import MAGIC
 
 
 class UnusableLog(ValueError):
-    """A log that cannot be judged; the message says why, `hint` what helps."""
+    """The log cannot be used. The message states the reason, and `hint` what to do."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         self.hint = hint
@@ -20,7 +20,7 @@ class UnusableLog(ValueError):
 
 
 class RawMessage(NamedTuple):
-    """A message as it stands in the log: `time` is when it was logged, in nanoseconds."""
+    """A serialized message; `time` is the time of logging in nanoseconds."""
 
     topic: str
     type: str
@@ -30,9 +30,10 @@ class RawMessage(NamedTuple):
 
 
 class McapMessages:
-    """Gives a file's messages in the order of the file; then `complete` says whether it came to its end.
+    """Iterates over the messages of an MCAP file.
 
-    Raises Unusable for a log of ROS 1, and what the mcap library raises on damage.
+    Afterwards, `complete` is False if the file is truncated, and `topics` has the message types by topic. Raises
+    UnusableLog for a log of ROS 1, and exceptions of the mcap library for damaged files.
     """
 
     def __init__(self, path: Path) -> None:
@@ -41,38 +42,38 @@ class McapMessages:
         self.topics: dict[str, str] = {}
 
     def __iter__(self) -> Iterator[RawMessage]:
-        """Read the file once."""
+        """Yield the messages in the order of the file."""
         with open_log(self._path) as stream:
             if stream.read(len(MAGIC)) != MAGIC:
                 raise UnusableLog("it is not an MCAP file")
             stream.seek(0)
-            whole = RecordReader(stream)
-            yield from self._messages(whole)
-            self.complete = not whole.cut
+            reader = RecordReader(stream)
+            yield from self._messages(reader)
+            self.complete = not reader.is_truncated
 
-    def _messages(self, whole: RecordReader) -> Iterator[RawMessage]:
+    def _messages(self, reader: RecordReader) -> Iterator[RawMessage]:
         types: dict[int, str] = {}
         channels: dict[int, records.Channel] = {}
-        for record in whole:
+        for record in reader:
             match record:
                 case records.Header():
-                    _refuse_ros1(record.profile)
+                    _reject_ros1(record.profile)
                 case records.Schema():
                     types[record.id] = record.name
                 case records.Channel():
-                    _refuse_ros1(record.message_encoding)
+                    _reject_ros1(record.message_encoding)
                     channels[record.id] = record
                     self.topics[record.topic] = types.get(record.schema_id, "")
                 case records.Message():
                     channel = channels[record.channel_id]
-                    kind = types.get(channel.schema_id, "")
-                    yield RawMessage(channel.topic, kind, channel.message_encoding, record.log_time, record.data)
+                    message_type, encoding = types.get(channel.schema_id, ""), channel.message_encoding
+                    yield RawMessage(channel.topic, message_type, encoding, record.log_time, record.data)
                 case _:
                     pass
 
 
 def is_simscen_log(path: Path) -> bool:
-    """Whether simscen wrote this file, which it says before the first message; True where nothing can be told."""
+    """Return whether simscen recorded this file. Returns True for unreadable files, so that read_log reports them."""
     try:
         with open_log(path) as stream:
             for record in RecordReader(stream):
@@ -80,13 +81,13 @@ def is_simscen_log(path: Path) -> bool:
                     return True
                 if isinstance(record, records.Message):
                     return False
-    except Exception:  # whoever reads all of it says what is wrong
+    except Exception:
         return True
     return False
 
 
-def _refuse_ros1(kind: str) -> None:
-    if kind == "ros1":
+def _reject_ros1(profile: str) -> None:
+    if profile == "ros1":
         raise UnusableLog("it is a log of ROS 1", "convert it, e.g. with `rosbags-convert`, whose logs are of ROS 2")
 
 
@@ -94,7 +95,11 @@ INSTALL_ROSBAGS = "pip install 'rosbags>=0.10,<1'"
 
 
 class BagMessages:
-    """Gives a folder's messages, file after file; then `complete` says whether all are there that it speaks of."""
+    """Iterates over the messages of a rosbag2 folder.
+
+    Afterwards, `complete` is False if messages are missing, and `topics` has the message types by topic. SQLite and
+    compressed bags need the optional package rosbags.
+    """
 
     def __init__(self, folder: Path, wanted: Container[str]) -> None:
         self._folder, self._wanted = folder, wanted
@@ -102,48 +107,48 @@ class BagMessages:
         self.topics: dict[str, str] = {}
 
     def __iter__(self) -> Iterator[RawMessage]:
-        """Read the folder once. Raises Unusable."""
+        """Yield the messages of all files. Raises UnusableLog."""
         files = sorted(self._folder.glob("*.mcap"), key=_file_number)
-        return self._own(files) if files and not self._is_compressed() else self._through_rosbags()
+        return self._read_mcap(files) if files and not self._is_compressed() else self._read_with_rosbags()
 
     def _is_compressed(self) -> bool:
-        """Whether rosbag2 compressed each message or file on top of what MCAP does."""
+        """Return whether rosbag2 compressed each message or file, in addition to the compression of MCAP."""
         metadata = self._folder / "metadata.yaml"
         text = metadata.read_text(encoding="utf-8", errors="replace") if metadata.is_file() else ""
         return re.search(r"compression_mode:\s*['\"]?(message|file)", text, re.IGNORECASE) is not None
 
-    def _own(self, files: list[Path]) -> Iterator[RawMessage]:
-        whole = []
+    def _read_mcap(self, files: list[Path]) -> Iterator[RawMessage]:
+        complete = []
         for file in files:
             messages = McapMessages(file)
             yield from messages
             self.topics.update(messages.topics)
-            whole.append(messages.complete)
-        self.complete = all(whole)
+            complete.append(messages.complete)
+        self.complete = all(complete)
 
-    def _through_rosbags(self) -> Iterator[RawMessage]:
+    def _read_with_rosbags(self) -> Iterator[RawMessage]:
         try:
             from rosbags.rosbag2 import Reader
         except ImportError as error:
-            raise UnusableLog("only the rosbags package reads SQLite and compressed bags", INSTALL_ROSBAGS) from error
+            raise UnusableLog("SQLite and compressed bags need the package rosbags", INSTALL_ROSBAGS) from error
         count = 0
         try:
             with Reader(self._folder) as reader:
-                self.topics = {one.topic: one.msgtype for one in reader.connections}
-                chosen = [one for one in reader.connections if one.topic in self._wanted]
+                self.topics = {connection.topic: connection.msgtype for connection in reader.connections}
+                chosen = [connection for connection in reader.connections if connection.topic in self._wanted]
                 for connection, time, data in reader.messages(chosen) if chosen else ():
                     count += 1
                     yield RawMessage(connection.topic, connection.msgtype, "cdr", time, bytes(data))
-                self.complete = count == sum(one.msgcount for one in chosen)
+                self.complete = count == sum(connection.msgcount for connection in chosen)
         except (UnusableLog, OSError):
             raise
-        except Exception as error:  # rosbags lets what SQLite, YAML and zstd raise fall through
-            told = f"rosbags cannot read it: {error or type(error).__name__}"
-            raise UnusableLog(told, "try `ros2 bag reindex`") from error
+        except Exception as error:  # rosbags does not catch exceptions of SQLite, YAML and zstd
+            text = f"rosbags cannot read it: {error or type(error).__name__}"
+            raise UnusableLog(text, "try `ros2 bag reindex`") from error
 
 
 def open_messages(path: Path, wanted: Container[str]) -> McapMessages | BagMessages:
-    """The messages of an MCAP file or of a rosbag2 folder, those on the topics `wanted` at least. Raises Unusable."""
+    """Open an MCAP file or a rosbag2 folder for reading at least the topics in `wanted`. Raises UnusableLog."""
     if path.is_dir():
         return BagMessages(path, wanted)
     if path.suffix == ".bag":
@@ -154,6 +159,6 @@ def open_messages(path: Path, wanted: Container[str]) -> McapMessages | BagMessa
 
 
 def _file_number(file: Path) -> tuple[int, str]:
-    """rosbag2 numbers its files: name_0, name_1, …, name_10."""
+    """Return the sort key of a file of a bag: name_0, name_1, …, name_10."""
     number = re.search(r"_(\d+)$", file.stem)
     return (int(number[1]) if number else -1, file.name)

@@ -1,4 +1,4 @@
-"""Reads a log of others into a Trace, and says what it lacks."""
+"""Entry point for reading logs of real robots: a Trace, what the log lacks, and sensor messages for replays."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import LogCoverage
 from simscen.record import topics
-from simscen.record.foreign.decoded import DecodedMessages, decode_messages, topic_roles
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
 from simscen.record.foreign.timebase import Timebase
 from simscen.record.foreign.trace_reader import ForeignTraceReader
+from simscen.record.foreign.tracks import DecodedMessages, decode_messages, topic_roles
 from simscen.record.foreign.transforms import lidar_mount
 from simscen.record.log_reader.read import LOG_READ_ERRORS, invalid_log
 from simscen.record.log_reader.sensor_messages import SensorMessages
@@ -26,42 +26,42 @@ from simscen.record.log_reader.sensor_messages import SensorMessages
 
 @dataclass(frozen=True, eq=False)
 class ForeignLog:
-    """A log of others: its trace, what it lacks, and what about it is odd, in words for its owner.
+    """Log of a real robot: its trace, the evidence that it lacks, and remarks for the user.
 
-    `seen` and `map` are what no trace holds; nothing unless it was asked for.
+    `sensors` and `map` are empty unless requested.
     """
 
     trace: Trace
     coverage: LogCoverage
     notes: Sequence[str]
-    seen: SensorMessages = field(default_factory=SensorMessages)
+    sensors: SensorMessages = field(default_factory=SensorMessages)
     map: OccupancyGrid | None = None
 
 
-def read_foreign_log(path: Path, wanted: ForeignLogOptions, looks: bool = False) -> ForeignLog:
+def read_foreign_log(path: Path, options: ForeignLogOptions, with_sensors: bool = False) -> ForeignLog:
     """Read an MCAP file or a rosbag2 folder of a real robot.
 
-    The trace lasts from the first to the last message that is wanted. One that was cut off has no `run.ended`, so that
-    nothing passes on it. With `looks`, scans, particles, local plans, costmaps and the map are kept, too. Raises
-    InvalidInput, with the reason, for what cannot be used.
+    The trace lasts from the first to the last relevant message. A truncated log has no event `run.ended`, so that no
+    criterion can pass. With `with_sensors`, also keep scans, particles, local plans, costmaps and the map. Raises
+    InvalidInput if the log cannot be used.
     """
     try:
-        roles = topic_roles(wanted)
-        watched = SensorMessageCollector() if looks else None
-        messages = open_messages(path, (*roles, *SENSOR_TOPICS) if looks else roles)
-        found = decode_messages(messages if watched is None else watched.among(messages), roles)
-        with np.errstate(all="ignore"):  # what is not finite is found and named by whoever judges it
-            reading = ForeignTraceReader(found, messages.topics, wanted)
-        end = reading.time.end
+        roles = topic_roles(options)
+        collector = SensorMessageCollector() if with_sensors else None
+        messages = open_messages(path, (*roles, *SENSOR_TOPICS) if with_sensors else roles)
+        decoded = decode_messages(messages if collector is None else collector.collect(messages), roles)
+        with np.errstate(all="ignore"):  # the judge reports numbers that are not finite
+            reader = ForeignTraceReader(decoded, messages.topics, options)
+        end = reader.time.end
         if messages.complete:
-            reading.rows.events.append(Event(end, EventKind.RUN_ENDED, "the recording ends"))
+            reader.rows.events.append(Event(end, EventKind.RUN_ENDED, "the recording ends"))
         else:
-            reading.notes.append("the log breaks off, so nothing passes on it")
-        trace = reading.rows.trace(wanted.tick_rate, end)
-        coverage = LogCoverage(reading.missing, reading.partial, recorded_by_simscen=False)
-        if watched is None:
-            return ForeignLog(trace, coverage, reading.notes)
-        return ForeignLog(trace, coverage, reading.notes, watched.seen(reading.time, found), watched.map)
+            reader.notes.append("the log is truncated, so no criterion can pass")
+        trace = reader.rows.trace(options.tick_rate, end)
+        coverage = LogCoverage(reader.missing, reader.partial, recorded_by_simscen=False)
+        if collector is None:
+            return ForeignLog(trace, coverage, reader.notes)
+        return ForeignLog(trace, coverage, reader.notes, collector.sensors(reader.time, decoded), collector.map)
     except UnusableLog as error:
         raise invalid_log(path, "SC804", str(error), error.hint) from error
     except OSError as error:
@@ -75,53 +75,53 @@ SENSOR_TOPICS = (
     *(topic.name for topic in (topics.PARTICLES, topics.LOCAL_PLAN, topics.MAP)),
     *(topic.name for topic in (topics.GLOBAL_COSTMAP, topics.LOCAL_COSTMAP)),
 )
-"""What is read of a bag whose other topics are left alone; an MCAP file shows lidars under any name."""
+"""Sensor topics to read from SQLite bags. In MCAP files, lidars are found on any topic."""
 BASE = "base_link"
 
 
 class SensorMessageCollector:
-    """Keeps messages that there is something to see in, while others read them; `map` is the last map."""
+    """Collects sensor messages while another reader iterates over the messages of a log. `map` is the last map."""
 
     def __init__(self) -> None:
         self.map: OccupancyGrid | None = None
-        self._seen = SensorMessages(stamped=False)
-        self._kept: list[RawMessage] = []
+        self._sensors = SensorMessages(stamped=False)
+        self._messages: list[RawMessage] = []
 
-    def among(self, messages: Iterable[RawMessage]) -> Iterator[RawMessage]:
-        """The same messages. Raises struct.error and ValueError for one that cannot be read."""
+    def collect(self, messages: Iterable[RawMessage]) -> Iterator[RawMessage]:
+        """Yield the same messages. Raises struct.error or ValueError for an invalid sensor message."""
         for message in messages:
             if message.encoding == "cdr":
-                self._look_at(message)
+                self._add(message)
             yield message
 
-    def seen(self, time: Timebase, found: DecodedMessages) -> SensorMessages:
-        """All of them at their ticks, with lidars where static transforms say."""
-        ticks = time.of_logged(np.array([message.time for message in self._kept], dtype=np.int64))
-        for tick, message in zip(ticks.tolist(), self._kept, strict=True):
-            take = self._seen.taker(message.topic, message.type)
-            assert take is not None
-            take(tick, message.data)
-        links = {posed.child: posed for _, told in found.said["tf_static"] for posed in told}
+    def sensors(self, time: Timebase, decoded: DecodedMessages) -> SensorMessages:
+        """Return the collected messages at their ticks, with the mounts of lidars from static transforms."""
+        ticks = time.ticks_of_logged(np.array([message.time for message in self._messages], dtype=np.int64))
+        for tick, message in zip(ticks.tolist(), self._messages, strict=True):
+            handler = self._sensors.handler(message.topic, message.type)
+            assert handler is not None
+            handler(tick, message.data)
+        links = {pose.child: pose for _, poses in decoded.by_role["tf_static"] for pose in poses}
         for frame in links:
             if (mount := lidar_mount(frame, BASE, links)) is not None:
-                self._seen.mounts[frame] = Pose3.planar(Pose2(*mount.pose))
-        return self._seen
+                self._sensors.mounts[frame] = Pose3.planar(Pose2(*mount.pose))
+        return self._sensors
 
-    def _look_at(self, message: RawMessage) -> None:
+    def _add(self, message: RawMessage) -> None:
         if (message.topic, message.type) == topics.MAP[:2]:
-            self.map = self._seen.costmap(message.data)[1]
-        elif self._seen.taker(message.topic, message.type) is not None:
-            self._try(message)
-            self._kept.append(message)
+            self.map = self._sensors.costmap(message.data)[1]
+        elif self._sensors.handler(message.topic, message.type) is not None:
+            self._check(message)
+            self._messages.append(message)
 
-    def _try(self, message: RawMessage) -> None:
-        """Read it now: whoever looks at it later need not be ready for damage."""
+    def _check(self, message: RawMessage) -> None:
+        """Decode a message once, so that damage is found now and not when the message is drawn."""
         match message.type:
             case topics.SCAN_TYPE:
-                self._seen.scan(message.data)
+                self._sensors.scan(message.data)
             case topics.PARTICLES.type:
-                self._seen.cloud(message.data)
+                self._sensors.cloud(message.data)
             case topics.LOCAL_PLAN.type:
-                self._seen.path(message.data)
+                self._sensors.path(message.data)
             case _:
-                self._seen.costmap(message.data)
+                self._sensors.costmap(message.data)

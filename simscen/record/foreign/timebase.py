@@ -1,4 +1,4 @@
-"""From the stamps of real messages, which repeat, come late and jump, to the ticks of a trace."""
+"""Conversion of the times of a real log, which can repeat, be late, or jump, to the ticks of a Trace."""
 
 from __future__ import annotations
 
@@ -12,14 +12,17 @@ from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.simtime import NS_PER_SECOND
 
 MAX_BACKWARD_JUMP_NS = NS_PER_SECOND
-"""Nanoseconds that a stamp may lie before an earlier one of its topic: messages overtake each other, clocks do not."""
+"""Maximum difference to an earlier but newer stamp of the topic. A larger one means that the clock was reset."""
 MAX_LOGGING_DELAY_NS = 10 * NS_PER_SECOND
-"""Nanoseconds between the stamp of a message and its logging above which they are of different clocks."""
+"""Maximum difference between the stamps of two topics at the same time. A larger one means different clocks."""
 
 
 @dataclass(frozen=True, eq=False)
 class StampedMessages:
-    """The messages of a topic in the order they were logged: `logged` and `stamps` in nanoseconds."""
+    """Times of the messages of a topic in ns, in the order of logging: times of logging, and stamps of the headers.
+
+    Raises UnusableLog if the stamps jump back.
+    """
 
     topic: str
     logged: Ticks
@@ -27,31 +30,31 @@ class StampedMessages:
 
     def __post_init__(self) -> None:
         newest = np.maximum.accumulate(self.stamps)
-        back = newest - self.stamps
-        if len(back) and back.max() > MAX_BACKWARD_JUMP_NS:
-            at = int(np.argmax(back > MAX_BACKWARD_JUMP_NS))
-            by = back[at] / NS_PER_SECOND
-            told = f"the time of {self.topic} jumps back by {by:.1f} s at its message {at + 1}"
-            raise UnusableLog(told, "a clock was reset or a bag looped: cut the log there, or judge it with --time log")
+        jumps = newest - self.stamps
+        if len(jumps) and jumps.max() > MAX_BACKWARD_JUMP_NS:
+            index = int(np.argmax(jumps > MAX_BACKWARD_JUMP_NS))
+            seconds = jumps[index] / NS_PER_SECOND
+            text = f"the time of {self.topic} jumps back by {seconds:.1f} s at its message {index + 1}"
+            raise UnusableLog(text, "a clock was reset or a bag looped: cut the log there, or judge it with --time log")
 
     @property
     def disorder(self) -> str:
-        """What is odd about the stamps, in words; "" for nothing."""
+        """Description of late and repeated stamps, or ""."""
         late = int((np.diff(self.stamps) < 0).sum())
-        again = len(self.stamps) - len(np.unique(self.stamps))
-        told = [
-            f"{late} came after a later one" if late else "",
-            f"{again} had the stamp of another, of which the last counts" if again else "",
+        repeated = len(self.stamps) - len(np.unique(self.stamps))
+        texts = [
+            f"{late} messages out of order" if late else "",
+            f"{repeated} repeated stamps, of which the last message is used" if repeated else "",
         ]
-        return ", ".join(text for text in told if text)
+        return ", ".join(text for text in texts if text)
 
 
 @dataclass(frozen=True, eq=False)
 class Timebase:
-    """The time of a log: ticks of 1/`rate` s since its first message, up to `end` (a tick).
+    """Ticks of a log: 1/`rate` s since the first message at `start`, until the last message at `stop` (ns).
 
-    `anchor` are messages with both times; by them the time of logging becomes that of the headers. None = the time of
-    logging is the time.
+    `anchor` are messages with both times; they convert times of logging to times of headers. Without an anchor, the
+    times of logging are used.
     """
 
     start: int
@@ -60,41 +63,42 @@ class Timebase:
     anchor: StampedMessages | None = None
 
     @classmethod
-    def over(cls, logged: Iterable[Ticks], rate: int, anchor: StampedMessages | None) -> Timebase:
-        """That of all messages logged at these times; there must be some."""
-        everything = np.concatenate(list(logged))
-        first, last = _header_times(np.array([everything.min(), everything.max()]), anchor).tolist()
-        return cls(first, last, rate, anchor)
+    def from_logged(cls, logged: Iterable[Ticks], rate: int, anchor: StampedMessages | None) -> Timebase:
+        """Return the timebase of messages that were logged at these times (at least one)."""
+        times = np.concatenate(list(logged))
+        start, stop = _header_times(np.array([times.min(), times.max()]), anchor).tolist()
+        return cls(start, stop, rate, anchor)
 
     @property
     def end(self) -> int:
-        """The last tick."""
+        """Last tick."""
         return int(self._ticks(np.array([self.stop]))[0])
 
-    def of_logged(self, logged: Ticks) -> Ticks:
-        """The ticks of messages without a stamp."""
+    def ticks_of_logged(self, logged: Ticks) -> Ticks:
+        """Return the ticks of messages without stamps."""
         return self._ticks(_header_times(logged, self.anchor))
 
-    def of_stamped(self, messages: StampedMessages) -> Ticks:
-        """The ticks of messages with one. Raises Unusable where the stamps are of another clock."""
+    def ticks_of_stamped(self, messages: StampedMessages) -> Ticks:
+        """Return the ticks of messages with stamps. Raises UnusableLog if their clock differs from the anchor's."""
         if self.anchor is None:
             return self._ticks(messages.logged)
-        late = np.abs(messages.stamps - _header_times(messages.logged, self.anchor))
-        if len(late) > 2 and np.median(late) > MAX_LOGGING_DELAY_NS:
-            by = float(np.median(late)) / NS_PER_SECOND
-            told = f"{messages.topic} and {self.anchor.topic} do not share a clock: their stamps differ by {by:.1f} s"
-            raise UnusableLog(told, "is use_sim_time the same for all nodes? --time log judges by the time of logging")
+        delays = np.abs(messages.stamps - _header_times(messages.logged, self.anchor))
+        if len(delays) > 2 and np.median(delays) > MAX_LOGGING_DELAY_NS:
+            seconds = float(np.median(delays)) / NS_PER_SECOND
+            topics = f"{messages.topic} and {self.anchor.topic}"
+            text = f"{topics} do not share a clock: their stamps differ by {seconds:.1f} s"
+            raise UnusableLog(text, "is use_sim_time the same for all nodes? --time log judges by the time of logging")
         return self._ticks(messages.stamps)
 
     def _ticks(self, times: Ticks) -> Ticks:
-        """The nearest ticks, all within the log: a latched message may be older than it, a transform newer."""
+        """Return the nearest ticks within the log. Latched messages can be older than the log, transforms newer."""
         since: Ticks = np.clip(times, self.start, self.stop) - self.start
         ticks: Ticks = (since * self.rate + NS_PER_SECOND // 2) // NS_PER_SECOND
         return ticks
 
 
 def _header_times(logged: Ticks, anchor: StampedMessages | None) -> Ticks:
-    """What headers would say at these times of logging; before and after all of them, time goes on as it was."""
+    """Convert times of logging to times of headers by interpolation. Outside the anchor, the difference is constant."""
     if anchor is None:
         return logged
     stamps = np.maximum.accumulate(anchor.stamps)
@@ -102,5 +106,5 @@ def _header_times(logged: Ticks, anchor: StampedMessages | None) -> Ticks:
     known = (anchor.logged - first).astype(np.float64)
     between = np.interp((logged - first).astype(np.float64), known, (stamps - begin).astype(np.float64))
     beyond = np.minimum(logged - first, 0) + np.maximum(logged - int(anchor.logged[-1]), 0)
-    told: Ticks = begin + np.rint(between).astype(np.int64) + beyond
-    return told
+    times: Ticks = begin + np.rint(between).astype(np.int64) + beyond
+    return times

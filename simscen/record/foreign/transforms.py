@@ -1,4 +1,4 @@
-"""Where a frame is in another one, out of the transforms of a log."""
+"""Poses between tf frames of a log, and the mounting pose of a lidar."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose3
 from simscen.core.records.trace import Ticks
-from simscen.record.foreign.messages import StampedPose
 from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.foreign.timebase import StampedMessages
 from simscen.record.localization_logs.rows import Triple
+from simscen.record.messages.decode import StampedPose
 
 
 @dataclass
 class _Link:
-    """Where a frame is in its parent."""
+    """Poses of a frame in its parent frame, with their times in ns."""
 
     parent: str
     logged: list[int] = field(default_factory=list)
@@ -29,13 +29,13 @@ class _Link:
 
 
 class TransformTree:
-    """The links of /tf and /tf_static by child frame."""
+    """Transforms of /tf and /tf_static."""
 
     def __init__(self) -> None:
         self._links: dict[str, _Link] = {}
 
     def add(self, logged: int, links: list[StampedPose], static: bool) -> None:
-        """Take in one message. A frame that gets another parent counts from then on as that one's."""
+        """Add one message. If a frame gets another parent, its previous transforms are dropped."""
         for posed in links:
             link = self._links.get(posed.child)
             if link is None or link.parent != posed.frame:
@@ -45,9 +45,10 @@ class TransformTree:
             link.poses.append(posed.pose)
 
     def between(self, outer: str, inner: str) -> tuple[StampedMessages, Array] | str:
-        """Where `inner` is in `outer`, (n, 7), whenever the innermost link that moves was told; or why that is unknown.
+        """Return the poses (n, 7) of `inner` in `outer` with their times, or the reason why they are unknown.
 
-        Links further out keep their value from one message to the next, as tf2 without interpolation.
+        There is one pose for each message of the innermost moving transform. The other transforms keep their value from
+        one message to the next, without interpolation.
         """
         chain = self._chain(outer, inner)
         if isinstance(chain, str):
@@ -67,21 +68,21 @@ class TransformTree:
         return StampedMessages(f"tf {outer}:{inner}", logged, times[kept]), poses
 
     def _chain(self, outer: str, inner: str) -> list[_Link] | str:
-        """The links from `inner` outwards."""
+        """Return the transforms from `inner` up to `outer`, or the reason why there is no such chain."""
         chain: list[_Link] = []
         frame = inner
         while frame != outer:
             link = self._links.get(frame)
             if link is None or link in chain:
-                known = ", ".join(sorted({*self._links, *(one.parent for one in self._links.values())})) or "none"
-                return f"tf does not connect {outer} with {inner}; frames: {known}"
+                frames = sorted({*self._links, *(link.parent for link in self._links.values())})
+                return f"tf does not connect {outer} with {inner}; frames: {', '.join(frames) or 'none'}"
             chain.append(link)
             frame = link.parent
         return chain
 
 
 def _latest_poses(link: _Link, times: Ticks) -> Array:
-    """The newest pose of a link at each of `times`."""
+    """Return the newest pose of a link at each of `times`."""
     stamps, poses = np.array(link.stamps, dtype=np.int64), np.array(link.poses)
     order = np.argsort(stamps, kind="stable")
     newest = np.searchsorted(stamps[order], times, side="right") - 1
@@ -90,7 +91,7 @@ def _latest_poses(link: _Link, times: Ticks) -> Array:
 
 
 def _compose(outer: Array, inner: Array) -> Array:
-    """outer ∘ inner of poses (n, 7)."""
+    """Compose poses (n, 7)."""
     ax, ay, az, aw = outer[:, 3:].T
     bx, by, bz, bw = inner[:, 3:].T
     turned = np.column_stack(
@@ -111,14 +112,17 @@ _BASES = ("base_link", "base_footprint")
 
 
 class LidarMount(NamedTuple):
-    """x, y, yaw of a lidar on the base, and whether it hangs upside down, so that it counts angles the other way."""
+    """Pose x, y, yaw of a lidar on the base. If the lidar is mounted upside down, its angles have the opposite sign."""
 
     pose: Triple
-    hangs: bool
+    is_upside_down: bool
 
 
 def lidar_mount(frame: str, base: str, links: Mapping[str, StampedPose]) -> LidarMount | None:
-    """Where `frame` is on the frame that odometry moves, else on what is called base_link; None where none says so."""
+    """Return the mount of a lidar on the base frame of the odometry, or else on base_link; None if it is unknown.
+
+    `links` are the static transforms by child frame.
+    """
     pose, seen, nearest = Pose3(0, 0, 0, 0, 0, 0, 1), set(), None
     while True:
         if frame == base:
@@ -140,34 +144,34 @@ def _planar_mount(pose: Pose3) -> LidarMount:
 
 
 LoggedMessage = tuple[int, int, Any]
-"""When a message was logged in ns, its place in the log, and what it says."""
+"""Time of logging in ns, index in the log, and decoded message."""
 
 
 def parse_frame_pair(name: str) -> tuple[str, str] | None:
-    """The two frames of `map:base_link`, outer first; None for the name of a topic."""
+    """Return the parent and child frame of `map:base_link`, or None for the name of a topic."""
     outer, colon, inner = name.partition(":")
     return (outer, inner) if colon and not name.startswith("/") else None
 
 
 @dataclass
 class TransformMessages:
-    """The transforms of a log, and its messages by when they were logged."""
+    """Transforms of a log, with the index in the log of each message."""
 
     transforms: TransformTree = field(default_factory=TransformTree)
-    orders: dict[int, int] = field(default_factory=dict)
+    indices: dict[int, int] = field(default_factory=dict)
 
-    def add(self, logged: int, order: int, links: list[StampedPose], static: bool) -> None:
-        """Take in one message."""
+    def add(self, logged: int, index: int, links: list[StampedPose], static: bool) -> None:
+        """Add one message."""
         self.transforms.add(logged, links, static)
-        self.orders[logged] = order
+        self.indices[logged] = index
 
     def between(self, outer: str, inner: str) -> list[LoggedMessage]:
-        """Where `inner` was in `outer`. Raises Unusable where nothing tells."""
-        found = self.transforms.between(outer, inner)
-        if isinstance(found, str):
-            raise UnusableLog(found)
-        times, poses = found
+        """Return the poses of `inner` in `outer` as messages. Raises UnusableLog if they are unknown."""
+        result = self.transforms.between(outer, inner)
+        if isinstance(result, str):
+            raise UnusableLog(result)
+        times, poses = result
         return [
-            (logged, self.orders[logged], StampedPose(stamp, outer, tuple(pose), child=inner))
+            (logged, self.indices[logged], StampedPose(stamp, outer, tuple(pose), child=inner))
             for logged, stamp, pose in zip(times.logged.tolist(), times.stamps.tolist(), poses.tolist(), strict=True)
         ]

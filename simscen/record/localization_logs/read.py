@@ -1,4 +1,4 @@
-"""What a robot measured, out of any log, and where it truly was if the log knows."""
+"""Entry point for reading logs for `simscen localize`: odometry, scans, and reference poses if available."""
 
 from __future__ import annotations
 
@@ -21,24 +21,28 @@ from simscen.record.log_reader.read import LOG_READ_ERRORS, invalid_log
 
 @dataclass(frozen=True, eq=False)
 class LocalizationLog:
-    """`readings` in the order in which the robot received them; `truth` (n, 3) x, y, yaw in the map at `ticks` (n,).
+    """Recorded input of a localizer. Ticks are 1/TICK_RATE_HZ s since the first reading.
 
-    Ticks are of 1/TICK_RATE s, from the log's first reading on. `notes` are what is odd about the log. `told` is where
-    the robot was when the odometry began, by the first thing that somebody told it.
+    Attributes:
+        readings: Readings in the order in which the robot received them.
+        ticks: Ticks (n,) of the reference poses.
+        truth: Reference poses x, y, yaw (n, 3) in the map frame.
+        notes: Remarks for the user.
+        initial_pose: Pose at the start of the odometry, from the first pose that was sent to the localizer.
     """
 
     readings: Sequence[Odometry | Scan]
     ticks: Ticks
     truth: Array
     notes: Sequence[str] = ()
-    told: Pose2 | None = None
+    initial_pose: Pose2 | None = None
 
 
 def read_localization_log(path: Path, odometry: str, scan: str, reference: str | None) -> LocalizationLog:
     """Read odometry, scans and a reference from a rosbag2 folder, an MCAP file, a CARMEN log or a CSV file.
 
-    The topics matter for ROS alone; without `reference`, what simscen's own logs, CARMEN's TRUEPOS and the rows called
-    `truth` of a CSV file say counts. Raises InvalidInput for what cannot be used.
+    The topics apply to ROS logs only. Without `reference`, the ground truth of simscen's logs is used. CARMEN logs have
+    the reference in TRUEPOS lines, and CSV files in `truth` rows. Raises InvalidInput if the log cannot be used.
     """
     try:
         if path.suffix == ".csv":
@@ -47,9 +51,9 @@ def read_localization_log(path: Path, odometry: str, scan: str, reference: str |
             rows = read_carmen_rows(path)
         else:
             rows = read_rosbag_rows(path, odometry, scan, reference)
-        for kind, told in (("odometry", rows.odometry), ("scans", rows.scans)):
-            if not told:
-                raise UnusableLog(f"it holds no {kind}", rows.hint)
+        for kind, found in (("odometry", rows.odometry), ("scans", rows.scans)):
+            if not found:
+                raise UnusableLog(f"it has no {kind}", rows.hint)
         return _to_log(rows)
     except UnusableLog as error:
         raise invalid_log(path, "SC804", str(error), error.hint) from error
@@ -67,43 +71,44 @@ def _to_log(rows: LocalizationRows) -> LocalizationLog:
     def tick(time: float) -> int:
         return round((time - start) * TICK_RATE_HZ)
 
-    told: list[tuple[int, int, Odometry | Scan]] = [
+    ordered: list[tuple[int, int, Odometry | Scan]] = [
         (row.order, 0, Odometry("odom", tick(row.time), Pose2(*row.pose), Twist())) for row in rows.odometry
     ]
-    told += [(row.order, 1, _scan(row, tick(row.time))) for row in rows.scans]
-    told.sort(key=lambda one: one[:2])
+    ordered += [(row.order, 1, _scan(row, tick(row.time))) for row in rows.scans]
+    ordered.sort(key=lambda item: item[:2])
     truth = {tick(row.time): row.pose for row in rows.truth}
     ticks = np.array(sorted(truth), dtype=np.int64)
-    poses = np.array([truth[int(one)] for one in ticks], dtype=np.float64).reshape(-1, 3)
-    readings = [one for *_, one in told]
+    poses = np.array([truth[tick] for tick in sorted(truth)], dtype=np.float64).reshape(-1, 3)
+    readings = [reading for *_, reading in ordered]
     return LocalizationLog(readings, ticks, poses, [*rows.notes, *_check_readings(readings)], _initial_pose(rows))
 
 
 def _initial_pose(rows: LocalizationRows) -> Pose2 | None:
-    """Where the robot was when the odometry began, if it has driven as that says until it was told where it is."""
+    """Return the pose at the start of the odometry, from the first initial pose and the odometry until then."""
     if not rows.initial:
         return None
-    first = min(rows.initial, key=lambda one: one.order)
-    near = min(rows.odometry, key=lambda one: abs(one.time - first.time))
-    return Pose2(*first.pose).compose(Pose2(*near.pose).between(Pose2(*rows.odometry[0].pose)))
+    first = min(rows.initial, key=lambda row: row.order)
+    nearest = min(rows.odometry, key=lambda row: abs(row.time - first.time))
+    return Pose2(*first.pose).compose(Pose2(*nearest.pose).between(Pose2(*rows.odometry[0].pose)))
 
 
 def _check_readings(readings: Sequence[Odometry | Scan]) -> Iterator[str]:
-    """Readings that no localizer can use. Raises Unusable where that is every scan."""
-    taken = [one for one in readings if isinstance(one, Scan)]
-    if any(one.angle_increment == 0.0 and len(one.ranges) > 1 for one in taken):
-        raise UnusableLog("all beams of a scan look the same way: its angle_increment is 0")
-    if blind := sum(not len(one.points()) for one in taken):
-        yield f"{blind} of {len(taken)} scans measured nothing within their range_min and range_max"
-    odometry = np.array([one.tick for one in readings if isinstance(one, Odometry)])
-    scans = np.array([one.tick for one in readings if isinstance(one, Scan)])
+    """Yield remarks on readings that a localizer cannot use. Raises UnusableLog if no scan can be used."""
+    all_scans = [reading for reading in readings if isinstance(reading, Scan)]
+    if any(scan.angle_increment == 0.0 and len(scan.ranges) > 1 for scan in all_scans):
+        raise UnusableLog("all beams of a scan have the same direction: its angle_increment is 0")
+    if empty := sum(not len(scan.points()) for scan in all_scans):
+        yield f"{empty} of {len(all_scans)} scans have no range between their range_min and range_max"
+    odometry = np.array([reading.tick for reading in readings if isinstance(reading, Odometry)])
+    scans = np.array([scan.tick for scan in all_scans])
     if late := int((np.diff(np.maximum.accumulate(odometry)) == 0).sum()):
-        yield f"{late} of {len(odometry)} odometry readings are not newer than one before, and count for nothing"
+        yield f"{late} of {len(odometry)} odometry readings are not newer than an earlier one and are ignored"
     outside = int(((scans < odometry[0]) | (scans > odometry.max())).sum())
     if outside == len(scans):
-        raise UnusableLog("no scan was taken while there was odometry", "their clocks differ, or a topic is another's")
+        hint = "do the topics belong to the same robot and clock?"
+        raise UnusableLog("no scan was measured while there was odometry", hint)
     if outside:
-        yield f"{outside} of {len(scans)} scans were taken before the odometry begins or after it ends"
+        yield f"{outside} of {len(scans)} scans were measured before the odometry starts or after it ends"
 
 
 def _scan(row: ScanRow, tick: int) -> Scan:

@@ -1,16 +1,15 @@
-"""Odometry, scans and a reference from the messages of ROS 2."""
+"""Reader of localization logs in ROS 2 formats: MCAP files and rosbag2 folders."""
 
 from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from simscen.record import topics
-from simscen.record.foreign import messages
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
 from simscen.record.foreign.transforms import (
     LidarMount,
@@ -27,124 +26,134 @@ from simscen.record.localization_logs.rows import (
     Triple,
     all_within,
 )
+from simscen.record.messages.decode import (
+    POSE_DECODERS,
+    MessageReader,
+    Numbers,
+    StampedPose,
+    decode_checked,
+    laser_scan,
+    transforms,
+)
 from simscen.record.simtime import NS_PER_SECOND
 
-_SCAN, _TRANSFORMS = "sensor_msgs/msg/LaserScan", "tf2_msgs/msg/TFMessage"
 INITIAL_POSE_TOPIC = "/initialpose"
-"""Where RViz and robots tell AMCL where it is."""
+"""Topic on which RViz and robots send the initial pose to AMCL."""
 
 
 @dataclass
 class _Messages:
-    """The messages that matter."""
+    """Decoded messages of a log, the static transforms by child frame, and the types of all topics."""
 
     odometry: list[LoggedMessage] = field(default_factory=list)
     scans: list[LoggedMessage] = field(default_factory=list)
     truth: list[LoggedMessage] = field(default_factory=list)
     initial: list[LoggedMessage] = field(default_factory=list)
-    links: dict[str, messages.StampedPose] = field(default_factory=dict)
+    static_transforms: dict[str, StampedPose] = field(default_factory=dict)
     tf: TransformMessages = field(default_factory=TransformMessages)
     topics: dict[str, str] = field(default_factory=dict)
 
 
 def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None) -> LocalizationRows:
-    """The rows of an MCAP file or a rosbag2 folder, in the order of logging, at the times of their headers.
+    """Read an MCAP file or a rosbag2 folder in the order of logging, with the times of the headers.
 
-    Without a `reference`, the truth of simscen's own logs is one. The lidar's mount is what /tf_static says. Odometry
-    and reference are those of a topic, or of two frames as `odom:base_link` what /tf says.
+    `odometry` and `reference` are topics, or pairs of frames such as `odom:base_link` to read from /tf. Without
+    `reference`, the ground truth of simscen's logs is used. The mount of the lidar is read from /tf_static.
     """
-    heard = _collect_messages(path, odometry, scan, reference or topics.TRUTH.name)
+    messages = _collect_messages(path, odometry, scan, reference or topics.TRUTH.name)
     if frames := parse_frame_pair(odometry):
-        heard.odometry = heard.tf.between(*frames)
+        messages.odometry = messages.tf.between(*frames)
     if reference is not None and (frames := parse_frame_pair(reference)):
-        heard.truth = heard.tf.between(*frames)
-    known = f"its topics: {', '.join(sorted(heard.topics)[:12]) or 'none'}"
-    rows = LocalizationRows(hint=f"{known}; name others with --odom, --scan and --reference")
-    if reference is not None and not heard.truth:
+        messages.truth = messages.tf.between(*frames)
+    names = ", ".join(sorted(messages.topics)[:12]) or "none"
+    rows = LocalizationRows(hint=f"its topics: {names}; name others with --odom, --scan and --reference")
+    if reference is not None and not messages.truth:
         raise UnusableLog(f"it has no messages on {reference}", rows.hint)
-    named = {odometry: heard.odometry, scan: heard.scans, reference or topics.TRUTH.name: heard.truth}
-    unstamped = [topic for topic, said in named.items() if said and not any(one.stamp for *_, one in said)]
+    by_topic = {odometry: messages.odometry, scan: messages.scans, reference or topics.TRUTH.name: messages.truth}
+    unstamped = [name for name, logged in by_topic.items() if logged and not any(each.stamp for *_, each in logged)]
     if unstamped:
-        rows.notes.append(f"{', '.join(unstamped)}: its stamps are all zero; all times are those of logging")
-    by_log = bool(unstamped)
-    rows.odometry += _poses(odometry, heard.odometry, by_log, rows.notes)
-    rows.truth += _poses(reference or "the truth", heard.truth, by_log, rows.notes)
-    rows.initial += _poses(INITIAL_POSE_TOPIC, heard.initial, by_log, rows.notes)
-    rows.scans += _scans(scan, heard, by_log, rows.notes)
-    others = sorted({one.frame for *_, one in heard.truth if one.frame != "map"})
-    if others:
-        rows.notes.append(f"{reference} is told in frame {', '.join(others)!r}; it is taken for that of the map")
+        names = ", ".join(unstamped)
+        rows.notes.append(f"{names}: all stamps are zero, so the times of logging are used for all topics")
+    use_log_time = bool(unstamped)
+    rows.odometry += _poses(odometry, messages.odometry, use_log_time, rows.notes)
+    rows.truth += _poses(reference or "the ground truth", messages.truth, use_log_time, rows.notes)
+    rows.initial += _poses(INITIAL_POSE_TOPIC, messages.initial, use_log_time, rows.notes)
+    rows.scans += _scans(scan, messages, use_log_time, rows.notes)
+    frames_of_truth = sorted({pose.frame for *_, pose in messages.truth if pose.frame != "map"})
+    if frames_of_truth:
+        rows.notes.append(f"{reference} is in the frame {', '.join(frames_of_truth)!r}, which is used as the map frame")
     return rows
 
 
 def _collect_messages(path: Path, odometry: str, scan: str, truth: str) -> _Messages:
-    told = any(map(parse_frame_pair, (odometry, truth)))
-    wanted = {odometry, scan, truth, topics.TF_STATIC.name, INITIAL_POSE_TOPIC, *([topics.TF.name] if told else [])}
-    stream, heard = open_messages(path, wanted), _Messages()
-    for order, raw in enumerate(stream):
+    needs_tf = any(map(parse_frame_pair, (odometry, truth)))
+    tf = [topics.TF.name] if needs_tf else []
+    stream = open_messages(path, {odometry, scan, truth, topics.TF_STATIC.name, INITIAL_POSE_TOPIC, *tf})
+    messages = _Messages()
+    for index, raw in enumerate(stream):
         if raw.topic in (topics.TF_STATIC.name, topics.TF.name):
-            links, static = _read(raw, {_TRANSFORMS: messages.transforms}), raw.topic == topics.TF_STATIC.name
-            heard.tf.add(raw.time, order, links, static)
-            heard.links.update({one.child: one for one in links if static})
+            links, static = _decode(raw, {topics.TF.type: transforms}), raw.topic == topics.TF_STATIC.name
+            messages.tf.add(raw.time, index, links, static)
+            messages.static_transforms.update({link.child: link for link in links if static})
         elif raw.topic == INITIAL_POSE_TOPIC:
-            heard.initial.append((raw.time, order, _read(raw, messages.POSES)))
+            messages.initial.append((raw.time, index, _decode(raw, POSE_DECODERS)))
         elif raw.topic == scan:
-            heard.scans.append((raw.time, order, _read(raw, {_SCAN: messages.laser_scan})))
+            messages.scans.append((raw.time, index, _decode(raw, {topics.SCAN_TYPE: laser_scan})))
         elif raw.topic in (odometry, truth):
-            said = (raw.time, order, _read(raw, messages.POSES))
-            heard.odometry += [said] if raw.topic == odometry else []
-            heard.truth += [said] if raw.topic == truth else []
-    heard.topics = stream.topics
-    return heard
+            pose = raw.time, index, _decode(raw, POSE_DECODERS)
+            messages.odometry += [pose] if raw.topic == odometry else []
+            messages.truth += [pose] if raw.topic == truth else []
+    messages.topics = stream.topics
+    return messages
 
 
-def _read(raw: RawMessage, readers: dict[str, Any]) -> Any:
-    if raw.encoding != "cdr" or raw.type not in readers:
-        raise UnusableLog(f"{raw.topic} is a {raw.type or 'type without a name'}, expected {' or '.join(readers)}")
+def _decode(raw: RawMessage, decoders: Mapping[str, Callable[[MessageReader], Any]]) -> Any:
+    if raw.encoding != "cdr" or raw.type not in decoders:
+        raise UnusableLog(f"{raw.topic} is a {raw.type or 'type without a name'}, expected {' or '.join(decoders)}")
     try:
-        return readers[raw.type](raw.data)
+        return decode_checked(decoders[raw.type], raw.data)
     except (struct.error, ValueError, OverflowError) as error:
         raise UnusableLog(f"a message of {raw.topic} cannot be read as {raw.type}: {error}") from error
 
 
-def _time(logged: int, said: Any, by_log: bool) -> float:
-    return (logged if by_log else said.stamp) / NS_PER_SECOND
+def _time(logged: int, message: Any, use_log_time: bool) -> float:
+    return (logged if use_log_time else message.stamp) / NS_PER_SECOND
 
 
-def _poses(topic: str, said: Iterable[LoggedMessage], by_log: bool, notes: list[str]) -> Iterator[PoseRow]:
-    """Where something was; what is no place is left out."""
-    left_out = 0
-    for logged, order, one in said:
-        if all_within(one.pose, MAX_COORDINATE_M):
-            yield PoseRow(_time(logged, one, by_log), order, planar_pose(one.pose))
+def _poses(topic: str, messages: Iterable[LoggedMessage], use_log_time: bool, notes: list[str]) -> Iterator[PoseRow]:
+    """Yield the valid poses, and note the number of invalid ones."""
+    invalid = 0
+    for logged, index, message in messages:
+        if all_within(message.pose, MAX_COORDINATE_M):
+            yield PoseRow(_time(logged, message, use_log_time), index, planar_pose(message.pose))
         else:
-            left_out += 1
-    if left_out:
-        notes.append(f"{topic}: {left_out} poses are not numbers, or no place that there is; they are left out")
+            invalid += 1
+    if invalid:
+        notes.append(f"{topic}: {invalid} poses with invalid coordinates are ignored")
 
 
-def _scans(topic: str, heard: _Messages, by_log: bool, notes: list[str]) -> Iterator[ScanRow]:
-    """Scans as a lidar would have taken them that is the right way up."""
-    base = next((one.child for *_, one in heard.odometry if one.child), "")
+def _scans(topic: str, messages: _Messages, use_log_time: bool, notes: list[str]) -> Iterator[ScanRow]:
+    """Yield the scans, converted for a lidar that is mounted upright."""
+    base = next((pose.child for *_, pose in messages.odometry if pose.child), "")
     mounts: dict[str, LidarMount | None] = {}
-    for logged, order, one in heard.scans:
-        layout = (one.angle_min, one.angle_increment, one.range_min, one.range_max)
+    for logged, index, scan in messages.scans:
+        layout = (scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max)
         if any(math.isnan(value) for value in layout) or not all_within(layout[:2], MAX_COORDINATE_M):
-            raise UnusableLog(f"a scan of {topic} says that its angles and ranges are {layout}")
-        if one.frame not in mounts:
-            mounts[one.frame] = lidar_mount(one.frame, base, heard.links)
-            if mounts[one.frame] is None:
-                told = f"/tf_static does not say where {one.frame!r} is on {base or 'base_link'!r}"
-                notes.append(f"{told}: the lidar is taken to be at its origin")
-        pose, hangs = mounts[one.frame] or LidarMount((0.0, 0.0, 0.0), False)
-        ranges = one.ranges
-        if hangs:
+            raise UnusableLog(f"a scan of {topic} has invalid angles or range limits: {layout}")
+        if scan.frame not in mounts:
+            mounts[scan.frame] = lidar_mount(scan.frame, base, messages.static_transforms)
+            if mounts[scan.frame] is None:
+                frames = f"{scan.frame!r} and {base or 'base_link'!r}"
+                notes.append(f"/tf_static does not connect {frames}; the lidar is assumed to be at the base")
+        pose, is_upside_down = mounts[scan.frame] or LidarMount((0.0, 0.0, 0.0), False)
+        ranges = scan.ranges
+        if is_upside_down:
             ranges = ranges[::-1]
-            layout = (-(one.angle_min + (len(ranges) - 1) * one.angle_increment), *layout[1:])
-        yield ScanRow(_time(logged, one, by_log), order, ranges, layout, pose)
+            layout = (-(scan.angle_min + (len(ranges) - 1) * scan.angle_increment), *layout[1:])
+        yield ScanRow(_time(logged, scan, use_log_time), index, ranges, layout, pose)
 
 
-def planar_pose(pose: messages.Numbers) -> Triple:
-    """x, y and yaw of x, y, z and a unit quaternion."""
+def planar_pose(pose: Numbers) -> Triple:
+    """Return x, y and yaw of x, y, z and a unit quaternion."""
     x, y, _, qx, qy, qz, qw = pose
     return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))

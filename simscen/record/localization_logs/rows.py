@@ -1,4 +1,4 @@
-"""The rows of a log that a localizer needs."""
+"""Rows of a log that a localizer needs: odometry, scans and reference poses."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 from simscen.core.geometry import Array
 
 TICK_RATE_HZ = 1000
-"""Ticks a second."""
 MAX_TIME_S, MAX_COORDINATE_M = 1e11, 1e6
-"""No reading has a time beyond this (s) or a place (m): squares of what a broken sensor may say would overflow."""
+"""Limits for valid times and coordinates. Squares of larger numbers, as broken sensors measure them, could overflow."""
 Triple = tuple[float, float, float]
+"""Pose x, y, yaw."""
 
 
 @dataclass(frozen=True)
 class PoseRow:
-    """A pose x, y, yaw at a time in s; `order` is its place in the log."""
+    """A pose at a time in s. `order` is the index of the row in the log."""
 
     time: float
     order: int
@@ -23,7 +23,10 @@ class PoseRow:
 
 @dataclass(frozen=True, eq=False)
 class ScanRow:
-    """A scan at a time in s: `layout` is its first angle, increment, least and greatest range; `mount` the lidar's."""
+    """A scan at a time in s. `layout` is first angle, angle increment, minimum and maximum range.
+
+    `order` is the index of the row in the log, `mount` the pose of the lidar on the base.
+    """
 
     time: float
     order: int
@@ -34,9 +37,10 @@ class ScanRow:
 
 @dataclass
 class LocalizationRows:
-    """What a log says; `hint` is what helps where something is missing, `notes` are what is odd.
+    """Rows of a log.
 
-    `initial` is where the robot was told to be.
+    `truth` are the reference poses and `initial` the poses sent to the localizer. `hint` is shown if rows are missing,
+    `notes` are remarks for the user.
     """
 
     odometry: list[PoseRow] = field(default_factory=list)
@@ -48,5 +52,5 @@ class LocalizationRows:
 
 
 def all_within(values: Iterable[float], largest: float) -> bool:
-    """Whether all of these are numbers, and none too large."""
+    """Return whether all values are numbers within ±`largest`."""
     return all(-largest < value < largest for value in values)

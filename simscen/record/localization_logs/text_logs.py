@@ -1,12 +1,17 @@
-"""Logs as CSV: one row for each reading, its kind first.
+"""Reader of localization logs in text formats: CSV and CARMEN.
+
+A CSV file has one row per reading:
 
     odom,TIME,X,Y,YAW
     scan,TIME,ANGLE_MIN,ANGLE_INCREMENT,RANGE_MIN,RANGE_MAX,R0,R1,…
     truth,TIME,X,Y,YAW
     mount,X,Y,YAW
 
-Seconds, meters, radians; `inf` where a beam hit nothing, `nan` where it gave no answer. `mount` is where the lidar is
-on the robot, for all scans after it. Rows that are empty or begin with `#` mean nothing.
+Units are seconds, meters and radians. A range is `inf` without a hit and `nan` without a measurement. `mount` is the
+pose of the lidar on the robot for all scans that follow. Empty rows and rows that start with `#` are ignored.
+
+CARMEN is the format of most published lidar data sets (Radish, the SLAM benchmarks of Freiburg and Bonn). Source: the
+message formats in the header of each log. The time is the third field from the end of a line.
 """
 
 import csv
@@ -29,7 +34,7 @@ from simscen.record.localization_logs.rows import (
 
 
 def read_csv_rows(path: Path) -> LocalizationRows:
-    """The rows of a CSV log. Raises Unusable for one that is none of these."""
+    """Read a CSV log. Raises UnusableLog for an invalid row."""
     rows, mount = LocalizationRows(hint="see `simscen localize --help` for its columns"), (0.0, 0.0, 0.0)
     with path.open(encoding="utf-8", newline="") as lines:
         for number, row in _numbered_rows(lines, rows.hint):
@@ -48,7 +53,7 @@ def read_csv_rows(path: Path) -> LocalizationRows:
 
 
 def _numbered_rows(lines: Iterable[str], hint: str) -> Iterator[tuple[int, list[str]]]:
-    """The rows of a file from 1 on."""
+    """Yield the rows of a file, numbered from 1."""
     reader = csv.reader(lines)
     try:
         yield from enumerate(reader, 1)
@@ -60,43 +65,40 @@ def _add_row(rows: LocalizationRows, kind: str, order: int, values: list[float],
     match kind:
         case "odom" | "truth":
             time, pose = (values or [math.nan])[0], values[1:]
-            told = rows.odometry if kind == "odom" else rows.truth
+            target = rows.odometry if kind == "odom" else rows.truth
             _check_time(time)
-            told.append(PoseRow(time, order, _finite(pose, 3)))
+            target.append(PoseRow(time, order, _finite(pose, 3)))
         case "scan":
             if len(values) < 6 or not all(math.isfinite(value) for value in values[:5]):
-                raise ValueError("a scan has a time, four numbers that describe it, and ranges")
+                raise ValueError("a scan needs TIME, ANGLE_MIN, ANGLE_INCREMENT, RANGE_MIN, RANGE_MAX and ranges")
             time, first, step, least, most = values[:5]
             _check_time(time)
             rows.scans.append(ScanRow(time, order, np.array(values[5:]), (first, step, least, most), mount))
         case _:
-            raise ValueError(f"no kind of row is called {kind!r}; known: odom, scan, truth, mount")
+            raise ValueError(f"unknown kind of row {kind!r}; use odom, scan, truth or mount")
 
 
 def _check_time(time: float) -> None:
     if not all_within((time,), MAX_TIME_S):
-        raise ValueError(f"{time} is not a time")
+        raise ValueError(f"{time} is not a valid time")
 
 
 def _finite(values: list[float], count: int) -> Triple:
     if len(values) != count or not all(math.isfinite(value) for value in values):
         raise ValueError(f"expected {count} numbers, got {values}")
     if not all_within(values, MAX_COORDINATE_M):
-        raise ValueError(f"no place is at {values}")
+        raise ValueError(f"invalid coordinates {values}")
     x, y, yaw = values
     return x, y, yaw
 
 
-# CARMEN is the format of most published lidar data (Radish, the SLAM benchmarks of Freiburg and Bonn). Source: the
-# logger of CARMEN (log_format of each message in its header). Angles are in rad and lengths in m. The time is the third
-# field from the end of each line.
 DEFAULT_MAX_RANGE_M = 81.9
-"""What a SICK LMS says where nothing was hit, in m: FLASER lines do not tell."""
+"""Range of a SICK LMS without a hit. FLASER lines do not contain the maximum range."""
 
 
 def read_carmen_rows(path: Path) -> LocalizationRows:
-    """The odometry (ODOM and what the lasers repeat of it), scans (FLASER, ROBOTLASER1) and TRUEPOS of a log."""
-    rows = LocalizationRows(hint="its lines should begin with ODOM, FLASER or ROBOTLASER1")
+    """Read odometry (ODOM and laser lines), scans (FLASER, ROBOTLASER1) and reference (TRUEPOS) of a CARMEN log."""
+    rows = LocalizationRows(hint="its lines must start with ODOM, FLASER or ROBOTLASER1")
     with path.open(encoding="utf-8", errors="strict") as lines:
         for number, line in enumerate(lines, 1):
             words = line.split()
@@ -117,19 +119,19 @@ def _truepos(rows: LocalizationRows, order: int, words: list[str]) -> None:
 
 
 def _flaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
-    """FLASER n r… x y theta odom_x odom_y odom_theta time host logger_time."""
+    """Read `FLASER n r… x y theta odom_x odom_y odom_theta time host logger_time`."""
     count = int(words[1])
     ranges, rest = _ranges(words[2 : 2 + count], count), words[2 + count :]
     time = _time(rest[6])
     step = math.pi / max(1, count - 1) if count % 2 else math.pi / count
     rows.odometry.append(PoseRow(time, order, _pose(rest[3:6])))
     mount = _relative_pose(_pose(rest[3:6]), _pose(rest[:3]))
-    mounted = mount if math.hypot(*mount[:2]) < 1.0 else (0.0, 0.0, 0.0)  # a corrected pose is not the lidar's mount
+    mounted = mount if math.hypot(*mount[:2]) < 1.0 else (0.0, 0.0, 0.0)  # some logs have corrected poses here
     rows.scans.append(ScanRow(time, order, ranges, (-math.pi / 2, step, 0.0, DEFAULT_MAX_RANGE_M), mounted))
 
 
 def _robotlaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
-    """ROBOTLASER1 type first fov step most accuracy mode n r… m remission… laser, robot, …, time host time."""
+    """Read `ROBOTLASER1 type start fov step max accuracy mode n r… m remission… laser robot … time host time`."""
     first, _, step, most = (_parse_finite(word) for word in words[2:6])
     count = int(words[8])
     ranges = _ranges(words[9 : 9 + count], count)
@@ -148,7 +150,7 @@ def _ranges(words: list[str], count: int) -> "np.ndarray[tuple[int, ...], np.dty
 def _pose(words: list[str]) -> Triple:
     x, y, yaw = (_parse_finite(word) for word in words)
     if not all_within((x, y, yaw), MAX_COORDINATE_M):
-        raise ValueError(f"no place is at {x:g}, {y:g}")
+        raise ValueError(f"invalid coordinates {x:g}, {y:g}")
     return x, y, yaw
 
 
@@ -159,7 +161,7 @@ def _relative_pose(base: Triple, other: Triple) -> Triple:
 
 def _time(word: str) -> float:
     if not all_within((value := _parse_finite(word),), MAX_TIME_S):
-        raise ValueError(f"{word} is not a time")
+        raise ValueError(f"{word} is not a valid time")
     return value
 
 

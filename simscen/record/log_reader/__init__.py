@@ -1,1 +1,1 @@
-"""Reader of simscen's own logs: from an MCAP file to the trace of its run."""
+"""Reader of logs that simscen recorded."""

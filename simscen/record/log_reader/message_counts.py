@@ -1,4 +1,4 @@
-"""Compares the messages in a log of simscen with the counts that the recorder wrote at its end."""
+"""Comparison of the messages in a log with the counts that the recorder wrote at its end."""
 
 from collections.abc import Mapping
 
@@ -22,7 +22,7 @@ _EVIDENCE: dict[str, frozenset[Evidence]] = {
 
 
 class MessageCounts:
-    """Counts the messages of each topic and checks that they are in the order of time."""
+    """Counts the messages of each topic and checks the order of their times."""
 
     def __init__(self) -> None:
         self._topics: dict[int, str] = {}
@@ -31,21 +31,21 @@ class MessageCounts:
         self._newest: dict[int, int] = {}
         self._expected: dict[str, int] | None = None
 
-    def open(self, channel: int, topic: str, kind: str) -> None:
-        """Take in a channel."""
+    def add_channel(self, channel: int, topic: str, message_type: str) -> None:
+        """Add a channel."""
         self._topics[channel] = topic
-        if kind == topics.SCAN_TYPE:
+        if message_type == topics.SCAN_TYPE:
             self._scans.add(topic)
 
-    def add(self, channel: int, time: int) -> None:
-        """Take in a message. Raises ValueError if an earlier one of its topic has a later time."""
+    def add_message(self, channel: int, time: int) -> None:
+        """Count a message. Raises ValueError if an earlier message of its topic has a later time."""
         if time < self._newest.get(channel, time):
             raise ValueError(f"the messages of {self._topics.get(channel, 'a topic')} are not in the order of time")
         self._newest[channel] = time
         self._found[channel] = self._found.get(channel, 0) + 1
 
-    def expect(self, end: Mapping[str, str], robot: str = "") -> None:
-        """Take in the end record. Of one of several robots, only topics in its namespace count."""
+    def set_expected(self, end: Mapping[str, str], robot: str = "") -> None:
+        """Read the counts from the end record. With `robot`, use only the topics in its namespace."""
         prefix = log_header.COUNT_PREFIX + (f"/{robot}" if robot else "")
         counts = {name: int(count) for name, count in end.items() if name.startswith(log_header.COUNT_PREFIX)}
         if counts:
@@ -54,18 +54,18 @@ class MessageCounts:
             }
 
     def coverage(self) -> LogCoverage:
-        """Return the evidence of which messages are missing, with the numbers."""
+        """Return the evidence with missing messages, with their numbers."""
         if self._expected is None:
             return LogCoverage(partial=dict.fromkeys(Evidence, NO_COUNTS))
         found = {topic: self._found.get(channel, 0) for channel, topic in self._topics.items()}
         missing: dict[Evidence, str] = {}
         partial: dict[Evidence, str] = {}
         for topic, count in self._expected.items():
-            held = found.get(topic, 0)
-            if held == count:
+            number = found.get(topic, 0)
+            if number == count:
                 continue
-            lacking = partial if held else missing
-            is_scan = topic in self._scans or topic.endswith("scan")  # the type of a topic that is gone is not known
+            is_scan = topic in self._scans or topic.endswith("scan")  # the type of a removed topic is unknown
             evidence = _EVIDENCE.get(topic, frozenset({Evidence.SCANS} if is_scan else ()))
-            lacking |= dict.fromkeys(evidence, f"{topic} holds {held} of {count} recorded messages")
+            reasons = dict.fromkeys(evidence, f"{topic} holds {number} of {count} recorded messages")
+            (partial if number else missing).update(reasons)
         return LogCoverage(missing, partial)

@@ -1,24 +1,25 @@
-"""Reads a log back into the Trace of its run, so that it can be judged without a simulator."""
+"""Reading of logs that simscen recorded, and recovery of the index of a log whose run was aborted."""
 
+import os
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
+from mcap import records
 from mcap.exceptions import McapError
 from zstandard import ZstdError
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import COMPLETE_COVERAGE, LogCoverage
-from simscen.record.log_file import PARTIAL_SUFFIX, RecordReader, open_log
+from simscen.record.log_file import PARTIAL_SUFFIX, RecordReader, open_log, write_error
 from simscen.record.log_header import LogHeader
 from simscen.record.log_reader.contents import LogContents, NotSimscenLog
 from simscen.record.log_reader.sensor_messages import SensorMessages
-from simscen.record.mcap_writer import MAGIC
+from simscen.record.mcap_writer import MAGIC, Channel, McapWriter, MessageType
 
-# What the libraries and our own readers raise on bytes that no Recorder wrote.
 LOG_READ_ERRORS = (
     McapError,
     ZstdError,
@@ -30,63 +31,70 @@ LOG_READ_ERRORS = (
     MemoryError,
     RecursionError,
 )
+"""Exceptions that the libraries and the decoders raise on damaged files."""
 
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A log that was read: how the run was ordered, what happened, and its result (JSON; "" while there is none).
+    """Contents of a log.
 
-    `complete` is False for the log of a run that broke off; its trace then ends with the last message. `robots` has
-    what the log says of each of several robots, by name; `about` and `trace` are then those of the first. `seen` is
-    what no trace holds; empty unless it was asked for.
+    With several robots, `robots` has the log of each robot by name, and `header` and `trace` are those of the first.
+
+    Attributes:
+        header: Description of the run.
+        trace: What happened.
+        result: Result of the run (JSON), or "" if there is none.
+        complete: False if the run was aborted; the trace then ends with the last message.
+        sensors: Messages that are not part of the trace. Empty unless requested.
+        coverage: Evidence that is missing because the log holds fewer messages than were recorded.
     """
 
-    about: LogHeader
+    header: LogHeader
     trace: Trace
     result: str
     complete: bool
     robots: Mapping[str, "Log"] = field(default_factory=dict)
-    seen: SensorMessages = field(default_factory=SensorMessages)
+    sensors: SensorMessages = field(default_factory=SensorMessages)
     coverage: LogCoverage = COMPLETE_COVERAGE
-    """Evidence that the log lacks, because it holds fewer messages than were recorded."""
 
     @property
     def traces(self) -> list[Trace]:
-        """What happened to each robot."""
+        """Trace of each robot."""
         return [log.trace for log in self.robots.values()] or [self.trace]
 
 
-def read_run(path: Path, looks: bool = False) -> Log:
-    """Read a log to judge or draw its run. Raises InvalidInput as `read_log` does, and where there is no truth."""
-    log = read_log(path, looks=looks)
+def read_run(path: Path, with_sensors: bool = False) -> Log:
+    """Read a log to judge or draw its run. Raises InvalidInput as `read_log` does, and if there is no ground truth."""
+    log = read_log(path, with_sensors=with_sensors)
     if not len(log.trace.truth):
-        raise invalid_log(path, "SC803", "the log holds no truth: its run broke off before it began")
+        raise invalid_log(path, "SC803", "the log has no ground truth: its run was aborted before the first step")
     return log
 
 
-def read_log(path: "str | Path", partial: bool | None = None, looks: bool = False) -> Log:
+def read_log(path: "str | Path", partial: bool | None = None, with_sensors: bool = False) -> Log:
     """Read a log that a Recorder wrote.
 
-    Its trace is the one that a TraceBuilder makes of the same moments, equal to the last bit. With `partial`, a log
-    that ends too early is read as far as it goes; by default that is so for files named `*.partial.mcap`. With `looks`,
-    what no trace holds is kept in `seen`. Raises InvalidInput when the file cannot be read, is no MCAP, is none of
-    simscen's, is damaged, or ends too early.
+    Its trace equals the one that a TraceBuilder builds from the same moments, to the last bit. With `partial`, accept a
+    truncated log; by default, files named `*.partial.mcap` are accepted. With `with_sensors`, also keep the messages
+    that are not part of the trace. Raises InvalidInput if the file cannot be read, is not a log of simscen, is damaged,
+    or is truncated.
     """
     path = Path(path)
-    forgiving = path.name.endswith(PARTIAL_SUFFIX) if partial is None else partial
-    contents = LogContents(looks)
+    accept_truncated = path.name.endswith(PARTIAL_SUFFIX) if partial is None else partial
+    contents = LogContents(with_sensors)
     try:
         with open_log(path) as stream:
-            whole = _read(stream, contents)
-        about = contents.header()
-        if not whole and not forgiving:
-            hint = "to read what there is, name it *.partial.mcap"
-            raise invalid_log(path, "SC803", "the log ends too early: its run broke off", hint)
+            complete = _read(stream, contents)
+        header = contents.header()
+        if not complete and not accept_truncated:
+            hint = "to read it nevertheless, rename it to *.partial.mcap"
+            raise invalid_log(path, "SC803", "the log is truncated: its run was aborted", hint)
         robots = {
-            name: Log(about.robots[name], trace, "", whole, {}, one.seen(), one.coverage())
-            for (name, trace), one in zip(contents.traces().items(), contents.robots.values(), strict=True)
+            name: Log(header.robots[name], trace, "", complete, {}, robot.sensors, robot.coverage())
+            for (name, trace), robot in zip(contents.traces().items(), contents.robots.values(), strict=True)
         }
-        return Log(about, contents.trace(), contents.result(), whole, robots, contents.seen(), contents.coverage())
+        trace, result = contents.trace(), contents.result()
+        return Log(header, trace, result, complete, robots, contents.sensors, contents.coverage())
     except OSError as error:
         raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror}") from error
     except NotSimscenLog as error:
@@ -96,16 +104,83 @@ def read_log(path: "str | Path", partial: bool | None = None, looks: bool = Fals
 
 
 def _read(stream: IO[bytes], contents: LogContents) -> bool:
-    """Put all records into `contents`; False when they stop before the end of the run."""
+    """Add all records to `contents`. Return False if they stop before the end of the run."""
     if stream.read(len(MAGIC)) != MAGIC:
         raise NotSimscenLog("it is not an MCAP file")
     stream.seek(0)
     records = RecordReader(stream)
     for record in records:
-        contents.take(record)
-    return contents.end is not None and not records.cut
+        contents.add(record)
+    return contents.end is not None and not records.is_truncated
 
 
 def invalid_log(path: Path, code: str, message: str, hint: str = "") -> InvalidInput:
-    """A problem with a log."""
+    """Return the exception for a problem with a log."""
     return InvalidInput([Problem(str(path), 0, 0, code, message, hint)])
+
+
+def recover(path: Path) -> bool:
+    """Rewrite the log of an aborted run with an index, which other tools need. Return False if it has one already.
+
+    The log keeps its name, and remains the log of an aborted run. Raises InvalidInput if the file cannot be read or is
+    not MCAP, RunError of kind "output" if the new file cannot be written.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with open_log(path) as stream:
+            if _ends_with_magic(stream):
+                return False
+            with part.open("wb") as file:
+                _copy(stream, file)
+        part.replace(path)
+    except OSError as error:
+        if part.exists():
+            raise write_error(part, error) from error
+        raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror}") from error
+    except NotSimscenLog as error:
+        raise invalid_log(path, "SC801", f"not a log of simscen: {error}") from error
+    except LOG_READ_ERRORS as error:
+        raise invalid_log(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
+    finally:
+        part.unlink(missing_ok=True)
+    return True
+
+
+def _ends_with_magic(stream: IO[bytes]) -> bool:
+    """Return whether the file ends as an MCAP file does. Raises NotSimscenLog if it does not start as one."""
+    if stream.read(len(MAGIC)) != MAGIC:
+        raise NotSimscenLog("it is not an MCAP file")
+    size = stream.seek(0, os.SEEK_END)
+    stream.seek(max(len(MAGIC), size - len(MAGIC)))
+    ends = stream.read() == MAGIC
+    stream.seek(0)
+    return ends
+
+
+def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
+    """Copy all complete records. Chunks stay the same, so that only the end of the file changes."""
+    writer: McapWriter | None = None
+    types: dict[int, MessageType] = {}
+    channels: dict[int, Channel] = {}
+    for record in RecordReader(stream):
+        if isinstance(record, records.Header):
+            writer = McapWriter(file, record.profile, record.library)
+            continue
+        if writer is None:
+            raise NotSimscenLog("it has no header")
+        match record:
+            case records.Schema():
+                types[record.id] = MessageType(record.name, record.data.decode(), "")
+            case records.Channel():
+                channels[record.id] = writer.channel(record.topic, types[record.schema_id], record.metadata)
+            case records.Message():
+                channels[record.channel_id].write(record.log_time, record.data)
+            case records.Attachment():
+                writer.add_attachment(record.name, record.media_type, record.data)
+            case records.Metadata():
+                writer.add_metadata(record.name, record.metadata)
+            case _:
+                pass  # indices are written again
+    if writer is None:
+        raise NotSimscenLog("it has no header")
+    writer.finish()

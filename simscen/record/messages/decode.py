@@ -1,98 +1,232 @@
-"""Reads those messages of a log that a Trace is made of, with every number as it was written."""
+"""Decoders of the ROS 2 messages that simscen reads, from its own logs and from logs of real robots.
 
-from typing import NamedTuple
+The decoders read fields from a MessageReader, which returns the exact numbers, or from a CheckedReader, which validates
+the messages of other programs. Source: common_interfaces of ROS 2 Humble; these types have not changed since Foxy.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.geometry import Array, Pose2
-from simscen.record.messages.cdr import CdrReader
-from simscen.record.simtime import Stamp
+from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.record.messages.cdr import HEADER, CdrReader
+from simscen.record.simtime import NS_PER_SECOND
 
 Numbers = tuple[float, ...]
+T = TypeVar("T")
 
-_UPPER_TRIANGLE = (0, 1, 5, 7, 11, 35)
-_ON_THE_GROUND = (0, 1, 5)
+_COVARIANCE_INDICES = (0, 1, 5, 7, 11, 35)
+"""Indices of xx, xy, xyaw, yy, yyaw, yawyaw in the 36 numbers of a covariance."""
+_PLANAR_TWIST_INDICES = (0, 1, 5)
+_MAX_QUATERNION_NORM_ERROR = 0.1
+NO_COVARIANCE: Numbers = (0.0,) * 6
 
 
-class Transform(NamedTuple):
-    """One link of a TFMessage; `pose` is x, y, z and a quaternion."""
+class MessageReader(CdrReader):
+    """Reads the fields of a message with their exact values."""
 
+    def frame(self) -> str:
+        """Return the next string, the name of a frame."""
+        return self.string()
+
+    def header(self) -> tuple[int, str]:
+        """Return the stamp in nanoseconds and the frame of a std_msgs/msg/Header."""
+        seconds, nanoseconds = self.take("iI")
+        return int(seconds) * NS_PER_SECOND + int(nanoseconds), self.frame()
+
+    def pose(self) -> Numbers:
+        """Return x, y, z and the quaternion of a geometry_msgs/msg/Pose or Transform."""
+        return self.take("7d")
+
+
+class CheckedReader(MessageReader):
+    """Reads a message of another program. Raises ValueError if the message is invalid.
+
+    Quaternions are normalized, and leading slashes of frames, which tf used before tf2, are removed.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        if len(data) < len(HEADER) or data[0] != 0 or data[1] not in (0, 1):
+            raise ValueError("a message is not plain CDR")
+        super().__init__(data)
+
+    def frame(self) -> str:
+        """Return the name of a frame without leading slashes."""
+        return self.string().lstrip("/")
+
+    def pose(self) -> Numbers:
+        """Return a pose with a normalized quaternion. Raises ValueError if the quaternion was never set."""
+        pose = self.take("7d")
+        norm = math.hypot(*pose[3:])
+        if not abs(norm - 1.0) < _MAX_QUATERNION_NORM_ERROR:
+            raise ValueError("an orientation is not a quaternion of length 1")
+        return (*pose[:3], *(value / norm for value in pose[3:]))
+
+
+def decode_checked(decoder: Callable[[MessageReader], T], data: bytes) -> T:
+    """Decode a message of another program. Raises ValueError or struct.error if it does not match its type."""
+    reader = CheckedReader(data)
+    message = decoder(reader)
+    if reader.remaining > 3:  # up to three bytes of padding
+        raise ValueError("a message is longer than its type")
+    return message
+
+
+class StampedPose(NamedTuple):
+    """Pose of the frame `child` in `frame`: x, y, z and a quaternion x, y, z, w.
+
+    `stamp` is in nanoseconds. `covariance` is xx, xy, xyaw, yy, yyaw, yawyaw, zeros if the message has none. `twist` is
+    vx, vy, wz in the child frame, None if the message has none.
+    """
+
+    stamp: int
     frame: str
-    child: str
     pose: Numbers
+    covariance: Numbers = NO_COVARIANCE
+    twist: Numbers | None = None
+    child: str = ""
 
 
-def odometry(data: bytes) -> tuple[Numbers, Numbers]:
-    """Pose and vx, vy, wz of a nav_msgs/msg/Odometry."""
-    cursor = _after_header(data)
-    cursor.string()
-    pose = cursor.take("7d")
-    cursor.take("36d")
-    twist = cursor.take("6d")
-    return pose, tuple(twist[i] for i in _ON_THE_GROUND)
+class VelocityCommand(NamedTuple):
+    """A velocity command vx, vy, wz. `stamp` is None if the message has no header."""
+
+    stamp: int | None
+    values: Numbers
 
 
-def pose_with_covariance(data: bytes) -> tuple[Numbers, Numbers]:
-    """Pose and xx, xy, xyaw, yy, yyaw, yawyaw of a geometry_msgs/msg/PoseWithCovarianceStamped."""
-    cursor = _after_header(data)
-    pose, covariance = cursor.take("7d"), cursor.take("36d")
-    return pose, tuple(covariance[i] for i in _UPPER_TRIANGLE)
+class PathMessage(NamedTuple):
+    """A path of poses (n, 7)."""
+
+    stamp: int
+    poses: Array
 
 
-def twist(data: bytes) -> Numbers:
-    """vx, vy, wz of a geometry_msgs/msg/Twist."""
-    values = CdrReader(data).take("6d")
-    return tuple(values[i] for i in _ON_THE_GROUND)
+class GoalState(NamedTuple):
+    """State of a goal of an action server: ID, acceptance time in ns, and status of action_msgs."""
+
+    id: bytes
+    accepted: int
+    status: int
 
 
-def float64(data: bytes) -> Numbers:
-    """The number of a std_msgs/msg/Float64."""
-    return CdrReader(data).take("d")
+class ScanMessage(NamedTuple):
+    """A planar scan: angles in rad, ranges (n,) in m, inf without a hit."""
+
+    stamp: int
+    frame: str
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    ranges: Array
 
 
-def string(data: bytes) -> str:
-    """The text of a std_msgs/msg/String."""
-    return CdrReader(data).string()
+def odometry(reader: MessageReader) -> StampedPose:
+    """Decode nav_msgs/msg/Odometry."""
+    stamp, frame = reader.header()
+    child, pose, covariance = reader.frame(), reader.pose(), reader.take("36d")
+    twist = _planar_twist(reader)
+    reader.take("36d")
+    return StampedPose(stamp, frame, pose, _planar_covariance(covariance), twist, child)
 
 
-def transforms(data: bytes) -> list[Transform]:
-    """The links of a tf2_msgs/msg/TFMessage."""
-    cursor = CdrReader(data)
-    links = []
-    for _ in range(cursor.count()):
-        cursor.take("iI")
-        links.append(Transform(cursor.string(), cursor.string(), cursor.take("7d")))
-    return links
+def pose_stamped(reader: MessageReader) -> StampedPose:
+    """Decode geometry_msgs/msg/PoseStamped."""
+    stamp, frame = reader.header()
+    return StampedPose(stamp, frame, reader.pose())
 
 
-def path(data: bytes) -> tuple[Stamp, Array]:
-    """When a nav_msgs/msg/Path was made, and its poses (n, 7)."""
-    cursor = CdrReader(data)
-    sec, nanosec = cursor.take("iI")
-    cursor.string()
-    poses = np.empty((cursor.count(), 7))
-    for row in poses:
-        cursor.take("iI")
-        cursor.string()
-        row[:] = cursor.take("7d")
-    return (int(sec), int(nanosec)), poses
+def pose_with_covariance_stamped(reader: MessageReader) -> StampedPose:
+    """Decode geometry_msgs/msg/PoseWithCovarianceStamped."""
+    stamp, frame = reader.header()
+    pose = reader.pose()
+    return StampedPose(stamp, frame, pose, _planar_covariance(reader.take("36d")))
 
 
-def occupancy_grid(data: bytes, resolution: float, origin: Pose2) -> OccupancyGrid:
-    """The cells of a nav_msgs/msg/OccupancyGrid, whose own resolution is rounded to a float32."""
-    cursor = _after_header(data)
-    cursor.take("iI")
-    cursor.take("f")
-    width, height = (int(n) for n in cursor.take("2I"))
-    cursor.take("7d")
-    cursor.count()
-    cells = cursor.array("i1", (height, width)).astype(np.int8)
-    return OccupancyGrid(cells, resolution, origin)
+def transforms(reader: MessageReader) -> list[StampedPose]:
+    """Decode tf2_msgs/msg/TFMessage."""
+    transforms = []
+    for _ in range(reader.count()):
+        stamp, frame = reader.header()
+        child = reader.frame()
+        transforms.append(StampedPose(stamp, frame, reader.pose(), child=child))
+    return transforms
 
 
-def _after_header(data: bytes) -> CdrReader:
-    cursor = CdrReader(data)
-    cursor.take("iI")
-    cursor.string()
-    return cursor
+def twist(reader: MessageReader) -> VelocityCommand:
+    """Decode geometry_msgs/msg/Twist."""
+    return VelocityCommand(None, _planar_twist(reader))
+
+
+def twist_stamped(reader: MessageReader) -> VelocityCommand:
+    """Decode geometry_msgs/msg/TwistStamped, the default of Nav2 since Kilted."""
+    stamp, _ = reader.header()
+    return VelocityCommand(stamp, _planar_twist(reader))
+
+
+def path(reader: MessageReader) -> PathMessage:
+    """Decode nav_msgs/msg/Path."""
+    stamp, _ = reader.header()
+    poses = []
+    for _ in range(reader.count()):
+        reader.header()
+        poses.append(reader.pose())
+    return PathMessage(stamp, np.array(poses, dtype=np.float64).reshape(-1, 7))
+
+
+def laser_scan(reader: MessageReader) -> ScanMessage:
+    """Decode sensor_msgs/msg/LaserScan without its intensities."""
+    stamp, frame = reader.header()
+    angle_min, _, angle_increment, _, _, range_min, range_max = reader.take("7f")
+    ranges = reader.array("f4", (reader.count(),)).astype(np.float64)
+    reader.array("f4", (reader.count(),))
+    return ScanMessage(stamp, frame, angle_min, angle_increment, range_min, range_max, ranges)
+
+
+def particle_cloud(reader: MessageReader) -> Array:
+    """Decode the particles (n, 8) of nav2_msgs/msg/ParticleCloud: pose and weight."""
+    reader.header()
+    return reader.array("f8", (reader.count(), 8)).astype(np.float64)
+
+
+def occupancy_grid(reader: MessageReader) -> tuple[str, OccupancyGrid]:
+    """Decode the frame and the cells of nav_msgs/msg/OccupancyGrid. The message rounds the resolution to float32."""
+    _, frame = reader.header()
+    reader.take("iI")
+    (resolution,) = reader.take("f")
+    width, height = (int(n) for n in reader.take("2I"))
+    origin = Pose3(*reader.take("7d")).plane
+    reader.count()
+    cells = reader.array("i1", (height, width)).astype(np.int8)
+    return frame, OccupancyGrid(cells, resolution, Pose2(*origin))
+
+
+def goal_states(reader: MessageReader) -> list[GoalState]:
+    """Decode action_msgs/msg/GoalStatusArray."""
+    states = []
+    for _ in range(reader.count()):
+        goal_id = bytes(int(byte) for byte in reader.take("16B"))
+        seconds, nanoseconds = reader.take("iI")
+        (status,) = reader.take("b")
+        states.append(GoalState(goal_id, int(seconds) * NS_PER_SECOND + int(nanoseconds), int(status)))
+    return states
+
+
+POSE_DECODERS: dict[str, Callable[[MessageReader], StampedPose]] = {
+    "nav_msgs/msg/Odometry": odometry,
+    "geometry_msgs/msg/PoseStamped": pose_stamped,
+    "geometry_msgs/msg/PoseWithCovarianceStamped": pose_with_covariance_stamped,
+}
+"""Decoders of the message types that contain one pose."""
+
+
+def _planar_twist(reader: MessageReader) -> Numbers:
+    values = reader.take("6d")
+    return tuple(values[i] for i in _PLANAR_TWIST_INDICES)
+
+
+def _planar_covariance(covariance: Numbers) -> Numbers:
+    return tuple(covariance[i] for i in _COVARIANCE_INDICES)

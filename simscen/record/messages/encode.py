@@ -1,7 +1,8 @@
-"""ROS 2 messages of one size, laid out. `packer()` of a layout gives what packs its fields, which are named here.
+"""Encoders of ROS 2 messages without long arrays.
 
-Definitions: ROS 2 Humble's common_interfaces. Unknown covariances are zeros, as REP 145 and the message comments ask. A
-`stamp` is when something was measured, a `twist` and the poses of a belief are of the ground.
+Types of fixed size have a Template; the docstring lists the fields that its `packer()` takes. Other types have a
+function that returns the bytes. Definitions: common_interfaces of ROS 2 Humble. Unknown covariances are zeros, as
+REP 145 and the message definitions require. A `stamp` is the time of the measurement. A `twist` is vx, vy, wz.
 """
 
 from collections.abc import Sequence
@@ -14,38 +15,38 @@ from simscen.record.simtime import Stamp
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 _TWIST = "2d24xd"
-"""Six numbers, of which the ground knows vx, vy and wz."""
+"""Six numbers with vx, vy and wz."""
 _COVARIANCE = "2d24x3d24xd144x2d24xd"
-"""36 numbers, of which the ground knows those of x, y and yaw."""
+"""36 numbers with the nine of x, y and yaw."""
 _TWIST_VARIANCES = "d48xd216xd"
-"""36 numbers: a diagonal matrix with the variances of vx, vy and wz."""
+"""36 numbers with the variances of vx, vy and wz on the diagonal."""
 
 
 def clock() -> Template:
-    """rosgraph_msgs/msg/Clock: stamp."""
+    """Return the layout of rosgraph_msgs/msg/Clock: stamp."""
     message = Template()
     message.slot("iI", "*stamp")
     return message
 
 
 def float64() -> Template:
-    """std_msgs/msg/Float64: value."""
+    """Return the layout of std_msgs/msg/Float64: value."""
     message = Template()
     message.slot("d", "value")
     return message
 
 
 def twist() -> Template:
-    """geometry_msgs/msg/Twist: twist."""
+    """Return the layout of geometry_msgs/msg/Twist: twist."""
     message = Template()
     message.slot(_TWIST, "*twist")
     return message
 
 
 def odometry(frame: str, child: str) -> Template:
-    """nav_msgs/msg/Odometry without covariances: stamp, pose, twist.
+    """Return the layout of nav_msgs/msg/Odometry without covariances: stamp, pose, twist.
 
-    `child` is in `frame`, and its velocity in its own frame.
+    The pose is that of `child` in `frame`, the twist is in the child frame.
     """
     message = _stamped(frame)
     message.string(child)
@@ -57,9 +58,9 @@ def odometry(frame: str, child: str) -> Template:
 
 
 def odometry_with_covariance(frame: str, child: str) -> Template:
-    """nav_msgs/msg/Odometry: stamp, pose, covariance, twist, variances.
+    """Return the layout of nav_msgs/msg/Odometry: stamp, pose, covariance, twist, variances.
 
-    `covariance` contains the nine numbers over x, y, yaw; `variances` those of vx, vy, wz.
+    `covariance` has nine numbers for x, y, yaw, `variances` three for vx, vy, wz.
     """
     message = _stamped(frame)
     message.string(child)
@@ -71,9 +72,10 @@ def odometry_with_covariance(frame: str, child: str) -> Template:
 
 
 def imu(frame: str) -> Template:
-    """sensor_msgs/msg/Imu: stamp, turn, turn_variance, force, force_variance, with the same variance for each axis.
+    """Return the layout of sensor_msgs/msg/Imu: stamp, turn, turn_variance, force, force_variance.
 
-    It has no heading; the first orientation covariance says so with -1.
+    `turn` is the angular velocity and `force` the linear acceleration; each has the same variance for all axes. The
+    first orientation covariance is -1, because there is no orientation.
     """
     message = _stamped(frame)
     message.put("4d", *_NO_ROTATION)
@@ -87,7 +89,7 @@ def imu(frame: str) -> Template:
 
 
 def pose_with_covariance(frame: str) -> Template:
-    """geometry_msgs/msg/PoseWithCovarianceStamped: stamp, pose, covariance (the nine numbers over x, y, yaw)."""
+    """Return the layout of geometry_msgs/msg/PoseWithCovarianceStamped: stamp, pose, covariance (nine numbers)."""
     message = _stamped(frame)
     message.slot("7d", "*pose")
     message.slot(_COVARIANCE, "*covariance")
@@ -95,15 +97,17 @@ def pose_with_covariance(frame: str) -> Template:
 
 
 def pose_stamped(frame: str) -> Template:
-    """geometry_msgs/msg/PoseStamped: stamp, pose."""
+    """Return the layout of geometry_msgs/msg/PoseStamped: stamp, pose."""
     message = _stamped(frame)
     message.slot("7d", "*pose")
     return message
 
 
 def transforms(links: Sequence[tuple[str, str, str]], more: int = 0, size: int = 0) -> Template:
-    """tf2_msgs/msg/TFMessage: stamp, and the poses of the links, each of which is a frame, its child, and the name of
-    the field for the child's pose in the frame; and of so many `more`, packed already, of a `size` in bytes: packed.
+    """Return the layout of tf2_msgs/msg/TFMessage: stamp, the poses of the links, and packed.
+
+    Each link is a frame, its child frame, and the name of the field for the child's pose. The field `packed` exists if
+    there are `more` links, serialized already, with `size` bytes in total.
     """
     message = Template()
     message.put("I", len(links) + more)
@@ -125,21 +129,21 @@ def _stamped(frame: str) -> Template:
 
 
 def string(text: str) -> bytes:
-    """std_msgs/msg/String."""
+    """Return a std_msgs/msg/String."""
     message = Template()
     message.string(text)
     return bytes(message.buffer)
 
 
 def boolean(value: bool) -> bytes:
-    """std_msgs/msg/Bool."""
+    """Return a std_msgs/msg/Bool."""
     message = Template()
     message.put("B", value)
     return bytes(message.buffer)
 
 
 def log(stamp: Stamp, level: int, name: str, text: str) -> bytes:
-    """rcl_interfaces/msg/Log, without the place in a source file."""
+    """Return a rcl_interfaces/msg/Log without a source location."""
     message = Template()
     message.put("iI", *stamp)
     message.put("B", level)
@@ -150,7 +154,7 @@ def log(stamp: Stamp, level: int, name: str, text: str) -> bytes:
 
 
 def image(frame: str, stamp: Stamp, pixels: "npt.NDArray[np.uint8] | npt.NDArray[np.float32]") -> bytes:
-    """sensor_msgs/msg/Image: (h, w, 3) uint8 as rgb8, (h, w) float32 as 32FC1 (REP 118: depth in meters)."""
+    """Return a sensor_msgs/msg/Image: (h, w, 3) uint8 as rgb8, (h, w) float32 as 32FC1 (REP 118: depth in meters)."""
     height, width = pixels.shape[:2]
     encoding, kind = ("rgb8", "u1") if pixels.ndim == 3 else ("32FC1", "<f4")
     content = pixels.astype(kind).tobytes()

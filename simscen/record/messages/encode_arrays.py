@@ -1,4 +1,7 @@
-"""ROS 2 messages that hold many of something: numpy lays them out, no Python runs per beam, cell, pose or particle."""
+"""Encoders of ROS 2 messages with long arrays: scans, paths, particles, transforms and grids.
+
+The arrays are serialized by numpy, without a Python loop over beams, cells, poses or particles.
+"""
 
 import struct
 from collections.abc import Callable, Sequence
@@ -14,10 +17,11 @@ from simscen.record.messages.cdr import HEADER, Template
 from simscen.record.simtime import Stamp
 
 Link = tuple[str, str, Stamp, Pose3]
+"""Frame, child frame, stamp, and pose of the child in the frame."""
 
 
 def planar_quaternions(headings: Array) -> Array:
-    """(n, 4) quaternions x, y, z, w of headings (n,) in radians."""
+    """Return quaternions (n, 4) x, y, z, w for headings (n,) in radians."""
     halves = headings / 2
     quaternions = np.zeros((len(halves), 4))
     quaternions[:, 2] = np.sin(halves)
@@ -26,7 +30,7 @@ def planar_quaternions(headings: Array) -> Array:
 
 
 def planar_poses(points: Array) -> Array:
-    """(n, 7) positions and quaternions of points (n, 3) x, y, yaw."""
+    """Return positions and quaternions (n, 7) for points (n, 3) x, y, yaw."""
     poses = np.zeros((len(points), 7))
     poses[:, :2] = points[:, :2]
     poses[:, 3:] = planar_quaternions(points[:, 2])
@@ -34,7 +38,7 @@ def planar_poses(points: Array) -> Array:
 
 
 class LaserScanPacker:
-    """sensor_msgs/msg/LaserScan without intensities."""
+    """Encoder of sensor_msgs/msg/LaserScan without intensities."""
 
     def __init__(self, frame: str) -> None:
         head = Template()
@@ -44,7 +48,7 @@ class LaserScanPacker:
         self._pack = head.packer()
 
     def __call__(self, stamp: Stamp, scan: Scan) -> bytes:
-        """The message for a scan that was taken at `stamp`."""
+        """Encode a scan that was measured at `stamp`."""
         n = len(scan.ranges)
         last = scan.angle_min + scan.angle_increment * (n - 1)
         angles = scan.angle_min, last, scan.angle_increment
@@ -53,9 +57,9 @@ class LaserScanPacker:
 
 
 class PathPacker:
-    """nav_msgs/msg/Path; every pose carries the path's own header.
+    """Encoder of nav_msgs/msg/Path. Every pose has the header of the path.
 
-    A pose ends on a multiple of eight bytes, so all but the first are laid out alike.
+    A pose ends at a multiple of eight bytes, so that all poses but the first have the same layout.
     """
 
     def __init__(self, frame: str) -> None:
@@ -69,7 +73,7 @@ class PathPacker:
 
     @staticmethod
     def _pose(frame: str, start: int) -> bytes:
-        """A pose up to its numbers, without its stamp."""
+        """Return the bytes of a pose between its stamp and its numbers."""
         pose = Template(prefix=b"", start=start)
         pose.put("iI", 0, 0)
         pose.string(frame)
@@ -77,7 +81,7 @@ class PathPacker:
         return bytes(pose.buffer[8:])
 
     def __call__(self, stamp: Stamp, points: Array) -> bytes:
-        """`points` (n, 3) hold x, y, yaw in the packer's frame."""
+        """Encode the path of `points` (n, 3) x, y, yaw."""
         head = self._pack(stamp, len(points))
         if not len(points):
             return head
@@ -90,7 +94,7 @@ class PathPacker:
 
 
 class ParticleCloudPacker:
-    """nav2_msgs/msg/ParticleCloud."""
+    """Encoder of nav2_msgs/msg/ParticleCloud."""
 
     def __init__(self, frame: str) -> None:
         head = Template()
@@ -101,7 +105,7 @@ class ParticleCloudPacker:
         self._pack = head.packer()
 
     def __call__(self, stamp: Stamp, particles: Array) -> bytes:
-        """`particles` (n, 4) hold x, y, yaw, weight; n > 0."""
+        """Encode `particles` (n, 4) x, y, yaw, weight; n > 0."""
         cloud = np.empty((len(particles), 8), dtype="<f8")
         cloud[:, :7] = planar_poses(particles)
         cloud[:, 7] = particles[:, 3]
@@ -109,14 +113,17 @@ class ParticleCloudPacker:
 
 
 class TransformsPacker:
-    """tf2_msgs/msg/TFMessage. A transform ends on a multiple of eight bytes, so only the first is laid out apart."""
+    """Encoder of tf2_msgs/msg/TFMessage.
+
+    A transform ends at a multiple of eight bytes, so that all transforms but the first have the same layout.
+    """
 
     def __init__(self) -> None:
         self._firsts: dict[tuple[str, str, int], Callable[[Stamp, Pose3], bytes]] = {}
         self._others: dict[tuple[str, str], Callable[[Stamp, Pose3], bytes]] = {}
 
     def __call__(self, links: list[Link]) -> bytes:
-        """Each link is (frame, child frame, stamp, pose of the child in the frame)."""
+        """Encode some links."""
         if not links:
             return HEADER + bytes(4)
         frame, child, stamp, pose = links[0]
@@ -136,7 +143,7 @@ class TransformsPacker:
 
 
 def _transform(frame: str, child: str, before: bytes, start: int) -> Callable[[Stamp, Pose3], bytes]:
-    """Packs geometry_msgs/msg/TransformStamped in a sequence, beginning `start` bytes after a multiple of eight."""
+    """Return a packer of geometry_msgs/msg/TransformStamped that starts `start` bytes after a multiple of eight."""
     message = Template(prefix=before, start=start)
     message.slot("iI", "*stamp")
     message.string(frame)
@@ -146,7 +153,7 @@ def _transform(frame: str, child: str, before: bytes, start: int) -> Callable[[S
 
 
 def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
-    """nav_msgs/msg/OccupancyGrid."""
+    """Return a nav_msgs/msg/OccupancyGrid."""
     height, width = grid.shape
     message = Template()
     message.put("iI", *stamp)
@@ -160,7 +167,10 @@ def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
 
 
 def pose_array(frame: str, stamp: Stamp, points: Array) -> bytes:
-    """geometry_msgs/msg/PoseArray of points (n, 3 or more) x, y, yaw, rounded to 32 bits, which packs well; n > 0."""
+    """Return a geometry_msgs/msg/PoseArray of points (n, 3 or more) x, y, yaw; n > 0.
+
+    Numbers are rounded to 32 bits, so that they compress well.
+    """
     message = Template()
     message.put("iI", *stamp)
     message.string(frame)
@@ -173,33 +183,32 @@ Bytes = npt.NDArray[np.uint8]
 
 
 class PrecomputedTransforms:
-    """What stands behind the first transform of a tf2_msgs/msg/TFMessage, for links that are always the same."""
+    """Encoder of all transforms but the first of tf2_msgs/msg/TFMessage, for many messages with the same links."""
 
     def __init__(self, links: Sequence[tuple[str, str]]) -> None:
         """Each link is (frame, child frame)."""
-        # A transform ends on a multiple of eight bytes, so that these begin on one.
         message = Template(prefix=b"")
-        self._places = list[tuple[slice, slice]]()
+        self._slices = list[tuple[slice, slice]]()
         for frame, child in links:
             stamp = _reserve(message, "iI")
             message.string(frame)
             message.string(child)
-            self._places.append((stamp, _reserve(message, "7d")))
+            self._slices.append((stamp, _reserve(message, "7d")))
         self._empty = np.frombuffer(message.buffer, np.uint8)
         self.size = len(self._empty)
-        """Bytes of a moment."""
+        """Number of bytes per message."""
 
     def __call__(self, stamps: Sequence[Stamp], poses: Array) -> Bytes:
-        """(n, size) bytes of n moments; `poses` (n, links, 7) are those of the children in their frames."""
+        """Return the bytes (n, size) of n messages. `poses` (n, links, 7) are those of the children in their frames."""
         packed = np.tile(self._empty, (len(poses), 1))
         times, numbers = np.array(stamps, "<u4").view(np.uint8), np.ascontiguousarray(poses, "<f8").view(np.uint8)
-        for column, (stamp, pose) in enumerate(self._places):
+        for column, (stamp, pose) in enumerate(self._slices):
             packed[:, stamp], packed[:, pose] = times, numbers[:, column]
         return packed
 
 
 def _reserve(message: Template, codes: str) -> slice:
-    """Where in a message some numbers stand that come next."""
+    """Append a slot, and return its position in the message."""
     message.slot(codes, "*numbers")
     end = len(message.buffer)
     return slice(end - calcsize(f"<{codes}"), end)

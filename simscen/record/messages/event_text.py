@@ -1,4 +1,4 @@
-"""Events as JSON, and as lines a person reads in a log panel."""
+"""Text of events: JSON for /simscen/events and readable lines for /rosout."""
 
 import json
 from typing import Any
@@ -18,24 +18,24 @@ _LEVELS = {
 
 
 def to_json(event: Event) -> str:
-    """One line; numbers survive exactly. What JSON lacks (infinity, nan) is written as Python's json writes it."""
+    """Return an event as one line of JSON with exact numbers. Infinity and nan are written as Python's json does."""
     record = {"tick": event.tick, "kind": event.kind, "name": event.name, "data": dict(event.data)}
     return json.dumps(record, separators=(",", ":"))
 
 
 def from_json(text: str) -> Event:
-    """The event that `to_json` wrote. Raises ValueError or KeyError when it is none."""
+    """Parse the event that `to_json` wrote. Raises ValueError or KeyError if it is not an event."""
     record: dict[str, Any] = json.loads(text)
     return Event(int(record["tick"]), EventKind(record["kind"]), str(record["name"]), dict(record["data"]))
 
 
 def level(event: Event) -> int:
-    """The severity for /rosout, in rcl_interfaces/msg/Log's numbers."""
+    """Return the severity for /rosout: a level of rcl_interfaces/msg/Log."""
     return _LEVELS.get(event.kind, INFO)
 
 
 def sentence(event: Event) -> str:
-    """The event in one line, e.g. "goal.failed shelf: error_code=208"."""
+    """Return the event as one line, for example "goal.failed shelf: error_code=208"."""
     head = f"{event.kind} {event.name}".rstrip()
     details = ", ".join(f"{key}={_short(value)}" for key, value in event.data.items())
     return f"{head}: {details}" if details else head

@@ -1,89 +1,90 @@
-"""Where messages go: into a log, or to a stack that is told them."""
+"""Destinations of messages: channels of a log, with batches that are packed in one call for speed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
-from simscen.record.mcap_writer import MESSAGE_HEADER_BYTES, Channel, McapWriter, MessageType, load
+from simscen.record.mcap_writer import MESSAGE_HEADER_BYTES, Channel, McapWriter, MessageType, load_message_types
 from simscen.record.messages.cdr import Slot, Template, compile_writer, field_names
 from simscen.record.topics import CLOCK, Topic, qos
 
 Write = Callable[[int, bytes], None]
-"""Takes a message at a time in nanoseconds."""
+"""Writes a serialized message with a time in nanoseconds."""
 
 Layouts = Sequence[tuple[Topic, Template]]
+"""Topics with the layouts of their messages."""
 
 
 class MessageSink(Protocol):
-    """Takes messages."""
+    """Destination of messages: a log, or an external stack."""
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """Take a message at `time` nanoseconds."""
+        """Publish a serialized message at `time` nanoseconds."""
         ...
 
-    def line(self, topic: Topic) -> "TopicWriter":
-        """For a topic on which much is written."""
+    def topic_writer(self, topic: Topic) -> "TopicWriter":
+        """Return a fast writer for a topic with many messages."""
         ...
 
-    def together(self, messages: Layouts) -> "BatchWriter":
-        """For messages of which much is written, always at one time, one behind the other."""
+    def batch_writer(self, layouts: Layouts) -> "BatchWriter":
+        """Return a fast writer for messages that are always published together."""
         ...
 
 
 class TopicWriter:
-    """What takes the messages of one topic with `write`; the channel of a log is opened by the first."""
+    """Writes the messages of one topic. `open_topic` is called before the first message and returns `write`."""
 
-    def __init__(self, begin: Callable[[], Write]) -> None:
-        self._begin = begin
+    def __init__(self, open_topic: Callable[[], Write]) -> None:
+        self._open_topic = open_topic
         self.write: Write = self._first
 
     def _first(self, time: int, data: bytes) -> None:
-        self.write = self._begin()
+        self.write = self._open_topic()
         self.write(time, data)
 
 
 class BatchWriter:
-    """Packs messages that always come at one time. Fields that are called alike are the same in all of them."""
+    """Packs several messages with the same time. A field name stands for the same value in all messages."""
 
-    def __init__(self, out: MessageSink, messages: Layouts) -> None:
+    def __init__(self, out: MessageSink, layouts: Layouts) -> None:
         self._out = out
-        fields = field_names([part for _, message in messages for part in message.parts])
-        self._each = [
+        fields = field_names([part for _, message in layouts for part in message.parts])
+        self._messages = [
             (topic, message.packer(), [fields.index(name) for name in field_names(message.parts)])
-            for topic, message in messages
+            for topic, message in layouts
         ]
 
     def write(self, time: int, *fields: Any) -> None:
-        """Write all of them at `time` nanoseconds; the fields are in the order in which they come first."""
-        for topic, pack, own in self._each:
-            self._out.publish(topic, time, pack(*[fields[index] for index in own]))
+        """Write all messages at `time` nanoseconds. The fields are in order of first appearance in the layouts."""
+        for topic, pack, indices in self._messages:
+            self._out.publish(topic, time, pack(*[fields[index] for index in indices]))
 
 
 class LogPublisher:
-    """Opens a channel the first time something is published on its topic."""
+    """Writes messages to a log. The channel of a topic is opened by its first message."""
 
     def __init__(self, writer: McapWriter) -> None:
         self._writer = writer
-        self._types: Mapping[str, MessageType] = load()
+        self._types: Mapping[str, MessageType] = load_message_types()
         self._channels: dict[str, Channel] = {}
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """Write a message at `time` nanoseconds."""
+        """Write a serialized message at `time` nanoseconds."""
         self.channel(topic).write(time, data)
 
-    def line(self, topic: Topic) -> TopicWriter:
-        """For a topic on which much is written."""
+    def topic_writer(self, topic: Topic) -> TopicWriter:
+        """Return a fast writer for a topic with many messages."""
         return TopicWriter(lambda: self.channel(topic).write)
 
-    def together(self, messages: Layouts) -> BatchWriter:
-        """For messages of which much is written, always at one time, one behind the other."""
-        return _ChunkBatchWriter(self, messages)
+    def batch_writer(self, layouts: Layouts) -> BatchWriter:
+        """Return a fast writer for messages that are always published together."""
+        return _ChunkBatchWriter(self, layouts)
 
-    def settle(self) -> None:
-        """Nothing comes for a while."""
-        self._writer.settle()
+    def flush_if_due(self) -> None:
+        """Write buffered messages to the file if there are enough."""
+        self._writer.flush_if_due()
 
     def channel(self, topic: Topic) -> Channel:
-        """The channel of a topic."""
+        """Return the channel of a topic, and open it if necessary."""
         channel = self._channels.get(topic.name)
         if channel is None:
             kind = self._types[topic.type]
@@ -93,65 +94,65 @@ class LogPublisher:
 
 
 class _ChunkBatchWriter(BatchWriter):
-    """Packs all messages in one call, as records of a chunk; where they do not all fit into it, one by one."""
+    """Packs all messages directly into the current chunk with one call, or one by one if they do not fit."""
 
-    def __init__(self, out: LogPublisher, messages: Layouts) -> None:
-        super().__init__(out, messages)
-        self._publisher, self._messages = out, messages
-        self._room = 0
-        self._places: list[tuple[Channel, int]] = []
+    def __init__(self, out: LogPublisher, layouts: Layouts) -> None:
+        super().__init__(out, layouts)
+        self._publisher, self._layouts = out, layouts
+        self._size = 0
+        self._offsets: list[tuple[Channel, int]] = []
 
     def write(self, time: int, *fields: Any) -> None:
-        if not self._places:
+        if not self._offsets:
             super().write(time, *fields)
-            self._lay_out()
+            self._compile_layout()
             return
         chunk = self._chunk
-        at = chunk.size
-        end = at + self._room
+        start = chunk.size
+        end = start + self._size
         if end > chunk.limit:
             super().write(time, *fields)
             return
-        self._pack(chunk.view, at, time, *fields)
+        self._pack(chunk.view, start, time, *fields)
         chunk.size = end
-        for channel, offset in self._places:
-            channel.entries += (time, at + offset)
+        for channel, offset in self._offsets:
+            channel.entries += (time, start + offset)
 
-    def _lay_out(self) -> None:
+    def _compile_layout(self) -> None:
         parts: list[bytes | Slot] = []
-        for topic, message in self._messages:
+        for topic, message in self._layouts:
             channel = self._publisher.channel(topic)
             parts += channel.record(message)
-            self._places.append((channel, self._room))
-            self._room += MESSAGE_HEADER_BYTES + len(message.buffer)
+            self._offsets.append((channel, self._size))
+            self._size += MESSAGE_HEADER_BYTES + len(message.buffer)
             self._chunk = channel.chunk
         self._pack = compile_writer(tuple(parts))
 
 
 class NamespacedPublisher:
-    """Takes the messages of one of several robots: its topics are in its namespace, as in Nav2's bringup of several.
+    """Publishes the messages of one of several robots in its namespace, as Nav2's bringup of several robots does.
 
-    There is one clock for all.
+    All robots share /clock.
     """
 
     def __init__(self, out: LogPublisher, robot: str) -> None:
         self._out, self._robot = out, robot
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """Take a message at `time` nanoseconds."""
-        self._out.publish(self._named(topic), time, data)
+        """Write a serialized message at `time` nanoseconds."""
+        self._out.publish(self._with_namespace(topic), time, data)
 
-    def line(self, topic: Topic) -> TopicWriter:
-        """For a topic on which much is written."""
-        return self._out.line(self._named(topic))
+    def topic_writer(self, topic: Topic) -> TopicWriter:
+        """Return a fast writer for a topic with many messages."""
+        return self._out.topic_writer(self._with_namespace(topic))
 
-    def together(self, messages: Layouts) -> BatchWriter:
-        """For messages of which much is written, always at one time, one behind the other."""
-        return self._out.together([(self._named(topic), message) for topic, message in messages])
+    def batch_writer(self, layouts: Layouts) -> BatchWriter:
+        """Return a fast writer for messages that are always published together."""
+        return self._out.batch_writer([(self._with_namespace(topic), message) for topic, message in layouts])
 
-    def settle(self) -> None:
-        """Nothing comes for a while."""
-        self._out.settle()
+    def flush_if_due(self) -> None:
+        """Write buffered messages to the file if there are enough."""
+        self._out.flush_if_due()
 
-    def _named(self, topic: Topic) -> Topic:
+    def _with_namespace(self, topic: Topic) -> Topic:
         return topic if topic == CLOCK else topic._replace(name=f"/{self._robot}{topic.name}")

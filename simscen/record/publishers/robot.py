@@ -1,26 +1,35 @@
-"""What happened once: /simscen/events, /rosout and /goal_pose."""
+"""Publishers for the moments of one robot: ground truth, decisions of the stack, events; with sensors and scene."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
 
 from simscen.core.environment.scenery import Scenery
 from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry.scripted_poses import PosesAtTick, PredictedPoses
 from simscen.core.messages.navigation import Belief
 from simscen.core.records.case import Case
 from simscen.core.records.events import Event, EventKind
-from simscen.core.records.trace import Decision, Moment
+from simscen.core.records.trace import Decision, Moment, Truth
 from simscen.record import frame_names, topics
 from simscen.record.frame_names import RobotFrames
 from simscen.record.log_header import LogHeader
 from simscen.record.messages import encode, encode_arrays, event_text
-from simscen.record.messages.encode_arrays import ParticleCloudPacker, PathPacker
-from simscen.record.publishers.channels import LogPublisher, MessageSink, NamespacedPublisher
+from simscen.record.messages.encode_arrays import (
+    Bytes,
+    ParticleCloudPacker,
+    PathPacker,
+    PrecomputedTransforms,
+    TransformsPacker,
+)
+from simscen.record.publishers.channels import BatchWriter, LogPublisher, MessageSink, NamespacedPublisher
 from simscen.record.publishers.scene import ScenePublisher
 from simscen.record.publishers.sensors import SensorPublisher
-from simscen.record.publishers.truth import TruthPublisher
 from simscen.record.simtime import SimTime
 from simscen.record.trace_thinning import Thinning, Throttle
 
 
 class EventPublisher:
-    """Writes events, for machines and for people; a goal that is accepted also as a pose."""
+    """Publishes events on /simscen/events (JSON) and /rosout (text), and accepted goals on /goal_pose."""
 
     def __init__(self, out: MessageSink, time: SimTime, case: Case) -> None:
         self._out, self._time = out, time
@@ -37,7 +46,7 @@ class EventPublisher:
             self._out.publish(topics.GOAL, now, self._goal(stamp, Pose3.planar(pose)))
 
     def _pose(self, event: Event) -> Pose2 | None:
-        """Where an accepted goal is: as the event says, else as the scenario does."""
+        """Return the pose of an accepted goal from the event, or else from the scenario."""
         x, y, yaw = (event.data.get(key) for key in ("x", "y", "yaw"))
         if isinstance(x, float) and isinstance(y, float):
             return Pose2(x, y, yaw if isinstance(yaw, float) else 0.0)
@@ -45,71 +54,70 @@ class EventPublisher:
 
 
 class RobotPublisher:
-    """Eats the moments of a robot in the order of their ticks, and writes them to `out`; the time only with `clock`."""
+    """Publishes the moments of a robot in the order of their ticks, and with `clock` also the time."""
 
     def __init__(
         self,
         out: LogPublisher | NamespacedPublisher,
         time: SimTime,
-        about: LogHeader,
+        header: LogHeader,
         scenery: Scenery,
         robot: str = "",
         clock: bool = True,
     ) -> None:
-        self._time, names = time, frame_names.RobotFrames(robot)
+        self._time, frames = time, RobotFrames(robot)
         self.thinning = thinning = Thinning(time.rate)
-        """What is kept; who keeps the same asks it, too."""
-        self.settle = out.settle
-        """To be called when nothing comes for a while."""
-        if about.map is not None:
-            out.publish(topics.MAP, 0, encode_arrays.occupancy_grid(frame_names.MAP, (0, 0), about.map))
-        if about.robot_description:
-            out.publish(topics.ROBOT_DESCRIPTION, 0, encode.string(about.robot_description))
-        self._truth = TruthPublisher(out, time, thinning, names, clock)
-        self._sensors = SensorPublisher(out, time, thinning, about.frames, about.sensors, names)
-        self._stack = StackPublisher(out, time, thinning, names)
-        self._events = EventPublisher(out, time, about.case)
-        self._scene = ScenePublisher(out, about.case, scenery, names, robot)
+        """Selects the samples to keep. The trace builder uses it, too."""
+        self.flush_if_due = out.flush_if_due
+        if header.map is not None:
+            out.publish(topics.MAP, 0, encode_arrays.occupancy_grid(frame_names.MAP, (0, 0), header.map))
+        if header.robot_description:
+            out.publish(topics.ROBOT_DESCRIPTION, 0, encode.string(header.robot_description))
+        self._truth = TruthPublisher(out, time, thinning, frames, clock)
+        self._sensors = SensorPublisher(out, time, thinning, header.frames, header.sensors, frames)
+        self._stack = StackPublisher(out, time, thinning, frames)
+        self._events = EventPublisher(out, time, header.case)
+        self._scene = ScenePublisher(out, header.case, scenery, frames, robot)
 
     def append(self, moment: Moment) -> None:
-        """Write one beat; every message of it carries the beat's simulated time."""
+        """Publish one moment. All its messages have the simulated time of the moment."""
         tick, decision = moment.tick, moment.decision
         now, truth = self._time.nanoseconds(tick), moment.truth
         if truth is not None:
             self._truth.write(now, tick, truth)
         if decision.belief is not None:
-            self._sensors.correct(Pose3.planar(decision.belief.map_from_odom))
+            self._sensors.set_map_from_odom(Pose3.planar(decision.belief.map_from_odom))
         for odometry in decision.odometry:
             self._sensors.write_filtered(now, odometry)
         self._sensors.write(now, moment.readings)
         self._stack.write(now, tick, decision)
-        if moment.events or not self._scene.begun:
+        if moment.events or not self._scene.has_published:
             self._scene.write(now, moment.events)
         if moment.events or decision.events:
             for event in (*moment.events, *decision.events):
                 self._events.write(now, event)
 
 
-PARTICLE_RATE_HZ = 2  # a cloud of 500 is 32 kB, a third of what all other topics say in a second
-POSE_ARRAY_RATE_HZ, MAX_ARRAY_POSES = 1, 200  # the same for the eye, to which 32-bit numbers are enough
-LOCAL_PLAN_RATE_HZ = 5  # only for the eye
+PARTICLE_RATE_HZ = 2  # a cloud of 500 particles has 32 kB, a third of all other messages of a second
+POSE_ARRAY_RATE_HZ, MAX_ARRAY_POSES = 1, 200  # for viewers only
+LOCAL_PLAN_RATE_HZ = 5  # for viewers only
 
 
 class StackPublisher:
-    """Writes decisions."""
+    """Publishes the decisions of a stack: beliefs, plans, costmaps, commands and log lines."""
 
-    def __init__(self, out: MessageSink, time: SimTime, thinning: Thinning, names: RobotFrames) -> None:
-        self._out, self._time, self._thinning, self._names = out, time, thinning, names
+    def __init__(self, out: MessageSink, time: SimTime, thinning: Thinning, frames: RobotFrames) -> None:
+        self._out, self._time, self._thinning, self._frames = out, time, thinning, frames
         self._particles = ParticleCloudPacker(frame_names.MAP)
         self._path = PathPacker(frame_names.MAP)
-        self._command = out.together([(topics.COMMAND, encode.twist())])
-        self._belief = out.together([(topics.BELIEF, encode.pose_with_covariance(frame_names.MAP))])
+        self._command = out.batch_writer([(topics.COMMAND, encode.twist())])
+        self._belief = out.batch_writer([(topics.BELIEF, encode.pose_with_covariance(frame_names.MAP))])
         self._particle_times = Throttle(time.rate, PARTICLE_RATE_HZ)
         self._poses_times = Throttle(time.rate, POSE_ARRAY_RATE_HZ)
         self._local_plan_times = Throttle(time.rate, LOCAL_PLAN_RATE_HZ)
 
     def write(self, now: int, tick: int, decision: Decision) -> None:
-        """Write the decision of `tick`, which is at `now` nanoseconds."""
+        """Publish the decision of `tick`, which is at `now` nanoseconds."""
         if decision.belief is not None:
             self._write_belief(now, tick, decision.belief)
         if decision.plan is not None:
@@ -120,10 +128,8 @@ class StackPublisher:
             self._out.publish(topics.LOCAL_PLAN, now, self._path(stamp, decision.local_plan.points))
         for costmap in decision.costmaps:
             topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
-            stamp = self._time.stamp(tick)
-            self._out.publish(
-                topic, now, encode_arrays.occupancy_grid(self._names.of(costmap.frame), stamp, costmap.grid)
-            )
+            stamp, frame = self._time.stamp(tick), self._frames.log_frame(costmap.frame)
+            self._out.publish(topic, now, encode_arrays.occupancy_grid(frame, stamp, costmap.grid))
         if self._thinning.keeps_command(tick, decision.command):
             self._command.write(now, decision.command)
         for line in decision.lines:
@@ -138,3 +144,70 @@ class StackPublisher:
         if len(belief.particles) and self._poses_times.passes(tick):
             some = belief.particles[:: -(-len(belief.particles) // MAX_ARRAY_POSES)]
             self._out.publish(topics.PARTICLE_POSES, now, encode_arrays.pose_array(frame_names.MAP, stamp, some))
+
+
+MAX_LAYOUTS = 16
+"""Maximum number of sets of moving objects with a precomputed layout. Most runs have few such sets."""
+
+
+class TruthPublisher:
+    """Publishes ground truth and clearance, the poses of robot and moving objects on /tf, and with `clock` the time."""
+
+    def __init__(
+        self, out: MessageSink, time: SimTime, thinning: Thinning, frames: RobotFrames, clock: bool = True
+    ) -> None:
+        self._out, self._time, self._thinning, self._frame = out, time, thinning, frames.truth
+        truth = (topics.TRUTH, encode.odometry(frame_names.MAP, frames.truth)), (topics.CLEARANCE, encode.float64())
+        self._always = ((topics.CLOCK, encode.clock()), *truth) if clock else truth
+        self._without_tf = out.batch_writer(self._always)
+        self._layouts: dict[tuple[str, ...], BatchWriter] = {}
+        self._pack_transforms, self._tf_writer = TransformsPacker(), out.topic_writer(topics.TF)
+        self._precomputed: _PrecomputedBatch | None = None
+
+    def write(self, now: int, tick: int, truth: Truth) -> None:
+        """Publish the sample of `tick`, which is at `now` nanoseconds."""
+        moved = self._thinning.moved(tick, truth) if truth.objects else {}
+        stamp, fields = self._time.stamp(tick), (truth.pose, truth.twist, truth.clearance)
+        if type(moved) is PosesAtTick:
+            batch = self._precomputed
+            if batch is None or batch.predicted is not moved.predicted:
+                batch = self._precomputed = self._precompute(moved.predicted)
+            batch.layout.write(now, stamp, *fields, batch.packed[moved.row].tobytes())
+            return
+        names = tuple(moved)
+        layout = self._layouts.get(names)
+        if layout is None and len(self._layouts) < MAX_LAYOUTS:
+            layout = self._layouts[names] = self._layout(names)
+        if layout is not None:
+            layout.write(now, stamp, *fields, *moved.values())
+            return
+        self._without_tf.write(now, stamp, *fields)
+        links = [(frame_names.MAP, frame_names.object_frame(name), stamp, pose) for name, pose in moved.items()]
+        self._tf_writer.write(now, self._pack_transforms([(frame_names.MAP, self._frame, stamp, truth.pose), *links]))
+
+    def _precompute(self, predicted: PredictedPoses) -> "_PrecomputedBatch":
+        """Serialize the transforms of all objects for all ticks of a prediction."""
+        previous, names = self._precomputed, predicted.names
+        if previous is not None and previous.predicted.names == names:
+            transforms, layout = previous.transforms, previous.layout
+        else:
+            transforms = PrecomputedTransforms([(frame_names.MAP, frame_names.object_frame(name)) for name in names])
+            tf = encode.transforms([(frame_names.MAP, self._frame, "pose")], len(names), transforms.size)
+            layout = self._out.batch_writer((*self._always, (topics.TF, tf)))
+        stamps = [self._time.stamp(tick) for tick in predicted.ticks]
+        return _PrecomputedBatch(predicted, transforms, layout, transforms(stamps, predicted.table))
+
+    def _layout(self, moved: Iterable[str]) -> BatchWriter:
+        """Return a writer for the messages with the poses of the robot and of these objects on /tf."""
+        links = [(frame_names.MAP, frame_names.object_frame(name), f"object{k}") for k, name in enumerate(moved)]
+        tf = encode.transforms([(frame_names.MAP, self._frame, "pose"), *links])
+        return self._out.batch_writer((*self._always, (topics.TF, tf)))
+
+
+class _PrecomputedBatch(NamedTuple):
+    """Messages for objects whose poses are known in advance; `packed` are the transforms of each tick."""
+
+    predicted: PredictedPoses
+    transforms: PrecomputedTransforms
+    layout: BatchWriter
+    packed: Bytes

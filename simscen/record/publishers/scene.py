@@ -1,4 +1,4 @@
-"""visualization_msgs/msg/MarkerArray: what a 3D viewer draws, each with the frame that it moves with."""
+"""Publisher of markers for 3D viewers: objects, footprints, zones, ramps and places."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -17,15 +17,16 @@ from simscen.record.messages.cdr import Template
 from simscen.record.publishers.channels import MessageSink
 
 Color = tuple[float, float, float, float]
-"""Red, green, blue and opacity, 0 … 1."""
+"""Red, green, blue and opacity, 0 to 1."""
 ARROW, LINE_LIST, TEXT, TRIANGLE_LIST = 0, 5, 9, 11
 _ADD, _DELETE_ALL = 0, 3
 
 
 class Marker(NamedTuple):
-    """One shape: `group` is its namespace, which viewers show and hide by name; `scale` in meters as ROS has it.
+    """One shape of visualization_msgs/msg/Marker.
 
-    `points` (n, 3) are in the frame of `pose`, which is in `frame`.
+    `group` is its namespace, which viewers can show and hide. `scale` is in meters. `pose` is in `frame`, and `points`
+    (n, 3) are relative to `pose`.
     """
 
     frame: str
@@ -39,9 +40,9 @@ class Marker(NamedTuple):
 
 
 def marker_array(markers: Iterable[Marker]) -> bytes:
-    """The message that takes the place of all that its topic said before: who comes late needs the last one only.
+    """Return a visualization_msgs/msg/MarkerArray that replaces all previous markers of its topic.
 
-    Stamps are zero and frames locked: each marker goes where its frame goes, however long ago it was said.
+    Stamps are zero and frames locked, so that each marker moves with its frame.
     """
     shown = list(markers)
     message = Template()
@@ -60,18 +61,18 @@ def _put(message: Template, marker: Marker, number: int, action: int) -> None:
     message.put("7d", *marker.pose)
     message.put("3d", *marker.scale)
     message.put("4f", *marker.color)
-    message.put("iI", 0, 0)  # it stays
+    message.put("iI", 0, 0)  # lifetime: forever
     message.put("B", True)
     message.put("I", len(marker.points))
     if len(marker.points):
         message.align(8)
         message.buffer += np.ascontiguousarray(marker.points, dtype="<f8").tobytes()
-    message.put("I", 0)  # no colors of single points
+    message.put("I", 0)  # no colors per point
     message.string("")  # no texture
     message.put("iI", 0, 0)
     for _ in ("frame", "format"):
         message.string("")
-    message.put("2I", 0, 0)  # no image, no coordinates in it
+    message.put("2I", 0, 0)  # no texture image and coordinates
     message.string(marker.text)
     message.string("")  # no mesh
     message.string("")
@@ -80,13 +81,13 @@ def _put(message: Template, marker: Marker, number: int, action: int) -> None:
 
 
 def outline_edges(outlines: Iterable[Sequence[Sequence[float]]], height: float = 0.0) -> Array:
-    """The edges of polygons as the points (n, 3) of a LINE_LIST."""
+    """Return the edges of polygons as points (n, 3) of a LINE_LIST."""
     edges = [edge for outline in outlines for edge in _edges(np.array(outline, dtype=np.float64), height)]
     return np.concatenate(edges) if edges else np.empty((0, 3))
 
 
 def rectangle_triangles(corners: Array, height: float = 0.0) -> Array:
-    """Rectangles (n, 4) of least x and y and greatest x and y as the points (6n, 3) of a TRIANGLE_LIST."""
+    """Return rectangles (n, 4) min x, min y, max x, max y as points (6n, 3) of a TRIANGLE_LIST."""
     points = np.full((len(corners), 6, 3), height)
     points[:, :, :2] = corners[:, [[0, 1], [2, 1], [2, 3], [0, 1], [2, 3], [0, 3]]]
     return points.reshape(-1, 3)
@@ -106,65 +107,65 @@ PLACE_COLOR: Color = (0.44, 0.45, 0.49, 1.0)
 RAMP_COLOR: Color = (0.66, 0.58, 0.43, 1.0)
 TRUTH_COLOR: Color = (0.0, 0.44, 0.34, 1.0)
 BELIEF_COLOR: Color = (0.8, 0.2, 0.5, 1.0)
-"""Okabe and Ito's hues, as on pages and pictures."""
+"""The colors of Okabe and Ito, as on pages and pictures."""
 LINE_SCALE, TEXT_SCALE = (0.03, 0.0, 0.0), (0.0, 0.0, 0.25)
-"""Scales: the width of a line and the height of letters in m."""
+"""Scales in m: width of lines and height of letters."""
 MAX_MASK_BLOCKS = 2000
-"""Blocks of a filter mask that are drawn; the largest come first."""
-_MARKER_HEIGHT_M = 0.02  # over the floor, so that the map does not hide it
+"""Maximum number of blocks of a filter mask to draw, the largest first."""
+_MARKER_HEIGHT_M = 0.02  # above the floor, so that the map does not hide markers
 _TEXT_POSE = Pose3(0.0, 0.0, 0.5)
 
 
 class ScenePublisher:
-    """Writes all that is there to be seen when anything of it has changed; where things are is told by /tf."""
+    """Publishes all markers whenever one of them changes. Poses of moving objects are on /tf."""
 
-    def __init__(self, out: MessageSink, case: Case, scenery: Scenery, names: RobotFrames, robot: str) -> None:
-        self._out, self._case, self._names, self._robot, self._scenery = out, case, names, robot, scenery
+    def __init__(self, out: MessageSink, case: Case, scenery: Scenery, frames: RobotFrames, robot: str) -> None:
+        self._out, self._case, self._frames, self._robot, self._scenery = out, case, frames, robot, scenery
         self._doors = {thing.name for thing in scenery.things if thing.closed is not None}
-        self._things: dict[str, Event] = {}
-        own = (zone for zone in scenery.zones if zone.robot == robot)
-        self._zones: dict[tuple[str, str], FilterZone] = {(zone.filter, zone.region): zone for zone in own}
-        self.begun = False
-        """Whether anything was written; from then on it need be told only of beats in which something happened."""
+        self._spawned: dict[str, Event] = {}
+        own_zones = (zone for zone in scenery.zones if zone.robot == robot)
+        self._zones: dict[tuple[str, str], FilterZone] = {(zone.filter, zone.region): zone for zone in own_zones}
+        self.has_published = False
+        """Afterwards, `write` must be called only for ticks with events."""
 
     def write(self, now: int, events: Sequence[Event]) -> None:
-        """Take in what happened in a beat, at `now` nanoseconds."""
-        came = [self._change_things(event) for event in events]
-        switched = [self._switch(event) for event in events]
-        if any(came) or not self.begun:
-            self._out.publish(topics.THINGS, now, marker_array(self._shown_things()))
-        if any(switched) or not self.begun:
-            self._out.publish(topics.SCENE, now, marker_array(self._shown_scene()))
-        self.begun = True
+        """Update the markers after events, and publish them at `now` nanoseconds if they have changed."""
+        objects_changed = [self._update_objects(event) for event in events]
+        zones_changed = [self._update_zones(event) for event in events]
+        if any(objects_changed) or not self.has_published:
+            self._out.publish(topics.THINGS, now, marker_array(self._object_markers()))
+        if any(zones_changed) or not self.has_published:
+            self._out.publish(topics.SCENE, now, marker_array(self._scene_markers()))
+        self.has_published = True
 
-    def _change_things(self, event: Event) -> bool:
+    def _update_objects(self, event: Event) -> bool:
         if event.kind == EventKind.OBJECT_SPAWNED:
-            self._things[event.name] = event
+            self._spawned[event.name] = event
             return True
-        return event.kind == EventKind.OBJECT_REMOVED and self._things.pop(event.name, None) is not None
+        return event.kind == EventKind.OBJECT_REMOVED and self._spawned.pop(event.name, None) is not None
 
-    def _switch(self, event: Event) -> bool:
+    def _update_zones(self, event: Event) -> bool:
         if event.kind != EventKind.ZONE_SWITCHED:
             return False
-        what: Filter = "speed" if event.data.get("filter") == "speed" else "keepout"
-        known = self._known(what, event.name)
+        filter_: Filter = "speed" if event.data.get("filter") == "speed" else "keepout"
+        zone = self._find_zone(filter_, event.name)
         limit = event.data.get("speed_limit", 0.0)
         if not event.data.get("enabled"):
-            self._zones.pop((what, event.name), None)
-        elif known is not None:
-            self._zones[what, event.name] = replace(known, speed_limit=limit if isinstance(limit, float) else 0.0)
+            self._zones.pop((filter_, event.name), None)
+        elif zone is not None:
+            self._zones[filter_, event.name] = replace(zone, speed_limit=limit if isinstance(limit, float) else 0.0)
         return True
 
-    def _known(self, what: Filter, region: str) -> FilterZone | None:
-        """A zone as it was at the start, or one of a region that was none."""
+    def _find_zone(self, filter_: Filter, region: str) -> FilterZone | None:
+        """Return a zone from the start of the run, or a new one for a region."""
         for zone in self._scenery.zones:
-            if (zone.filter, zone.region, zone.robot) == (what, region, self._robot):
+            if (zone.filter, zone.region, zone.robot) == (filter_, region, self._robot):
                 return zone
         outline = self._case.regions.get(region)
-        return FilterZone(what, region, outline) if outline else None
+        return FilterZone(filter_, region, outline) if outline else None
 
-    def _shown_things(self) -> Iterator[Marker]:
-        for name, event in self._things.items():
+    def _object_markers(self) -> Iterator[Marker]:
+        for name, event in self._spawned.items():
             group, color = "things", OBJECT_COLOR
             if event.data.get("person"):
                 group, color = "people", PERSON_COLOR
@@ -172,25 +173,15 @@ class ScenePublisher:
                 group, color = "doors", DOOR_COLOR
             frame = frame_names.object_frame(name)
             if outlines := _outlines(event):
-                yield Marker(
-                    frame, group, LINE_LIST, color, LINE_SCALE, points=outline_edges(outlines, _MARKER_HEIGHT_M)
-                )
+                edges = outline_edges(outlines, _MARKER_HEIGHT_M)
+                yield Marker(frame, group, LINE_LIST, color, LINE_SCALE, points=edges)
             yield Marker(frame, "names", TEXT, color, TEXT_SCALE, _TEXT_POSE, text=name)
 
-    def _shown_scene(self) -> Iterator[Marker]:
-        for frame, group, color in (
-            (self._names.truth, "footprint", TRUTH_COLOR),
-            (self._names.base, "believed footprint", BELIEF_COLOR),
-        ):
-            if self._case.footprint:
-                yield Marker(
-                    frame,
-                    group,
-                    LINE_LIST,
-                    color,
-                    LINE_SCALE,
-                    points=outline_edges([self._case.footprint], _MARKER_HEIGHT_M),
-                )
+    def _scene_markers(self) -> Iterator[Marker]:
+        if self._case.footprint:
+            edges, frames = outline_edges([self._case.footprint], _MARKER_HEIGHT_M), self._frames
+            yield Marker(frames.truth, "footprint", LINE_LIST, TRUTH_COLOR, LINE_SCALE, points=edges)
+            yield Marker(frames.base, "believed footprint", LINE_LIST, BELIEF_COLOR, LINE_SCALE, points=edges)
         for zone in self._zones.values():
             yield from _zone_markers(zone)
         for ground in self._scenery.ground:
@@ -198,42 +189,38 @@ class ScenePublisher:
             yield Marker(frame_names.MAP, "ramps", LINE_LIST, RAMP_COLOR, LINE_SCALE, points=outline)
         for name, place in self._scenery.places.items():
             yield Marker(frame_names.MAP, "places", ARROW, PLACE_COLOR, (0.4, 0.06, 0.06), Pose3.planar(place))
-            yield Marker(
-                frame_names.MAP, "places", TEXT, PLACE_COLOR, TEXT_SCALE, Pose3(place.x, place.y, 0.3), text=name
-            )
+            above = Pose3(place.x, place.y, 0.3)
+            yield Marker(frame_names.MAP, "places", TEXT, PLACE_COLOR, TEXT_SCALE, above, text=name)
 
 
 def _outlines(event: Event) -> list[list[tuple[float, float]]]:
-    """The parts that an object.spawned event tells; those that are no polygons, as plug-ins may tell, are left out."""
+    """Return the outlines in an object.spawned event, without those of plug-ins that are not polygons."""
     parts = event.data.get("parts")
-    read = [_corners(part) for part in parts] if isinstance(parts, list) else []
-    return [corners for corners in read if len(corners) > 2]
+    outlines = [_corners(part) for part in parts] if isinstance(parts, list) else []
+    return [corners for corners in outlines if len(corners) > 2]
 
 
 def _corners(part: Value) -> list[tuple[float, float]]:
-    found = []
+    corners = []
     for corner in part if isinstance(part, list) else []:
         match corner:
             case [int() | float() as x, int() | float() as y]:
-                found.append((float(x), float(y)))
-    return found
+                corners.append((float(x), float(y)))
+    return corners
 
 
 def _zone_markers(zone: FilterZone) -> Iterator[Marker]:
     keepout = zone.filter == "keepout"
     group, color = f"{zone.filter} zones", KEEPOUT_COLOR if keepout else SPEED_COLOR
-    told = zone.region if keepout or not zone.speed_limit else f"{zone.region}: {zone.speed_limit:g} m/s"
+    text = zone.region if keepout or not zone.speed_limit else f"{zone.region}: {zone.speed_limit:g} m/s"
     if zone.outline:
-        yield Marker(
-            frame_names.MAP, group, LINE_LIST, color, LINE_SCALE, points=outline_edges([zone.outline], _MARKER_HEIGHT_M)
-        )
+        edges = outline_edges([zone.outline], _MARKER_HEIGHT_M)
+        yield Marker(frame_names.MAP, group, LINE_LIST, color, LINE_SCALE, points=edges)
         x, y = np.mean(zone.outline, axis=0).tolist()
-        yield Marker(frame_names.MAP, group, TEXT, color, TEXT_SCALE, Pose3(x, y, 0.3), text=told)
+        yield Marker(frame_names.MAP, group, TEXT, color, TEXT_SCALE, Pose3(x, y, 0.3), text=text)
     if zone.cells is not None:
         blocks = sorted(zone.cells.blocks, key=lambda block: -block[2] * block[3])[:MAX_MASK_BLOCKS]
         corners = np.array([(c, r, c + w, r + h) for c, r, w, h, _ in blocks], dtype=np.float64).reshape(-1, 4)
-        points, pose = (
-            rectangle_triangles(corners * zone.cells.resolution, _MARKER_HEIGHT_M),
-            Pose3.planar(zone.cells.origin),
-        )
+        points = rectangle_triangles(corners * zone.cells.resolution, _MARKER_HEIGHT_M)
+        pose = Pose3.planar(zone.cells.origin)
         yield Marker(frame_names.MAP, group, TRIANGLE_LIST, (*color[:3], 0.35), (1.0, 1.0, 1.0), pose, points)

@@ -1,4 +1,4 @@
-"""Goals and what came of each: reached, failed with which code, canceled, or never tried."""
+"""Goals, faults, events, collisions and violations on a run picture."""
 
 import math
 from collections.abc import Iterator
@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.messages.goal_names import matches_goal_name
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.navigation import Goal, matches_goal_name
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.verdict import Status
 from simscen.judge.finding_text import comparison, subject
@@ -23,15 +22,15 @@ _ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, E
 
 @dataclass(frozen=True)
 class GoalOutcome:
-    """What came of a goal, in a word, its color, and what its label says of it."""
+    """Outcome of a goal as a word, its color, and a text for the label."""
 
     word: str
     color: Color
-    told: str = ""
+    text: str = ""
 
 
 def error_code_text(event: Event) -> str:
-    """An error in Nav2's words: "NO_VALID_PATH (208)"; "" where the event names none."""
+    """Return the error of Nav2 in an event, for example "NO_VALID_PATH (208)", or ""."""
     name, code = event.data.get("error_name"), event.data.get("error_code")
     if not name or name == "NONE":
         return ""
@@ -39,62 +38,60 @@ def error_code_text(event: Event) -> str:
 
 
 def goal_outcome(goal: Goal, scene: Scene) -> GoalOutcome:
-    """What the robot said of a goal; one that it claims to have reached and a criterion denies is failed."""
+    """Return the outcome of a goal. It has failed if the robot reports success, but the criterion is violated."""
     ends = [event for event in scene.trace.of_kind(*_ENDS) if event.name == goal.name]
     if not ends:
-        begun = any(event.name == goal.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED))
-        return (
-            GoalOutcome("not reached", palette.AMBER, "not reached")
-            if begun
-            else GoalOutcome("not tried", palette.GRAY, "not tried")
-        )
+        if any(event.name == goal.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)):
+            return GoalOutcome("not reached", palette.AMBER, "not reached")
+        return GoalOutcome("not tried", palette.GRAY, "not tried")
     match ends[-1].kind:
         case EventKind.GOAL_FAILED:
             expected = "as expected" if goal.name in scene.case.expected else ""
-            told = ", ".join(part for part in (f"failed {expected}".strip(), error_code_text(ends[-1])) if part)
-            return GoalOutcome("failed", palette.AMBER if expected else palette.RED, told)
+            text = ", ".join(part for part in (f"failed {expected}".strip(), error_code_text(ends[-1])) if part)
+            return GoalOutcome("failed", palette.AMBER if expected else palette.RED, text)
         case EventKind.GOAL_CANCELED:
             return GoalOutcome("canceled", palette.GRAY, "canceled")
         case _:
-            denied = _denied(goal, scene)
-            return GoalOutcome("failed", palette.RED, "not there") if denied else GoalOutcome("reached", palette.GREEN)
+            if _is_false_success(goal, scene):
+                return GoalOutcome("failed", palette.RED, "not there")
+            return GoalOutcome("reached", palette.GREEN)
 
 
-def _denied(goal: Goal, scene: Scene) -> bool:
+def _is_false_success(goal: Goal, scene: Scene) -> bool:
     findings = [f for v in scene.result.verdicts if v.criterion == "goals_reached" for f in v.findings]
     return any(f.status is Status.FAIL and f.what.endswith(f"goal {goal.name}") for f in findings)
 
 
 def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Each goal: its tolerance as a ring, its heading, its name, and what came of it."""
+    """Draw each goal with its tolerance as a ring, heading, name, and outcome."""
     sent = {event.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)}
     goals = [goal for goal in scene.case.every_goal if goal.name in sent or goal not in scene.case.sent]
     names: dict[tuple[float, float], list[str]] = {}
     for goal in goals:
-        fate = goal_outcome(goal, scene)
+        outcome = goal_outcome(goal, scene)
         there = names.setdefault((goal.pose.x, goal.pose.y), [])
         known = any(matches_goal_name(goal.name, other.partition(":")[0]) for other in there)
-        if not known or fate.told:  # the second loop comes to the same place
-            there.append(f"{goal.name}: {fate.told}" if fate.told else goal.name)
+        if not known or outcome.text:  # goals of a second loop have the same position
+            there.append(f"{goal.name}: {outcome.text}" if outcome.text else goal.name)
     for goal in goals:
-        fate = goal_outcome(goal, scene)
+        outcome = goal_outcome(goal, scene)
         x, y, yaw = goal.pose
         reach = max(goal.xy_tolerance * canvas.scale, 5.0)
-        hollow = fate.word in ("not tried", "canceled")
-        canvas.disc(x, y, reach, None if hollow else (*fate.color, 46), fate.color, 1.8, busy=True)
+        hollow = outcome.word in ("not tried", "canceled")
+        canvas.disc(x, y, reach, None if hollow else (*outcome.color, 46), outcome.color, 1.8, busy=True)
         tip = (reach + 10) / canvas.scale
         heading = np.array([(x, y), (x + tip * math.cos(yaw), y + tip * math.sin(yaw))])
-        canvas.line(heading, fate.color, 2.2, busy=True)
-        if fate.word == "failed":
+        canvas.line(heading, outcome.color, 2.2, busy=True)
+        if outcome.word == "failed":
             bar = 0.72 * reach / canvas.scale
             for dy in (bar, -bar):
-                canvas.line(np.array([(x - bar, y - dy), (x + bar, y + dy)]), fate.color, 2.0)
+                canvas.line(np.array([(x - bar, y - dy), (x + bar, y + dy)]), outcome.color, 2.0)
         else:
-            canvas.disc(x, y, 2.6, fate.color)
-        canvas.tell(f"goal {scene.called(goal.name)} {fate.word}", heading)
-        if told := names.pop((x, y), None):
+            canvas.disc(x, y, 2.6, outcome.color)
+        canvas.add_part(f"goal {scene.label(goal.name)} {outcome.word}", heading)
+        if texts := names.pop((x, y), None):
             rim = max(reach, 8.0)
-            yield Label(1, x, y, printable(scene.called(", ".join(told))), fate.color, 14, rim)
+            yield Label(1, x, y, printable(scene.label(", ".join(texts))), outcome.color, 14, rim)
 
 
 _STAR = [(r * math.cos(a), r * math.sin(a)) for k in range(16) for r, a in [((16, 7)[k % 2], k * math.pi / 8)]]
@@ -106,31 +103,31 @@ _DIAMOND = [(0, -6), (6, 0), (0, 6), (-6, 0)]
 
 
 def draw_fault_bands(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """A broad band under the way where a fault was on."""
-    for begun, ended, name in _faults(scene):
+    """Draw a wide band under the path where a fault was active."""
+    for start, ended, name in _faults(scene):
         for piece in driven_segments(scene):
-            on = (piece.ticks >= begun) & (piece.ticks <= ended)
+            on = (piece.ticks >= start) & (piece.ticks <= ended)
             canvas.line(piece.values[on, :2], palette.FAULTY, 11.0)
             if on.any():
-                canvas.tell(f"fault {scene.called(name)}", piece.values[on][[0, -1], :2])
+                canvas.add_part(f"fault {scene.label(name)}", piece.values[on][[0, -1], :2])
     yield from ()
 
 
 def draw_faults(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """A bolt where the robot was when a fault began, a gray one where it was when that was over."""
+    """Draw a bolt where the robot was when a fault started, and a gray one for its end."""
     trace = scene.trace
-    for begun, ended, name in _faults(scene):
-        ends = [(begun, f"{name} from", palette.AMBER), (ended, f"{name} over,", palette.FAINT_INK)]
-        for tick, told, color in ends if ended < trace.end else ends[:1]:
+    for start, ended, name in _faults(scene):
+        ends = [(start, f"{name} from", palette.AMBER), (ended, f"{name} over,", palette.FAINT_INK)]
+        for tick, text, color in ends if ended < trace.end else ends[:1]:
             x, y = trace.place(tick)
             canvas.disc(x, y, 11, (255, 255, 255, 225), color, 1.4, busy=True)
-            canvas.sign(x, y, _BOLT, color)
-            text = printable(scene.called(f"{told} {trace.seconds(tick):.1f} s"))
-            yield Label(2, x, y, text, palette.AMBER, 12, 12.0)
+            canvas.symbol(x, y, _BOLT, color)
+            label = printable(scene.label(f"{text} {trace.seconds(tick):.1f} s"))
+            yield Label(2, x, y, label, palette.AMBER, 12, 12.0)
 
 
 def _faults(scene: Scene) -> list[tuple[int, int, str]]:
-    """When each fault began and ended, and its name."""
+    """Return the start tick, end tick and name of each fault."""
     ended = list(scene.trace.of_kind(EventKind.FAULT_ENDED))
     found = []
     for event in scene.trace.of_kind(EventKind.FAULT_STARTED):
@@ -142,63 +139,63 @@ def _faults(scene: Scene) -> list[tuple[int, int, str]]:
 
 
 def draw_events(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """A diamond where the robot was when an event of the scenario began, and where it got a new goal."""
+    """Draw a diamond where the robot was when an event of the scenario started or a new goal arrived."""
     trace = scene.trace
-    told = [(event.tick, event.name) for event in trace.of_kind(EventKind.EVENT_STARTED) if event.name]
+    events = [(event.tick, event.name) for event in trace.of_kind(EventKind.EVENT_STARTED) if event.name]
     sent = {goal.name for goal in scene.case.sent}
-    told += [(e.tick, f"new goal {e.name}") for e in trace.of_kind(EventKind.GOAL_ACCEPTED) if e.name in sent]
-    for tick, name in told:
+    events += [(e.tick, f"new goal {e.name}") for e in trace.of_kind(EventKind.GOAL_ACCEPTED) if e.name in sent]
+    for tick, name in events:
         x, y = trace.place(tick)
-        canvas.sign(x, y, _DIAMOND, palette.INK)
-        canvas.tell(f"event {scene.called(name)}", [(x, y)])
-        yield Label(3, x, y, printable(scene.called(f"{name}, {trace.seconds(tick):.1f} s")), palette.INK, 12, 7.0)
+        canvas.symbol(x, y, _DIAMOND, palette.INK)
+        canvas.add_part(f"event {scene.label(name)}", [(x, y)])
+        yield Label(3, x, y, printable(scene.label(f"{name}, {trace.seconds(tick):.1f} s")), palette.INK, 12, 7.0)
 
 
 def draw_marks(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """A flag with its name where the robot was when an event set a mark."""
+    """Draw a flag where the robot was when an event set a mark."""
     for event in scene.trace.of_kind(EventKind.MARK):
         x, y = scene.trace.place(event.tick)
-        canvas.sign(x, y, _FLAG, palette.AMBER)
-        canvas.tell(f"mark {scene.called(event.name)}", [(x, y)])
+        canvas.symbol(x, y, _FLAG, palette.AMBER)
+        canvas.add_part(f"mark {scene.label(event.name)}", [(x, y)])
         yield Label(3, x, y, printable(event.name), palette.AMBER, 12, 10.0)
 
 
 def draw_collisions(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """A star at every contact."""
+    """Draw a star at each collision."""
     for event in scene.trace.of_kind(EventKind.COLLISION_STARTED):
         x, y = event.data.get("x"), event.data.get("y")
         if not isinstance(x, int | float) or not isinstance(y, int | float):
             x, y = scene.trace.place(event.tick)
-        canvas.sign(float(x), float(y), _STAR, palette.RED)
-        canvas.tell(f"collision {scene.called(event.name)}", [(x, y)])
+        canvas.symbol(float(x), float(y), _STAR, palette.RED)
+        canvas.add_part(f"collision {scene.label(event.name)}", [(x, y)])
     yield from ()
 
 
 def draw_violations(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """A cross in a circle where each criterion failed, with what it says."""
+    """Draw a cross where each criterion was violated, with the finding."""
     for verdict in scene.result.verdicts:
         finding = verdict.tightest
         if verdict.status is Status.PASS or finding is None or finding.place is None:
             continue
         x, y = finding.place
         canvas.disc(x, y, 10, (255, 255, 255, 215), palette.RED, 2.0, busy=True)
-        canvas.sign(x, y, _CROSS, palette.RED)
-        canvas.tell(f"violation {verdict.id}", [(x, y)])
+        canvas.symbol(x, y, _CROSS, palette.RED)
+        canvas.add_part(f"violation {verdict.id}", [(x, y)])
         text = _truncate(printable(f"{subject(verdict, finding)}: {comparison(finding)}"))
         yield Label(0, x, y, text, palette.PAGE, 12, 11.0, palette.RED)
 
 
 def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Named places that are no goals: a small diamond and the name."""
+    """Draw a small diamond with the name for each place that is not a goal."""
     goals = [goal.pose for robot in scene.each for goal in robot.case.every_goal]
     taken = {(round(pose.x, 3), round(pose.y, 3)) for pose in goals}
     for name, pose in sorted(scene.scenery.places.items()):
         if (round(pose.x, 3), round(pose.y, 3)) not in taken and canvas.shows(pose.x, pose.y):
-            canvas.sign(pose.x, pose.y, [(0, -4), (4, 0), (0, 4), (-4, 0)], palette.PLACE)
-            canvas.tell(f"place {name}", np.array([(pose.x, pose.y)]))
-            yield Label(9, pose.x, pose.y, printable(name), palette.FAINT_INK, 11, 5.0, spare=True)
+            canvas.symbol(pose.x, pose.y, [(0, -4), (4, 0), (0, 4), (-4, 0)], palette.PLACE)
+            canvas.add_part(f"place {name}", np.array([(pose.x, pose.y)]))
+            yield Label(9, pose.x, pose.y, printable(name), palette.FAINT_INK, 11, 5.0, optional=True)
 
 
 def _truncate(text: str, limit: int = 60) -> str:
-    """The beginning of a text; the whole of it is beside the map."""
+    """Truncate a text. The sidebar has the whole text."""
     return text if len(text) <= limit else f"{text[: limit - 1].rstrip()}…"

@@ -1,4 +1,4 @@
-"""Names beside what they name: where they cover no way, no robot, no goal and no other name."""
+"""Placement of labels next to their objects such that they cover no path, robot, goal, or other label."""
 
 import math
 from dataclasses import dataclass
@@ -11,21 +11,22 @@ from simscen.report.picture.canvas import LABEL_CELL_PX, Canvas, TextItem, text_
 from simscen.report.picture.palette import Color
 
 _DISTANCES_PX = (4.0, 12.0, 22.0, 36.0, 54.0, 76.0, 104.0, 140.0)
-"""Pixels between a mark's rim and its label, in the order in which they are tried."""
+"""Distances between an object and its label, in the order in which they are tried."""
 _ANGLES = tuple(math.radians(degrees) for degrees in (0, 180, 90, 270, 30, 150, 330, 210, 60, 120, 300, 240))
 _LEADER_DISTANCE_PX = 16.0
-"""Pixels from which on a line leads from the label to its mark."""
+"""Distance from which a line connects the label with its object."""
 _WALL_WEIGHT, _FAR_WEIGHT = 0.25, 0.0015
-"""What a label over walls, and each pixel of distance, count against one over a way."""
+"""Costs of covering walls, and of each pixel of distance, relative to covering a path."""
 _MAX_COVERED_SHARE = 0.2
-"""Share of a label that may be over something; beyond it a label that can be missed is left out."""
+"""Maximum cost of an optional label; more expensive ones are omitted."""
 
 
 @dataclass(frozen=True)
 class Label:
-    """Text for a mark at (x, y) in meters whose rim is `rim` pixels away; `plate` is the color of its ground.
+    """Text for an object at (x, y) in meters with a radius of `rim` pixels.
 
-    One that is `spare` is left out where there is no room. Those of a low `rank` are placed first.
+    Labels with a low `rank` are placed first. `plate` is the color of a box behind the text. An `optional` label is
+    omitted if there is no free space.
     """
 
     rank: int
@@ -36,17 +37,17 @@ class Label:
     size: int = 12
     rim: float = 6.0
     plate: Color | None = None
-    spare: bool = False
+    optional: bool = False
 
 
 def place_labels(canvas: Canvas, labels: list[Label], walls: Array) -> None:
-    """Set all labels; `walls` is a share 0 … 1 for each cell of the canvas's `busy`."""
+    """Place all labels. `walls` is the share 0 to 1 of walls in each label cell of the canvas."""
     taken = canvas.busy + _WALL_WEIGHT * walls
     for label in sorted(labels, key=lambda label: label.rank):
         if not canvas.shows(label.x, label.y):
             continue
-        cost, (left, top, right, low) = _best(canvas, label, taken)
-        if label.spare and cost > _MAX_COVERED_SHARE:
+        cost, (left, top, right, low) = _best_box(canvas, label, taken)
+        if label.optional and cost > _MAX_COVERED_SHARE:
             continue
         rows, columns = (
             slice(int(top // LABEL_CELL_PX), int(low // LABEL_CELL_PX) + 1),
@@ -55,21 +56,22 @@ def place_labels(canvas: Canvas, labels: list[Label], walls: Array) -> None:
         taken[rows, columns] = 3.0
         u, v = canvas.pixel(label.x, label.y)
         end = min(max(u, left), right), min(max(v, top), low)
-        apart = math.dist((u, v), end)
-        if apart > label.rim + _LEADER_DISTANCE_PX:
-            share = label.rim / apart
+        distance = math.dist((u, v), end)
+        if distance > label.rim + _LEADER_DISTANCE_PX:
+            share = label.rim / distance
             canvas.leader((u + share * (end[0] - u), v + share * (end[1] - v)), end, label.plate or label.color)
         halo = None if label.plate else palette.FREE
         middle = (left + right) / 2, (top + low) / 2
-        canvas.note(TextItem(*middle, label.text, label.size, label.color, "mm", label.plate, halo))
-        canvas.tell(f"label {label.text}", [(label.x, label.y)])
+        canvas.text(TextItem(*middle, label.text, label.size, label.color, "mm", label.plate, halo))
+        canvas.add_part(f"label {label.text}", [(label.x, label.y)])
 
 
 Box = tuple[float, float, float, float]
+"""Left, top, right and bottom in pixels."""
 
 
-def _best(canvas: Canvas, label: Label, taken: Array) -> tuple[float, Box]:
-    """The best of all places tried, and what counts against it."""
+def _best_box(canvas: Canvas, label: Label, taken: Array) -> tuple[float, Box]:
+    """Return the box of a label with the lowest cost, and the cost."""
     sums = np.zeros((taken.shape[0] + 1, taken.shape[1] + 1))
     sums[1:, 1:] = taken.cumsum(axis=0).cumsum(axis=1)
     wide, high = text_size(label.text, label.size)
@@ -78,7 +80,7 @@ def _best(canvas: Canvas, label: Label, taken: Array) -> tuple[float, Box]:
     best: tuple[float, Box] = (math.inf, (u, v, u + wide, v + high))
     for away in _DISTANCES_PX:
         if best[0] <= _FAR_WEIGHT * away:
-            break  # what is farther away cannot be better
+            break  # boxes at larger distances cannot be better
         for number, angle in enumerate(_ANGLES):
             box = _box(canvas, (u, v), angle, label.rim + away, (wide, high))
             cost = _covered(sums, box) + _FAR_WEIGHT * (away + number / 4)
@@ -88,10 +90,10 @@ def _best(canvas: Canvas, label: Label, taken: Array) -> tuple[float, Box]:
 
 
 def _box(canvas: Canvas, at: tuple[float, float], angle: float, away: float, size: tuple[float, float]) -> Box:
-    """The box whose nearest point is that far from a pixel, moved onto the canvas."""
+    """Return the box at a distance and angle from a pixel, moved onto the canvas."""
     c, s = math.cos(angle), -math.sin(angle)
     middle = at[0] + c * (away + abs(c) * size[0] / 2), at[1] + s * (away + abs(s) * size[1] / 2)
-    if abs(c) > 0.1 and abs(s) > 0.1:  # at a corner: beside the mark, not above it
+    if abs(c) > 0.1 and abs(s) > 0.1:  # diagonal: next to the object, not above it
         middle = at[0] + math.copysign(away * abs(c) + size[0] / 2, c), middle[1]
     left = min(max(middle[0] - size[0] / 2, 2.0), max(2.0, canvas.width - size[0] - 2.0))
     top = min(max(middle[1] - size[1] / 2, 2.0), max(2.0, canvas.height - size[1] - 2.0))
@@ -99,7 +101,7 @@ def _box(canvas: Canvas, at: tuple[float, float], angle: float, away: float, siz
 
 
 def _covered(sums: Array, box: Box) -> float:
-    """The share of a box that is taken."""
+    """Return the share of a box that is occupied. `sums` are cumulative sums over the label cells."""
     left, top, right, low = (int(part // LABEL_CELL_PX) for part in box)
     right, low = min(right + 1, sums.shape[1] - 1), min(low + 1, sums.shape[0] - 1)
     inside = float(sums[low, right] - sums[top, right] - sums[low, left] + sums[top, left])

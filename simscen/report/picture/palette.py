@@ -1,8 +1,8 @@
-"""The colors of pictures and pages: told apart in gray and by the color-blind, and never by color alone.
+"""Colors of pictures and pages, which are distinguishable in grayscale and with color blindness.
 
-Hues are those of Okabe and Ito (2008), darkened until text in them has a contrast of 4.5 to 1 on white: good is a
-bluish green, bad vermilion, odd amber, which differ in blue and lightness as well. On the way of a robot time goes from
-dark blue to light orange. What failed has a cross beside its color, what passed a tick.
+The hues are those of Okabe and Ito (2008), darkened for a text contrast of 4.5 to 1 on white: bluish green for good,
+vermilion for bad, amber for warnings. The path of a robot changes with time from dark blue to light orange. Colors are
+always combined with symbols.
 """
 
 from simscen.core.records.run_result import Outcome
@@ -18,7 +18,7 @@ INK: Color = (38, 42, 48)
 FAINT_INK: Color = (98, 103, 111)
 RULE: Color = (222, 224, 227)
 GRID = (38, 42, 48, 24)
-"""Seen on the floor, and not on walls."""
+"""Visible on the floor, but not on walls."""
 BELIEF: Color = (20, 20, 24)
 PLAN: Color = (176, 203, 232)
 PLACE: Color = (112, 116, 124)
@@ -35,7 +35,7 @@ GREEN: Color = (0, 113, 86)
 GRAY: Color = (98, 103, 111)
 GOAL = GREEN
 ROBOTS: tuple[Color, ...] = ((30, 34, 40), (0, 113, 86), (122, 62, 130), (150, 98, 0), (0, 105, 148))
-"""The rims of the ways of several robots, in the order of their names."""
+"""Outlines of the paths of several robots, in the order of their names."""
 
 OUTCOMES = {
     Outcome.PASSED: GREEN,
@@ -51,7 +51,7 @@ _STOPS = ((40, 60, 160), (110, 40, 170), (185, 40, 130), (225, 85, 75), (240, 15
 
 
 def time_color(share: float) -> Color:
-    """The color of a share 0 … 1 of the run's time, from deep blue over purple to orange."""
+    """Return the color for a share 0 to 1 of the duration of the run, from dark blue to orange."""
     at = min(max(share, 0.0), 1.0) * (len(_STOPS) - 1)
     low = min(int(at), len(_STOPS) - 2)
     r, g, b = (round(a + (at - low) * (z - a)) for a, z in zip(_STOPS[low], _STOPS[low + 1], strict=True))
@@ -66,11 +66,11 @@ DARK = {
     "page": "#15181c", "panel": "#1e2329", "rule": "#363d46", "ink": "#e7eaee", "quiet": "#a3abb6",
     "good": "#4fc9a2", "bad": "#ff8a66", "odd": "#e9b44c", "link": "#7cc4f5", "focus": "#7cc4f5",
 }  # fmt: skip
-"""The pages' own, for light and dark surroundings; each of the texts has 4.5 to 1 on `page` and on `panel`."""
+"""Light and dark theme of the pages. Text colors have a contrast of 4.5 to 1 on `page` and `panel`."""
 
 
 def css_variables() -> str:
-    """Both themes as variables of CSS (`--good`, …), dark where the reader's system is."""
+    """Return both themes as CSS variables (`--good`, …). The system settings of the reader select the theme."""
     light, dark = ("".join(f"--{name}:{value};" for name, value in theme.items()) for theme in (LIGHT, DARK))
     return (
         f":root{{color-scheme:light dark;{light}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"

@@ -1,4 +1,4 @@
-"""Where a robot was: truth and belief, in one piece only where it drove."""
+"""Paths on a run picture: true path, belief, plans, and the robot at start and end."""
 
 import math
 from collections.abc import Iterator
@@ -15,15 +15,15 @@ from simscen.report.picture.labels import Label
 from simscen.report.picture.scene import Scene
 
 MAX_SPEED_M_S, MIN_JUMP_M = 8.0, 0.3
-"""Between two samples a thing that came so far (m) faster than that (m/s) did not drive there."""
+"""A larger distance at a higher speed between two samples is a jump and not a motion."""
 _BANDS = 48
 _DOT = 0.15 * np.column_stack((np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)))
-_LIFTED = [(-6, -2), (0, -9), (6, -2), (2, -2), (2, 6), (-2, 6), (-2, -2)]
-_SET_DOWN = [(-6, 2), (0, 9), (6, 2), (2, 2), (2, -6), (-2, -6), (-2, 2)]
+_LIFTED_SYMBOL = [(-6, -2), (0, -9), (6, -2), (2, -2), (2, 6), (-2, 6), (-2, -2)]
+_SET_DOWN_SYMBOL = [(-6, 2), (0, 9), (6, 2), (2, 2), (2, -6), (-2, -6), (-2, 2)]
 
 
 def split_at_jumps(samples: Samples, tick_rate: int, placed: tuple[int, ...] = ()) -> list[Samples]:
-    """The signal cut where it jumps, and where it changed most about each of the ticks at which it was `placed`."""
+    """Split poses at jumps, and at the ticks at which the object was `placed` elsewhere."""
     if len(samples) < 2:
         return [samples] if len(samples) else []
     far = np.hypot(*np.diff(samples.values[:, :2], axis=0).T)
@@ -37,13 +37,13 @@ def split_at_jumps(samples: Samples, tick_rate: int, placed: tuple[int, ...] = (
 
 
 def driven_segments(scene: Scene) -> list[Samples]:
-    """The true way, cut where the robot was set down elsewhere."""
+    """Split the true path where the robot was moved elsewhere."""
     placed = tuple(event.tick for event in scene.trace.of_kind(EventKind.ROBOT_PLACED))
     return split_at_jumps(scene.trace.truth, scene.trace.tick_rate, placed)
 
 
 def draw_plans(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """All plans, faint; the newer the stronger."""
+    """Draw all plans; newer ones have stronger colors."""
     plans = scene.trace.plans
     for k, plan in enumerate(plans):
         weight = 0.45 + 0.55 * (k + 1) / len(plans)
@@ -53,14 +53,14 @@ def draw_plans(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_truth(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """The driven way, colored by time, with a dot at round seconds; there is a gap where it was carried."""
+    """Draw the true path, colored by time, with dots at round seconds and gaps where the robot was carried."""
     trace, pieces = scene.trace, driven_segments(scene)
     edges = np.linspace(0, trace.end, _BANDS + 1)
     for piece in pieces:
         points = piece.values[:, :2]
-        canvas.tell(scene.called("way"), points[[0, -1]])
+        canvas.add_part(scene.label("path"), points[[0, -1]])
         if len(scene.robots) > 1:
-            canvas.line(_thinned(points, canvas), palette.ROBOTS[scene.number % len(palette.ROBOTS)], 6.4)
+            canvas.line(_thinned(points, canvas), palette.ROBOTS[scene.robot_index % len(palette.ROBOTS)], 6.4)
         for k in range(_BANDS):
             first, last = np.searchsorted(piece.ticks, (edges[k], edges[k + 1]), side="left")
             band = points[max(first - 1, 0) : last + 1]
@@ -74,27 +74,28 @@ def draw_truth(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_kidnapping(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """An arrow up where the robot was lifted, and one down where it was set down."""
+    """Draw an arrow up where the robot was lifted, and an arrow down where it was set down."""
     for before, after in pairwise(driven_segments(scene)):
         when = f"{scene.trace.seconds(int(before.ticks[-1])):.1f} s"
-        for place, sign, told in ((before.values[-1], _LIFTED, "lifted"), (after.values[0], _SET_DOWN, "set down")):
-            x, y = place[:2].tolist()
+        ends = (before.values[-1], _LIFTED_SYMBOL, "lifted"), (after.values[0], _SET_DOWN_SYMBOL, "set down")
+        for pose, symbol, text in ends:
+            x, y = pose[:2].tolist()
             canvas.disc(x, y, 12, (255, 255, 255, 225), palette.AMBER, 1.6, busy=True)
-            canvas.sign(x, y, sign, palette.AMBER)
-            canvas.tell(scene.called(told), [(x, y)])
-            yield Label(1, x, y, printable(scene.called(f"{told} at {when}")), palette.AMBER, 12, 13.0)
+            canvas.symbol(x, y, symbol, palette.AMBER)
+            canvas.add_part(scene.label(text), [(x, y)])
+            yield Label(1, x, y, printable(scene.label(f"{text} at {when}")), palette.AMBER, 12, 13.0)
 
 
 def draw_belief(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Where the robot thought it was; where that jumped there is no line."""
+    """Draw the believed path with gaps at jumps."""
     for piece in split_at_jumps(scene.trace.belief, scene.trace.tick_rate):
         canvas.dashes(_thinned(piece.values[:, :2], canvas), palette.BELIEF, 1.2, 4.0)
-        canvas.tell(scene.called("belief"), piece.values[[0, -1], :2])
+        canvas.add_part(scene.label("belief"), piece.values[[0, -1], :2])
     yield from ()
 
 
 def draw_robot(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """The robot's hull where it began and where it ended."""
+    """Draw the footprint of the robot at the start and at the end."""
     if not len(scene.trace.truth):
         return
     first, last = (Pose2(*row) for row in scene.trace.truth.values[[0, -1]].tolist())
@@ -102,16 +103,16 @@ def draw_robot(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     reach = float(np.hypot(*hull.T).max()) * canvas.scale
     nose = np.array([(0.35, -0.4), (0.85, 0.0), (0.35, 0.4)]) * (float(hull[:, 0].max()), float(hull[:, 1].max()))
     moved = first.distance(last) * canvas.scale > reach
-    for pose, color, strength, told in ((first, palette.START, 40, "start"), (last, palette.ROBOT, 170, "end")):
-        canvas.polygon(pose.apply(hull), (*color, strength), color, busy=True)
-        canvas.polygon(pose.apply(nose), palette.PAGE if strength > 100 else color)
-        canvas.tell(scene.called(f"robot at the {told}"), pose.apply(hull))
-        if told == "end" or moved:
-            yield Label(3, pose.x, pose.y, printable(scene.called(told)), color, 12, reach + 1)
+    for pose, color, opacity, text in ((first, palette.START, 40, "start"), (last, palette.ROBOT, 170, "end")):
+        canvas.polygon(pose.apply(hull), (*color, opacity), color, busy=True)
+        canvas.polygon(pose.apply(nose), palette.PAGE if opacity > 100 else color)
+        canvas.add_part(scene.label(f"robot at the {text}"), pose.apply(hull))
+        if text == "end" or moved:
+            yield Label(3, pose.x, pose.y, printable(scene.label(text)), color, 12, reach + 1)
 
 
 def round_time_step(seconds: float) -> float:
-    """A round number of seconds that divides a run into at most ten parts: 1, 2, 5, 10, …"""
+    """Return a round number of seconds that divides a run into at most ten parts: 1, 2, 5, 10, …"""
     if seconds <= 0:
         return 1.0
     power = 10 ** math.floor(math.log10(seconds / 10)) if seconds > 10 else 1.0
@@ -119,7 +120,7 @@ def round_time_step(seconds: float) -> float:
 
 
 def _thinned(points: Array, canvas: Canvas) -> Array:
-    """Points at least a pixel apart, and the last one: more would only cost time."""
+    """Return points at least one pixel apart, and the last one, to save time."""
     if len(points) < 3:
         return points
     pixels = np.floor(points * canvas.scale)

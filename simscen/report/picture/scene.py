@@ -1,4 +1,4 @@
-"""What a picture shows."""
+"""Contents of a run picture, and the outlines of its objects."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,10 +16,13 @@ from simscen.core.records.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A finished run: everything here is in its log.
+    """A finished run to draw.
 
-    `map` is the world as it is (not necessarily the map the robot was given), `scenery` what else there was to see.
-    `robots` is what there is of each of several robots; one of these has a `name`.
+    Attributes:
+        map: Map of the world, which can differ from the robot's map.
+        scenery: Objects, zones, ramps and places of the world.
+        robots: With several robots, the scene of each robot by name.
+        name: Name of the robot; "" for a single robot.
     """
 
     trace: Trace
@@ -32,21 +35,21 @@ class Scene:
 
     @property
     def each(self) -> Sequence["Scene"]:
-        """What is shown of each robot."""
+        """Scene of each robot."""
         return tuple(self.robots.values()) or (self,)
 
     @property
-    def number(self) -> int:
-        """Which of several robots it is of, by name; 0 for the only one."""
+    def robot_index(self) -> int:
+        """Index of the robot in the sorted names; 0 for a single robot."""
         return sorted(self.robots).index(self.name) if self.name in self.robots else 0
 
-    def called(self, what: str) -> str:
-        """What something of this robot is called on the picture."""
-        return f"{self.name}: {what}" if self.name else what
+    def label(self, text: str) -> str:
+        """Return a label, with the name of the robot if there are several."""
+        return f"{self.name}: {text}" if self.name else text
 
 
 def scene_with_robots(scene: Scene, robots: Mapping[str, tuple[Trace, Case]]) -> Scene:
-    """The scene with several robots, which are not things in it."""
+    """Return the scene with several robots."""
     parts = {name: replace(scene, trace=trace, case=case, name=name) for name, (trace, case) in robots.items()}
     return replace(scene, robots={name: replace(part, robots=parts) for name, part in parts.items()})
 
@@ -56,16 +59,16 @@ Outlines = tuple[Array, ...]
 
 
 def object_outlines(trace: Trace, things: Sequence[MovableObject]) -> dict[str, Outlines]:
-    """The outlines, each (n, 2), of each object in its own frame: what was spawned, and else the world's things."""
-    found = {thing.name: tuple(map(np.array, thing.outlines)) for thing in things if thing.outlines}
-    found.update({event.name: outlines_of_event(event) for event in trace.of_kind(EventKind.OBJECT_SPAWNED)})
+    """Return the outlines (n, 2) of all objects, spawned ones and those of the world, in their own frames."""
+    outlines = {thing.name: tuple(map(np.array, thing.outlines)) for thing in things if thing.outlines}
+    outlines.update({event.name: outlines_of_event(event) for event in trace.of_kind(EventKind.OBJECT_SPAWNED)})
     for name in trace.objects:
-        found.setdefault(name, (_circle(_UNKNOWN_RADIUS_M),))
-    return found
+        outlines.setdefault(name, (_circle(_UNKNOWN_RADIUS_M),))
+    return outlines
 
 
 def outlines_of_event(event: Event) -> Outlines:
-    """The outlines that an object.spawned event describes: its parts, or else `shape` with `size` or `points`."""
+    """Return the outlines in an object.spawned event: its parts, or else `shape` with `size` or `points`."""
     size, points = _floats(event.data, "size"), event.data.get("points")
     parts = event.data.get("parts")
     if isinstance(parts, list) and parts:
@@ -82,7 +85,7 @@ def outlines_of_event(event: Event) -> Outlines:
 
 
 def spawn_pose(event: Event) -> Pose2:
-    """Where an object.spawned event puts the object."""
+    """Return the pose of the object in an object.spawned event."""
     x, y, yaw = (event.data.get(key, 0.0) for key in ("x", "y", "yaw"))
     assert isinstance(x, int | float) and isinstance(y, int | float) and isinstance(yaw, int | float)
     return Pose2(float(x), float(y), float(yaw))

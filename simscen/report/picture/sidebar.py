@@ -1,4 +1,4 @@
-"""The words beside the map: what the run was, how each criterion came out, and what the signs mean."""
+"""Sidebar of a run picture: reason of an error, criteria with their results, and legend."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -24,11 +24,11 @@ Row = tuple[Status, Color, list[str]]
 
 
 def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
-    """The sidebar, at least `height` pixels tall; its legend explains what is among the `parts` of the map."""
+    """Draw the sidebar with at least `height` pixels. The legend explains the `parts` of the map."""
     reasons, rows = _reasons(scene), _criteria(scene)
     legend = [entry[1:] for entry in _legend(round_time_step(scene.result.simulated)) if _is_on(parts, entry[0])]
-    said = len(reasons) * _LINE + (14 if reasons else 0) + sum(_LINE * len(lines) + 8 for _, _, lines in rows)
-    needed = 54 + said + 26 + 20 * len(legend) + 62
+    text_height = len(reasons) * _LINE + (14 if reasons else 0) + sum(_LINE * len(lines) + 8 for _, _, lines in rows)
+    needed = 54 + text_height + 26 + 20 * len(legend) + 62
     image = Image.new("RGB", (WIDTH, max(height, needed)), palette.PAGE)
     draw = ImageDraw.Draw(image, "RGBA")
     _criteria_list(draw, reasons, rows)
@@ -42,12 +42,12 @@ def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
 
 
 def _is_on(parts: Sequence[str], wanted: str) -> bool:
-    """Whether a kind of part is on the map; "failed" is the end of one."""
+    """Return whether the name of a part starts or ends with a word of the legend."""
     return any(part.startswith(wanted) or part.endswith(f" {wanted}") for part in parts)
 
 
 def _reasons(scene: Scene) -> list[str]:
-    """Why the run could not be completed, or why its failure is none."""
+    """Return the lines with an error, or the reason of a skipped or expectedly failed run."""
     result = scene.result
     if result.error is not None:
         return _wrapped(printable(f"{result.error.kind}: {result.error.message}"), _PAD)
@@ -57,19 +57,19 @@ def _reasons(scene: Scene) -> list[str]:
 
 
 def _criteria(scene: Scene) -> list[Row]:
-    """What did not pass comes first."""
+    """Return a row per criterion, failures first."""
     rows: list[Row] = []
     for verdict in sorted(scene.result.verdicts, key=lambda verdict: _ORDER.index(verdict.status)):
         finding = verdict.tightest
-        warned = verdict.severity == "warn" and verdict.status is not Status.PASS
-        color = palette.AMBER if warned else palette.STATUSES[verdict.status]
+        is_warning = verdict.severity == "warn" and verdict.status is not Status.PASS
+        color = palette.AMBER if is_warning else palette.STATUSES[verdict.status]
         if finding is None:
             rows.append((verdict.status, color, _wrapped(f"{printable(verdict.id)}: checked nothing")))
             continue
         failed = verdict.status is not Status.PASS
         where = time_and_place(finding, scene.result.tick_rate) if failed else ""
-        told = ", ".join(part for part in (f"{subject(verdict, finding)}: {comparison(finding)}", where) if part)
-        texts = [f"warning: {told}" if warned else told, *(finding.detail if failed else ())]
+        text = ", ".join(part for part in (f"{subject(verdict, finding)}: {comparison(finding)}", where) if part)
+        texts = [f"warning: {text}" if is_warning else text, *(finding.detail if failed else ())]
         rows.append((verdict.status, color, [line for text in texts for line in _wrapped(printable(text))]))
     return rows
 
@@ -91,16 +91,18 @@ def _criteria_list(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
 
 
 def _wrapped(text: str, left: int = _PAD + 20, size: int = 13) -> list[str]:
-    """The whole text in lines that fit; a word that is longer than a line is broken."""
-    room = WIDTH - left - 12
+    """Wrap a text. Words that are longer than a line are split."""
+    available = WIDTH - left - 12
     lines, current = [], ""
     for word in text.split(" "):
         longer = f"{current} {word}".strip()
-        if current and font(size).getlength(longer) > room:
+        if current and font(size).getlength(longer) > available:
             lines.append(current)
             longer = word
-        while font(size).getlength(longer) > room:
-            fits = next(k for k in range(len(longer) - 1, 0, -1) if k == 1 or font(size).getlength(longer[:k]) <= room)
+        while font(size).getlength(longer) > available:
+            fits = next(
+                k for k in range(len(longer) - 1, 0, -1) if k == 1 or font(size).getlength(longer[:k]) <= available
+            )
             lines.append(longer[:fits])
             longer = longer[fits:]
         current = longer
@@ -117,30 +119,30 @@ def _cross(draw: Pen, x: float, y: float, color: Color) -> None:
 
 
 def _legend(step: float) -> list[tuple[str, str, Sample]]:
-    """What a part's name begins with, what its sign means, and the sign."""
+    """Return the entries of the legend: start of the name of a part, text, and function that draws the symbol."""
     return [
-        ("", f"where it truly was, a dot every {step:g} s", _way),
-        ("belief", "where it thought it was", _dashes),
+        ("", f"true path, a dot every {step:g} s", _path),
+        ("belief", "believed path", _dashes),
         ("", "plans", lambda d, x, y: d.line([(x, y), (x + 24, y)], fill=palette.PLAN, width=4)),
-        ("set down", "carried elsewhere: lifted, set down", _arrow),
+        ("set down", "robot lifted and set down elsewhere", _arrow),
         ("goal", "goal, its tolerance and heading", _ring(palette.GREEN, False)),
         ("failed", "goal that failed", _ring(palette.RED, True)),
         ("robot", "robot at the end", _robot),
-        ("object", "object at the end; before, in its time's color", _block(palette.OBJECT)),
-        ("door", "door at the end; dashed: where it can be", _door),
-        ("person", "person at the end, and where they look", _person),
-        ("keepout zone", "zone to keep out of", _hatched(palette.RED, -6)),
+        ("object", "object at the end; before: color of the time", _block(palette.OBJECT)),
+        ("door", "door at the end; dashed: open and closed", _door),
+        ("person", "person at the end, with heading", _person),
+        ("keepout zone", "keepout zone", _hatched(palette.RED, -6)),
         ("speed zone", "zone with a speed limit", _hatched(palette.AMBER, 6)),
         ("ground", "ramp or sill; chevrons point uphill", _block(palette.GROUND)),
-        ("floor", "floor of another friction", _block(palette.SLIPPERY)),
-        ("fault", "a fault began; band: it was on", _band),
-        ("event", "where the robot was at an event", _diamond),
+        ("floor", "floor with different friction", _block(palette.SLIPPERY)),
+        ("fault", "start of a fault; band: fault active", _band),
+        ("event", "robot at an event", _diamond),
         ("collision", "collision", lambda d, x, y: d.regular_polygon((x + 12, y, 7), 5, fill=palette.RED)),
-        ("violation", "where a criterion failed", lambda d, x, y: _cross(d, x + 12, y, palette.RED)),
+        ("violation", "violated criterion", lambda d, x, y: _cross(d, x + 12, y, palette.RED)),
     ]
 
 
-def _way(draw: Pen, x: float, y: float) -> None:
+def _path(draw: Pen, x: float, y: float) -> None:
     for k in range(24):
         draw.line([(x + k, y), (x + k + 1, y)], fill=palette.time_color(k / 24), width=3)
     draw.ellipse((x + 8, y - 4, x + 16, y + 4), fill=palette.PAGE, outline=palette.time_color(0.5), width=2)
@@ -209,7 +211,7 @@ def _diamond(draw: Pen, x: float, y: float) -> None:
 
 
 def _time_bar(draw: Pen, scene: Scene, y: float) -> None:
-    """The colors of the driven way, from the start to the end of the run."""
+    """Draw the color scale of the path, from the start to the end of the run."""
     end = f"{scene.result.simulated:.0f} s"
     left, right = _PAD + 34, WIDTH - _PAD - math.ceil(font(12).getlength(end)) - 8
     draw_text(draw, TextItem(_PAD, y, "0 s", 12, palette.FAINT_INK))

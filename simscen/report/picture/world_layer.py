@@ -1,4 +1,4 @@
-"""What is about the floor: zones of costmap filters, slippery patches, ramps and sills."""
+"""World on a run picture: ramps, floors, zones of costmap filters, objects, doors and pedestrians."""
 
 import math
 from collections.abc import Iterator
@@ -20,18 +20,18 @@ LABEL_RANK = 6
 
 
 def draw_ground(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Ramps, with chevrons that point uphill, sills and platforms, with how high they are."""
+    """Draw ramps with chevrons that point uphill, sills and platforms, with their heights."""
     for ground in scene.scenery.ground:
         outline = np.array(ground.outline)
         if len(outline) < 3:
             continue
         canvas.polygon(outline, (*palette.GROUND, 120), palette.GROUND)
-        canvas.tell(f"ground {ground.name}", outline)
+        canvas.add_part(f"ground {ground.name}", outline)
         _chevrons(canvas, ground, outline)
         x, y = outline.mean(axis=0).tolist()
-        told = f"{ground.height:.2g} m" if ground.height >= 1 else f"{100 * ground.height:.2g} cm"
-        named = printable(f"{ground.name}, {told} high" if ground.name else f"{told} high")
-        yield Label(LABEL_RANK, x, y, named, palette.FAINT_INK, 11, _label_distance(canvas, outline), spare=True)
+        height = f"{ground.height:.2g} m" if ground.height >= 1 else f"{100 * ground.height:.2g} cm"
+        text = printable(f"{ground.name}, {height} high" if ground.name else f"{height} high")
+        yield Label(LABEL_RANK, x, y, text, palette.FAINT_INK, 11, _label_distance(canvas, outline), optional=True)
 
 
 def _chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> None:
@@ -48,46 +48,53 @@ def _chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> None:
 
 
 def draw_floors(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Floor that holds wheels less, or more, than dry concrete; what was spilled says when."""
+    """Draw floors with a friction that differs from dry concrete; changes during the run have their time."""
     for floor in scene.scenery.floors:
         yield from _floor(canvas, floor.region, np.array(floor.outline), f"friction {floor.friction:g}")
     for event in scene.each[0].trace.of_kind(EventKind.FLOOR_CHANGED):
         outline, friction = event.data.get("outline"), event.data.get("friction")
         assert isinstance(outline, list) and isinstance(friction, int | float)
-        begun = f"friction {friction:g} from {scene.trace.seconds(event.tick):.1f} s"
+        text = f"friction {friction:g} from {scene.trace.seconds(event.tick):.1f} s"
         until = event.data.get("until")
-        told = f"{begun} to {until:.1f} s" if isinstance(until, int | float) else begun
-        yield from _floor(canvas, event.name, np.array(outline, dtype=np.float64), told)
+        text += f" to {until:.1f} s" if isinstance(until, int | float) else ""
+        yield from _floor(canvas, event.name, np.array(outline, dtype=np.float64), text)
 
 
-def _floor(canvas: Canvas, name: str, outline: Array, told: str) -> Iterator[Label]:
+def _floor(canvas: Canvas, name: str, outline: Array, text: str) -> Iterator[Label]:
     canvas.polygon(outline, (*palette.SLIPPERY, 40), palette.SLIPPERY, 1.0)
-    canvas.tell(f"floor {name}: {told}", outline)
+    canvas.add_part(f"floor {name}: {text}", outline)
     x, y = outline.mean(axis=0).tolist()
     yield Label(
-        LABEL_RANK, x, y, printable(f"{name}: {told}"), palette.OBJECT, 11, _label_distance(canvas, outline), spare=True
+        LABEL_RANK,
+        x,
+        y,
+        printable(f"{name}: {text}"),
+        palette.OBJECT,
+        11,
+        _label_distance(canvas, outline),
+        optional=True,
     )
 
 
 def draw_zones(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Zones of the stack's filters: where not to go falls to the right in red, where to go slowly rises in amber."""
-    for zone, told in _active_zones(scene):
+    """Draw the zones of costmap filters: keepout zones with red hatching, speed zones with amber hatching."""
+    for zone, text in _active_zones(scene):
         outlines = [np.array(zone.outline)] if zone.outline else _mask_outlines(zone)
         color = palette.RED if zone.filter == "keepout" else palette.AMBER
         canvas.hatch(outlines, (*color, 110), rising=zone.filter == "speed")
         if zone.outline:
             canvas.polygon(outlines[0], None, color, 1.2)
         for outline in outlines:
-            canvas.tell(f"{zone.filter} zone {scene.called(told)}", outline)
+            canvas.add_part(f"{zone.filter} zone {scene.label(text)}", outline)
         if outlines:
             x, y = outlines[0].mean(axis=0).tolist()
             yield Label(
-                2, x, y, printable(scene.called(told)), color, 12, min(18.0, _label_distance(canvas, outlines[0]))
+                2, x, y, printable(scene.label(text)), color, 12, min(18.0, _label_distance(canvas, outlines[0]))
             )
 
 
 def _active_zones(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
-    """Zones that were on at any time, each with what it says and when it does."""
+    """Yield the zones that were enabled at any time, each with its text."""
     own = {(str(zone.filter), zone.region): zone for zone in scene.scenery.zones if zone.robot == scene.name}
     switched: dict[tuple[str, str], list[Event]] = {}
     for event in scene.trace.of_kind(EventKind.ZONE_SWITCHED):
@@ -99,23 +106,23 @@ def _active_zones(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
 
 
 def _added_zone(scene: Scene, key: tuple[str, str]) -> FilterZone | None:
-    """A zone that the stack was told of on the way."""
+    """Return a zone that was added during the run."""
     outline = scene.case.regions.get(key[1])
     return FilterZone("speed" if key[0] == "speed" else "keepout", key[1], outline) if outline else None
 
 
 def _zone_text(scene: Scene, zone: FilterZone, events: list[Event]) -> str:
-    """What a zone is and when: "gate: keep out, on at 2.0 s", "ward: at most 0.25 m/s"."""
+    """Return the text of a zone, for example "gate: keep out, on at 2.0 s" or "ward: at most 0.25 m/s"."""
     limits = [zone.speed_limit, *(event.data.get("speed_limit") for event in events)]
     limit = next((value for value in reversed(limits) if isinstance(value, int | float) and value), 0.0)
     slow = f"at most {limit:g} m/s" if limit else "slow zone"
-    what = "keep out" if zone.filter == "keepout" else slow
+    rule = "keep out" if zone.filter == "keepout" else slow
     changes = [f"{'on' if e.data['enabled'] else 'off'} at {scene.trace.seconds(e.tick):.1f} s" for e in events]
-    return f"{zone.region}: {', '.join([what, *changes])}" if zone.region else ", ".join([f"{what} (mask)", *changes])
+    return f"{zone.region}: {', '.join([rule, *changes])}" if zone.region else ", ".join([f"{rule} (mask)", *changes])
 
 
 def _mask_outlines(zone: FilterZone) -> list[Array]:
-    """The cells of a mask that say something, as rectangles."""
+    """Return the blocks of a mask with a restriction, as rectangles."""
     cells = zone.cells or MaskBlocks(1.0)
     wanted = [block for block in cells.blocks if block[4] == 100 or zone.filter == "speed"]
     boxes = [[(c, r), (c + w, r), (c + w, r + h), (c, r + h)] for c, r, w, h, _ in wanted]
@@ -123,19 +130,19 @@ def _mask_outlines(zone: FilterZone) -> list[Array]:
 
 
 def _label_distance(canvas: Canvas, outline: Array) -> float:
-    """Pixels from the middle of an outline to its nearer sides."""
+    """Return the pixels from the center of an outline to its nearest side."""
     return float(np.ptp(outline, axis=0).min()) * canvas.scale / 2
 
 
-_GHOST_COUNT = 6
+_EARLIER_POSES = 6
 _MIN_MOTION = 0.02
-"""m and rad that something moves before it has a way."""
+"""Minimum motion in m or rad for drawing a path."""
 
 
-def draw_things(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Each where it ended, with its way and ghosts on it in the color of their time.
+def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
+    """Draw each object at its last pose, with its path and earlier poses.
 
-    A ghost has the color that the robot's way has where the robot was at that moment. What is gone is an empty rim.
+    Earlier poses have the color of their time, as on the path of the robot. Removed objects have only an outline.
     """
     trace = scene.trace
     shapes = object_outlines(trace, scene.scenery.things)
@@ -148,7 +155,7 @@ def draw_things(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         kind = "person" if person else "door" if name in doors else "object"
         color = palette.PERSON if person else palette.OBJECT
         if samples is not None:
-            _way(canvas, scene, samples, shapes[name])
+            _object_path(canvas, scene, samples, shapes[name])
         if name in doors:
             _door_positions(canvas, doors[name], shapes[name])
         if samples is not None and len(samples):
@@ -161,29 +168,29 @@ def draw_things(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         placed = [last.apply(outline) for outline in shapes[name]]
         for outline in placed:
             canvas.polygon(outline, None if gone else (*color, 150), color, 1.0 if gone else 1.5, busy=not gone)
-            canvas.tell(f"{kind} {name}{' gone' if gone else ''}", outline)
+            canvas.add_part(f"{kind} {name}{' gone' if gone else ''}", outline)
         if person:
             _heading_line(canvas, last, placed[0])
         corners = np.concatenate(placed)
         x, y = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
-        told = f"{name} (gone at {trace.seconds(removed[name]):.1f} s)" if gone else name
+        text = f"{name} (gone at {trace.seconds(removed[name]):.1f} s)" if gone else name
         rim = float(np.ptp(corners, axis=0).min()) * canvas.scale / 2 + 2
-        yield Label(4, x, y, printable(told), color, 12, min(rim, 40.0))
+        yield Label(4, x, y, printable(text), color, 12, min(rim, 40.0))
 
 
-def _way(canvas: Canvas, scene: Scene, samples: Samples, shape: Outlines) -> None:
-    """The way of a thing, dotted, and its ghosts; nothing of one that stood still."""
+def _object_path(canvas: Canvas, scene: Scene, samples: Samples, shape: Outlines) -> None:
+    """Draw the path of a moving object as a dotted line, and its earlier poses."""
     for stretch in split_at_jumps(samples, scene.trace.tick_rate):
         if np.ptp(stretch.values[:, :2], axis=0).max() > _MIN_MOTION:
             canvas.dashes(stretch.values[:, :2], palette.PLACE, 1.0, 2.5)
-    for k in _ghosts(samples):
+    for k in _earlier_poses(samples):
         color = palette.time_color(int(samples.ticks[k]) / max(scene.trace.end, 1))
         for outline in shape:
             canvas.polygon(_pose(samples, k).apply(outline), (*color, 30), color, 0.8)
 
 
 def _door_positions(canvas: Canvas, door: MovableObject, shape: Outlines) -> None:
-    """Where the panel of a door can be, and its hinge."""
+    """Draw the closed and open position of a door, and its hinge."""
     for end in (door.closed, door.opened):
         for corners in () if end is None else map(end.apply, shape):
             canvas.dashes(np.vstack((corners, corners[:1])), palette.OBJECT, 0.8, 3.0)
@@ -192,19 +199,19 @@ def _door_positions(canvas: Canvas, door: MovableObject, shape: Outlines) -> Non
 
 
 def _heading_line(canvas: Canvas, pose: Pose2, outline: Array) -> None:
-    """Where somebody looks."""
+    """Draw the heading of a pedestrian."""
     reach = float(np.hypot(*(outline - (pose.x, pose.y)).T).max())
     canvas.line(pose.apply(np.array([(0.0, 0.0), (1.5 * reach, 0.0)])), palette.PERSON, 2.0)
 
 
-def _ghosts(samples: Samples) -> list[int]:
-    """Samples evenly spread over the way of a thing, without the last; none of a thing that stood still."""
+def _earlier_poses(samples: Samples) -> list[int]:
+    """Return indices of samples, evenly spread over the path of an object without its end; empty if it did not move."""
     steps = np.diff(samples.values[:, :3], axis=0)
     moved = np.hypot(steps[:, 0], steps[:, 1]) + 0.3 * np.abs(np.angle(np.exp(1j * steps[:, 2])))
-    way = np.concatenate(([0.0], np.cumsum(moved)))
-    if way[-1] < _MIN_MOTION:
+    lengths = np.concatenate(([0.0], np.cumsum(moved)))
+    if lengths[-1] < _MIN_MOTION:
         return []
-    chosen = np.searchsorted(way, np.linspace(0, way[-1], _GHOST_COUNT)[:-1], side="right") - 1
+    chosen = np.searchsorted(lengths, np.linspace(0, lengths[-1], _EARLIER_POSES)[:-1], side="right") - 1
     return sorted(set(chosen.tolist()))
 
 

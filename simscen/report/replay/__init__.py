@@ -1,4 +1,4 @@
-"""replay.html: a run to look at, from its log alone; what the robot saw, believed and did, and what was asked."""
+"""The replay page, replay.html, which plays a run from its log: world, sensors, belief, plans, and criteria."""
 
 from simscen.report.replay.page import replay_page, write_replay
 

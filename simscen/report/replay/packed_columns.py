@@ -1,4 +1,8 @@
-"""Numbers in few bytes: whole steps, differences to the number before, seven bits a byte. The page reads them back."""
+"""Compact encoding of columns of numbers for the replay page, and selection of samples.
+
+Numbers are rounded to multiples of a step, and the differences between them are stored as zigzag varints. The scripts
+of the page decode them.
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -7,14 +11,14 @@ from simscen.core.geometry import Array
 from simscen.core.records.trace import Ticks
 
 INFINITE_STEPS = 2**30
-"""Steps from which on a number counts as infinite; one more stands for what is no number."""
+"""Number of steps that stands for infinity; one more stands for nan."""
 
 Column = list[float]
-"""Where a column begins in the bytes, how many numbers it holds, and the step they are multiples of."""
+"""Position of a column in the bytes, count of its numbers, and step."""
 
 
 class PackedColumns:
-    """Columns of numbers, one after the other. `left_out` tells readers of the page what there was no room for."""
+    """Collects encoded columns. `left_out` lists the data that was reduced, for a note on the page."""
 
     def __init__(self) -> None:
         self.left_out: list[str] = []
@@ -22,7 +26,7 @@ class PackedColumns:
         self._size = 0
 
     def add(self, values: "npt.ArrayLike", step: float = 1.0) -> Column:
-        """Keep numbers as the nearest whole multiples of `step`; the result is what the page finds them by."""
+        """Add numbers, rounded to multiples of `step`, and return the reference to the column."""
         whole = quantize(np.asarray(values, dtype=np.float64).ravel(), step)
         data = varints(zigzag(np.diff(whole, prepend=0)))
         begin = self._size
@@ -30,19 +34,19 @@ class PackedColumns:
         self._size += len(data)
         return [begin, len(whole), step]
 
-    def thinned(self, what: str, kept: int, among: int) -> None:
-        """Say how many of something were kept, where that is not all."""
-        if kept < among:
-            self.left_out.append(f"{what}: {kept} of {among}")
+    def note_reduction(self, name: str, kept: int, total: int) -> None:
+        """Note that only a part of some data was kept, if that is the case."""
+        if kept < total:
+            self.left_out.append(f"{name}: {kept} of {total}")
 
     @property
     def data(self) -> bytes:
-        """All columns."""
+        """The bytes of all columns."""
         return b"".join(self._parts)
 
 
 def quantize(values: Array, step: float) -> npt.NDArray[np.int64]:
-    """Whole numbers of steps; infinities are LARGEST with their sign, what is no number one more."""
+    """Return the numbers of steps, with INFINITE_STEPS for infinity and INFINITE_STEPS + 1 for nan."""
     bounded = np.clip(
         np.nan_to_num(values / step, nan=0.0, posinf=INFINITE_STEPS, neginf=-INFINITE_STEPS),
         -INFINITE_STEPS,
@@ -54,12 +58,12 @@ def quantize(values: Array, step: float) -> npt.NDArray[np.int64]:
 
 
 def zigzag(numbers: npt.NDArray[np.int64]) -> npt.NDArray[np.uint64]:
-    """0, -1, 1, -2, … as 0, 1, 2, 3, …: small numbers stay small, whatever their sign."""
+    """Map 0, -1, 1, -2, … to 0, 1, 2, 3, …"""
     return ((numbers << 1) ^ (numbers >> 63)).astype(np.uint64)
 
 
 def varints(numbers: npt.NDArray[np.uint64]) -> bytes:
-    """Seven bits a byte, the lowest first; the eighth says that more follow."""
+    """Encode numbers with seven bits per byte, lowest first; the eighth bit marks that more bytes follow."""
     if not len(numbers):
         return b""
     sizes = np.ones(len(numbers), dtype=np.int64)
@@ -76,17 +80,18 @@ def varints(numbers: npt.NDArray[np.uint64]) -> bytes:
 
 
 Chosen = npt.NDArray[np.int64]
+"""Indices of samples."""
 
 
-def evenly_spaced(number: int, most: int) -> Chosen:
-    """At most `most` of so many things, evenly spread, the first and the last among them."""
-    if number <= most:
-        return np.arange(number)
-    return np.unique(np.rint(np.linspace(0, number - 1, max(most, 1))).astype(np.int64))
+def evenly_spaced(count: int, most: int) -> Chosen:
+    """Return at most `most` evenly spaced indices below `count`, including the first and the last."""
+    if count <= most:
+        return np.arange(count)
+    return np.unique(np.rint(np.linspace(0, count - 1, max(most, 1))).astype(np.int64))
 
 
 def spaced_in_time(ticks: Ticks, period: int) -> Chosen:
-    """Samples that are at least `period` ticks apart, and the last before a pause: from there on nothing moved."""
+    """Return samples at least `period` ticks apart, and also the last sample before each pause."""
     kept: list[int] = []
     last = None
     for k, tick in enumerate(ticks.tolist()):
@@ -98,9 +103,9 @@ def spaced_in_time(ticks: Ticks, period: int) -> Chosen:
 
 
 def keep_extremes(values: Array, most: int) -> Chosen:
-    """At most `most` samples, such that the least and the greatest of each stretch are among them."""
+    """Return at most `most` samples, with the minimum and the maximum of each segment."""
     if len(values) <= most:
         return np.arange(len(values))
-    stretches = np.array_split(np.arange(len(values)), max(1, most // 2))
-    chosen = [(s[int(np.argmin(values[s]))], s[int(np.argmax(values[s]))]) for s in stretches]
+    segments = np.array_split(np.arange(len(values)), max(1, most // 2))
+    chosen = [(s[int(np.argmin(values[s]))], s[int(np.argmax(values[s]))]) for s in segments]
     return np.unique(np.array(chosen).ravel())

@@ -1,7 +1,7 @@
-"""replay.html: one file that plays a run, or two side by side; nothing is loaded from elsewhere.
+"""The replay page, replay.html: a single file that plays one run, or two runs side by side.
 
-The page's own parts are package data. Its modules are put into one script in the order in which they need each other;
-`import` and `export` are for the tests, which load them one by one.
+HTML, CSS and JavaScript modules are package data. The modules are joined to one script in the order of their imports.
+Tests import them one by one.
 """
 
 import base64
@@ -30,23 +30,23 @@ _LEVEL = 6
 
 
 def replay_page(runs: Sequence[tuple[Log, RunResult]]) -> bytes:
-    """The page of a run, or of two to be compared. Equal logs give equal bytes."""
+    """Return the page of one run, or of two runs to compare. Equal logs give equal bytes."""
     columns = PackedColumns()
     described = [run_data(log, result, columns) for log, result in runs]
-    whole = {"format": FORMAT, "runs": described, "leftOut": list(dict.fromkeys(columns.left_out))}
-    about = json.dumps(whole, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    document = {"format": FORMAT, "runs": described, "leftOut": list(dict.fromkeys(columns.left_out))}
+    data = json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     title = " against ".join(_title(run) for run in described)
-    return page(title, about.encode(), columns.data).encode()
+    return page(title, data.encode(), columns.data).encode()
 
 
 def write_replay(path: Path, runs: Sequence[tuple[Log, RunResult]]) -> None:
-    """Make the page and write it."""
+    """Write the page to a file."""
     path.write_bytes(replay_page(runs))
 
 
-def page(title: str, about: bytes, numbers: bytes) -> str:
-    """The file: its parts, with a policy that lets nothing but them work, and the data as one block of text."""
-    packed = zlib.compress(struct.pack("<I", len(about)) + about + numbers, _LEVEL)[2:-4]  # as deflate alone
+def page(title: str, data: bytes, numbers: bytes) -> str:
+    """Return the HTML with compressed data, and a content security policy that allows only its own script and style."""
+    packed = zlib.compress(struct.pack("<I", len(data)) + data + numbers, _LEVEL)[2:-4]  # deflate without header
     parts = {name: (FOLDER / f"page.{name}").read_text(encoding="utf-8") for name in ("html", "css")}
     parts = {**parts, "css": css_variables() + parts["css"], "js": script()}
     policy = (
@@ -60,14 +60,14 @@ def page(title: str, about: bytes, numbers: bytes) -> str:
 
 @lru_cache(maxsize=1)
 def script() -> str:
-    """All modules as one."""
+    """Return all modules as one script."""
     texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(FOLDER.glob("*.js"))}
-    own = [re.sub(r"^export ", "", _IMPORT.sub("", texts[name]), flags=re.MULTILINE) for name in _in_order(texts)]
-    return "\n".join(own)
+    modules = [re.sub(r"^export ", "", _IMPORT.sub("", texts[name]), flags=re.MULTILINE) for name in _in_order(texts)]
+    return "\n".join(modules)
 
 
 def _in_order(texts: Mapping[str, str]) -> list[str]:
-    """Each module after those that it imports."""
+    """Return the names of the modules, each after the modules that it imports."""
     done: list[str] = []
 
     def visit(name: str) -> None:
@@ -81,8 +81,8 @@ def _in_order(texts: Mapping[str, str]) -> list[str]:
 
 
 def _title(run: Mapping[str, Any]) -> str:
-    said = [run["scenario"], f"seed {run['seed']}", run["variation"], run["stack"], run["outcome"]]
-    return ", ".join(part for part in said if part)
+    parts = [run["scenario"], f"seed {run['seed']}", run["variation"], run["stack"], run["outcome"]]
+    return ", ".join(part for part in parts if part)
 
 
 def _digest(text: str) -> str:

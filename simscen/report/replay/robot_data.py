@@ -1,4 +1,4 @@
-"""What a robot saw and thought of: scans, particles, plans, costmaps; as many as the page has room for."""
+"""Data of one robot for the replay page: poses, scans, particles, plans and costmaps, reduced to limit the size."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -18,10 +18,10 @@ from simscen.record.log_reader.sensor_messages import LoggedMessages, SensorMess
 from simscen.report.display_text import one_line
 from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, spaced_in_time
 from simscen.report.replay.signal_plots import signal_limits, signal_plots
-from simscen.report.replay.source_lines import SourceLines
+from simscen.report.replay.timeline import SourceLines
 
 MAX_BEAMS, MAX_RANGES = 360, 300_000
-"""Beams of a scan that are kept, and ranges of a lidar in all."""
+"""Maximum number of beams per scan, and of ranges per lidar."""
 MAX_PARTICLES, MAX_CLOUDS = 250, 300
 MAX_PLAN_POINTS, MAX_PATH_POINTS = 120, 60_000
 MAX_LOCAL_PLANS = 1500
@@ -29,20 +29,20 @@ MAX_GRID_CELLS = 2_000_000
 _CENTIMETER = 0.01
 
 
-def scans_of(seen: SensorMessages, columns: PackedColumns) -> list[dict[str, Any]]:
-    """Each lidar's scans: `ticks` at which the stack got them, `measured` when they were taken."""
-    return [_lidar(topic, messages, seen, columns) for topic, messages in sorted(seen.scans.items()) if messages]
+def scans_of(sensors: SensorMessages, columns: PackedColumns) -> list[dict[str, Any]]:
+    """Return the scans of each lidar, with the ticks at which they were received and measured."""
+    return [_lidar(topic, messages, sensors, columns) for topic, messages in sorted(sensors.scans.items()) if messages]
 
 
-def _lidar(topic: str, messages: LoggedMessages, seen: SensorMessages, columns: PackedColumns) -> dict[str, Any]:
-    first = seen.scan(messages[0][1])
+def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any]:
+    first = sensors.scan(messages[0][1])
     stride = -(-max(1, len(first.ranges)) // MAX_BEAMS)
     beams = -(-len(first.ranges) // stride)
     kept = evenly_spaced(len(messages), max(1, MAX_RANGES // max(1, beams))).tolist()
-    scans = [(messages[k][0], seen.scan(messages[k][1])) for k in kept]
+    scans = [(messages[k][0], sensors.scan(messages[k][1])) for k in kept]
     scans = [(tick, scan) for tick, scan in scans if len(scan.ranges) == len(first.ranges)]
-    columns.thinned(f"scans on {one_line(topic)}", len(scans), len(messages))
-    columns.thinned(f"beams of a scan on {one_line(topic)}", beams, len(first.ranges))
+    columns.note_reduction(f"scans on {one_line(topic)}", len(scans), len(messages))
+    columns.note_reduction(f"beams of a scan on {one_line(topic)}", beams, len(first.ranges))
     ranges = np.array([scan.ranges[::stride] for _, scan in scans])
     ranges[~np.isfinite(ranges)] = 0.0
     return {
@@ -54,21 +54,21 @@ def _lidar(topic: str, messages: LoggedMessages, seen: SensorMessages, columns: 
         "most": round(first.range_max, 4),
         "beams": beams,
         "ticks": columns.add([tick for tick, _ in scans]),
-        "measured": columns.add([scan.tick if seen.stamped else tick for tick, scan in scans]),
+        "measured": columns.add([scan.tick if sensors.stamped else tick for tick, scan in scans]),
         "ranges": columns.add(ranges, _CENTIMETER),
     }
 
 
-def particles_of(seen: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
-    """Clouds of particles, each thinned to an even choice of them."""
-    if not seen.particles:
+def particles_of(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
+    """Return the particle clouds, each reduced to evenly spaced particles."""
+    if not sensors.particles:
         return None
-    kept = evenly_spaced(len(seen.particles), MAX_CLOUDS).tolist()
-    clouds = [(seen.particles[k][0], seen.cloud(seen.particles[k][1])) for k in kept]
+    kept = evenly_spaced(len(sensors.particles), MAX_CLOUDS).tolist()
+    clouds = [(sensors.particles[k][0], sensors.cloud(sensors.particles[k][1])) for k in kept]
     chosen = [cloud[evenly_spaced(len(cloud), MAX_PARTICLES)] for _, cloud in clouds]
     table = np.concatenate(chosen)
-    columns.thinned("particle clouds", len(clouds), len(seen.particles))
-    columns.thinned("particles of a cloud", max(map(len, chosen)), max(len(cloud) for _, cloud in clouds))
+    columns.note_reduction("particle clouds", len(clouds), len(sensors.particles))
+    columns.note_reduction("particles of a cloud", max(map(len, chosen)), max(len(cloud) for _, cloud in clouds))
     return {
         "ticks": columns.add([tick for tick, _ in clouds]),
         "numbers": columns.add([len(cloud) for cloud in chosen]),
@@ -79,15 +79,15 @@ def particles_of(seen: SensorMessages, columns: PackedColumns) -> dict[str, Any]
 
 
 def plans_of(plans: Sequence[Path], columns: PackedColumns) -> dict[str, Any] | None:
-    """The plans, by when they were made."""
+    """Return the plans with their planning ticks."""
     return _paths([(plan.tick, plan.points[:, :2]) for plan in plans], columns)
 
 
-def local_plans_of(seen: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
-    """What the controller meant to drive next."""
-    kept = evenly_spaced(len(seen.local_plans), MAX_LOCAL_PLANS).tolist()
-    columns.thinned("local plans", len(kept), len(seen.local_plans))
-    return _paths([(seen.local_plans[k][0], seen.path(seen.local_plans[k][1])) for k in kept], columns)
+def local_plans_of(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
+    """Return the local plans of the controller."""
+    kept = evenly_spaced(len(sensors.local_plans), MAX_LOCAL_PLANS).tolist()
+    columns.note_reduction("local plans", len(kept), len(sensors.local_plans))
+    return _paths([(sensors.local_plans[k][0], sensors.path(sensors.local_plans[k][1])) for k in kept], columns)
 
 
 def _paths(paths: list[tuple[int, Array]], columns: PackedColumns) -> dict[str, Any] | None:
@@ -105,7 +105,7 @@ def _paths(paths: list[tuple[int, Array]], columns: PackedColumns) -> dict[str, 
 
 
 def grid_of(grid: OccupancyGrid, columns: PackedColumns) -> dict[str, Any]:
-    """A map, row by row from its lowest."""
+    """Return a map, row by row from the lowest y."""
     rows, width = grid.shape
     return {
         "width": width,
@@ -116,39 +116,39 @@ def grid_of(grid: OccupancyGrid, columns: PackedColumns) -> dict[str, Any]:
     }
 
 
-def costmaps_of(seen: SensorMessages, trace: Trace, columns: PackedColumns) -> list[dict[str, Any]]:
-    """The costmaps as the log has them, as often as there is room for; in the map frame, wherever they live."""
-    return [_costmap(topic, messages, seen, trace, columns) for topic, messages in sorted(seen.costmaps.items())]
+def costmaps_of(sensors: SensorMessages, trace: Trace, columns: PackedColumns) -> list[dict[str, Any]]:
+    """Return the costmaps in the map frame."""
+    return [_costmap(topic, messages, sensors, trace, columns) for topic, messages in sorted(sensors.costmaps.items())]
 
 
 def _costmap(
-    topic: str, messages: LoggedMessages, seen: SensorMessages, trace: Trace, columns: PackedColumns
+    topic: str, messages: LoggedMessages, sensors: SensorMessages, trace: Trace, columns: PackedColumns
 ) -> dict[str, Any]:
-    """Each grid whole, or its differences to the one before where that is of the same place."""
-    _, first = seen.costmap(messages[0][1])
+    """Return the grids of a topic; a grid with the same origin as the previous one is stored as differences."""
+    _, first = sensors.costmap(messages[0][1])
     kept = evenly_spaced(len(messages), max(1, MAX_GRID_CELLS // max(1, first.cells.size))).tolist()
-    columns.thinned(f"grids on {one_line(topic)}", len(kept), len(messages))
+    columns.note_reduction(f"grids on {one_line(topic)}", len(kept), len(messages))
     grids = []
-    before: OccupancyGrid | None = None
+    previous: OccupancyGrid | None = None
     for tick, data in (messages[k] for k in kept):
-        frame, grid = seen.costmap(data)
-        same = before is not None and before.shape == grid.shape and before.origin == grid.origin
-        cells = grid.cells.astype(np.int64) - before.cells if before is not None and same else grid.cells
+        frame, grid = sensors.costmap(data)
+        same = previous is not None and previous.shape == grid.shape and previous.origin == grid.origin
+        cells = grid.cells.astype(np.int64) - previous.cells if previous is not None and same else grid.cells
         origin = grid.origin if frame == frame_names.MAP else map_from_odom(trace, tick).compose(grid.origin)
-        told = grid_of(OccupancyGrid(cells, grid.resolution, origin), columns)
-        grids.append({"tick": tick, "changes": same, **told})
-        before = grid
+        data_of_grid = grid_of(OccupancyGrid(cells, grid.resolution, origin), columns)
+        grids.append({"tick": tick, "changes": same, **data_of_grid})
+        previous = grid
     return {"name": one_line(topic), "grids": grids}
 
 
 def map_from_odom(trace: Trace, tick: int) -> Pose2:
-    """The correction of the newest belief; none for a robot without belief or odometry."""
+    """Return the transform from map to odom by the newest belief, or the identity without belief or odometry."""
     if not len(trace.belief) or not len(trace.odometry):
         return Pose2(0.0, 0.0)
     newest = trace.belief.ticks[max(int(np.searchsorted(trace.belief.ticks, tick, side="right")) - 1, 0)]
     at = np.array([newest])
-    believed, rolled = Pose2(*trace.belief.at(at)[0, :3].tolist()), Pose2(*trace.odometry.at(at)[0, :3].tolist())
-    return believed.compose(rolled.inverse())
+    believed, odometry = Pose2(*trace.belief.at(at)[0, :3].tolist()), Pose2(*trace.odometry.at(at)[0, :3].tolist())
+    return believed.compose(odometry.inverse())
 
 
 def _rounded(pose: Sequence[float]) -> list[float]:
@@ -156,7 +156,7 @@ def _rounded(pose: Sequence[float]) -> list[float]:
 
 
 MAX_POSES = 12_000
-"""Poses of a robot: five minutes at 40 Hz."""
+"""Maximum number of poses per robot: five minutes at 40 Hz."""
 MILLIMETER, MILLIRADIAN = 1e-3, 1e-3
 
 
@@ -168,8 +168,8 @@ def robot_data(
     verdicts: tuple[Verdict, ...],
     columns: PackedColumns,
 ) -> dict[str, Any]:
-    """One robot; `name` is "" for the only one."""
-    trace, case = log.trace, log.about.case
+    """Return the data of one robot; `name` is "" for a single robot."""
+    trace, case = log.trace, log.header.case
     return {
         "name": one_line(name),
         "footprint": [[round(x, 4), round(y, 4)] for x, y in case.footprint],
@@ -177,12 +177,12 @@ def robot_data(
         "goals": _goals(case, lines),
         "truth": _poses(trace.truth, columns),
         "belief": _belief(trace.belief, columns),
-        "map": None if log.about.map is None else grid_of(log.about.map, columns),
-        "scans": scans_of(log.seen, columns),
-        "particles": particles_of(log.seen, columns),
+        "map": None if log.header.map is None else grid_of(log.header.map, columns),
+        "scans": scans_of(log.sensors, columns),
+        "particles": particles_of(log.sensors, columns),
         "plans": plans_of(trace.plans, columns),
-        "local": local_plans_of(log.seen, columns),
-        "costmaps": costmaps_of(log.seen, trace, columns),
+        "local": local_plans_of(log.sensors, columns),
+        "costmaps": costmaps_of(log.sensors, trace, columns),
         "clock": columns.add(trace.truth.ticks),
         "strips": signal_plots(trace, case, spec, columns),
         "limits": signal_limits(verdicts, name),
@@ -190,11 +190,11 @@ def robot_data(
 
 
 def _goals(case: Case, lines: SourceLines) -> list[dict[str, Any]]:
-    """Each goal once: a further loop comes to the same place."""
-    found: dict[tuple[str, float, float], dict[str, Any]] = {}
+    """Return each goal once, also if it is repeated in several loops."""
+    goals: dict[tuple[str, float, float], dict[str, Any]] = {}
     for goal in case.every_goal:
         base = goal.name.partition("#")[0] if goal.name.partition("#")[0] in lines.goals else goal.name
-        found.setdefault(
+        goals.setdefault(
             (base, goal.pose.x, goal.pose.y),
             {
                 "name": one_line(base),
@@ -205,12 +205,12 @@ def _goals(case: Case, lines: SourceLines) -> list[dict[str, Any]]:
                 "line": lines.goals.get(base, 0),
             },
         )
-    return list(found.values())
+    return list(goals.values())
 
 
 def _poses(samples: Samples, columns: PackedColumns) -> dict[str, Any]:
     kept = evenly_spaced(len(samples), MAX_POSES)
-    columns.thinned("poses", len(kept), len(samples))
+    columns.note_reduction("poses", len(kept), len(samples))
     x, y, yaw = samples.values[kept, :3].T
     return {
         "ticks": columns.add(samples.ticks[kept]),
@@ -229,12 +229,12 @@ def _belief(samples: Samples, columns: PackedColumns) -> dict[str, Any] | None:
     return {**_poses(samples, columns), **{key: columns.add(part, step) for key, (part, step) in more.items()}}
 
 
-def moving_objects(trace: Trace, columns: PackedColumns, besides: frozenset[str]) -> list[dict[str, Any]]:
-    """Things that move, by name; their poses at most twenty times a second."""
-    found = []
+def moving_objects(trace: Trace, columns: PackedColumns, robots: frozenset[str]) -> list[dict[str, Any]]:
+    """Return the moving objects except for `robots`, with at most 20 poses per second."""
+    objects = []
     for name, samples in sorted(trace.objects.items()):
-        if name in besides or not len(samples):
+        if name in robots or not len(samples):
             continue
         kept = spaced_in_time(samples.ticks, max(1, trace.tick_rate // 20))
-        found.append({"name": one_line(name), **_poses(Samples(samples.ticks[kept], samples.values[kept]), columns)})
-    return found
+        objects.append({"name": one_line(name), **_poses(Samples(samples.ticks[kept], samples.values[kept]), columns)})
+    return objects

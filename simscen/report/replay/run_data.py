@@ -1,4 +1,4 @@
-"""What there was to see besides what moved: outlines of the world's things, its ground, zones and places."""
+"""Data of one run for the replay page: result, timeline, scenery, objects and robots."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -11,16 +11,15 @@ from simscen.record.log_reader.read import Log
 from simscen.report.display_text import escape_control, one_line
 from simscen.report.replay.packed_columns import PackedColumns
 from simscen.report.replay.robot_data import grid_of, moving_objects, robot_data
-from simscen.report.replay.source_lines import read_source_lines
-from simscen.report.replay.timeline import disturbance_data, timeline_entries, verdict_data
+from simscen.report.replay.timeline import disturbance_data, read_source_lines, timeline_entries, verdict_data
 
 MAX_MASK_BLOCKS = 2000
-"""Blocks of a filter mask that are drawn; the largest come first."""
+"""Maximum number of blocks of a filter mask to draw, the largest first."""
 
 
 def scenery_data(log: Log, columns: PackedColumns) -> dict[str, Any]:
-    """The scenery of a log; of one that has none, nothing."""
-    scenery = scenery_from_header(log.about)
+    """Return the objects, places, ramps, floors and zones of a log, and the map of the world."""
+    scenery = scenery_from_header(log.header)
     return {
         "things": {
             one_line(thing.name): {
@@ -38,8 +37,8 @@ def scenery_data(log: Log, columns: PackedColumns) -> dict[str, Any]:
 
 
 def _zones(scenery: Scenery) -> list[dict[str, Any]]:
-    """Zones by region, and those of masks as boxes."""
-    told = []
+    """Return the zones of costmap filters, with masks as blocks."""
+    zones = []
     for zone in scenery.zones:
         data: dict[str, Any] = {"filter": zone.filter, "region": one_line(zone.region), "limit": zone.speed_limit}
         if zone.cells is not None:
@@ -49,38 +48,38 @@ def _zones(scenery: Scenery) -> list[dict[str, Any]]:
                 "resolution": zone.cells.resolution,
                 "blocks": [list(block) for block in blocks],
             }
-        told.append(data)
-    return told
+        zones.append(data)
+    return zones
 
 
 def points(polygon: Iterable[Iterable[float]]) -> list[list[float]]:
-    """Corners to the millimeter."""
+    """Return corners, rounded to millimeters."""
     return [[round(float(axis), 3) for axis in corner] for corner in polygon]
 
 
 MAX_SCENARIO_CHARACTERS = 400_000
-"""Characters of a scenario's text."""
+"""Maximum length of the text of a scenario."""
 
 
 def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, Any]:
-    """All of a run; of several robots, each in `robots`."""
+    """Return the data of a run, with the data of each robot in `robots`."""
     parts: Mapping[str, Log] = log.robots or {"": log}
-    known = {name: read_source_lines(log.about.scenario, name) for name in parts}
-    lines = {name: found for name, (found, _) in known.items()}
+    sources = {name: read_source_lines(log.header.scenario, name) for name in parts}
+    lines = {name: source_lines for name, (source_lines, _) in sources.items()}
     first = next(iter(parts))
     robots = frozenset(log.robots)
     events = [
-        told.as_data(name)
+        entry.as_data(name)
         for name, part in parts.items()
-        for told in timeline_entries(part.trace, lines[name], shared=name == first)
-        if told.name not in robots or not told.kind.startswith("object.")
+        for entry in timeline_entries(part.trace, lines[name], with_world=name == first)
+        if entry.name not in robots or not entry.kind.startswith("object.")
     ]
     key = result.key
     return {
         "scenario": one_line(key.scenario),
         "seed": key.seed,
         "variation": one_line(key.variation),
-        "stack": one_line(key.stack_name or log.about.facts.get("stack", "")),
+        "stack": one_line(key.stack_name or log.header.facts.get("stack", "")),
         "outcome": result.outcome.value,
         "reason": one_line(result.reason),
         "error": None if result.error is None else one_line(f"{result.error.kind}: {result.error.message}"),
@@ -93,8 +92,8 @@ def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, A
         "disturbances": disturbance_data(result, lines),
         "metrics": {name: value for name, value in sorted(result.metrics.items()) if value is not None},
         "events": sorted(events, key=lambda event: event["tick"]),
-        "text": escape_control(log.about.scenario[:MAX_SCENARIO_CHARACTERS]).rstrip("\n").split("\n"),
-        "regions": {one_line(name): points(polygon) for name, polygon in log.about.case.regions.items()},
+        "text": escape_control(log.header.scenario[:MAX_SCENARIO_CHARACTERS]).rstrip("\n").split("\n"),
+        "regions": {one_line(name): points(polygon) for name, polygon in log.header.case.regions.items()},
         "scenery": scenery_data(log, columns),
         "spawned": [
             _spawned(event) for event in log.trace.of_kind(EventKind.OBJECT_SPAWNED) if event.name not in robots
@@ -102,14 +101,14 @@ def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, A
         "gone": [[one_line(event.name), event.tick] for event in log.trace.of_kind(EventKind.OBJECT_REMOVED)],
         "things": moving_objects(log.trace, columns, robots),
         "robots": [
-            robot_data(name, part, lines[name], known[name][1], result.verdicts, columns)
+            robot_data(name, part, lines[name], sources[name][1], result.verdicts, columns)
             for name, part in parts.items()
         ],
     }
 
 
 def _spawned(event: Event) -> dict[str, Any]:
-    """A thing that was put into the world: when, where, and what it looks like from above, in its own frame."""
+    """Return the data of a spawned object: tick, pose, and outlines in its own frame."""
     parts: Any = event.data.get("parts")
     outlines = parts if isinstance(parts, list) and parts else []
     return {

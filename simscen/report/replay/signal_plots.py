@@ -1,4 +1,4 @@
-"""Signals of a run as strips over time, with the bounds that criteria set on them."""
+"""Data of the signal plots on the replay page, with the limits of criteria."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from simscen.report.display_text import one_line
 from simscen.report.replay.packed_columns import PackedColumns, keep_extremes
 
 MAX_SAMPLES = 6000
-"""Samples of a strip; twice as many as a wide screen has columns."""
+"""Maximum number of samples per plot: twice the columns of a wide screen."""
 _RESOLUTION_OF_UNIT = {"m": 1e-3, "rad": 1e-3, "s": 1e-2, "m/s": 1e-3, "rad/s": 1e-3, "m/s²": 1e-2, "m/s2": 1e-2}
 _EXCLUDED_SIGNALS = frozenset({"time", "started"})
 _SIGNAL_OF_CRITERION = {
@@ -34,57 +34,58 @@ _SIGNAL_OF_CRITERION = {
     ("recoveries", ""): "recovery_count",
     ("collisions", ""): "collision_count",
 }
-"""Criterion and unit of its finding → the signal that it bounds."""
+"""Signal that a criterion limits, by criterion and unit of the finding."""
 
 
 @dataclass(frozen=True)
 class SignalPlot:
-    """A signal, and what it is about where it has to be said."""
+    """A signal with its arguments."""
 
     signal: SignalName
-    of: SignalArguments
+    arguments: SignalArguments
 
     @property
     def name(self) -> str:
-        """E.g. "distance_to cart"."""
-        about = [str(getattr(value, "name", value)) for value in self.of.values()]
-        return one_line(" ".join((self.signal, *about)))
+        """Name of the plot, for example "distance_to cart"."""
+        arguments = [str(getattr(value, "name", value)) for value in self.arguments.values()]
+        return one_line(" ".join((self.signal, *arguments)))
 
 
 def signal_plots(trace: Trace, case: Case, spec: ScenarioSpec | None, columns: PackedColumns) -> list[dict[str, Any]]:
-    """Every signal that the trace holds: those that need no more to be said, and those that criteria compare."""
-    asked = dict.fromkeys(_signals_in_criteria(spec)) if spec is not None else {}
-    plain = [
+    """Return the plots of all signals without arguments, and of the signals with arguments in temporal criteria."""
+    in_criteria = dict.fromkeys(_signals_in_criteria(spec)) if spec is not None else {}
+    without_arguments = [
         SignalPlot(name, {})
         for name, signal in SIGNALS.items()
         if not signal.required_arguments and name not in _EXCLUDED_SIGNALS
     ]
-    found = {strip.name: strip for strip in (*plain, *(SignalPlot(name, dict(of)) for name, of in asked))}
-    return [told for strip in found.values() if (told := _plot_data(strip, trace, case, columns)) is not None]
+    with_arguments = [SignalPlot(name, dict(arguments)) for name, arguments in in_criteria]
+    plots = {plot.name: plot for plot in (*without_arguments, *with_arguments)}
+    return [data for plot in plots.values() if (data := _plot_data(plot, trace, case, columns)) is not None]
 
 
 def signal_limits(verdicts: tuple[Verdict, ...], robot: str) -> list[dict[str, Any]]:
-    """The bounds of findings that bound a signal: which, how, and whether they held."""
-    told = []
+    """Return the limits that findings of a robot set on signals, with their status."""
+    limits = []
     for verdict in verdicts:
-        whose, _, _ = verdict.id.rpartition("/")
+        owner, _, _ = verdict.id.rpartition("/")
         for finding in verdict.findings:
-            if (whose == robot or not robot) and (bound := _bound(verdict, finding)) is not None:
-                told.append({**bound, "verdict": one_line(verdict.id), "status": finding.status.value})
-    return told
+            if (owner == robot or not robot) and (limit := _limit(verdict, finding)) is not None:
+                limits.append({**limit, "verdict": one_line(verdict.id), "status": finding.status.value})
+    return limits
 
 
-def _plot_data(strip: SignalPlot, trace: Trace, case: Case, columns: PackedColumns) -> dict[str, Any] | None:
-    signal = SIGNALS[strip.signal]
+def _plot_data(plot: SignalPlot, trace: Trace, case: Case, columns: PackedColumns) -> dict[str, Any] | None:
+    signal = SIGNALS[plot.signal]
     try:
-        values = read_signal(strip.signal, trace, case, strip.of)
+        values = read_signal(plot.signal, trace, case, plot.arguments)
     except (SignalUnavailable, InvalidTrace):
         return None
     if not len(values) or not np.isfinite(values).any():
         return None
     kept = keep_extremes(np.nan_to_num(values), MAX_SAMPLES)
     return {
-        "name": strip.name,
+        "name": plot.name,
         "text": signal.text,
         "unit": signal.unit,
         "asks": signal.is_boolean,
@@ -94,7 +95,7 @@ def _plot_data(strip: SignalPlot, trace: Trace, case: Case, columns: PackedColum
 
 
 def _step(unit: str, values: Array) -> float:
-    """A thousandth of a meter and the like; of what counts, whole numbers."""
+    """Return the resolution for a unit, or 1 for counts."""
     finite = values[np.isfinite(values)]
     if unit == "" and np.array_equal(finite, np.rint(finite)):
         return 1.0
@@ -109,13 +110,13 @@ def _signals_in_criteria(spec: ScenarioSpec) -> Iterator[tuple[SignalName, tuple
                 yield one.signal, tuple(one.arguments.items())
 
 
-def _bound(verdict: Verdict, finding: Finding) -> dict[str, Any] | None:
+def _limit(verdict: Verdict, finding: Finding) -> dict[str, Any] | None:
     relation = finding.limit[:1]
     if finding.margin is None or finding.value is None or relation not in ("≤", "≥", "<", ">"):
         return None
-    least = relation in ("≥", ">")
+    is_minimum = relation in ("≥", ">")
     name = _SIGNAL_OF_CRITERION.get((verdict.criterion, finding.unit)) or finding.what.partition(" ")[0]
-    if name not in SIGNALS or SIGNALS[name].unit != finding.unit:  # a margin in scales is no distance to a bound
+    if name not in SIGNALS or SIGNALS[name].unit != finding.unit:  # such a margin is not a distance to the limit
         return None
-    value = finding.value - finding.margin if least else finding.value + finding.margin
-    return {"signal": name, "value": round(value, 6), "least": least}
+    value = finding.value - finding.margin if is_minimum else finding.value + finding.margin
+    return {"signal": name, "value": round(value, 6), "least": is_minimum}

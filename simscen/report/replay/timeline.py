@@ -1,17 +1,24 @@
-"""What happened, in the lanes of a timeline: moments, and stretches from their begin to their end."""
+"""Timeline, verdicts and disturbances for the replay page, with the scenario lines that they come from."""
+
+from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
 from typing import Any
 
+from simscen.core.errors import InvalidInput
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.run_result import RunResult
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Verdict
+from simscen.criteria.registry import verdict_names
 from simscen.judge.finding_text import DISTURBANCE, comparison, disturbance_times, subject
 from simscen.judge.run_result import OF_ALL
+from simscen.loading.scenario_text import parts_of_text
+from simscen.loading.yaml.tree import Key, MappingNode, key_position
+from simscen.model.scenario import ScenarioSpec
 from simscen.report.display_text import one_line
-from simscen.report.replay.source_lines import SourceLines
 
 K = EventKind
 _LANES = {
@@ -29,15 +36,15 @@ _PAIRS = {
     K.FAULT_STARTED: (K.FAULT_ENDED,),
     K.EVENT_STARTED: (K.EVENT_ENDED,),
 }
-"""What begins a stretch, and what ends it."""
+"""Events that start an interval, with the events that end it."""
 _BAD = {K.GOAL_FAILED, K.COLLISION_STARTED, K.PLAN_FAILED}
 _QUIET = {"tick", "entry", "parts", "points", "waypoints", "times", "index", "effects"}
-"""Data of events that say nothing to people, or are said otherwise."""
+"""Data of events that are not shown as text."""
 
 
 @dataclass(frozen=True)
 class TimelineEntry:
-    """One thing in a lane: `until` is set for what lasts, `line` is where the scenario asks for it (0 = nowhere)."""
+    """One entry of a lane. Intervals have the end tick `until`. `line` is the line in the scenario (0 = unknown)."""
 
     tick: int
     kind: str
@@ -52,33 +59,33 @@ class TimelineEntry:
     about: Mapping[str, Any] = field(default_factory=dict)
 
     def as_data(self, robot: str) -> dict[str, Any]:
-        """As JSON holds it."""
-        told = {"tick": self.tick, "kind": self.kind, "lane": self.lane, "name": self.name, "text": self.text}
+        """Return the entry as JSON data, without empty values."""
+        data = {"tick": self.tick, "kind": self.kind, "lane": self.lane, "name": self.name, "text": self.text}
         more: dict[str, Any] = {"until": self.until, "ended": self.ended, "bad": self.bad, "line": self.line}
         more |= {"place": self.place, "about": self.about}
-        return told | {key: value for key, value in more.items() if value} | ({"robot": robot} if robot else {})
+        return data | {key: value for key, value in more.items() if value} | ({"robot": robot} if robot else {})
 
 
-def timeline_entries(trace: Trace, lines: SourceLines, shared: bool) -> list[TimelineEntry]:
-    """All events of a robot in their order; with `shared`, also what happens to the world."""
-    found: list[TimelineEntry] = []
+def timeline_entries(trace: Trace, lines: SourceLines, with_world: bool) -> list[TimelineEntry]:
+    """Return the events of a robot in order, and with `with_world` also the events of the world."""
+    entries: list[TimelineEntry] = []
     open_: dict[tuple[EventKind, str], int] = {}
     for event in trace.events:
-        if _is_shared(event) and not shared:
+        if _is_world_event(event) and not with_world:
             continue
         for begin, ends in _PAIRS.items():
-            place = open_.pop((begin, event.name), None) if event.kind in ends else None
-            if place is not None:
-                found[place] = replace(found[place], until=event.tick, ended=str(event.kind))
+            index = open_.pop((begin, event.name), None) if event.kind in ends else None
+            if index is not None:
+                entries[index] = replace(entries[index], until=event.tick, ended=str(event.kind))
         if event.kind in _PAIRS:
-            open_[event.kind, event.name] = len(found)
-        found.append(_entry(event, lines))
-    for place in open_.values():
-        found[place] = replace(found[place], until=trace.end)
-    return found
+            open_[event.kind, event.name] = len(entries)
+        entries.append(_entry(event, lines))
+    for index in open_.values():
+        entries[index] = replace(entries[index], until=trace.end)
+    return entries
 
 
-def _is_shared(event: Event) -> bool:
+def _is_world_event(event: Event) -> bool:
     return str(event.kind).startswith(OF_ALL) and event.kind != EventKind.RUN_ENDED
 
 
@@ -126,19 +133,19 @@ def _line(event: Event, lines: SourceLines) -> int:
 
 
 def verdict_data(result: RunResult, lines: dict[str, SourceLines]) -> list[dict[str, Any]]:
-    """All verdicts in their order; of several robots each with its robot."""
+    """Return all verdicts in order, each with its robot."""
     return [_verdict(verdict, result, lines) for verdict in result.verdicts]
 
 
 def disturbance_data(result: RunResult, lines: dict[str, SourceLines]) -> list[dict[str, Any]]:
-    """Each event and fault of the scenario: when it began, and what it changed."""
-    told, numbers = [], {"event": 0, "fault": 0}
+    """Return the events and faults of the scenario with their times and effects."""
+    data, numbers = [], {"event": 0, "fault": 0}
     first = next(iter(lines.values()))
     for one in result.disturbances:
         number = numbers[one.ordered.kind]
         numbers[one.ordered.kind] += 1
         known = first.events if one.ordered.kind == "event" else first.faults
-        told.append(
+        data.append(
             {
                 "kind": one.ordered.kind,
                 "name": one_line(one.ordered.name),
@@ -151,7 +158,7 @@ def disturbance_data(result: RunResult, lines: dict[str, SourceLines]) -> list[d
                 "line": known.get(number, one.ordered.line) if len(lines) == 1 else one.ordered.line,
             }
         )
-    return told
+    return data
 
 
 def _verdict(verdict: Verdict, result: RunResult, lines: dict[str, SourceLines]) -> dict[str, Any]:
@@ -170,7 +177,7 @@ def _verdict(verdict: Verdict, result: RunResult, lines: dict[str, SourceLines])
 
 
 def _disturbance_line(verdict: Verdict, name: str, result: RunResult) -> int:
-    """The line of the event or fault that did not happen."""
+    """Return the line of the event or fault of a verdict on a missing disturbance."""
     if verdict.criterion != DISTURBANCE:
         return 0
     ordered = [one.ordered for one in result.disturbances]
@@ -187,3 +194,55 @@ def _finding(verdict: Verdict, finding: Finding) -> dict[str, Any]:
         "place": None if finding.place is None else [round(axis, 3) for axis in finding.place],
         "detail": [one_line(text) for text in finding.detail],
     }
+
+
+@dataclass(frozen=True)
+class SourceLines:
+    """Line numbers in the text of a scenario: criteria by verdict name, goals by name, events and faults by index."""
+
+    criteria: dict[str, int] = field(default_factory=dict)
+    goals: dict[str, int] = field(default_factory=dict)
+    events: dict[int, int] = field(default_factory=dict)
+    faults: dict[int, int] = field(default_factory=dict)
+
+
+def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, ScenarioSpec | None]:
+    """Return the line numbers and the specification of a scenario, or no specification if it is invalid.
+
+    A scenario in a log can be invalid if a package that it needs is not installed.
+    """
+    if not text:
+        return SourceLines(), None
+    try:
+        spec, tree = parts_of_text(text, "scenario.yaml", robot)
+    except InvalidInput:
+        return SourceLines(), None
+    names = verdict_names(spec.pass_)
+    sent = {
+        action.chosen.name: _source_line(tree, *keys)
+        for step in spec.steps
+        for keys, action in step.located_actions()
+        if action.kind == "new_goal" and hasattr(action.chosen, "name")
+    }
+    return SourceLines(
+        criteria={name: _source_line(tree, "pass", index) for index, name in enumerate(names)},
+        goals=sent | {name: _source_line(tree, "goals", index) for index, name in enumerate(_goal_names(spec))},
+        events={number: _source_line(tree, *step.keys) for number, step in enumerate(spec.steps)},
+        faults={index: _source_line(tree, "faults", index) for index in range(len(spec.faults))},
+    ), spec
+
+
+def _goal_names(spec: ScenarioSpec) -> list[str]:
+    """As ScenarioSpec.goal_names, of a specification in which places are still names."""
+    taken, names = {goal.name for goal in spec.goals}, list[str]()
+    for number, goal in enumerate(spec.goals, start=1):
+        pose: Any = goal.pose
+        default = pose if isinstance(pose, str) else f"goal-{number}"
+        others = (name for again in count(2) if (name := f"{default}-{again}") not in taken)
+        names.append(goal.name or (default if default not in taken else next(others)))
+        taken.add(names[-1])
+    return names
+
+
+def _source_line(tree: MappingNode, *keys: Key) -> int:
+    return key_position(tree, keys).line

@@ -1,4 +1,4 @@
-"""report.html: a session in a browser, with what sessions before it said."""
+"""The HTML report of a session, report.html, with the history of earlier sessions."""
 
 from simscen.report.suite.page import RunningSession, Session, to_html
 

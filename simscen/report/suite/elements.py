@@ -1,4 +1,4 @@
-"""Small pieces of the page. Whatever comes from a scenario is text, never markup."""
+"""Small HTML elements of the report. All text of users is escaped."""
 
 import base64
 import re
@@ -19,82 +19,83 @@ SIGNS = {
     Outcome.FAILED_AS_EXPECTED: "~",
     Outcome.SKIPPED: "–",
 }
+"""Symbols of outcomes."""
 
 
-def html_text(what: str) -> str:
-    """Text on one line, also for attributes between double quotes."""
-    return escape(one_line(what), quote=True)
+def html_text(text: str) -> str:
+    """Escape text for one line of HTML, also for attributes in double quotes."""
+    return escape(one_line(text), quote=True)
 
 
 def count(number: int, noun: str) -> str:
-    """1 run, 2 runs."""
+    """Return a number with a noun: "1 run", "2 runs"."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def pill(outcome: Outcome) -> str:
-    """The outcome with its sign, so that its color need not be seen."""
+    """Return an outcome with its symbol, so that it does not depend on color."""
     word = outcome.value.replace("-", " ")
     return f'<span class="pill {outcome.value}"><span aria-hidden="true">{SIGNS[outcome]} </span>{word}</span>'
 
 
-def outcome_marks(outcomes: Sequence[Outcome | None], what: str) -> str:
-    """One sign for each outcome, the oldest first; a dot where there was none."""
-    told = "".join(SIGNS[outcome] if outcome else "·" for outcome in outcomes)
+def outcome_marks(outcomes: Sequence[Outcome | None], label: str) -> str:
+    """Return one symbol per outcome, oldest first; None is shown as a dot."""
+    symbols = "".join(SIGNS[outcome] if outcome else "·" for outcome in outcomes)
     words = ", ".join(outcome.value.replace("-", " ") if outcome else "not run" for outcome in outcomes)
-    return f'<span class="marks" role="img" aria-label="{what}: {words}">{told}</span>'
+    return f'<span class="marks" role="img" aria-label="{label}: {words}">{symbols}</span>'
 
 
 def link(path: str, folder: str, label: str) -> str:
-    """A link to a file in the session's folder; "" where it is not in there: nobody else's paths become links."""
+    """Return a link to a file in the folder of the session, or "" for files outside of it."""
     if not path or not folder or not PurePath(path).is_relative_to(folder) or ".." in PurePath(path).parts:
         return ""
     return f'<a href="./{quote(relative(path, folder))}">{html_text(label)}</a>'
 
 
 def anchor(key: RunKey) -> str:
-    """What a link to a run names it by: letters, digits and dashes, one for each run."""
+    """Return the unique HTML ID of a run: letters, digits and dashes."""
     parts = [key.scenario, key.variation, f"seed-{key.seed}", key.stack_name]
     return "run-" + re.sub(r"[^\w.=]+", "-", "-".join(part for part in parts if part), flags=re.ASCII)
 
 
-def sparkline(values: Sequence[float], told: str, low: float, high: float) -> str:
-    """A small line through values, `low` at its foot and `high` at its top."""
+def sparkline(values: Sequence[float], label: str, low: float, high: float) -> str:
+    """Return a small line chart of values between `low` and `high`."""
     span, step = (high - low) or 1.0, 72 / max(1, len(values) - 1)
     points = [(4 + step * k, 18 - 14 * (value - low) / span) for k, value in enumerate(values)]
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
     x, y = points[-1]
     return (
-        f'<svg class="spark" viewBox="0 0 80 22" width="80" height="22" role="img" aria-label="{html_text(told)}">'
+        f'<svg class="spark" viewBox="0 0 80 22" width="80" height="22" role="img" aria-label="{html_text(label)}">'
         f'<polyline points="{line}"/><circle cx="{x:.1f}" cy="{y:.1f}" r="2.5"/></svg>'
     )
 
 
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 MAX_EMBEDDED_BYTES = 6 * 2**20
-"""Of all pictures together; one weighs some 50 kB. Larger pages open slowly and are cut off by CI systems."""
+"""Maximum size of all pictures, of about 50 kB each. CI systems truncate larger pages."""
 
 
 def embedded_pictures(runs: Sequence[RunFinished], folder: str) -> dict[RunKey, str]:
-    """Each run's picture, as long as there is room, in this order, then links; one that has gone since is left out."""
-    shown, room = {}, MAX_EMBEDDED_BYTES
+    """Return the picture of each run by key: embedded in this order until MAX_EMBEDDED_BYTES, then as links."""
+    pictures, available = {}, MAX_EMBEDDED_BYTES
     for run in runs:
         path = Path(run.artifacts.picture)
         size = path.stat().st_size if run.artifacts.picture and path.is_file() else 0
-        room -= size
+        available -= size
         if size:
-            shown[run.key] = _picture(path, run) if room >= 0 else _picture_link(path, folder)
-    return shown
+            pictures[run.key] = _picture(path, run) if available >= 0 else _picture_link(path, folder)
+    return pictures
 
 
 def _picture(path: Path, run: RunFinished) -> str:
     content = path.read_bytes()
     if not content.startswith(PNG_MAGIC):
-        return ""  # a journal names files, and not whatever it names is to be seen by all who get the page
+        return ""  # do not embed other files that a manipulated journal names
     data = base64.b64encode(content).decode("ascii")
-    told = html_text(f"map of {run.key.test}, seed {run.key.seed}: {run.outcome.value.replace('-', ' ')}")
-    return f'<img alt="{told}" loading="lazy" decoding="async" src="data:image/png;base64,{data}">'
+    alt = html_text(f"map of {run.key.test}, seed {run.key.seed}: {run.outcome.value.replace('-', ' ')}")
+    return f'<img alt="{alt}" loading="lazy" decoding="async" src="data:image/png;base64,{data}">'
 
 
 def _picture_link(path: Path, folder: str) -> str:
-    where = link(str(path), folder, "picture") or f"picture: <code>{html_text(str(path))}</code>"
-    return f'<p class="quiet">{where} (not in this page, which would be too large)</p>'
+    target = link(str(path), folder, "picture") or f"picture: <code>{html_text(str(path))}</code>"
+    return f'<p class="quiet">{target} (not embedded, because the page would be too large)</p>'

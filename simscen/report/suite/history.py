@@ -1,4 +1,4 @@
-"""What sessions before this one said of the same runs."""
+"""Outcomes of the same runs in earlier sessions."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -13,14 +13,14 @@ from simscen.judge.result_json import read_key
 from simscen.report.journal_reader import sessions_in
 
 MAX_SESSIONS = 10
-"""So many sessions are looked back on."""
+"""Maximum number of earlier sessions to show."""
 MAX_RESULTS_BYTES = 64 << 20
-"""Bytes of a results.json that is still read."""
+"""Maximum size of a results.json to read."""
 
 
 @dataclass(frozen=True)
 class PastOutcome:
-    """How a run came out in a session, and how many seconds it simulated."""
+    """Outcome of a run in an earlier session, with its simulated seconds."""
 
     outcome: Outcome
     simulated: float
@@ -28,26 +28,26 @@ class PastOutcome:
 
 @dataclass(frozen=True)
 class PastSession:
-    """An earlier session: the name of its folder, and its runs."""
+    """An earlier session: the name of its folder, and the outcomes of its runs."""
 
     name: str
     runs: Mapping[RunKey, PastOutcome] = field(default_factory=dict)
 
     def number(self, *outcomes: Outcome) -> int:
-        """How many of its runs came out so."""
-        return sum(before.outcome in outcomes for before in self.runs.values())
+        """Return the number of runs with one of these outcomes."""
+        return sum(run.outcome in outcomes for run in self.runs.values())
 
 
 def past_sessions(folder: Path) -> list[PastSession]:
-    """The sessions beside the output folder that are older than it, the newest first."""
-    beside = sessions_in(folder.absolute().parent)
-    own = next((place for place, each in enumerate(beside) if each.name == folder.absolute().name), -1)
-    found = (past for each in beside[own + 1 :] if (past := _read(each)) is not None)
-    return list(islice(found, MAX_SESSIONS))
+    """Return the sessions next to the output folder that are older than it, newest first."""
+    folders = sessions_in(folder.absolute().parent)
+    index = next((k for k, each in enumerate(folders) if each.name == folder.absolute().name), -1)
+    sessions = (past for each in folders[index + 1 :] if (past := _read(each)) is not None)
+    return list(islice(sessions, MAX_SESSIONS))
 
 
 def _read(folder: Path) -> PastSession | None:
-    """What its results.json says; None of one that was killed, or that another version wrote."""
+    """Read results.json of a session. Return None if it is missing, too large, or from another version."""
     try:
         file = folder / "results.json"
         if file.stat().st_size > MAX_RESULTS_BYTES:
@@ -63,13 +63,13 @@ def _read(folder: Path) -> PastSession | None:
 
 
 def past_outcomes(run: RunFinished, past: Sequence[PastSession]) -> list[PastOutcome | None]:
-    """What became of a run, in the sessions from the oldest to the one before this; None where it was not run."""
+    """Return the outcomes of a run in earlier sessions, oldest first; None for sessions without the run."""
     return [session.runs.get(run.key) for session in reversed(past)]
 
 
 def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
-    """How a run came out when it was run last, where that was otherwise: "failed before"; else ""."""
-    known = [before for before in past_outcomes(run, past) if before is not None]
+    """Return the previous outcome of a run if it has changed, for example "failed before", or ""."""
+    known = [outcome for outcome in past_outcomes(run, past) if outcome is not None]
     if not known or known[-1].outcome.good == run.outcome.good:
         return ""
     return f"{known[-1].outcome.value.replace('-', ' ')} before"

@@ -1,4 +1,4 @@
-"""One run on the page: a line to find it by, and behind it all that is known of it."""
+"""Entry of one run in the HTML report: a summary line that expands to all details."""
 
 from collections.abc import Sequence
 from html import escape
@@ -14,29 +14,29 @@ from simscen.report.session_lines import violation_lines
 from simscen.report.styled_line import plain_text
 from simscen.report.suite.elements import anchor, html_text, link, outcome_marks, pill, sparkline
 from simscen.report.suite.history import PastOutcome
-from simscen.report.violations import error_details, error_summary, excuse_text, reported_violations, source_location
+from simscen.report.violations import error_details, error_summary, excuse_text, first_violation, source_location
 
 _FILES = (("scenario.yaml", "scenario"), ("worker.log", "worker's log"), ("stack.log", "stack's log"))
 
 
 def full_run_name(key: RunKey) -> str:
-    """What tells a run from all others."""
+    """Return the unique name of a run."""
     return ", ".join(part for part in (key.test, f"seed {key.seed}", key.stack_name) if part)
 
 
 def run_element(
     run: RunFinished, folder: str, picture: str, before: Sequence[PastOutcome | None], one_of_many: bool = False
 ) -> str:
-    """The whole element; what did not pass stands open."""
+    """Return the entry of a run. Failures are expanded."""
     extra = ", ".join(part for part in (f"seed {run.key.seed}", run.key.stack_name) if part)
     name = (run.key.variation or extra) if one_of_many else run.key.test
-    outcomes = [None if one is None else one.outcome for one in before]
-    told = outcome_marks([*outcomes, run.outcome], "last sessions and this") if any(outcomes) else ""
+    outcomes = [None if past is None else past.outcome for past in before]
+    marks = outcome_marks([*outcomes, run.outcome], "earlier sessions and this one") if any(outcomes) else ""
     return (
         f'<details class="run" id="{anchor(run.key)}"{"" if run.outcome.good else " open"} '
         f"{_data_attributes(run, before)}>"
         f'<summary>{pill(run.outcome)}<span class="name">{html_text(name)}</span>'
-        f'<span class="quiet">{html_text(extra if name != extra else "")}</span>{told}'
+        f'<span class="quiet">{html_text(extra if name != extra else "")}</span>{marks}'
         f'<span class="quiet near">{html_text(_headline(run))}</span>'
         f'<span class="time">{"kept · " if run.resumed else ""}{run.result.simulated:.1f} s</span></summary>'
         f'<div class="in">{_error_section(run)}{_criteria_table(run)}{_disturbance_table(run)}'
@@ -45,8 +45,8 @@ def run_element(
 
 
 def _data_attributes(run: RunFinished, before: Sequence[PastOutcome | None]) -> str:
-    """What the page's script filters and sorts by."""
-    known = [one.outcome.good for one in before if one is not None]
+    """Return the attributes by which the script of the page filters and sorts."""
+    known = [past.outcome.good for past in before if past is not None]
     values = {
         "status": run.outcome.value,
         "tags": " ".join(run.tags),
@@ -62,34 +62,32 @@ def _data_attributes(run: RunFinished, before: Sequence[PastOutcome | None]) -> 
 
 
 def theme(key: RunKey) -> str:
-    """The folder that a scenario lies in: "scenarios/faults/lidar_off" is about faults."""
+    """Return the name of the folder of a scenario: "faults" for "scenarios/faults/lidar_off"."""
     return key.scenario.rpartition("/")[0].rpartition("/")[2]
 
 
 def relative_margin(run: RunFinished) -> float | None:
-    """The least margin of its criteria, as a share of the limit; negative where one is violated, None without any."""
-    margins = [share for v in run.result.verdicts for f in v.findings if (share := _share(f)) is not None]
-    return min(margins, default=None)
+    """Return the smallest margin of all criteria relative to the limit, negative if violated; None without margins."""
+    findings = [finding for verdict in run.result.verdicts for finding in verdict.findings]
+    return min((share for finding in findings if (share := _share(finding)) is not None), default=None)
 
 
 def _share(finding: Finding) -> float | None:
     if finding.margin is None or finding.value is None or not finding.unit:
         return None
-    below = finding.limit.startswith(("≥", ">"))
-    limit = abs(finding.value - finding.margin if below else finding.value + finding.margin)
+    is_lower_limit = finding.limit.startswith(("≥", ">"))
+    limit = abs(finding.value - finding.margin if is_lower_limit else finding.value + finding.margin)
     return finding.margin / limit if limit else finding.margin
 
 
 def _headline(run: RunFinished) -> str:
-    """How near it came to failing; of what failed the first reason, and how many more."""
+    """Return the tightest margin of a passed run, or the first reason of a failure."""
     match run.outcome:
         case Outcome.PASSED:
             nearest = tightest_margin(run.result.verdicts)
             return f"tightest: {nearest}" if nearest else ""
         case Outcome.FAILED:
-            told = [complaint.message for complaint in reported_violations(run) if not complaint.warning]
-            more = f" (and {len(told) - 1} more)" if len(told) > 1 else ""
-            return f"{told[0]}{more}" if told else ""
+            return first_violation(run)
         case Outcome.ERROR:
             return error_summary(run)
         case Outcome.FAILED_AS_EXPECTED | Outcome.SKIPPED:
@@ -106,12 +104,12 @@ def _error_section(run: RunFinished) -> str:
 
 
 def _criteria_table(run: RunFinished) -> str:
-    """A line for each bound that was checked, those that do not hold first, each with its reasons."""
+    """Return a table with a row per checked limit, violations first, with explanations."""
     lines = run.result.lines or (0,) * len(run.result.verdicts)
     rows = [(v, f, n) for v, n in zip(run.result.verdicts, lines, strict=True) for f in v.findings]
     rows.sort(key=lambda row: row[1].status is Status.PASS)
     body = "".join(_criterion_row(run, *row) for row in rows)
-    head = "".join(f'<th scope="col">{name}</th>' for name in ("", "criterion", "measured", "margin", "written in"))
+    head = "".join(f'<th scope="col">{name}</th>' for name in ("", "criterion", "measured", "margin", "source"))
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>' if body else ""
 
 
@@ -120,34 +118,31 @@ def _criterion_row(run: RunFinished, verdict: Verdict, finding: Finding, line: i
     look = "" if not failed else "bad" if finding.status is Status.FAIL and not warning else "odd"
     word = "warning" if failed and warning else finding.status.value
     margin = "" if finding.margin is None else f"{finding.margin:+.3g} {finding.unit}".rstrip()
-    where = (
-        f", {time_and_place(finding, run.result.tick_rate)}"
-        if failed and time_and_place(finding, run.result.tick_rate)
-        else ""
-    )
+    where = time_and_place(finding, run.result.tick_rate) if failed else ""
+    measured = f"{comparison(finding)}, {where}" if where else comparison(finding)
     reasons = "".join(f"<li>{html_text(reason)}</li>" for reason in finding.detail)
     return (
         f'<tr class="{look}"><td>{word}</td><td>{html_text(subject(verdict, finding))}</td>'
-        f"<td>{html_text(comparison(finding) + where)}{f'<ul class=why>{reasons}</ul>' if reasons else ''}</td>"
+        f"<td>{html_text(measured)}{f'<ul class=why>{reasons}</ul>' if reasons else ''}</td>"
         f'<td class="margin">{html_text(margin)}</td>'
         f'<td class="quiet">{html_text(source_location(run, line))}</td></tr>'
     )
 
 
 def _disturbance_table(run: RunFinished) -> str:
-    """Each event and fault, when it began and what it changed."""
+    """Return a table of events and faults with their times and effects."""
     rows = "".join(
         f'<tr class="{"bad" if one.missing else ""}"><td>{"happened" if one.happened else "did not happen"}</td>'
         f"<td>{html_text(one.ordered.name)}</td><td>{html_text(one.ordered.trigger)}</td>"
         f"<td>{html_text(disturbance_times(one, run.result.tick_rate))}</td><td>{html_text(one.effect)}</td></tr>"
         for one in run.result.disturbances
     )
-    head = "".join(f'<th scope="col">{name}</th>' for name in ("", "event or fault", "ordered", "began", "effect"))
+    head = "".join(f'<th scope="col">{name}</th>' for name in ("", "event or fault", "trigger", "started", "effect"))
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>' if rows else ""
 
 
 def _links(run: RunFinished, folder: str) -> str:
-    """Where to look further: what the run left in its folder."""
+    """Return links to the artifacts of a run."""
     files = run.artifacts
     named = [
         (files.replay, "replay"),
@@ -157,33 +152,30 @@ def _links(run: RunFinished, folder: str) -> str:
     ]
     if files.folder:
         others = [(str(Path(files.folder, name)), label) for name, label in _FILES]
-        named += [(path, label) for path, label in others if _written(path)]
-    links = " · ".join(one for path, label in named if (one := link(path, folder, label)))
+        named += [(path, label) for path, label in others if _has_content(path)]
+    links = " · ".join(html for path, label in named if (html := link(path, folder, label)))
     return f"<p>{links}</p>" if links else ""
 
 
-def _written(path: str) -> bool:
+def _has_content(path: str) -> bool:
     file = Path(path)
     return file.is_file() and file.stat().st_size > 0
 
 
 def _details(run: RunFinished, before: Sequence[PastOutcome | None]) -> str:
-    """How to see it again, how long it took before, what it is tagged with, its numbers, and what the console said."""
+    """Return the command to repeat a run, its history, tags, metrics, and console output."""
     again = f'<p class="again">again: <code>{escape(shell_command_text(run.again))}</code></p>' if run.again else ""
     tags = "".join(f'<span class="tag">{html_text(tag)}</span> ' for tag in run.tags)
     known = [f"{name} {value:.4g}" for name, value in sorted(run.result.metrics.items()) if value is not None]
-    told = _folded("metrics", f"<p>{html_text(' · '.join(known))}</p>") if known else ""
-    return again + _duration_sparkline(run, before) + (f"<p>{tags}</p>" if tags else "") + told + _console_output(run)
+    metrics = _folded("metrics", f"<p>{html_text(' · '.join(known))}</p>") if known else ""
+    tag_line = f"<p>{tags}</p>" if tags else ""
+    return again + _duration_sparkline(run, before) + tag_line + metrics + _console_output(run)
 
 
 def _console_output(run: RunFinished) -> str:
-    """What the console said of it, to be copied."""
-    said = "\n".join(plain_text(line).rstrip() for line in violation_lines(run))
-    return (
-        _folded("as the console told it", f'<pre tabindex="0">{escape(escape_control(dedent(said)))}</pre>')
-        if said
-        else ""
-    )
+    """Return the console output for a run, to be copied."""
+    text = "\n".join(plain_text(line).rstrip() for line in violation_lines(run))
+    return _folded("console output", f'<pre tabindex="0">{escape(escape_control(dedent(text)))}</pre>') if text else ""
 
 
 def _folded(title: str, inside: str) -> str:
@@ -191,10 +183,10 @@ def _folded(title: str, inside: str) -> str:
 
 
 def _duration_sparkline(run: RunFinished, before: Sequence[PastOutcome | None]) -> str:
-    """How long a run took to end, session by session, in simulated seconds, as a line; "" of less than three."""
-    known = [one.simulated for one in before if one is not None] + [run.result.simulated]
+    """Return a line chart of simulated seconds in the last sessions, or "" for less than three."""
+    known = [past.simulated for past in before if past is not None] + [run.result.simulated]
     if len(known) < 3:
         return ""
-    told = ", ".join(f"{value:.1f}" for value in known)
-    line = sparkline(known, f"simulated seconds, oldest first: {told}", min(known), max(known))
-    return f'<p class="quiet">simulated in the last sessions {line} {known[-2]:.1f} s, now {known[-1]:.1f} s</p>'
+    values = ", ".join(f"{value:.1f}" for value in known)
+    line = sparkline(known, f"simulated seconds, oldest first: {values}", min(known), max(known))
+    return f'<p class="quiet">simulated time in the last sessions: {line} {known[-2]:.1f} s, now {known[-1]:.1f} s</p>'

@@ -1,4 +1,4 @@
-"""What the runs are filtered and sorted with; hidden where the page's script does not run."""
+"""Sections of the HTML report above the runs: filters and history."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -11,16 +11,16 @@ from simscen.report.suite.history import PastSession, outcome_change
 from simscen.report.suite.run_entry import full_run_name, theme
 
 _SORTS = {
-    "": "failed first",
+    "": "failures first",
     "name": "by name",
-    "simulated": "longest first",
-    "wall": "slowest to run first",
-    "margin": "least margin first",
+    "simulated": "longest simulated time first",
+    "wall": "longest wall time first",
+    "margin": "smallest margin first",
 }
 
 
 def filter_form(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
-    """The search field, the statuses, and a list for whatever there is more than one of."""
+    """Return the search field, and filters for properties with several values. Hidden without JavaScript."""
     number = Counter(run.outcome for run in runs)
     statuses = "".join(
         f'<label class="{outcome.value}"><input type="checkbox" name="status" value="{outcome.value}" checked> '
@@ -30,7 +30,7 @@ def filter_form(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str
     )
     changed = sum(outcome_change(run, past) != "" for run in runs)
     if changed:
-        statuses += f'<label><input type="checkbox" name="changed"> only the {changed} that changed</label>'
+        statuses += f'<label><input type="checkbox" name="changed"> only changed ({changed})</label>'
     lists = [
         _select("theme", Counter(theme(run.key) for run in runs)),
         _select("tag", Counter(tag for run in runs for tag in set(run.tags))),
@@ -60,26 +60,26 @@ def _select(name: str, found: Counter[str]) -> str:
     return f'<label>{name} <select name="{name}"><option value="">all</option>{options}</select></label>'
 
 
-MOST_CHANGES = 20
+MAX_CHANGES = 20
 _GOOD = tuple(outcome for outcome in Outcome if outcome.good)
 
 
 def history_section(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
-    """A section; nothing where there was no session before."""
+    """Return the section on earlier sessions, or "" if there are none."""
     if not past:
         return ""
     rows = "".join(_session_row(session) for session in past)
     return (
-        '<details class="history"><summary><h2>last sessions</h2>'
+        '<details class="history"><summary><h2>earlier sessions</h2>'
         f"{_pass_rate_sparkline(runs, past)}{_change_counts(runs, past)}</summary>"
-        '<div class="in"><table><thead><tr><th scope="col">session</th><th scope="col">as they should be</th>'
+        '<div class="in"><table><thead><tr><th scope="col">session</th><th scope="col">as expected</th>'
         '<th scope="col">failed</th><th scope="col">errors</th><th scope="col">simulated</th></tr></thead>'
         f"<tbody>{rows}</tbody></table>{_changed_list(runs, past)}</div></details>"
     )
 
 
 def _session_row(session: PastSession) -> str:
-    simulated = sum(before.simulated for before in session.runs.values())
+    simulated = sum(run.simulated for run in session.runs.values())
     return (
         f'<tr><th scope="row"><a href="../{quote(session.name)}/report.html">{html_text(session.name)}</a></th>'
         f"<td>{session.number(*_GOOD)} of {len(session.runs)}</td>"
@@ -89,18 +89,18 @@ def _session_row(session: PastSession) -> str:
 
 
 def _pass_rate_sparkline(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
-    """The share of runs that are as they should be, session by session, as a line."""
+    """Return a line chart of the share of runs with the expected outcome."""
     shares = [session.number(*_GOOD) / max(1, len(session.runs)) for session in reversed(past)]
     shares.append(sum(run.outcome.good for run in runs) / max(1, len(runs)))
-    told = ", ".join(f"{share:.0%}" for share in shares)
-    return sparkline(shares, f"share of runs as they should be, oldest first: {told}", 0.0, 1.0)
+    values = ", ".join(f"{share:.0%}" for share in shares)
+    return sparkline(shares, f"share of runs as expected, oldest first: {values}", 0.0, 1.0)
 
 
 def _change_counts(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
     worse = sum(outcome_change(run, past) != "" and not run.outcome.good for run in runs)
     better = sum(outcome_change(run, past) != "" and run.outcome.good for run in runs)
-    told = [f"{number} {word}" for number, word in ((worse, "newly failing"), (better, "newly passing")) if number]
-    return f'<span class="quiet">{", ".join(told) or "no change since the last"}</span>'
+    parts = [f"{number} {word}" for number, word in ((worse, "newly failing"), (better, "newly passing")) if number]
+    return f'<span class="quiet">{", ".join(parts) or "no change since the last session"}</span>'
 
 
 def _changed_list(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
@@ -110,7 +110,7 @@ def _changed_list(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> s
         f'<li><a href="#{anchor(run.key)}">{html_text(full_run_name(run.key))}</a>: '
         f"{run.outcome.value.replace('-', ' ')}, "
         f"{outcome_change(run, past)}</li>"
-        for run in changed[:MOST_CHANGES]
+        for run in changed[:MAX_CHANGES]
     )
-    more = f"<li>and {len(changed) - MOST_CHANGES} more</li>" if len(changed) > MOST_CHANGES else ""
+    more = f"<li>and {len(changed) - MAX_CHANGES} more</li>" if len(changed) > MAX_CHANGES else ""
     return f"<ul>{rows}{more}</ul>" if rows else ""

@@ -21,9 +21,8 @@ from simscen.peer import wire
 from simscen.peer.cdr import Reader
 from simscen.peer.messages import read
 from simscen.record import frame_names, topics
-from simscen.record.foreign import messages
-from simscen.record.foreign.messages import StampedPose
 from simscen.record.messages import decode
+from simscen.record.messages.decode import MessageReader, StampedPose, decode_checked
 from simscen.record.simtime import NS_PER_SECOND, SimTime
 from simscen.record.trace_builder import to_planar
 from simscen.run.external.protocol import EXACT_SUFFIX, FLOAT64_ARRAY, POSE2D, STACK_TOPICS, ProtocolViolation
@@ -121,7 +120,7 @@ def _correction(said: MessagesByTopic) -> Pose2 | None:
     exact = _last(said, topics.TF.name + EXACT_SUFFIX, _pose2d)
     if exact is not None:
         return exact
-    links = [link for part in _told(said, topics.TF.name, messages.transforms) for link in part]
+    links = [link for part in _told(said, topics.TF.name, partial(decode_checked, decode.transforms)) for link in part]
     found = [link for link in links if (link.frame, link.child) == (frame_names.MAP, frame_names.ODOM)]
     return _ground(found[-1]) if found else None
 
@@ -157,7 +156,7 @@ def _filtered_odometry(said: MessagesByTopic, time: SimTime, now: int) -> Iterat
 
 
 def _path(said: MessagesByTopic, name: str, tick: int, time: SimTime) -> Path | None:
-    told = _last(said, name, messages.path)
+    told = _last(said, name, partial(decode_checked, decode.path))
     exact = _last(said, name + EXACT_SUFFIX, lambda data: _table(data, 3))
     if told is None and exact is None:
         return None
@@ -190,14 +189,14 @@ def _costmap(name: str, data: bytes) -> CostGrid:
 
 
 def _twist(data: bytes) -> Twist:
-    command = Twist(*messages.twist(data).values)
+    command = Twist(*decode_checked(decode.twist, data).values)
     if not all(map(math.isfinite, command)):
         raise ProtocolViolation(f"a command that is not finite: {', '.join(f'{value:g}' for value in command)}")
     return command
 
 
 def _posed(data: bytes) -> StampedPose:
-    told = messages.pose_with_covariance_stamped(data)
+    told = decode_checked(decode.pose_with_covariance_stamped, data)
     if told.frame not in (frame_names.MAP, ""):
         raise ProtocolViolation(
             f"a pose on {topics.BELIEF.name} in the frame `{told.frame}` instead of `{frame_names.MAP}`"
@@ -249,7 +248,7 @@ def _table(data: bytes, width: int) -> Array:
 
 
 def _event(data: bytes) -> dict[str, Any]:
-    return wire.from_json(decode.string(data).encode())
+    return wire.from_json(MessageReader(data).string().encode())
 
 
 def _line(data: bytes) -> LogLine:

@@ -13,7 +13,7 @@ from simscen.model.stack_base import GoalTolerances, StackBase
 from simscen.model.stack_files import ExternalStackSpec
 from simscen.run.external.handshake import RunParameters
 from simscen.run.external.stack import ExternalStack
-from simscen.run.preparation.scenario import PreparedScenario
+from simscen.run.preparation import PreparedScenario
 from simscen.run.process.isolation import clean_environment
 from simscen.run.robot_interface import sensor_frames, sensor_kinds
 from simscen.sim.urdf.writer import to_urdf

@@ -7,8 +7,7 @@ end of the task, so that the events of a log are always consistent.
 from typing import Any
 
 from simscen.core.clock import Clock
-from simscen.core.messages.goal_names import Mode
-from simscen.core.messages.navigation import ErrorCode, Goal, error_code
+from simscen.core.messages.navigation import ErrorCode, Goal, Mode, error_code
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.run.external.protocol import ProtocolViolation
 from simscen.stack.tasks import Task

@@ -6,8 +6,7 @@ from typing import Any
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose3
-from simscen.core.messages.goal_names import Mode
-from simscen.core.messages.navigation import Estimate, Goal
+from simscen.core.messages.navigation import Estimate, Goal, Mode
 from simscen.core.version import __version__
 from simscen.peer import wire
 from simscen.record.topics import Topic

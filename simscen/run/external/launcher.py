@@ -21,6 +21,8 @@ from typing import Any
 
 from simscen.run.process.isolation import adopt_orphans, kill_children_except
 
+EXIT_GRACE_S = 0.5
+"""Time in which a stack can exit by itself after the run, so that its last output is not lost."""
 TERM_GRACE_S = 0.5
 """Time between SIGTERM and SIGKILL."""
 MAX_OPEN_FILES = 1024
@@ -50,8 +52,8 @@ def main() -> None:
         return
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.close(stream)
-    _watch(process, control, report)
-    _end(process)
+    released = _watch(process, control, report)
+    _end(process, EXIT_GRACE_S if released else 0.0)
 
 
 def _why(error: Exception) -> str:
@@ -65,8 +67,11 @@ def _why(error: Exception) -> str:
     return f"{error.strerror}: {error.filename}" if error.filename else error.strerror
 
 
-def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> None:
-    """Wait for the end of the run; report the exit of the stack if it comes first."""
+def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> bool:
+    """Wait for the end of the run; report the exit of the stack if it comes first.
+
+    Returns False if the worker has died: then it closes the pipe without a byte.
+    """
     pidfd = os.pidfd_open(process.pid)
     waiting = [control, pidfd]
     while True:
@@ -75,17 +80,22 @@ def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> Non
             _tell(report, {"exit": process.wait()})
             waiting.remove(pidfd)
         if control in ready:
-            return
+            return bool(os.read(control, 1))
 
 
-def _end(process: "subprocess.Popen[bytes]") -> None:
-    """Terminate the process group of the stack, then kill all of its descendants."""
+def _end(process: "subprocess.Popen[bytes]", grace: float) -> None:
+    """Give the stack `grace` seconds to exit, or terminate its process group; then kill all of its descendants."""
+    _wait(process, grace)
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGTERM)
-    end = time.monotonic() + TERM_GRACE_S
+        _wait(process, TERM_GRACE_S)
+    kill_children_except(())
+
+
+def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> None:
+    end = time.monotonic() + seconds
     while process.poll() is None and time.monotonic() < end:
         select.select([], [], [], 0.005)
-    kill_children_except(())
 
 
 def _own_limits() -> None:

@@ -96,16 +96,16 @@ class StepPublisher:
         messages, self._waiting = self._waiting, []
         return messages
 
-    def line(self, topic: Topic) -> TopicWriter:
-        """Implement record's Publisher."""
+    def topic_writer(self, topic: Topic) -> TopicWriter:
+        """Implement record's MessageSink."""
         return TopicWriter(lambda: partial(self.publish, topic))
 
-    def together(self, messages: Layouts) -> BatchWriter:
-        """Implement record's Publisher."""
-        return BatchWriter(self, messages)
+    def batch_writer(self, layouts: Layouts) -> BatchWriter:
+        """Implement record's MessageSink."""
+        return BatchWriter(self, layouts)
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """Publish a message if the stack wants its topic (record's Publisher)."""
+        """Publish a message if the stack wants its topic (record's MessageSink)."""
         if topic is topics.TF_STATIC and not self._numbers:  # sensor mounts, published before topics are selected
             self._latched.append((topic, data))
         self._put(topic.name, data)

@@ -133,6 +133,8 @@ class StackProcess:
     def release(self) -> None:
         """Request the end of the process and its descendants; `close` waits for it."""
         if self._control >= 0:
+            with suppress(BrokenPipeError):
+                os.write(self._control, b"\0")
             os.close(self._control)
             self._control = -1
 

@@ -11,8 +11,8 @@ from simscen.core.random_streams import Streams
 from simscen.core.records.events import KIND_BY_INSTANCE, MAP
 from simscen.faults.base import FaultSetting
 from simscen.model.disturbances import FaultEntry
-from simscen.run.live_world.random_streams import stream_names
-from simscen.run.preparation.scenario import PreparedScenario
+from simscen.run.preparation import PreparedScenario
+from simscen.run.random_streams import stream_names
 
 
 def apply_map_faults(prepared: PreparedScenario, seed: int) -> PreparedScenario:

@@ -9,9 +9,9 @@ from simscen.core.records.events import Event, EventKind, Value
 from simscen.core.stage import Situation
 from simscen.model.disturbances import FaultEntry, SequenceStep
 from simscen.run.faults.injector import FaultInjector
-from simscen.run.live_world.random_streams import stream_names
 from simscen.run.live_world.stage import LiveStage
-from simscen.triggers.registry import AnyCondition, Trigger
+from simscen.run.random_streams import stream_names
+from simscen.triggers.base import AnyCondition, Trigger
 from simscen.triggers.timing import Time
 
 _AT_ONCE = Trigger(time=Time(0.0))

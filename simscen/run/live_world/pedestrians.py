@@ -12,12 +12,12 @@ from simscen.core.geometry.polygons import distance_to_polygon
 from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.pedestrians.crowd import Crowd, Point
-from simscen.pedestrians.surroundings import ObservedObject, ObservedRobot, Surroundings, Walls
+from simscen.pedestrians.surroundings import ObservedObject, ObservedRobot, Surroundings, WallMap
 from simscen.sim.body.outline import footprint, outlines_in_band
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
-from simscen.worlds.geometry.cross_section import section
-from simscen.worlds.routes.shortest_paths import ShortestPaths, ways_in
+from simscen.worlds.geometry.cross_section import cross_section
+from simscen.worlds.routes.shortest_paths import ShortestPaths, shortest_paths_in
 
 MAX_STEP_S = 0.05
 """Longest step of the pedestrian model."""
@@ -50,11 +50,11 @@ class PedestrianSimulation:
         self.tell: list[Callable[[Event], None]] = []
 
     @cached_property
-    def _walls(self) -> Walls:
-        cuts = [section(self._built.mesh, height) for height in OBSTACLE_HEIGHTS_M]
+    def _walls(self) -> WallMap:
+        cuts = [cross_section(self._built.mesh, height) for height in OBSTACLE_HEIGHTS_M]
         opaque = np.concatenate([np.full(len(cut.owners), cut is cuts[-1]) for cut in cuts])
         owners = np.concatenate([cut.owners for cut in cuts]).astype(np.int64)
-        return Walls(np.concatenate([cut.segments for cut in cuts]), owners, opaque)
+        return WallMap(np.concatenate([cut.segments for cut in cuts]), owners, opaque)
 
     @cached_property
     def _people(self) -> Crowd:
@@ -143,7 +143,7 @@ class PedestrianSimulation:
         """Return a path around walls, with extra clearance if possible; a straight line if there is no path."""
         for room in (radius + PREFERRED_CLEARANCE_M, radius):
             if room not in self._ways:
-                self._ways[room] = ways_in(self._built, (), room, BODY_HEIGHT_RANGE_M, PATH_CELL_M)
+                self._ways[room] = shortest_paths_in(self._built, (), room, BODY_HEIGHT_RANGE_M, PATH_CELL_M)
             corners = self._ways[room].way(Pose2(*start, 0.0), Pose2(*goal, 0.0))
             if corners is not None:
                 return [(x, y) for x, y in corners[1:].tolist()]

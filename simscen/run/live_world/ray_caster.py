@@ -9,7 +9,7 @@ from simscen.core.geometry.ray_fans import RayCaster, RayFan, Singles
 from simscen.core.geometry.scripted_poses import PosesAtTick, PredictedPoses
 from simscen.core.geometry.shapes import Body, Shape, TriangleMesh
 from simscen.sim.robots.robot import Robot
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 REFRESH_DISTANCE_M = 4.0
@@ -71,7 +71,7 @@ class LiveRayCaster(RayCaster):
             if name not in self._without:
                 parts = _parts(body)
                 alike = next((surface for others, surface in known if others == parts), None)
-                meshes[name] = fuse(body.solids) if alike is None else alike
+                meshes[name] = merge_solids(body.solids) if alike is None else alike
                 known.append((parts, meshes[name]))
         return meshes
 

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from simscen.core.cpu_kernels import kernel_variables
 from simscen.spec.registry import Entry, search_path
 
 MAX_MEMORY_BYTES = 4 << 30
@@ -65,10 +66,10 @@ def limit_resources() -> None:
 
 
 def clean_environment() -> dict[str, str]:
-    """Return the environment of worker processes: no secrets, one BLAS thread, a fixed hash seed."""
+    """Return the environment of worker processes: no secrets, fixed CPU kernels and hash seed, one BLAS thread."""
     kept = {k: v for k, v in os.environ.items() if k in _PASSED_ON | _ARITHMETIC or k.startswith("LC_")}
     one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "TBB")}
-    return {**kept, **one_thread, "PYTHONHASHSEED": "0"}
+    return {**kernel_variables(), **kept, **one_thread, "PYTHONHASHSEED": "0"}
 
 
 _PR_SET_CHILD_SUBREAPER = 36

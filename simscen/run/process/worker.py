@@ -29,6 +29,7 @@ ExecuteJob = Callable[[Job, Callable[[float], None]], dict[str, Any]]
 """Runs a job, reports progress in simulated seconds to a callback, and returns the end record."""
 
 
+_DISK_FULL_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT})
 _OUT_OF_MEMORY = {"error": "out-of-memory", "message": "the run used more memory than it may"}
 
 
@@ -86,9 +87,10 @@ def _end_record(job: Job, report: int, perform: ExecuteJob) -> dict[str, Any]:
     except SystemExit as left:
         return {"error": "crashed", "message": f"exited {left.code} by itself ({_innermost(left)})"}
     except OSError as error:
-        traceback.print_exc()
         if error.errno == errno.ENOMEM:
             return _OUT_OF_MEMORY
+        if error.errno not in _DISK_FULL_ERRNOS:
+            traceback.print_exc()
         return {"error": "output", "message": f"{error.strerror or error} writing {error.filename or job.folder}"}
     except Exception as error:
         # The boundary of the process: any exception becomes the error of this run.

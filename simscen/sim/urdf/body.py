@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.assets.folders import Folders, Trouble
+from simscen.assets.folders import AllowedFolders, UnusableFile
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Solid
@@ -38,17 +38,17 @@ def read_spec_tree(
     """Read the links and joints of `spec.urdf`. Raises InvalidInput."""
     assert spec.urdf is not None
     folder = (file or Path()).resolve().parent
-    folders = Folders.of(roots or (folder,), found.packages if found else None)
+    folders = AllowedFolders.of(roots or (folder,), found.packages if found else None)
     try:
         path = found.urdf if found else folders.find(spec.urdf, folder)
-    except Trouble as trouble:
+    except UnusableFile as trouble:
         shown = folders.shown(file.resolve()) if file else ""
         raise InvalidInput([Problem(shown, 0, 0, CODE, f"urdf {spec.urdf[:200]!r}: {trouble}")]) from trouble
     return read_tree(path, folders, read_mesh, {name: _text(value) for name, value in spec.arguments.items()})
 
 
 def read_tree(
-    path: Path, folders: Folders, read_mesh: MeshReader | None, arguments: Mapping[str, str] | None = None
+    path: Path, folders: AllowedFolders, read_mesh: MeshReader | None, arguments: Mapping[str, str] | None = None
 ) -> Tree:
     """Read the links and joints of a URDF or xacro file. Raises InvalidInput."""
     path = folders.named(path)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.assets.addresses import PACKAGES
-from simscen.assets.folders import Absent, Folders, Trouble
+from simscen.assets.folders import AllowedFolders, NoSuchFile, UnusableFile
+from simscen.assets.uris import PACKAGE_SCHEMES
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
 from simscen.sim.body.inertia import MassProperties
@@ -52,7 +52,7 @@ class MeshSource:
     """
 
     folder: Path
-    folders: Folders
+    folders: AllowedFolders
     read: MeshReader | None
     expanded: bool = False
 
@@ -63,10 +63,10 @@ class MeshSource:
         try:
             path = self.folders.check(self._found(written), MESH_BYTES)
             if self.read is None:
-                raise Trouble("meshes cannot be read here")
+                raise UnusableFile("meshes cannot be read here")
             mesh = self.read(path)
-        except (Trouble, ValueError) as error:
-            hint = error.hint if isinstance(error, Trouble) else ""
+        except (UnusableFile, ValueError) as error:
+            hint = error.hint if isinstance(error, UnusableFile) else ""
             raise InvalidElement(element, f"mesh {written[:200]!r}: {error}", hint) from error
         with np.errstate(over="ignore"):
             vertices = mesh.vertices * np.array(scale)
@@ -81,8 +81,8 @@ class MeshSource:
     def _found(self, written: str) -> Path:
         try:
             return self.folders.find(written, self.folder, absolute=self.expanded)
-        except Absent:
-            if written.startswith(PACKAGES):  # perhaps there is no such package, which tells more
+        except NoSuchFile:
+            if written.startswith(PACKAGE_SCHEMES):  # perhaps there is no such package, which tells more
                 self.folders.package(written.partition("://")[2].partition("/")[0], self.folder)
             raise
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.assets.folders import Folders
+from simscen.assets.folders import AllowedFolders
 from simscen.core.errors import InvalidInput
 from simscen.model.robot import (
     Ackermann,
@@ -40,7 +40,7 @@ def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshRead
     m/s, 1.5 rad/s, 1 m/s², and 2 rad/s², or those of the wheel joints if they are lower. The lidar is on the link named
     laser, lidar, or scan, or on top. Raises InvalidInput if the file is invalid or its drive ambiguous.
     """
-    folders = Folders.of(roots or (path.resolve().parent,))
+    folders = AllowedFolders.of(roots or (path.resolve().parent,))
     tree = read_tree(path, folders, read_mesh)
     wheels = infer_wheels(tree)
     drive = _drive(tree, wheels)

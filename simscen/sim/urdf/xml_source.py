@@ -8,7 +8,7 @@ from pathlib import Path
 from typing_extensions import Self
 
 from simscen.assets import markup
-from simscen.assets.folders import Folders, Trouble
+from simscen.assets.folders import AllowedFolders, UnusableFile
 from simscen.core.errors import InvalidInput, Problem
 
 CODE = "SC400"
@@ -72,7 +72,7 @@ def parse_xml(data: bytes, file: str) -> Element:
     """Parse an XML text. Raises InvalidInput with the line of an error."""
     try:
         return markup.parse(data, markup.Source.of(data, file), Element)
-    except markup.Broken as error:
+    except markup.MalformedXml as error:
         problem = Problem(file, error.line, error.col, CODE, error.message, error.hint, source=error.source)
         raise InvalidInput([problem]) from error
 
@@ -90,11 +90,11 @@ class RobotFiles:
     packages: Mapping[str, Path]
 
 
-def read_xml(path: Path, folders: Folders) -> Element:
+def read_xml(path: Path, folders: AllowedFolders) -> Element:
     """Read a URDF or an included file without expansion. Raises InvalidInput."""
     shown = folders.shown(path)
     try:
         _, data = folders.open(path, URDF_BYTES)
-    except Trouble as trouble:
+    except UnusableFile as trouble:
         raise InvalidInput([Problem(shown, 0, 0, CODE, str(trouble))]) from trouble
     return parse_xml(data, shown)

@@ -3,15 +3,15 @@
 import math
 
 import numpy as np
+import numpy.typing as npt
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
-from simscen.stack.arcs import poses_along
-from simscen.stack.footprint import Footprint, distance_at
+from simscen.stack.footprint import Footprint, distance_at, distances, lethal_near
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M
+from simscen.stack.path_geometry import MIN_YAW_RATE, poses_along
 from simscen.stack.protocols import CostmapView, NavigationFailure
-from simscen.stack.time_to_collision import time_to_collision
 
 MIN_SPEED_M_S = 0.1
 """Speed below which a command is not slowed further: the path counts as blocked."""
@@ -20,7 +20,7 @@ SPEED_FACTORS = (1.0, 0.75, 0.5, 0.25, 0.0)
 MAX_TIME_STEP_S, UNCERTAINTY_SIGMAS = 0.1, 0.5
 """Largest time between two collision checks, and standard deviations by which obstacles are enlarged."""
 APPROACH_TOLERANCE_M = 1e-4
-"""Decrease of the distance from which a robot that is already too near counts as approaching."""
+"""Decrease of the distance above which a robot that is already too close counts as approaching."""
 
 
 class CollisionChecker:
@@ -29,27 +29,27 @@ class CollisionChecker:
     def __init__(self, footprint: Footprint) -> None:
         self._footprint = footprint
 
-    def seconds(self, costmap: CostmapView, pose: Pose2, command: Twist, horizon: float) -> float:
+    def free_time(self, costmap: CostmapView, pose: Pose2, command: Twist, horizon: float) -> float:
         """Return how long the command can be driven without touching a static obstacle, in s, at most `horizon`."""
         return horizon if command == STOP else time_to_collision(self._footprint, costmap, pose, command, horizon)
 
-    def within(self, command: Twist, free: float, horizon: float, demanded: float) -> Twist:
-        """Return the command, slowed so that the free time becomes `demanded` s. Raises NO_VALID_CONTROL.
+    def slowed(self, command: Twist, free_time: float, horizon: float, required: float) -> Twist:
+        """Return the command, slowed so that the free time becomes `required` s. Raises NO_VALID_CONTROL.
 
         Nav2 fails at once. Slowing down first gives the planner time to find a way around the obstacle.
         """
-        if free >= horizon:
+        if free_time >= horizon:
             return command
-        scale = free / demanded
+        scale = free_time / required
         if max(abs(command.vx), abs(command.vy)) * scale < MIN_SPEED_M_S:
-            raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, f"collision ahead in {free:.2f} s")
+            raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, f"collision ahead in {free_time:.2f} s")
         return Twist(command.vx * scale, command.vy * scale, command.wz * scale)
 
-    def letting_pass(self, command: Twist, costmap: CostmapView, pose: Pose2, horizon: float) -> Twist:
-        """Return the fastest fraction of the command that hits no moving obstacle, or the one that hits it last.
+    def slowed_for_moving(self, command: Twist, costmap: CostmapView, pose: Pose2, horizon: float) -> Twist:
+        """Return the fastest fraction of the command that hits no moving obstacle, or the one that hits one last.
 
-        Robot and obstacles are compared at equal times: the robot does not slow down for one that will have left
-        by then. Stopping is no failure, because a moving obstacle goes on.
+        The positions of robot and obstacles are compared at the same times, so that the robot does not slow down for an
+        obstacle that will have left by then. A stop is not a failure, because a moving obstacle will move on.
         """
         if not costmap.moving.things or command == STOP:
             return command
@@ -58,31 +58,31 @@ class CollisionChecker:
         if not near.things:
             return command
         times = np.linspace(0.0, horizon, max(1, math.ceil(horizon / MAX_TIME_STEP_S)) + 1)
-        met_at = list[int]()
-        for part in SPEED_FACTORS:
-            gaps = self._footprint.gap(near, poses_along(pose, command, part * times), times, UNCERTAINTY_SIGMAS)
-            met = (gaps[1:] < 0.0) & (gaps[1:] < gaps[0] - APPROACH_TOLERANCE_M)
-            if not met.any():
+        collision_steps = list[int]()
+        for factor in SPEED_FACTORS:
+            gaps = self._footprint.gap(near, poses_along(pose, command, factor * times), times, UNCERTAINTY_SIGMAS)
+            collides = (gaps[1:] < 0.0) & (gaps[1:] < gaps[0] - APPROACH_TOLERANCE_M)
+            if not collides.any():
                 break
-            met_at.append(int(met.argmax()))
+            collision_steps.append(int(collides.argmax()))
         else:
-            part = SPEED_FACTORS[met_at.index(max(met_at))]
-        return command if part == 1.0 else Twist(part * command.vx, part * command.vy, part * command.wz)
+            factor = SPEED_FACTORS[collision_steps.index(max(collision_steps))]
+        return command if factor == 1.0 else Twist(factor * command.vx, factor * command.vy, factor * command.wz)
 
 
 ROTATION_CLEARANCE_CELLS = 1.01
-"""Cells between the hull and the nearest lethal cell's center that a turn must keep: cells stand for obstacles that
-may reach half a cell nearer, and behind the robot no scan corrects them."""
+"""Minimum distance, in cells, between the footprint and the center of a lethal cell during a rotation in place. The
+obstacle may be half a cell nearer, and a robot without a rear lidar does not see obstacles behind it."""
 BACKUP_SPEED_M_S, BACKUP_FREE_TIME_S = 0.15, 1.0
-"""Speed of backing up (Nav2's backup_speed), and time for which the way back must be free."""
+"""Speed of backing up (Nav2's backup_speed), and time for which a command to back up must be free."""
 BACKUP_TURN_RATES_RAD_S = (0.0, 0.3, -0.3, 0.6, -0.6)
-"""Turn rates tried in this order: a robot that entered on a curve may not be able to leave straight."""
+"""Turn rates to try in this order: a robot that came in on a curve may not be able to leave straight."""
 
 
 class RotationClearance:
-    """Checks whether a hull with corners can rotate in place where it is.
+    """Checks whether a footprint with corners can rotate in place at a pose.
 
-    A turn that is begun without room for all of it wedges the robot: its corners come nearer to obstacles with every
+    A robot that starts a rotation without room for all of it gets stuck: its corners come closer to obstacles with each
     step, until it can neither turn nor leave.
     """
 
@@ -90,23 +90,78 @@ class RotationClearance:
         self._footprint = footprint
 
     def has_room(self, angle: float, pose: Pose2, costmap: CostmapView) -> bool:
-        """Return whether a rotation by `angle` rad keeps the required clearance, or all that there is now."""
+        """Return whether a rotation by `angle` rad keeps the required clearance, or the current one if it is less."""
         reach = self._footprint.reach
         if reach == 0.0 or distance_at(costmap, pose.x, pose.y) > reach + 2.0 * costmap.resolution:
             return True
         steps = max(2, math.ceil(abs(angle) * reach / costmap.resolution) + 1)
         poses = poses_along(pose, Twist(0.0, 0.0, angle), np.linspace(0.0, 1.0, steps))
-        room = self._footprint.clearance(costmap, poses)
-        return bool((room >= min(ROTATION_CLEARANCE_CELLS * costmap.resolution, float(room[0]))).all())
+        clearance = self._footprint.clearance(costmap, poses)
+        required = min(ROTATION_CLEARANCE_CELLS * costmap.resolution, float(clearance[0]))
+        return bool((clearance >= required).all())
 
     def back_out(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
         """Return a command that backs up as straight as possible; None if every curvature is blocked."""
-        backs = (Twist(-BACKUP_SPEED_M_S, 0.0, rate) for rate in BACKUP_TURN_RATES_RAD_S)
-        return next(
-            (
-                one
-                for one in backs
-                if time_to_collision(self._footprint, costmap, pose, one, BACKUP_FREE_TIME_S) >= BACKUP_FREE_TIME_S
-            ),
-            None,
-        )
+        for turn_rate in BACKUP_TURN_RATES_RAD_S:
+            command = Twist(-BACKUP_SPEED_M_S, 0.0, turn_rate)
+            if time_to_collision(self._footprint, costmap, pose, command, BACKUP_FREE_TIME_S) >= BACKUP_FREE_TIME_S:
+                return command
+        return None
+
+
+CELL_DIAGONAL = 1.4143
+"""Diagonal of a cell relative to its edge, rounded up."""
+
+
+def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> float:
+    """Return the time in s until the first collision at this velocity, at most `horizon`.
+
+    A robot that is in collision according to the costmap, for example because of a localization error, may move unless
+    that brings it further into the same obstacle by more than half a cell, or into another one. Otherwise, it could
+    never leave the collision.
+    """
+    if _clearly_free(footprint.circumscribed, costmap, pose, twist, horizon):
+        return horizon
+    speed = math.hypot(twist.vx, twist.vy) + abs(twist.wz) * footprint.reach
+    steps = max(2, math.ceil(horizon * speed / costmap.resolution) + 1)
+    times = np.linspace(0.0, horizon, steps)
+    poses = poses_along(pose, twist, times)
+    blocked = ~footprint.free(costmap, poses)
+    if blocked[0]:
+        blocked = _is_worse(footprint, costmap, poses)
+    if not blocked.any():
+        return horizon
+    return float(times[max(0, int(blocked.argmax()) - 1)])
+
+
+def _is_worse(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.NDArray[np.bool_]:
+    """Return which of the poses (n, 3) are further inside a lethal cell than the first pose, or inside another one."""
+    reach = footprint.circumscribed + float(np.hypot(*(poses[:, :2] - poses[0, :2]).T).max()) + costmap.resolution
+    gaps = footprint.gaps(lethal_near(costmap, poses[0, 0].item(), poses[0, 1].item(), reach), poses)
+    deeper = gaps < np.minimum(gaps[0] - 0.5 * costmap.resolution, 0.0)
+    in_lethal_cell = distances(costmap, poses[:, :2]) <= 0.0
+    return np.asarray(deeper.any(axis=1) | (in_lethal_cell & ~in_lethal_cell[0]))
+
+
+def _clearly_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> bool:
+    """Return True if a disc of `radius` is free along the whole arc. Each step is as long as the free distance.
+
+    Half a cell diagonal is added at both ends of a step, because distances are known between cell centers. This quick
+    check avoids the check of all poses in open space.
+    """
+    vx, vy, wz = twist
+    speed, turns = math.hypot(vx, vy), abs(wz) >= MIN_YAW_RATE
+    cosine, sine, resolution = math.cos(pose.yaw), math.sin(pose.yaw), costmap.resolution
+    required = radius + CELL_DIAGONAL * resolution
+    time, at_x, at_y = 0.0, pose.x, pose.y
+    while True:
+        room = distance_at(costmap, at_x, at_y) - required
+        if room <= resolution and (room <= 0.0 or speed > 0.0):
+            return False
+        if time >= horizon or speed == 0.0:
+            return True
+        time += room / speed
+        time = min(time, horizon)
+        forward, left = (math.sin(wz * time) / wz, (1.0 - math.cos(wz * time)) / wz) if turns else (time, 0.0)
+        x, y = vx * forward - vy * left, vx * left + vy * forward
+        at_x, at_y = pose.x + cosine * x - sine * y, pose.y + sine * x + cosine * y

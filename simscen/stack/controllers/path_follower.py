@@ -1,7 +1,10 @@
-"""Base class of the controllers: the path, the progress on it, and the speed limit."""
+"""Base class of the controllers: path, progress on it, speed limit, and rotation at the goal."""
 
-from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import ErrorCode, Path
+import math
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.stack.controllers.path_handler import PathTracker
 from simscen.stack.protocols import NavigationFailure, RobotModel
 
@@ -14,10 +17,10 @@ SAME_GOAL_M = 0.1
 class PathFollower:
     """Base class of a controller that follows a path at a limited speed. Subclasses implement `command`."""
 
-    def __init__(self, wanted: float | None, robot: RobotModel) -> None:
-        self._fastest = min(wanted or DEFAULT_SPEED_M_S, robot.max_linear)
-        self._limit: float | None = None
-        self._track: PathTracker | None = None
+    def __init__(self, max_speed: float | None, robot: RobotModel) -> None:
+        self._full_speed = min(max_speed or DEFAULT_SPEED_M_S, robot.max_linear)
+        self._speed_limit: float | None = None
+        self._tracker: PathTracker | None = None
         self._end: Pose2 | None = None
 
     def set_path(self, path: Path) -> None:
@@ -27,7 +30,7 @@ class PathFollower:
         end = Pose2(*path.points[-1].tolist())
         if self._end is None or end.distance(self._end) > SAME_GOAL_M:
             self.begin()
-        self._end, self._track = end, PathTracker(path)
+        self._end, self._tracker = end, PathTracker(path)
 
     def begin(self) -> None:
         """Reset the state for a path to another goal. A new path to the same goal does not reset it."""
@@ -35,25 +38,89 @@ class PathFollower:
     @property
     def full_speed(self) -> float:
         """Speed in m/s without a speed limit."""
-        return self._fastest
+        return self._full_speed
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Drive no faster than this in m/s; None lifts the limit."""
-        self._limit = limit
+        self._speed_limit = limit
 
     @property
     def _speed(self) -> float:
         """Maximum speed now, in m/s."""
-        return self._fastest if self._limit is None else min(self._fastest, self._limit)
+        return self._full_speed if self._speed_limit is None else min(self._full_speed, self._speed_limit)
 
     @property
-    def _share(self) -> float:
+    def _speed_ratio(self) -> float:
         """Ratio by which the speed limit scales all velocities, as in Nav2's DWB and MPPI."""
-        return self._speed / self._fastest
+        return self._speed / self._full_speed
 
-    def _located(self, pose: Pose2) -> PathTracker:
+    def _locate(self, pose: Pose2) -> PathTracker:
         """Return the path, updated with the position of the robot on it."""
-        if self._track is None:
+        if self._tracker is None:
             raise NavigationFailure(ErrorCode.INVALID_PATH, "there is no path to follow")
-        self._track.locate(pose)
-        return self._track
+        self._tracker.locate(pose)
+        return self._tracker
+
+
+REACHED_TOLERANCE_RATIO, PASSED_TOLERANCE_RATIO = 0.45, 0.8
+"""Distances to the goal at which driving stops, relative to xy_goal_tolerance: ahead of the goal, and beyond it."""
+STOPPED_SPEED_M_S, STOPPED_PATH_LENGTH_M = 0.01, 0.2
+"""A robot that stands within the tolerance has arrived if its speed and the rest of its path are below these."""
+PASSED_PATH_LENGTH_M = 0.1
+"""Maximum length of the rest of the path for a goal to count as passed."""
+CAR_PATH_END_M = 0.03
+"""Length of the rest of the path at which a car has arrived: it gets its heading from the last arc."""
+SETTLING_PERIODS = 2.0
+"""Minimum number of control periods for the rest of a rotation. With fewer, the heading would oscillate."""
+BRAKING_FACTOR = 1.6
+"""Factor of deceleration times distance in the square of the speed. Twice the distance would leave no reserve."""
+
+
+class GoalRotation:
+    """Decides when the position of the goal is reached, and rotates the robot to the heading of the goal."""
+
+    def __init__(self, robot: RobotModel, max_turn_rate: float, acceleration: float, period: float) -> None:
+        """Take the limits in rad/s and rad/s², and the control period in s."""
+        self._can_turn = robot.turning_radius == 0.0
+        self._max_turn_rate = min(max_turn_rate, robot.max_angular)
+        self._acceleration, self._period = acceleration, period
+        self._is_reached = False
+
+    def reset(self) -> None:
+        """Prepare for another goal."""
+        self._is_reached = False
+
+    def reached(self, pose: Pose2, twist: Twist, goal: Goal, remaining: float) -> bool:
+        """Return whether to stop driving and to rotate; `remaining` is the length of the rest of the path in m.
+
+        The answer stays True until the robot leaves the tolerance.
+        """
+        distance = goal.pose.distance(pose)
+        if not self._can_turn:
+            return distance <= goal.xy_tolerance and remaining < CAR_PATH_END_M
+        if distance > goal.xy_tolerance:
+            self._is_reached = False
+            return False
+        dx, dy = goal.pose.x - pose.x, goal.pose.y - pose.y
+        is_behind = dx * math.cos(pose.yaw) + dy * math.sin(pose.yaw) <= 0.0
+        is_near = distance <= REACHED_TOLERANCE_RATIO * goal.xy_tolerance
+        has_stopped = abs(twist.vx) < STOPPED_SPEED_M_S and remaining < STOPPED_PATH_LENGTH_M
+        has_passed = (
+            distance <= PASSED_TOLERANCE_RATIO * goal.xy_tolerance and is_behind and remaining < PASSED_PATH_LENGTH_M
+        )
+        self._is_reached = self._is_reached or is_near or has_stopped or has_passed
+        return self._is_reached
+
+    def turn(self, angle: float, twist: Twist) -> Twist:
+        """Return the command to rotate by `angle` rad, slow enough to stop at the end of the rotation."""
+        braking = math.sqrt(BRAKING_FACTOR * self._acceleration * abs(angle))
+        settling = abs(angle) / (SETTLING_PERIODS * self._period)
+        turn_rate = math.copysign(min(self._max_turn_rate, braking, settling), angle)
+        change = self._acceleration * self._period
+        return Twist(0.0, 0.0, min(max(turn_rate, twist.wz - change), twist.wz + change))
+
+    def turn_to_goal(self, pose: Pose2, goal: Goal, twist: Twist) -> Twist:
+        """Return the command to rotate to the heading of the goal; a car stops instead."""
+        if not self._can_turn:
+            return STOP
+        return self.turn(wrap(goal.pose.yaw - pose.yaw), twist)

@@ -11,27 +11,28 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Path
-from simscen.stack.cusps import changes, forward_steps
+from simscen.stack.path_geometry import direction_changes, forward_steps
 
 SEARCH_AHEAD_M = 1.5
 """Length of path beyond the last position that is searched for the nearest point, so that a path may cross itself."""
 CUSP_REACHED_M = 0.03
-"""Distance to a change of direction at which it counts as reached."""
+"""Length of path before a cusp at which the cusp counts as reached."""
 CURVATURE_SPAN_M = 0.3
-"""Distance to both sides of a point over which the curvature of the path is measured."""
+"""Length of path to both sides of a point over which the curvature is measured."""
+CARROT_SEARCH_MARGIN_M = 0.5
+"""Length of path, beyond twice the distance of the carrot, that is searched for the carrot."""
 LENGTH_TOLERANCE_M = 1e-9
 """Rounding error allowed for sums of lengths."""
 
 
 class PathTracker:
-    """Follows the robot's progress along a path; the place only ever moves forward.
+    """Position of the robot on a path. It only moves forward.
 
-    A path may change between forward and backward (Reeds-Shepp). It is followed piece by piece: nothing beyond the
-    next such cusp is looked at until the robot is there.
+    A path may change between forward and backward driving (Reeds-Shepp). It is followed segment by segment: points
+    beyond the next cusp are not considered until the robot has reached it.
 
-    Searches pass over what cannot be what they look for: so many meters along the path change the distance to the robot
-    by no more than that, and so many points are no more meters than that many of the longest steps. A handful of points
-    x + iy is looked at, which takes less than arrays of thirty do.
+    Searches skip points that cannot be the result: a step along the path changes the distance to the robot by at most
+    the length of the step. So few points remain that scalars (points as x + iy) are faster than arrays.
     """
 
     def __init__(self, path: Path) -> None:
@@ -39,138 +40,146 @@ class PathTracker:
         steps = np.diff(self.points[:, :2], axis=0)
         lengths = np.hypot(steps[:, 0], steps[:, 1])
         self.along = np.concatenate(([0.0], np.cumsum(lengths)))
-        self._meters: list[float] = self.along.tolist()
-        self._places: list[complex] = (self.points[:, 0] + 1j * self.points[:, 1]).tolist()
-        self.longest = float(lengths.max(initial=0.0))
-        """Length of the longest step in m."""
-        self._most = 1.0 / (self.longest + LENGTH_TOLERANCE_M)
-        """Points for each meter, at least."""
-        ahead = forward_steps(self.points)
-        self._ends: list[int] = [*changes(ahead).tolist(), len(self.points) - 1]
-        self._forward: list[bool] = [bool(ahead[max(0, end - 1)]) if len(ahead) else True for end in self._ends]
-        self.index = self._begin = 0
+        """Length of path (n,) in m from the start to each point."""
+        self._along: list[float] = self.along.tolist()
+        self._complex_points: list[complex] = (self.points[:, 0] + 1j * self.points[:, 1]).tolist()
+        self.longest_step = float(lengths.max(initial=0.0))
+        """Largest distance in m between successive points."""
+        self._points_per_meter = 1.0 / (self.longest_step + LENGTH_TOLERANCE_M)
+        is_forward = forward_steps(self.points)
+        self._segment_ends: list[int] = [*direction_changes(is_forward).tolist(), len(self.points) - 1]
+        self._segment_forward: list[bool] = [
+            bool(is_forward[max(0, end - 1)]) if len(is_forward) else True for end in self._segment_ends
+        ]
+        self.index = self._segment_start = 0
 
     @property
     def length(self) -> float:
-        """Length of the path in meters."""
-        return self._meters[-1]
+        """Length of the path in m."""
+        return self._along[-1]
 
     @property
     def has_cusps(self) -> bool:
-        """Whether the path has another piece after this one."""
-        return len(self._ends) > 1
+        """Whether there is another segment after the current one."""
+        return len(self._segment_ends) > 1
 
     @property
     def forward(self) -> bool:
-        """Whether the piece being followed is driven forward."""
-        return self._forward[0]
+        """Whether the current segment is driven forward."""
+        return self._segment_forward[0]
 
     def locate(self, pose: Pose2) -> None:
-        """Move to the point of this piece nearest to the robot, and on to the next piece at its end."""
-        self._nearest(pose)
-        while len(self._ends) > 1 and self.to_cusp() <= CUSP_REACHED_M:
-            self.index = self._begin = self._ends.pop(0)
-            self._forward.pop(0)
-            self._nearest(pose)
+        """Move to the point of the segment nearest to the robot, and on to the next segment at its end."""
+        self._find_nearest(pose)
+        while len(self._segment_ends) > 1 and self.to_cusp() <= CUSP_REACHED_M:
+            self.index = self._segment_start = self._segment_ends.pop(0)
+            self._segment_forward.pop(0)
+            self._find_nearest(pose)
 
-    def _nearest(self, pose: Pose2) -> None:
-        places, meters, most, here = self._places, self._meters, self._most, complex(pose.x, pose.y)
+    def _find_nearest(self, pose: Pose2) -> None:
+        points, along, robot = self._complex_points, self._along, complex(pose.x, pose.y)
         index = nearest = self.index
-        end, far, near = self._ends[0], meters[index] + SEARCH_AHEAD_M, math.inf
-        while index <= end and meters[index] <= far:
-            away = abs(places[index] - here)
-            if away < near:
-                nearest, near = index, away
-            index += int((away - near) * most) or 1
+        end, search_end, shortest = self._segment_ends[0], along[index] + SEARCH_AHEAD_M, math.inf
+        while index <= end and along[index] <= search_end:
+            distance = abs(points[index] - robot)
+            if distance < shortest:
+                nearest, shortest = index, distance
+            index += int((distance - shortest) * self._points_per_meter) or 1
         self.index = nearest
 
-    def ahead(self, meters: float) -> tuple[Array, Array]:
-        """Points (n, 3) of this piece for so many meters, at least two where it has any, and meters (n,) to them."""
-        end = min(self._stop(meters) + 1, self._ends[0] + 1)
+    def ahead(self, length: float) -> tuple[Array, Array]:
+        """Return the points (n, 3) of the segment for a length of path in m, and the length of path (n,) to each.
+
+        There are at least two points if the segment has as many.
+        """
+        end = bisect_right(self._along, self._along[self.index] + length)
+        end = min(end + 1, self._segment_ends[0] + 1)
         start = min(self.index, max(0, end - 2))
         return self.points[start:end], self.along[start:end] - self.along[start]
 
-    def places(self, every: int) -> list[complex]:
-        """Each so-manieth of the points from the nearest one on, x + iy."""
-        return self._places[self.index :: every]
+    def sampled_points(self, every: int) -> list[complex]:
+        """Return every n-th point (x + iy) from the nearest one on."""
+        return self._complex_points[self.index :: every]
 
-    def stations(self, step: float, reach: float) -> Iterator[tuple[float, complex, float]]:
-        """Points of this piece about `step` meters apart, the first so far ahead: meters to each, x + iy, its bend."""
-        meters, here = self._meters, self._meters[self.index]
-        at = step
-        while at <= reach:
-            index = bisect_left(meters, here + at)
-            if index > self._ends[0]:
+    def samples_ahead(self, spacing: float, reach: float) -> Iterator[tuple[float, complex, float]]:
+        """Yield points of the segment about `spacing` m apart, up to `reach` m ahead, starting with the first spacing.
+
+        Each comes with the length of path to it in m, and with the curvature in 1/m: (length, x + iy, curvature).
+        """
+        along, start = self._along, self._along[self.index]
+        length = spacing
+        while length <= reach:
+            index = bisect_left(along, start + length)
+            if index > self._segment_ends[0]:
                 return
-            yield meters[index] - here, self._places[index], self._bend(index)
-            at = meters[index] - here + step
+            yield along[index] - start, self._complex_points[index], self._curvature(index)
+            length = along[index] - start + spacing
 
-    def _bend(self, index: int) -> float:
-        """About the curvature at a point in 1/m; 0 where the piece does not go on so far to both sides."""
-        meters, places = self._meters, self._places
-        before = bisect_right(meters, meters[index] - CURVATURE_SPAN_M) - 1
-        after = bisect_left(meters, meters[index] + CURVATURE_SPAN_M)
-        if before < self._begin or after > self._ends[0]:
+    def _curvature(self, index: int) -> float:
+        """Return the approximate curvature at a point in 1/m; 0 near the ends of the segment."""
+        along, points = self._along, self._complex_points
+        before = bisect_right(along, along[index] - CURVATURE_SPAN_M) - 1
+        after = bisect_left(along, along[index] + CURVATURE_SPAN_M)
+        if before < self._segment_start or after > self._segment_ends[0]:
             return 0.0
-        turn = phase((places[after] - places[index]) * (places[index] - places[before]).conjugate())
-        return 2.0 * abs(turn) / (meters[after] - meters[before])
+        turn = phase((points[after] - points[index]) * (points[index] - points[before]).conjugate())
+        return 2.0 * abs(turn) / (along[after] - along[before])
 
     def remaining(self) -> float:
         """Return the length of path from the nearest point to the end, in m."""
-        return self._meters[-1] - self._meters[self.index]
+        return self._along[-1] - self._along[self.index]
 
     def to_cusp(self) -> float:
-        """Return the length of path to the end of this piece, in m."""
-        return self._meters[self._ends[0]] - self._meters[self.index]
+        """Return the length of path to the end of the segment, in m."""
+        return self._along[self._segment_ends[0]] - self._along[self.index]
 
     @property
-    def piece_end(self) -> tuple[float, float]:
-        """End point of this piece."""
-        end = self._places[self._ends[0]]
+    def segment_end(self) -> tuple[float, float]:
+        """End point of the segment."""
+        end = self._complex_points[self._segment_ends[0]]
         return end.real, end.imag
 
     def carrot(self, pose: Pose2, distance: float, beyond: bool = False) -> tuple[float, float]:
-        """Return where the piece leaves the circle of `distance` around the robot, or its end if it does not.
+        """Return the point where the segment leaves the circle of radius `distance` around the robot, or its end.
 
-        Interpolated between points, so that the carrot glides (RPP's circleSegmentIntersection). `beyond` prolongs
-        the piece in the direction it ends in, so that the robot comes in straight (interpolate_curvature_after_goal).
+        It is interpolated between points, so that it moves smoothly (RPP's circleSegmentIntersection). With `beyond`,
+        the segment is extended straight beyond its end (interpolate_curvature_after_goal), so that the robot arrives
+        with the heading of the end.
         """
-        far = self._meters[self.index] + 2 * distance + 0.5
-        first = self._leaving(pose, distance, far)
-        if first is None:
-            x, y, yaw = self.points[min(bisect_right(self._meters, far), self._ends[0])].tolist()
+        search_end = self._along[self.index] + 2 * distance + CARROT_SEARCH_MARGIN_M
+        outside = self._first_outside(pose, distance, search_end)
+        if outside is None:
+            x, y, yaw = self.points[min(bisect_right(self._along, search_end), self._segment_ends[0])].tolist()
             if not beyond:
                 return x, y
-            more = distance if self.forward else -distance
-            return _on_circle(
-                x - pose.x, y - pose.y, x + 2 * more * math.cos(yaw) - pose.x, y + 2 * more * math.sin(yaw) - pose.y,
-                distance, pose,
-            )  # fmt: skip
-        x, y = (place := self._places[first]).real, place.imag
-        if first == self.index:
-            return x, y
-        before = self._places[first - 1]
-        return _on_circle(before.real - pose.x, before.imag - pose.y, x - pose.x, y - pose.y, distance, pose)
+            extension = distance if self.forward else -distance
+            extended_x, extended_y = x + 2 * extension * math.cos(yaw), y + 2 * extension * math.sin(yaw)
+            return _on_circle(x - pose.x, y - pose.y, extended_x - pose.x, extended_y - pose.y, distance, pose)
+        point = self._complex_points[outside]
+        if outside == self.index:
+            return point.real, point.imag
+        inside = self._complex_points[outside - 1]
+        return _on_circle(
+            inside.real - pose.x, inside.imag - pose.y, point.real - pose.x, point.imag - pose.y, distance, pose
+        )
 
-    def _leaving(self, pose: Pose2, distance: float, far: float) -> int | None:
-        """Return the first point of the piece, at most `far` m along the path, that is at least `distance` m away."""
-        places, meters, most, here = self._places, self._meters, self._most, complex(pose.x, pose.y)
-        index, end = self.index, self._ends[0]
-        while index <= end and (index == 0 or meters[index - 1] <= far):
-            near = abs(places[index] - here)
-            if near >= distance:
+    def _first_outside(self, pose: Pose2, distance: float, search_end: float) -> int | None:
+        """Return the first point of the segment that is at least `distance` m away from the robot.
+
+        The search ends `search_end` m along the path.
+        """
+        points, along, robot = self._complex_points, self._along, complex(pose.x, pose.y)
+        index, end = self.index, self._segment_ends[0]
+        while index <= end and (index == 0 or along[index - 1] <= search_end):
+            away = abs(points[index] - robot)
+            if away >= distance:
                 return index
-            index += int((distance - near) * most) or 1
+            index += int((distance - away) * self._points_per_meter) or 1
         return None
-
-    def _stop(self, meters: float) -> int:
-        """One past the last point so far ahead, or of this piece."""
-        end = bisect_right(self._meters, self._meters[self.index] + meters)
-        return min(end, self._ends[0] + 1)
 
 
 def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, center: Pose2) -> tuple[float, float]:
-    """Return the intersection of segment a (inside) to b (outside) with a circle, in the frame of `center`."""
+    """Return where the segment from a (inside) to b leaves a circle; a and b are relative to its `center`."""
     dx, dy = bx - ax, by - ay
     a, b, c = dx * dx + dy * dy, ax * dx + ay * dy, ax * ax + ay * ay - radius * radius
     t = (-b + math.sqrt(max(0.0, b * b - a * c))) / a if a > 0 else 1.0
@@ -184,28 +193,31 @@ LOCAL_PLAN_SPACING_M = 0.05
 
 @dataclass(frozen=True, eq=False)
 class LocalPlan:
-    """Poses (n, 3) from where the robot is on its path, `spacing` meters apart, and its `length`.
+    """Poses (n, 3) from the position of the robot on its path on, `spacing` m apart, and their `length` in m.
 
-    It ends where the robot must next turn round, at the path's end, or after as many meters as were asked for.
+    They end at the next cusp, at the end of the path, or after the requested length.
     """
 
     points: Array
     spacing: float
     length: float
 
-    def about(self, pose: Pose2) -> tuple[Floats, Floats, Floats]:
-        """x, y (n,) with the robot at the origin of the unrotated frame, and yaw: short numbers for float32."""
+    def relative_to(self, pose: Pose2) -> tuple[Floats, Floats, Floats]:
+        """Return x and y (n,) relative to a pose, in the same orientation, and the headings.
+
+        Relative positions are small, so that float32 is precise enough.
+        """
         x, y, yaw = self.points.T
         return (x - pose.x).astype(np.float32), (y - pose.y).astype(np.float32), yaw.astype(np.float32)
 
 
-def local_plan(track: PathTracker, meters: float, spacing: float = LOCAL_PLAN_SPACING_M) -> LocalPlan:
-    """Return the next `meters` of the path with points at most `spacing` m apart."""
-    points, along = track.ahead(meters)
-    length = float(min(meters, along[-1]))
-    steps = max(1, math.ceil(length / spacing - 1e-9))
+def local_plan(tracker: PathTracker, max_length: float, spacing: float = LOCAL_PLAN_SPACING_M) -> LocalPlan:
+    """Return the next `max_length` m of the path with points at most `spacing` m apart."""
+    points, along = tracker.ahead(max_length)
+    length = float(min(max_length, along[-1]))
+    steps = max(1, math.ceil(length / spacing - LENGTH_TOLERANCE_M))
     at = np.arange(steps + 1) * (length / steps)
     at[-1] = length
     x, y = np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])
-    yaw = points[np.minimum(np.searchsorted(along, at + 1e-9, side="right"), len(points)) - 1, 2]
+    yaw = points[np.minimum(np.searchsorted(along, at + LENGTH_TOLERANCE_M, side="right"), len(points)) - 1, 2]
     return LocalPlan(np.stack((x, y, yaw), axis=-1), length / steps, length)

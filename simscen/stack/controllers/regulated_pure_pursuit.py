@@ -1,205 +1,288 @@
 """Regulated pure pursuit (Macenski et al. 2023; nav2_regulated_pure_pursuit_controller)."""
 
 import math
+from typing import NamedTuple
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.controllers import RegulatedPurePursuit as RppSpec
-from simscen.stack.arcs import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.controllers.collision_checker import CollisionChecker, RotationClearance
-from simscen.stack.controllers.goal_rotation import GoalRotation
-from simscen.stack.controllers.path_follower import PathFollower
+from simscen.stack.controllers.path_follower import BRAKING_FACTOR, GoalRotation, PathFollower
 from simscen.stack.controllers.path_handler import CUSP_REACHED_M, PathTracker
-from simscen.stack.controllers.speed_regulation import SpeedRegulation
 from simscen.stack.footprint import distance_at
+from simscen.stack.path_geometry import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 MIN_SQUARED_CHORD_M2 = 0.001
-"""m²: nearer carrots are straight ahead (Nav2's calculateCurvature)."""
+"""Squared distance of the carrot below which the curvature is 0 (Nav2's calculateCurvature)."""
 CAR_LOOKAHEAD_RATIO = 0.4
-"""Of its turning radius a car looks ahead at most: its plans go from full left to full right, and what a chord cuts off
-there it cannot make good again."""
+"""Maximum lookahead distance of a car relative to its turning radius. A plan can change from full left to full right,
+and a car cannot correct the error of a shortcut there."""
 MIN_ROTATION_RAD = 0.1
-"""rad. Carrots that lie less to the side than that are straight ahead: to turn to them changes nothing."""
+"""Angle to the carrot below which a rotation in place would change nothing."""
 LOOKAHEAD_RATIOS = (1.0, 0.7, 0.5, 0.35)
-"""Parts of the look-ahead distance that are tried until the arc is free: an arc to a far carrot cuts the path's bends,
-shorter ones keep to it. nav2_graceful_controller goes through its targets likewise."""
+"""Ratios of the lookahead distance to try until the arc is free. An arc to a far carrot cuts the bends of the path; a
+shorter one stays closer to it. nav2_graceful_controller tries its targets in the same way."""
+
+
+class Carrot(NamedTuple):
+    """Point of the path to drive to, in m in the frame of the robot."""
+
+    x: float
+    y: float
+
+    @property
+    def distance(self) -> float:
+        """Distance from the robot in m."""
+        return math.hypot(self.x, self.y)
+
+    def bearing(self, backward: bool) -> float:
+        """Return the angle in rad by which the robot must rotate until its front, or its back, points at the carrot."""
+        sign = -1.0 if backward else 1.0
+        return math.atan2(sign * self.y, sign * self.x)
+
+
+class Arc(NamedTuple):
+    """A command, the time in s for which it is free of collisions, and the time in s for which it must be free."""
+
+    command: Twist
+    free_time: float
+    horizon: float
 
 
 class RegulatedPurePursuit(PathFollower):
-    """Steers at a carrot on the path and regulates its speed by curvature, nearness of obstacles and of the goal."""
+    """Steers at a carrot on the path, and regulates the speed by curvature, nearby obstacles, and distance to the goal.
+
+    Where Nav2's controller fails because the arc to the carrot is blocked, this one tries nearer carrots, then a slower
+    command, and then a rotation in place.
+    """
 
     def __init__(self, spec: RppSpec, setting: Setting) -> None:
         robot, footprint, period = setting.robot, setting.footprint, setting.control_period
         super().__init__(spec.desired_linear_vel, robot)
-        self._spec, self._robot, self._free_way = spec, robot, CollisionChecker(footprint)
-        self._goal_pose = GoalRotation(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)
-        self._turning, self._slowing = RotationClearance(footprint), SpeedRegulation(spec, setting)
+        self._spec, self._robot, self._is_car = spec, robot, robot.turning_radius > 0.0
+        self._goal_rotation = GoalRotation(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)
+        self._collision_checker, self._rotation_clearance = CollisionChecker(footprint), RotationClearance(footprint)
+        self._speed_regulation = SpeedRegulation(spec, setting)
         self.arc: tuple[Pose2, Twist] | None = None
-        """The pose and the velocity of its last command."""
+        """Pose and velocity of the last command."""
 
     def begin(self) -> None:
-        """Another goal."""
-        self._goal_pose.reset()
+        """Reset the goal rotation for a path to another goal."""
+        self._goal_rotation.reset()
 
     @property
     def local_plan(self) -> Path | None:
-        """The arc it expects to drive in the next second and a half."""
+        """The arc of the last command."""
         return None if self.arc is None else Path(arc_poses(*self.arc, LOCAL_PLAN_TIMES_S))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """Return the velocity to drive now. Raises NO_VALID_CONTROL when the arc to the carrot is blocked."""
-        track, steered = self._located(pose), self._robot.turning_radius > 0.0
-        there = self._goal_pose.reached(pose, twist, goal, track.remaining())
-        if there and (steered or self._spec.use_rotate_to_heading):
-            command = STOP if steered else self._turn(wrap(goal.pose.yaw - pose.yaw), pose, twist, costmap)
+        """Return the velocity command. Raises NO_VALID_CONTROL when the arc to the carrot is blocked."""
+        tracker = self._locate(pose)
+        is_reached = self._goal_rotation.reached(pose, twist, goal, tracker.remaining())
+        if is_reached and self._is_car:
+            command = STOP
+        elif is_reached and self._spec.use_rotate_to_heading:
+            command = self._rotate(wrap(goal.pose.yaw - pose.yaw), pose, twist, costmap)
         else:
-            command = self._follow(track, pose, twist, costmap)
+            command = self._follow(tracker, pose, twist, costmap)
         self.arc = (pose, command)
         return command
 
-    def _follow(self, track: PathTracker, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """To the farthest carrot that can be reached freely; if none can, on the arc that is free for longest."""
-        reach = self._lookahead(twist.vx)
-        arcs: list[tuple[float, float, Twist]] = []
-        turn: float | None = None
-        aside: float | None = None
-        for part in LOOKAHEAD_RATIOS:
-            if part < 1.0 and part * reach < self._spec.min_lookahead_dist:
+    def _follow(self, tracker: PathTracker, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
+        """Return the command to the farthest carrot with a free arc, or else the arc that is free for the longest."""
+        lookahead_distance = self._lookahead_distance(twist.vx)
+        arcs: list[Arc] = []
+        rotation: float | None = None
+        escape_rotation: float | None = None
+        for ratio in LOOKAHEAD_RATIOS:
+            if ratio < 1.0 and ratio * lookahead_distance < self._spec.min_lookahead_dist:
                 break
-            carrot = _seen_from(pose, *track.carrot(pose, part * reach, beyond=self._robot.turning_radius > 0.0))
-            bend = self._bend(track, pose) if self._spec.use_fixed_curvature_lookahead else carrot
-            backward = not track.forward or (self._spec.allow_reversing and carrot[0] < 0.0)
-            if self._should_rotate(bend, backward):
-                turn = _bearing(bend, backward)
+            carrot = _carrot(tracker, pose, ratio * lookahead_distance, self._is_car)
+            curvature_carrot = (
+                self._curvature_carrot(tracker, pose) if self._spec.use_fixed_curvature_lookahead else carrot
+            )
+            backward = not tracker.forward or (self._spec.allow_reversing and carrot.x < 0.0)
+            if self._should_rotate(curvature_carrot, backward):
+                rotation = curvature_carrot.bearing(backward)
                 break
-            command = self._drive(bend, backward, pose, costmap)
-            free, horizon = self._time_free(command, pose, costmap, self._as_far_as(carrot))
-            if free >= horizon:
-                return self._letting_pass(command, pose, costmap, horizon)
-            arcs.append((free, horizon, command))
-            if aside is None and self._straight_is_free(carrot, backward, command, pose, costmap):
-                aside = _bearing(carrot, backward)
-        if turn is not None:
-            return self._turn(turn, pose, twist, costmap)
-        free, horizon, command = max(arcs, key=lambda arc_poses: arc_poses[0])
-        demanded = self._spec.max_allowed_time_to_collision_up_to_carrot
+            command = self._drive(tracker, curvature_carrot, backward, pose, costmap)
+            arc = self._checked_arc(command, pose, costmap, self._checked_distance(tracker, carrot))
+            if arc.free_time >= arc.horizon:
+                return self._slowed_for_moving(command, pose, costmap, arc.horizon)
+            arcs.append(arc)
+            if escape_rotation is None and self._is_straight_free(carrot, backward, command, pose, costmap):
+                escape_rotation = carrot.bearing(backward)
+        if rotation is not None:
+            return self._rotate(rotation, pose, twist, costmap)
+        command, free_time, horizon = max(arcs, key=lambda arc: arc.free_time)
+        required = self._spec.max_allowed_time_to_collision_up_to_carrot
         try:
-            slower = self._free_way.within(command, free, horizon, demanded)
+            slowed = self._collision_checker.slowed(command, free_time, horizon, required)
         except NavigationFailure:
-            if aside is None:
+            if escape_rotation is None:
                 raise
-            return self._turn(aside, pose, twist, costmap)
-        return self._letting_pass(slower, pose, costmap, horizon)
+            return self._rotate(escape_rotation, pose, twist, costmap)
+        return self._slowed_for_moving(slowed, pose, costmap, horizon)
 
-    def _straight_is_free(
-        self, carrot: tuple[float, float], backward: bool, arc_poses: Twist, pose: Pose2, costmap: CostmapView
+    def _is_straight_free(
+        self, carrot: Carrot, backward: bool, command: Twist, pose: Pose2, costmap: CostmapView
     ) -> bool:
-        """Return whether the robot could drive straight to the carrot after a rotation, where the arc collides.
+        """Return whether the robot could drive straight to the carrot after a rotation in place.
 
-        Out of a tight place that is often the only way; nav2_regulated_pure_pursuit fails there. A hull that is not
-        round would come nearer to what it stands beside by turning.
+        That is often the only way out of a tight place. Only for round robots, because others come closer to obstacles
+        when they rotate.
         """
-        angle = _bearing(carrot, backward)
+        angle = carrot.bearing(backward)
         if not self._spec.use_rotate_to_heading or self._robot.radius is None or abs(angle) < MIN_ROTATION_RAD:
             return False
-        free, horizon = self._time_free(
-            Twist(arc_poses.vx, 0.0, 0.0), Pose2(pose.x, pose.y, pose.yaw + angle), costmap, math.hypot(*carrot)
-        )
-        return free >= horizon
+        rotated = Pose2(pose.x, pose.y, pose.yaw + angle)
+        arc = self._checked_arc(Twist(command.vx, 0.0, 0.0), rotated, costmap, carrot.distance)
+        return arc.free_time >= arc.horizon
 
-    def _bend(self, track: PathTracker, pose: Pose2) -> tuple[float, float]:
+    def _curvature_carrot(self, tracker: PathTracker, pose: Pose2) -> Carrot:
         """Return the point that determines the curvature with use_fixed_curvature_lookahead."""
-        beyond = self._spec.interpolate_curvature_after_goal
-        return _seen_from(pose, *track.carrot(pose, self._spec.curvature_lookahead_dist, beyond=beyond))
+        spec = self._spec
+        return _carrot(tracker, pose, spec.curvature_lookahead_dist, spec.interpolate_curvature_after_goal)
 
-    def _as_far_as(self, carrot: tuple[float, float]) -> float:
-        """Return the distance in m that must be free: to the carrot, or for a car to where it stops."""
-        assert self._track is not None
-        away = math.hypot(*carrot)
-        return min(away, max(CUSP_REACHED_M, self._track.to_cusp())) if self._robot.turning_radius > 0.0 else away
+    def _checked_distance(self, tracker: PathTracker, carrot: Carrot) -> float:
+        """Return the distance in m that must be free: to the carrot or, for a car, to the next cusp if it is nearer."""
+        if not self._is_car:
+            return carrot.distance
+        return min(carrot.distance, max(CUSP_REACHED_M, tracker.to_cusp()))
 
-    def _turn(self, angle: float, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """In place where there is room for all of the turn; else back out to where there is."""
-        if not self._spec.use_collision_detection or self._turning.has_room(angle, pose, costmap):
-            return self._goal_pose.turn(angle, twist)
-        back = self._turning.back_out(pose, costmap)
-        if back is None:
+    def _rotate(self, angle: float, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
+        """Return the command to rotate in place or, if there is no room for all of the rotation, to back out."""
+        if not self._spec.use_collision_detection or self._rotation_clearance.has_room(angle, pose, costmap):
+            return self._goal_rotation.turn(angle, twist)
+        back_out = self._rotation_clearance.back_out(pose, costmap)
+        if back_out is None:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "no room to turn, nor to back out")
-        return back
+        return back_out
 
-    def _lookahead(self, speed: float) -> float:
+    def _lookahead_distance(self, speed: float) -> float:
         spec = self._spec
         if not spec.use_velocity_scaled_lookahead_dist:
             return spec.lookahead_dist
-        reach = min(max(abs(speed) * spec.lookahead_time, spec.min_lookahead_dist), spec.max_lookahead_dist)
-        if self._robot.turning_radius > 0.0:
-            reach = min(reach, max(spec.min_lookahead_dist, CAR_LOOKAHEAD_RATIO * self._robot.turning_radius))
-        return reach
+        distance = min(max(abs(speed) * spec.lookahead_time, spec.min_lookahead_dist), spec.max_lookahead_dist)
+        if self._is_car:
+            distance = min(distance, max(spec.min_lookahead_dist, CAR_LOOKAHEAD_RATIO * self._robot.turning_radius))
+        return distance
 
-    def _should_rotate(self, carrot: tuple[float, float], backward: bool) -> bool:
-        if not self._spec.use_rotate_to_heading or self._robot.turning_radius > 0.0:
+    def _should_rotate(self, carrot: Carrot, backward: bool) -> bool:
+        if not self._spec.use_rotate_to_heading or self._is_car:
             return False
-        return abs(_bearing(carrot, backward)) > self._spec.rotate_to_heading_min_angle
+        return abs(carrot.bearing(backward)) > self._spec.rotate_to_heading_min_angle
 
-    def _drive(self, carrot: tuple[float, float], backward: bool, pose: Pose2, costmap: CostmapView) -> Twist:
-        square = carrot[0] ** 2 + carrot[1] ** 2
-        curvature = 2.0 * carrot[1] / square if square > MIN_SQUARED_CHORD_M2 else 0.0
-        if self._robot.turning_radius > 0.0:
-            tightest = 1.0 / self._robot.turning_radius
-            curvature = min(max(curvature, -tightest), tightest)
-        speed = self._regulated(curvature, pose, costmap)
+    def _drive(self, tracker: PathTracker, carrot: Carrot, backward: bool, pose: Pose2, costmap: CostmapView) -> Twist:
+        """Return the command for the arc to a carrot, at the regulated speed."""
+        squared_chord = carrot.x**2 + carrot.y**2
+        curvature = 2.0 * carrot.y / squared_chord if squared_chord > MIN_SQUARED_CHORD_M2 else 0.0
+        if self._is_car:
+            max_curvature = 1.0 / self._robot.turning_radius
+            curvature = min(max(curvature, -max_curvature), max_curvature)
+        speed = self._regulated_speed(tracker, curvature, pose, costmap)
         if abs(curvature) * speed > self._robot.max_angular:
             speed = self._robot.max_angular / abs(curvature)
         if backward:
             speed = -min(speed, self._robot.max_reverse)
         return Twist(speed, 0.0, speed * curvature)
 
-    def _regulated(self, curvature: float, pose: Pose2, costmap: CostmapView) -> float:
-        assert self._track is not None
-        speed, slowing = self._speed, self._slowing
-        slow = slowing.within(speed, curvature)
-        if self._spec.use_cost_regulated_linear_velocity_scaling:
-            slow = min(slow, slowing.beside(speed, distance_at(costmap, pose.x, pose.y)))
-        slow = slowing.before(speed, slow, self._track, costmap)
-        return min(speed, self._approaching(max(slow, self._spec.regulated_linear_scaling_min_speed), pose))
+    def _regulated_speed(self, tracker: PathTracker, curvature: float, pose: Pose2, costmap: CostmapView) -> float:
+        speed, regulation, spec = self._speed, self._speed_regulation, self._spec
+        regulated = regulation.for_curvature(speed, curvature)
+        if spec.use_cost_regulated_linear_velocity_scaling:
+            regulated = min(regulated, regulation.for_distance(speed, distance_at(costmap, pose.x, pose.y)))
+        regulated = regulation.for_path_ahead(speed, regulated, tracker, costmap)
+        regulated = max(regulated, spec.regulated_linear_scaling_min_speed)
+        return min(speed, self._approach_speed(tracker, regulated, pose))
 
-    def _approaching(self, speed: float, pose: Pose2) -> float:
-        """Slow down near the end of the path, or of a piece: by Nav2's ratio, never faster than the brakes allow."""
-        assert self._track is not None
-        left, spec = self._track.to_cusp(), self._spec
-        if left < spec.approach_velocity_scaling_dist:
-            near = math.hypot(*_seen_from(pose, *self._track.piece_end))
-            scaled = speed * near / spec.approach_velocity_scaling_dist
+    def _approach_speed(self, tracker: PathTracker, speed: float, pose: Pose2) -> float:
+        """Return the speed near the end of the path or a cusp: scaled as in Nav2, and limited by the brakes."""
+        remaining, spec = tracker.to_cusp(), self._spec
+        if remaining < spec.approach_velocity_scaling_dist:
+            distance = _to_robot_frame(pose, *tracker.segment_end).distance
+            scaled = speed * distance / spec.approach_velocity_scaling_dist
             speed = min(speed, max(scaled, spec.min_approach_linear_velocity))
-            left = max(left, near)  # who has made way for somebody at the end of the path has to come back to it
-        braking = math.sqrt(1.6 * self._robot.linear_deceleration * left)
+            remaining = max(remaining, distance)  # a robot that has left the path at its end has to come back
+        braking = math.sqrt(BRAKING_FACTOR * self._robot.linear_deceleration * remaining)
         return min(speed, max(braking, spec.min_approach_linear_velocity))
 
-    def _time_free(self, command: Twist, pose: Pose2, costmap: CostmapView, carrot: float) -> tuple[float, float]:
-        """Seconds until the first collision on the arc up to the carrot, and how many are demanded."""
-        allowed = self._spec.max_allowed_time_to_collision_up_to_carrot
+    def _checked_arc(self, command: Twist, pose: Pose2, costmap: CostmapView, distance: float) -> Arc:
+        """Return the command with its free time; it must be free for `distance` m, but not longer than Nav2's limit."""
+        max_time = self._spec.max_allowed_time_to_collision_up_to_carrot
         if not self._spec.use_collision_detection:
-            return allowed, allowed
-        horizon = min(allowed, carrot / abs(command.vx)) if command.vx != 0.0 else allowed
-        return self._free_way.seconds(costmap, pose, command, horizon), horizon
+            return Arc(command, max_time, max_time)
+        horizon = min(max_time, distance / abs(command.vx)) if command.vx != 0.0 else max_time
+        return Arc(command, self._collision_checker.free_time(costmap, pose, command, horizon), horizon)
 
-    def _letting_pass(self, command: Twist, pose: Pose2, costmap: CostmapView, horizon: float) -> Twist:
-        """Return the command, slowed where it would hit a moving obstacle."""
+    def _slowed_for_moving(self, command: Twist, pose: Pose2, costmap: CostmapView, horizon: float) -> Twist:
+        """Return the command, slowed if it would hit a moving obstacle."""
         if not self._spec.use_collision_detection:
             return command
-        return self._free_way.letting_pass(command, costmap, pose, horizon)
+        return self._collision_checker.slowed_for_moving(command, costmap, pose, horizon)
 
 
-def _bearing(carrot: tuple[float, float], backward: bool) -> float:
-    """How far the end of the robot that goes first must turn to point at the carrot."""
-    sign = -1.0 if backward else 1.0
-    return math.atan2(sign * carrot[1], sign * carrot[0])
+def _carrot(tracker: PathTracker, pose: Pose2, distance: float, beyond: bool) -> Carrot:
+    """Return the carrot at a distance in m; see PathTracker.carrot."""
+    return _to_robot_frame(pose, *tracker.carrot(pose, distance, beyond=beyond))
 
 
-def _seen_from(pose: Pose2, x: float, y: float) -> tuple[float, float]:
-    """Return a point of the map in the frame of the robot."""
+def _to_robot_frame(pose: Pose2, x: float, y: float) -> Carrot:
     cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
-    return cosine * (x - pose.x) + sine * (y - pose.y), cosine * (y - pose.y) - sine * (x - pose.x)
+    return Carrot(cosine * (x - pose.x) + sine * (y - pose.y), cosine * (y - pose.y) - sine * (x - pose.x))
+
+
+DECELERATION_RATIO, REACTION_TIME_S = 0.9, 0.1
+"""Fraction of the maximum deceleration used for planning, and delay before braking starts."""
+SAMPLE_SPACING_M = 0.1
+"""Distance along the path between the points that are checked."""
+SPEED_PER_CLEARANCE_1_S = 10.0
+"""Speed allowed per meter of clearance beside the footprint, to react when the robot leaves the center of a gap."""
+
+
+class SpeedRegulation:
+    """Regulates the speed by curvature and nearby obstacles, and brakes before bends and narrow passages.
+
+    Nav2's controller slows down in them; this one also takes the braking distance into account. Speeds are in m/s.
+    """
+
+    def __init__(self, spec: RppSpec, setting: Setting) -> None:
+        self._spec, self._inscribed_radius = spec, setting.footprint.inscribed
+        self._doubled_deceleration = 2.0 * DECELERATION_RATIO * setting.robot.linear_deceleration
+
+    def for_distance(self, speed: float, distance: float) -> float:
+        """Return the speed with an obstacle `distance` m from the base: Nav2's, and less in narrow passages."""
+        spec = self._spec
+        if not spec.use_cost_regulated_linear_velocity_scaling or distance >= spec.cost_scaling_dist:
+            return speed
+        scaled = speed * spec.cost_scaling_gain * distance / spec.cost_scaling_dist
+        if not spec.slow_down_ahead:
+            return scaled
+        clearance = max(0.0, distance - self._inscribed_radius)
+        return min(scaled, spec.regulated_linear_scaling_min_speed + SPEED_PER_CLEARANCE_1_S * clearance)
+
+    def for_curvature(self, speed: float, curvature: float) -> float:
+        """Return the speed in a bend of this curvature in 1/m."""
+        ratio = abs(curvature) * self._spec.regulated_linear_scaling_min_radius
+        return speed / ratio if self._spec.use_regulated_linear_velocity_scaling and ratio > 1.0 else speed
+
+    def for_path_ahead(self, speed: float, regulated: float, tracker: PathTracker, costmap: CostmapView) -> float:
+        """Return the speed, at most `regulated`, from which the robot can brake for the path ahead.
+
+        `speed` is the speed limit that applies at each point before it is regulated.
+        """
+        if not self._spec.slow_down_ahead:
+            return regulated
+        stopping_distance = regulated * (regulated / self._doubled_deceleration + REACTION_TIME_S)
+        for distance, point, curvature in tracker.samples_ahead(SAMPLE_SPACING_M, stopping_distance):
+            speed_there = self.for_curvature(speed, curvature)
+            obstacle_distance = distance_at(costmap, point.real, point.imag)
+            if obstacle_distance > 0.0:  # the collision check handles obstacles on the path
+                speed_there = min(speed_there, self.for_distance(speed, obstacle_distance))
+            if speed_there < regulated:
+                braking = self._doubled_deceleration * max(0.0, distance - REACTION_TIME_S * regulated)
+                regulated = min(regulated, math.sqrt(speed_there * speed_there + braking))
+        return regulated

@@ -2,142 +2,158 @@
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.stack import StackSpec
-from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.costmap.grid_frame import MAX_ROLL_OFFSET_M
-from simscen.stack.frames import Frames, transform_polygon
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
+from simscen.stack.frames import Frames, OdometryHistory, transform_polygon
 from simscen.stack.latency_queue import LatencyQueue
-from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
 
 MIN_LOCAL_SIZE_M = 3.0
 """Size of Nav2's local costmap, and the default minimum size of this one."""
 ZONE_TOLERANCE_M = 0.02
-"""Displacement of zones in the odom frame from which they are drawn again."""
+"""Displacement of keepout zones in the odom frame above which the local costmap is updated with their new position."""
 
 
 class Costmaps:
-    """Keeps both up to date, each at its own rate.
+    """Global and local costmap of one robot, each updated at its own rate.
 
-    The global one is in the map frame: the map, and what was seen from where the robot believed itself. The local one
-    rolls with the robot in the odom frame, knows no map, and shows where things are from the robot: a correction of
-    the localizer moves nothing in it but keepout zones, which are known in the map frame alone.
+    The global costmap is in the map frame and contains the map. The local costmap rolls with the robot in the odom
+    frame and contains no map, so that a correction of the localizer does not move obstacles in it. Only keepout zones,
+    which are defined in the map frame, move with a correction.
     """
 
-    def __init__(self, spec: StackSpec, surroundings: Surroundings, reach: float, latency: int = 0) -> None:
-        """`reach`: how far in meters the controller looks ahead; `latency`: ticks that an update takes."""
-        self.wide = Costmap(spec.costmap, surroundings)
-        near = spec.local_costmap.completed(spec.costmap)
-        edge = max(MIN_LOCAL_SIZE_M, 2.0 * (reach + surroundings.robot.circumscribed_radius + MAX_ROLL_OFFSET_M))
-        size = spec.local_costmap.width or edge, spec.local_costmap.height or edge
-        bare = replace(surroundings, map=None, keepout=(), masks=replace(surroundings.masks, keepout=None))
-        self.near = Costmap(near, bare, size, MAX_ROLL_OFFSET_M)
-        self._reach = max(size) / 2
-        self._wide = _Rhythm(math.ceil(surroundings.tick_rate / spec.costmap.update_frequency), latency)
-        self._near = _Rhythm(math.ceil(surroundings.tick_rate / near.update_frequency), latency)
+    def __init__(
+        self, spec: StackSpec, surroundings: Surroundings, lookahead_distance: float, latency: int = 0
+    ) -> None:
+        """Create both costmaps.
+
+        `lookahead_distance` in m is how far the controller looks ahead; `latency` is the time of an update in ticks.
+        """
+        self.global_costmap = LayeredCostmap(spec.costmap, surroundings)
+        local_spec = spec.local_costmap.completed(spec.costmap)
+        needed = lookahead_distance + surroundings.robot.circumscribed_radius + MAX_ROLL_OFFSET_M
+        default_size = max(MIN_LOCAL_SIZE_M, 2.0 * needed)
+        size = spec.local_costmap.width or default_size, spec.local_costmap.height or default_size
+        without_map = replace(surroundings, map=None, keepout=(), masks=replace(surroundings.masks, keepout=None))
+        self.local_costmap = LayeredCostmap(local_spec, without_map, size, MAX_ROLL_OFFSET_M)
+        self._local_range = max(size) / 2
+        tick_rate = surroundings.tick_rate
+        self._global_schedule = _UpdateSchedule(math.ceil(tick_rate / spec.costmap.update_frequency), latency)
+        self._local_schedule = _UpdateSchedule(math.ceil(tick_rate / local_spec.update_frequency), latency)
         self._zones = Zones(surroundings.keepout, (), surroundings.masks)
         self._odom_from_map: Pose2 | None = None
-        self._painted = False
+        self._has_zones = False
         self.next: float = 0
-        """The tick before which an update has nothing to do."""
+        """The tick of the next update."""
 
-    def see(self, seen: Scan | Image) -> None:
-        """Store a reading for the next update."""
-        for rhythm in (self._wide, self._near):
-            rhythm.seen[seen.sensor] = seen
+    def add_reading(self, reading: Scan | Image) -> None:
+        """Store a reading for the next update of each costmap."""
+        for schedule in (self._global_schedule, self._local_schedule):
+            schedule.readings[reading.sensor] = reading
 
     def due(self, tick: int) -> bool:
         """Return whether it is time for an update of the global costmap."""
-        return self._wide.due(tick)
+        return self._global_schedule.due(tick)
 
     def set_zones(self, zones: Zones) -> None:
-        """Keep out of these from now on, and of no others."""
+        """Replace all keepout zones."""
         self._zones, self._odom_from_map = zones, None
-        self.wide.set_zones(zones)
+        self.global_costmap.set_zones(zones)
 
     def update(self, tick: int, frames: Frames, odometry: OdometryHistory) -> None:
-        """Feed the newest reading of each sensor to the costmaps that are due, seen from where it was taken."""
-        if tick >= self._wide.next:
-            for base, seen, _ in self._wide.take(tick, frames, frames.pose, odometry):
-                self.wide.update(base, seen)
-        if tick >= self._near.next:
-            for base, seen, then in self._near.take(tick, frames, frames.odometry, odometry):
-                self._paint_zones(then)
-                self.near.update(base, seen)
-        self.next = min(self._wide.next, self._near.next)
+        """Update the costmaps that are due with the newest reading of each sensor, at the pose where it was taken."""
+        if tick >= self._global_schedule.next:
+            for base, reading, _ in self._global_schedule.take(tick, frames, frames.pose, odometry):
+                self.global_costmap.update(base, reading)
+        if tick >= self._local_schedule.next:
+            for base, reading, frames_then in self._local_schedule.take(tick, frames, frames.odometry, odometry):
+                self._update_local_zones(frames_then)
+                self.local_costmap.update(base, reading)
+        self.next = min(self._global_schedule.next, self._local_schedule.next)
 
     def clear(self) -> None:
-        """Forget every live obstacle but those that the newest scans show (Nav2's ClearEntireCostmap of both)."""
-        self.wide.clear()
+        """Clear all obstacles except those in the newest readings (Nav2's ClearEntireCostmap for both costmaps)."""
+        self.global_costmap.clear()
         self.clear_local()
 
     def clear_around(self) -> None:
-        """Clear both costmaps as far as the local costmap reaches (Nav2's ClearCostmapAroundRobot).
+        """Clear both costmaps within the range of the local costmap (Nav2's ClearCostmapAroundRobot).
 
-        What lies farther off is in no controller's way, and who forgets a dead end drives into it again.
+        Obstacles that are farther away do not stop the controller, and without them the robot would drive into the same
+        dead end again.
         """
-        self.wide.clear(self._reach)
+        self.global_costmap.clear(self._local_range)
         self.clear_local()
 
     def clear_local(self) -> None:
         """Clear the local costmap, except for cells that no lidar sees: the robot backs up by this costmap."""
-        self.near.clear(unseen=self._reach)
+        self.local_costmap.clear(unseen=self._local_range)
 
     def clear_global(self, *, entirely: bool) -> None:
-        """Forget live obstacles in the global costmap alone: all but those in sight, or as far as `clear_around`."""
-        self.wide.clear(math.inf if entirely else self._reach)
+        """Clear the global costmap only: entirely, or within the range of the local costmap."""
+        self.global_costmap.clear(math.inf if entirely else self._local_range)
 
-    def _paint_zones(self, frames: Frames) -> None:
-        """Keepout zones where they belong in the odom frame by now."""
-        mask, known = self._zones.masks.keepout, self._odom_from_map
-        if not self._zones.keepout and mask is None and not self._painted:
+    def _update_local_zones(self, frames: Frames) -> None:
+        """Move the keepout zones of the local costmap to their current position in the odom frame."""
+        mask, previous = self._zones.masks.keepout, self._odom_from_map
+        if not self._zones.keepout and mask is None and not self._has_zones:
             return
-        if known is not None and frames.moved(known, self._reach) <= ZONE_TOLERANCE_M:
+        if previous is not None and frames.moved(previous, self._local_range) <= ZONE_TOLERANCE_M:
             return
-        moved, self._painted = frames.odom_from_map, True
-        self._odom_from_map = moved
-        polygons = tuple(transform_polygon(moved, polygon) for polygon in self._zones.keepout)
-        here = None if mask is None else replace(mask, origin=moved.compose(mask.origin))
-        self.near.set_zones(Zones(polygons, (), replace(self._zones.masks, keepout=here)))
+        odom_from_map, self._has_zones = frames.odom_from_map, True
+        self._odom_from_map = odom_from_map
+        polygons = tuple(transform_polygon(odom_from_map, polygon) for polygon in self._zones.keepout)
+        local_mask = None if mask is None else replace(mask, origin=odom_from_map.compose(mask.origin))
+        self.local_costmap.set_zones(Zones(polygons, (), replace(self._zones.masks, keepout=local_mask)))
 
 
-class _Rhythm:
-    """When a costmap is updated, and the readings that it has not taken in yet."""
+class _Update(NamedTuple):
+    """A reading, the pose of the robot when it was taken, and the frames when the update started."""
+
+    base: Pose2
+    reading: Scan | Image
+    frames: Frames
+
+
+class _UpdateSchedule:
+    """Update times of a costmap, and the readings for its next update."""
 
     def __init__(self, period: int, latency: int) -> None:
-        self._period, self._updated = max(period, latency), -period
-        self._underway = LatencyQueue[_View](latency)
+        """Take the time between updates and the time that an update takes, in ticks."""
+        self._period, self._updated_at = max(period, latency), -period
+        self._updates = LatencyQueue[_Update](latency)
         self.next: float = 0
-        """The tick before which there is nothing to take."""
-        self.seen: dict[str, Scan | Image] = {}
+        """The tick of the next update."""
+        self.readings: dict[str, Scan | Image] = {}
 
     def due(self, tick: int) -> bool:
-        return tick - self._updated >= self._period
+        return tick - self._updated_at >= self._period
 
-    def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list["_View"]:
-        """Return the readings to be processed by now, for a robot at `base`. An update waits for a first reading."""
-        if self.seen and self.due(tick):
-            self._updated = tick
-            for one in self.seen.values():
-                if isinstance(one, Image) or not _blind(one):
-                    self._underway.put(tick, (odometry.then(base, one.tick), one, frames))
-            self.seen.clear()
-        there: list[_View] = []
-        while tick >= self._underway.due:
-            there.append(self._underway.take())
-        self.next = min(self._updated + self._period, self._underway.due)
-        return there
+    def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list[_Update]:
+        """Return the updates that are complete at this tick, for a robot that is at `base` now.
+
+        Start an update if it is due and there is a reading.
+        """
+        if self.readings and self.due(tick):
+            self._updated_at = tick
+            for reading in self.readings.values():
+                if isinstance(reading, Image) or not _is_blind(reading):
+                    self._updates.put(tick, _Update(odometry.then(base, reading.tick), reading, frames))
+            self.readings.clear()
+        complete: list[_Update] = []
+        while tick >= self._updates.due:
+            complete.append(self._updates.take())
+        self.next = min(self._updated_at + self._period, self._updates.due)
+        return complete
 
 
-def _blind(scan: Scan) -> bool:
-    """Return whether no beam of a scan measured free space or a hit: all are invalid or too close."""
+def _is_blind(scan: Scan) -> bool:
+    """Return whether all beams of a scan are invalid or too close, so that none measured free space or a hit."""
     ranges, nearest = scan.ranges, scan.range_min
     return not len(ranges) or not (ranges.item(0) >= nearest or bool((ranges >= nearest).any()))
-
-
-_View = tuple[Pose2, Scan | Image, Frames]
-"""Pose of the robot at a reading, the reading, and the frames when the update began."""

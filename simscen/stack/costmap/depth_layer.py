@@ -23,7 +23,7 @@ from simscen.stack.costmap.static_layer import Mask
 Heights = npt.NDArray[np.float32]
 
 
-class Shown(NamedTuple):
+class DepthObservation(NamedTuple):
     """Content of a depth image: obstacle cells (n, 2), their heights (n,), and ground cells."""
 
     cells: Cells
@@ -31,7 +31,9 @@ class Shown(NamedTuple):
     ground: Cells
 
 
-def shown(image: Image, base: Pose2, frame: GridFrame, spec: CostmapSpec, known: Mask) -> Shown:
+def project_depth_image(
+    image: Image, base: Pose2, frame: GridFrame, spec: CostmapSpec, known: Mask
+) -> DepthObservation:
     """Return what the camera sees from a robot at `base`; `known` are cells already detected as ground."""
     across, up = _slopes(image.depth.shape, image.field_of_view)
     depth = image.depth.astype(np.float64)
@@ -49,7 +51,9 @@ def shown(image: Image, base: Pose2, frame: GridFrame, spec: CostmapSpec, known:
     counts = (above >= spec.min_obstacle_height) & (above <= spec.max_obstacle_height)
     counts &= (away >= spec.obstacle_min_range) & (away <= spec.obstacle_max_range)
     marked = counts.reshape(-1) & inside
-    return Shown(cells[marked], heights.reshape(-1)[marked].astype(np.float32), cells[level.reshape(-1) & inside])
+    return DepthObservation(
+        cells[marked], heights.reshape(-1)[marked].astype(np.float32), cells[level.reshape(-1) & inside]
+    )
 
 
 def seen_through(
@@ -65,9 +69,9 @@ def seen_through(
     column = np.floor(columns / 2 - focal * seen[:, 1] / depth).astype(np.int64)
     row = np.floor(rows / 2 - focal * seen[:, 2] / depth).astype(np.int64)
     inside = ahead & (row >= 0) & (column >= 0) & (row < rows) & (column < columns)
-    shown = image.depth[np.where(inside, row, 0), np.where(inside, column, 0)]
+    project_depth_image = image.depth[np.where(inside, row, 0), np.where(inside, column, 0)]
     with np.errstate(invalid="ignore"):
-        through = inside & (shown > depth + frame.resolution) & (depth <= spec.raytrace_max_range)
+        through = inside & (project_depth_image > depth + frame.resolution) & (depth <= spec.raytrace_max_range)
     return np.asarray(through)
 
 

@@ -13,7 +13,7 @@ from simscen.stack.localizers.beams import Plane
 
 Cells = npt.NDArray[np.int64]
 _least, _most = np.minimum.reduce, np.maximum.reduce
-Numbers = npt.NDArray[np.int64]
+CellIndices = npt.NDArray[np.int64]
 """Cells (n,) by number: row by row, from cell (0, 0) on."""
 
 MAX_CACHED_CELLS = 10_000
@@ -49,7 +49,7 @@ class GridFrame:
         rows, columns = cells[:, 0], cells[:, 1]
         return (rows >= 0) & (columns >= 0) & (rows < self.shape[0]) & (columns < self.shape[1])
 
-    def numbers(self, points: Plane, center: complex, reach: float) -> Numbers:
+    def numbers(self, points: Plane, center: complex, reach: float) -> CellIndices:
         """Return the cells under those points (n,) that lie on the grid; all are within `reach` of `center`.
 
         Where all of that is on the grid, nobody is asked.
@@ -60,7 +60,7 @@ class GridFrame:
         if some:
             np.floor(flat, out=flat)  # where all are positive, to cut off does the same
         cells = flat.astype(np.int64).reshape(-1, 2)
-        numbers: Numbers = cells.dot(self._steps)
+        numbers: CellIndices = cells.dot(self._steps)
         if some:
             off = cells.view(np.uint64)  # below zero is far beyond every grid without a sign
             numbers = numbers[(off[:, 0] < self.shape[1]) & (off[:, 1] < self.shape[0])]
@@ -73,11 +73,11 @@ class GridFrame:
         return left + reach <= x <= left + wide - reach and low + reach <= y <= low + high - reach
 
     @cached_property
-    def _steps(self) -> Numbers:
+    def _steps(self) -> CellIndices:
         """Factors that turn the column and row of a cell into its number."""
         return np.array((1, self.shape[1]))
 
-    def points(self, numbers: Numbers) -> Plane:
+    def points(self, numbers: CellIndices) -> Plane:
         """Return the centers (n,) of cells."""
         corner, (rows, columns) = complex(*self.origin), self.shape
         if rows * columns > MAX_CACHED_CELLS:
@@ -86,7 +86,7 @@ class GridFrame:
         points += corner
         return points
 
-    def extent(self, numbers: Numbers) -> tuple[tuple[int, int], tuple[int, int]]:
+    def extent(self, numbers: CellIndices) -> tuple[tuple[int, int], tuple[int, int]]:
         """Return the lowest and the highest row and column of at least one cell."""
         width = self.shape[1]
         first, last, columns = int(_least(numbers)), int(_most(numbers)), numbers % width
@@ -97,11 +97,11 @@ class GridFrame:
         column, row = (x - self.origin[0]) / self.resolution, (y - self.origin[1]) / self.resolution
         return 0 <= row < self.shape[0] and 0 <= column < self.shape[1]
 
-    def within(self, window: tuple[slice, slice], numbers: Numbers) -> Numbers:
+    def within(self, window: tuple[slice, slice], numbers: CellIndices) -> CellIndices:
         """Cells of a window, which are given as numbers in it."""
         (rows, columns), width = window, self.shape[1]
         wide = max(1, columns.stop - columns.start)
-        cells: Numbers = numbers + numbers // wide * (width - wide) + (rows.start * width + columns.start)
+        cells: CellIndices = numbers + numbers // wide * (width - wide) + (rows.start * width + columns.start)
         return cells
 
     def window(self, low: tuple[int, int], high: tuple[int, int], margin: int) -> tuple[slice, slice]:
@@ -112,7 +112,7 @@ class GridFrame:
         )
 
 
-def _middles(numbers: Numbers, columns: int, edge: float, corner: complex = 0j) -> Plane:
+def _middles(numbers: CellIndices, columns: int, edge: float, corner: complex = 0j) -> Plane:
     """Return the centers x + iy (n,) of cells of a grid with this corner."""
     up, across = np.divmod(numbers, columns)
     middles: Plane = up * (1j * edge) + (across * edge + (corner + (0.5 + 0.5j) * edge))

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from simscen.stack.distance_transform import (
+from simscen.stack.costmap.distance_transform import (
     MAX_REACH_CELLS,
     OUT_OF_REACH,
     squared_distance_blocks,

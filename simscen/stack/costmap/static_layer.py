@@ -51,7 +51,7 @@ def free_layer(grid: OccupancyGrid, unknown: bool) -> StaticLayer:
 
 
 @cached_on_instance
-def walls_within(grid: OccupancyGrid, reach: int) -> Squared:
+def static_distances(grid: OccupancyGrid, reach: int) -> Squared:
     """For each cell of such a layer, see `squared_distances`: once for all its runs."""
     return squared_distances(free_layer(grid, True).lethal, reach)
 

@@ -10,10 +10,10 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import AmclParameters
+from simscen.stack.frames import OdometryHistory
 from simscen.stack.localizers.clusters import spread, summarize
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
-from simscen.stack.odometry_history import OdometryHistory
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,4 +151,4 @@ class AmclLocalizer:
 
     def _propagated_covariance(self, last: Correction, delta: Pose2) -> Array:
         """Return the covariance (3, 3) after moving by `delta` (in the base frame) since the last correction."""
-        return self._motion.carry(last.covariance, last.pose.yaw, delta)
+        return self._motion.propagate(last.covariance, last.pose.yaw, delta)

@@ -13,17 +13,17 @@ import numpy as np
 from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
 from simscen.core.geometry import Array
 from simscen.stack.localizers.beams import Beams
-from simscen.stack.localizers.distance_field import DistanceField, by_blocks
-from simscen.stack.localizers.likelihood_field import PEAK_OF_SUMS, STRAYS_OF_SUMS
+from simscen.stack.localizers.distance_field import DistanceField, evaluate_in_blocks
+from simscen.stack.localizers.likelihood_field import MAX_RANDOM_SHARE_OF_SUMS, PEAK_POWER_OF_SUMS
 
 
 def opaque_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
-    """Distances to what stops a ray: occupied and unknown cells and everything off the map, as in nav2_amcl."""
+    """Return distances to what stops a ray: occupied and unknown cells, and everything off the map, as in nav2_amcl."""
     return DistanceField(grid, grid.cells != FREE, max_distance, walled=True)
 
 
 def cast_rays(field: DistanceField, poses: Array, beams: Beams) -> Array:
-    """Ranges (n, b) in m that `beams` would measure from robot `poses` (n, 3), to within half a cell."""
+    """Return the ranges (n, b) in m that `beams` would measure at `poses` (n, 3), to within half a cell."""
     places, heading = (values.astype(np.float64)[..., None] for values in field.coordinates(poses))
     forward, left, c, s = beams.origin.real, beams.origin.imag, np.cos(heading), np.sin(heading)
     angle, cell = heading + beams.bearings, field.resolution
@@ -35,7 +35,7 @@ def cast_rays(field: DistanceField, poses: Array, beams: Beams) -> Array:
 
 
 def _march(field: DistanceField, x: Array, y: Array, angle: Array, limit: float) -> Array:
-    """How far rays (r,) get from x, y along `angle`, at most `limit`; all lengths in cells."""
+    """Return how far rays (r,) get from x, y along `angle`, at most `limit`; all lengths in cells."""
     cos, sin, flown, flying = np.cos(angle), np.sin(angle), np.zeros_like(x), np.arange(x.size)
     while flying.size:
         column = (x[flying] + cos[flying] * flown[flying]).astype(np.float32)
@@ -50,10 +50,10 @@ def _march(field: DistanceField, x: Array, y: Array, angle: Array, limit: float)
 
 @dataclass(frozen=True, eq=False)
 class BeamModel:
-    """Each beam's range is a hit, something short before it, nothing, or chance; a particle weighs 1 + Σ p³."""
+    """Mixture of hit, short, maximum, and random ranges for each beam; a particle weighs 1 + Σ p³ over its beams."""
 
-    peak: ClassVar[float] = PEAK_OF_SUMS
-    strays: ClassVar[float] = STRAYS_OF_SUMS
+    peak_power: ClassVar[float] = PEAK_POWER_OF_SUMS
+    max_random_share: ClassVar[float] = MAX_RANDOM_SHARE_OF_SUMS
 
     field: DistanceField
     z_hit: float
@@ -64,10 +64,10 @@ class BeamModel:
     lambda_short: float
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
-        """Logarithms (n,) of 1 + Σ p³."""
+        """Return the logarithms (n,) of 1 + Σ p³."""
         missed = beams.ranges >= beams.range_max
 
-        def judge(block: Array) -> Array:
+        def weigh(block: Array) -> Array:
             error = beams.ranges - cast_rays(self.field, block, beams)
             p = self.z_hit * np.exp(np.square(error) / (-2 * self.sigma_hit**2))
             p += (error < 0) * (self.z_short * self.lambda_short * np.exp(-self.lambda_short * beams.ranges))
@@ -75,8 +75,8 @@ class BeamModel:
             logarithm: Array = np.log1p((p * p * p).sum(axis=1))
             return logarithm
 
-        return by_blocks(judge, poses)
+        return evaluate_in_blocks(weigh, poses)
 
     def tempering(self, beams: Beams) -> float:
-        """A sum of cubes says little however many beams there are."""
+        """Return 1: a sum of cubes has the same scale for any number of beams."""
         return 1.0

@@ -12,25 +12,25 @@ from simscen.core.geometry import Array
 from simscen.core.messages.sensor_data import Scan
 
 Plane = npt.NDArray[np.complex128]
-"""Points or directions x + iy: turned by a product, placed by a sum."""
+"""Points or directions as complex numbers x + iy: a product rotates, and a sum translates."""
 
 Cells = npt.NDArray[np.int32]
 
 
 class Field(Protocol):
-    """A table of what is where on a map."""
+    """Lookup table over the cells of a map."""
 
-    def cells_seen(self, poses: Array, points: Plane) -> Cells:
-        """Indices (n, b) into the table of `points` (b,) in the base frame as seen from each of `poses` (n, 3)."""
+    def endpoint_cells(self, poses: Array, points: Plane) -> Cells:
+        """Return table indices (n, b) of `points` (b,), given in the base frame, for each of the `poses` (n, 3)."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Beams:
-    """Beams that gave an answer.
+    """Valid beams of a scan.
 
-    `ranges` (b,) in m, at most `range_max`, which means that nothing was hit; `towards` (b,) are unit vectors along
-    them in the base frame; `origin` is the lidar's place in the base frame.
+    `ranges` (b,) in m; `range_max` means that nothing was hit. `towards` (b,) are unit vectors along the beams, and
+    `origin` is the position of the lidar, both in the base frame.
     """
 
     ranges: Array
@@ -45,35 +45,35 @@ class Beams:
 
     @cached_property
     def ends(self) -> Plane:
-        """Where the beams that hit something ended: points (m,) in the base frame."""
+        """Endpoints (m,) in the base frame of the beams that hit something."""
         hit = (self.ranges < self.range_max).nonzero()[0]
         return self.ranges.take(hit) * self.towards.take(hit) + self.origin
 
     def cells(self, field: Field, poses: Array) -> Cells:
-        """Those of a field in which `ends` lie, seen from each of `poses` (n, 3): (n, m).
+        """Return the cells (n, m) of the endpoints for each of the `poses` (n, 3).
 
-        Of the same poses, which nobody writes to, the filter asks twice: what they are worth, and how likely they are.
+        The result is cached, because the filter needs it twice for the same poses.
         """
         last: tuple[Field, Array, Cells] | None = self.__dict__.get("_cells")
         if last is None or last[0] is not field or last[1] is not poses:
-            last = self.__dict__["_cells"] = field, poses, field.cells_seen(poses, self.ends)
+            last = self.__dict__["_cells"] = field, poses, field.endpoint_cells(poses, self.ends)
         return last[2]
 
-    def of_hits(self, chosen: npt.NDArray[np.bool_]) -> "Beams":
-        """Of those that hit something the `chosen` ones (m,) alone, and all others."""
+    def keeping_hits(self, chosen: npt.NDArray[np.bool_]) -> "Beams":
+        """Return the beams without those that hit something and are not `chosen` (m,)."""
         kept = self.ranges >= self.range_max
         kept[(~kept).nonzero()[0][chosen]] = True
         return Beams(self.ranges[kept], self.towards[kept], self.origin, self.range_max)
 
 
 def directions(scan: Scan) -> Plane:
-    """Unit vectors (n,) along the beams of a scan, in the base frame; not to be written to."""
+    """Return read-only unit vectors (n,) along the beams of a scan, in the base frame."""
     return _directions(scan.angle_min, scan.angle_increment, len(scan.ranges), scan.mount.yaw)
 
 
 @lru_cache(maxsize=1024)
-def evenly(count: int, most: int) -> npt.NDArray[np.int64]:
-    """Indices (most,) of so many of `count` things, evenly chosen; not to be written to."""
+def evenly_spaced(count: int, most: int) -> npt.NDArray[np.int64]:
+    """Return `most` read-only indices, evenly spaced over `count` items."""
     chosen: npt.NDArray[np.int64] = np.linspace(0, count - 1, most).astype(np.int64)
     chosen.flags.writeable = False
     return chosen
@@ -81,7 +81,7 @@ def evenly(count: int, most: int) -> npt.NDArray[np.int64]:
 
 @lru_cache(maxsize=8)
 def _directions(first: float, increment: float, count: int, turn: float) -> Plane:
-    """Beams of a lidar point the same ways in all its scans."""
+    """Return the directions of all beams; cached, since they are the same in all scans of a lidar."""
     angles = first + increment * np.arange(count, dtype=np.float64)
     towards: Plane = (np.cos(angles) + 1j * np.sin(angles)) * cmath.rect(1.0, turn)
     towards.flags.writeable = False

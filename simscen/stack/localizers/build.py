@@ -17,7 +17,7 @@ from simscen.stack.localizers.likelihood_field import (
     SensorModel,
     obstacle_field,
 )
-from simscen.stack.localizers.motion_models import Differential, MotionModel, Omni
+from simscen.stack.localizers.motion_models import DifferentialMotionModel, MotionModel, OmniMotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.particles import FreeSpace
 from simscen.stack.protocols import Localizer
@@ -75,8 +75,8 @@ def motion_model(spec: model.AmclParameters, holonomic: bool) -> MotionModel:
     """Return the motion model that the parameters name, by default the one of the robot's drive."""
     alpha = (spec.alpha1, spec.alpha2, spec.alpha3, spec.alpha4)
     if (spec.robot_model or ("omni" if holonomic else "differential")) == "omni":
-        return Omni((*alpha, spec.alpha5))
-    return Differential(alpha)
+        return OmniMotionModel((*alpha, spec.alpha5))
+    return DifferentialMotionModel(alpha)
 
 
 def sensor_model(spec: model.AmclParameters, grid: OccupancyGrid, field: DistanceField) -> SensorModel:

@@ -5,24 +5,24 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap
-from simscen.stack.localizers.kld import BIN_METERS, BINS_OF_YAW, Keys, bins, join, split
+from simscen.stack.localizers.kld import BIN_SIZE_M, YAW_BINS, Keys, bins, join, split
 from simscen.stack.localizers.particles import Particles, wrapped
 
-BINS_IN_TOUCH = 8
-"""The most that poses fill which are nearer to each other than a bin is wide, in all three coordinates."""
-_AROUND = np.array([(x, y, a) for x in (-1, 0, 1) for y in (-1, 0, 1) for a in (-1, 0, 1)])
+MAX_COMPACT_BINS = 8
+"""Maximum number of bins that contain poses whose extent is less than one bin in all three coordinates."""
+_NEIGHBORS = np.array([(x, y, a) for x in (-1, 0, 1) for y in (-1, 0, 1) for a in (-1, 0, 1)])
 
 
-def clusters(keys: Keys) -> Keys:
-    """Labels (n,) of groups of particles whose bins touch, corners and the turn from 350° to 0° included.
+def cluster_labels(keys: Keys) -> Keys:
+    """Return the labels (n,) of clusters: groups of particles whose histogram bins `keys` (n,) touch.
 
-    `keys` (n,) are their histogram bins. As pf_kdtree_cluster of nav2_amcl, which overlooks the full turn. A label is
-    the rank of the lowest bin of its group. (scipy's connected_components takes 0.3 ms to answer for the few bins of
-    a robot that knows where it is, three times as long as all of this.)
+    Bins also touch at corners, and from 350° to 0°, in contrast to nav2_amcl's pf_kdtree_cluster. A label is the rank
+    of the lowest bin of its cluster. For the few bins of a localized robot, scipy's connected_components is three times
+    as slow.
     """
     occupied, bin_of = np.unique(keys, return_inverse=True)
     x, y, yaw = split(occupied)
-    wanted = join(x + _AROUND[:, :1], y + _AROUND[:, 1:2], (yaw + _AROUND[:, 2:]) % BINS_OF_YAW)
+    wanted = join(x + _NEIGHBORS[:, :1], y + _NEIGHBORS[:, 1:2], (yaw + _NEIGHBORS[:, 2:]) % YAW_BINS)
     found = np.minimum(np.searchsorted(occupied, wanted), len(occupied) - 1)
     itself = np.arange(len(occupied))
     neighbors, labels = np.where(occupied[found] == wanted, found, itself), itself
@@ -33,41 +33,39 @@ def clusters(keys: Keys) -> Keys:
         labels = lowest[lowest]
 
 
-def summarize(particles: Particles, peak: float = 1.0) -> tuple[Pose2, Array]:
-    """Where the particles say the robot is, and the covariance (3, 3) of *all* particles about that pose.
+def summarize(particles: Particles, peak_power: float = 1.0) -> tuple[Pose2, Array]:
+    """Return the estimated pose and the covariance (3, 3) of all particles about it.
 
-    The pose is that of the heaviest cluster. nav2_amcl takes its mean, which lags behind a moving robot where weights
-    are as flat as those of its default sensor model. The best particle does not lag, but jumps when another one takes
-    its place, by as much as the cluster is wide. Here the weights to the power `peak` (the sensor model's; 1 leaves
-    the mean) are averaged, too, and the two means count in inverse proportion to their variances: where the best
-    particles agree it is theirs, where they do not it stays in the middle, and it changes smoothly with the weights.
-    All of this was measured (docs/reference/localizers.md).
+    The pose is that of the heaviest cluster. nav2_amcl uses the mean of the cluster, which lags behind a moving robot
+    if the sensor model has flat weights. The best particle does not lag, but jumps when another particle becomes the
+    best. Here, the mean with the weights to the power `peak_power` (of the sensor model; 1 changes nothing) is combined
+    with the plain mean, in inverse proportion to their variances. docs/reference/localizers.md has the measurements.
 
-    The covariance is that of all particles, as in nav2_amcl, so that a second cluster shows. It is taken about the
-    reported pose, which makes it the expected squared error of that pose, and it holds the products of place and
-    heading too, which nav2_amcl leaves zero. Headings are averaged on the circle.
+    The covariance includes all particles, as in nav2_amcl, so that it shows a second cluster. It refers to the returned
+    pose, so that it is the expected squared error of this pose, and it includes the products of position and heading,
+    which are zero in nav2_amcl. Headings are averaged on the circle.
     """
     poses, weights = particles.poses, particles.weights
-    if not in_touch(particles):
-        labels = clusters(bins(poses))
+    if not are_compact(particles):
+        labels = cluster_labels(bins(poses))
         heaviest = labels == np.bincount(labels, weights=weights).argmax()
         poses, weights = poses[heaviest], weights[heaviest]
-    elif peak == 1.0:
-        return _together(particles)
+    elif peak_power == 1.0:
+        return _summarize_compact(particles)
     mean = _mean(poses, weights)
-    if peak == 1.0:
+    if peak_power == 1.0:
         return mean, spread(particles, mean)
-    peaked = (weights / weights.max()) ** peak
+    peaked = (weights / weights.max()) ** peak_power
     best = _mean(poses, peaked)
-    width, narrower = _width(poses, weights, mean), _width(poses, peaked, best)
-    towards = width / (width + narrower) if narrower > 0 else 1.0
-    turned = mean.yaw + towards * wrap(best.yaw - mean.yaw)
-    pose = Pose2(mean.x + towards * (best.x - mean.x), mean.y + towards * (best.y - mean.y), wrap(turned))
+    variance, peak_variance = _position_variance(poses, weights, mean), _position_variance(poses, peaked, best)
+    share = variance / (variance + peak_variance) if peak_variance > 0 else 1.0
+    yaw = wrap(mean.yaw + share * wrap(best.yaw - mean.yaw))
+    pose = Pose2(mean.x + share * (best.x - mean.x), mean.y + share * (best.y - mean.y), yaw)
     return pose, spread(particles, pose)
 
 
-def _together(particles: Particles) -> tuple[Pose2, Array]:
-    """The same of particles that are in touch, all sums in one product: of those headings are as good as numbers."""
+def _summarize_compact(particles: Particles) -> tuple[Pose2, Array]:
+    """Return the same for compact particles, in one matrix product. Their headings need no average on the circle."""
     first: tuple[float, float, float] = tuple(particles.poses[0].tolist())
     off = np.ones((4, len(particles.weights)))
     np.subtract(particles.poses.T, np.array([first]).T, off[:3])
@@ -79,33 +77,33 @@ def _together(particles: Particles) -> tuple[Pose2, Array]:
     return pose, np.array(((xx - dx * x, xy, xa), (xy, yy - dy * y, ya), (xa, ya, aa - turn * a)))
 
 
-def in_touch(particles: Particles) -> bool:
-    """Whether they are so near to each other that their bins touch, whichever these are."""
+def are_compact(particles: Particles) -> bool:
+    """Return whether the extent of the particles is less than one bin, so that they are one cluster."""
     x, y, yaw = particles.extent
-    return x < BIN_METERS and y < BIN_METERS and yaw < 2 * math.pi / BINS_OF_YAW
+    return x < BIN_SIZE_M and y < BIN_SIZE_M and yaw < 2 * math.pi / YAW_BINS
 
 
 def _mean(poses: Array, weights: Array) -> Pose2:
-    """The mean of poses (n, 3) by weights (n,)."""
+    """Return the mean of poses (n, 3) with weights (n,)."""
     total, yaw = float(np.add.reduce(weights)), poses[:, 2]
     x, y = (weights @ poses[:, :2]).tolist()
     return Pose2(x / total, y / total, math.atan2(weights @ np.sin(yaw), weights @ np.cos(yaw)))
 
 
-def _width(poses: Array, weights: Array, mean: Pose2) -> float:
-    """The variance of the places of poses (n, 3) by weights (n,) about their mean, in m²."""
+def _position_variance(poses: Array, weights: Array, mean: Pose2) -> float:
+    """Return the variance of the positions of poses (n, 3) with weights (n,) about their mean, in m²."""
     return float(weights @ np.square(poses[:, :2] - mean[:2]).sum(axis=1) / weights.sum())
 
 
 def spread(particles: Particles, pose: Pose2) -> Array:
-    """The expected squared error (3, 3) of `pose`, if the particles are right."""
-    error = errors_about(np.array(pose), particles.poses).T
+    """Return the covariance (3, 3) of the particles about `pose`: the expected squared error of this pose."""
+    error = pose_errors(np.array(pose), particles.poses).T
     covariance: Array = (error * particles.weights) @ error.T
     return covariance
 
 
-def errors_about(pose: Array, poses: Array) -> Array:
-    """What `poses` (n, 3) differ by from `pose` (3,), headings wrapped."""
+def pose_errors(pose: Array, poses: Array) -> Array:
+    """Return the differences (n, 3) of `poses` from `pose` (3,), with wrapped headings."""
     error = poses - pose
     error[:, 2] = wrapped(error[:, 2])
     return error

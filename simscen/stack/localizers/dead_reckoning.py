@@ -6,8 +6,8 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
-from simscen.stack.localizers.planar_motion import grown
-from simscen.stack.odometry_history import is_plausible
+from simscen.stack.frames import is_plausible
+from simscen.stack.localizers.planar_motion import grow_covariance
 
 _UNKNOWN_STD = (100.0, 100.0, np.pi / np.sqrt(3))
 """Standard deviations of an unknown pose: 100 m, and any heading."""
@@ -39,7 +39,9 @@ class DeadReckoning:
             return
         last, self._odometry = self._odometry, odometry.pose
         belief, step = self._belief, (last or odometry.pose).between(odometry.pose)
-        covariance = grown(belief.covariance, belief.pose.yaw, step, _NOISE.translation_noise, _NOISE.rotation_noise)
+        covariance = grow_covariance(
+            belief.covariance, belief.pose.yaw, step, _NOISE.translation_noise, _NOISE.rotation_noise
+        )
         pose = belief.pose.compose(step)
         map_from_odom = pose.compose(odometry.pose.inverse()) if last is None else belief.map_from_odom
         self._belief = Belief(pose, covariance, map_from_odom, updated=odometry.tick)

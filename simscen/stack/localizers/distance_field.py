@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array
-from simscen.stack.distance_transform import (
+from simscen.stack.costmap.distance_transform import (
     MAX_REACH_CELLS,
     OUT_OF_REACH,
     squared_distance_blocks,
@@ -21,30 +21,29 @@ Float32 = npt.NDArray[np.float32]
 Kind = TypeVar("Kind", np.float32, np.uint8)
 
 
-# 512 x 60 beams fit the second-level cache. Larger tables also cost fresh pages from the system at every update:
-# 5000 particles at once took 8 to 100 ms, in blocks 3 ms.
-BLOCK = 512
-AT_ONCE = 2**16
-"""Cells."""
+BLOCK_POSES = 512
+"""Poses that are evaluated at once. With 60 beams, the block fits the second-level cache."""
+BLOCK_CELLS = 2**16
+"""Cells that are tabulated at once."""
 
 
-def by_blocks(judge: Callable[[Array], Array], poses: Array) -> Array:
-    """What `judge` says (n,) of `poses` (n, 3), asked in blocks."""
-    if len(poses) <= BLOCK:
-        return judge(poses)
-    return np.concatenate([judge(poses[begin : begin + BLOCK]) for begin in range(0, len(poses), BLOCK)])
+def evaluate_in_blocks(evaluate: Callable[[Array], Array], poses: Array) -> Array:
+    """Return the values (n,) of a function of `poses` (n, 3), evaluated in blocks."""
+    if len(poses) <= BLOCK_POSES:
+        return evaluate(poses)
+    return np.concatenate([evaluate(poses[begin : begin + BLOCK_POSES]) for begin in range(0, len(poses), BLOCK_POSES)])
 
 
 class DistanceField:
-    """Distances in m between cell centers, as a flat table with a border that stands for everything off the map.
+    """Distances in m between cell centers, as a flat table with a border of one cell.
 
-    The border makes a look-up off the map a look-up like any other: coordinates are clipped onto it.
+    Coordinates off the map are clipped to the border, so that all lookups are alike.
     """
 
     def __init__(self, grid: OccupancyGrid, obstacles: npt.NDArray[np.bool_], limit: float, *, walled: bool) -> None:
-        """`obstacles` (height, width); no distance is above `limit`.
+        """Compute the distances to `obstacles` (height, width), at most `limit` m.
 
-        Everything off the map is an obstacle if `walled`, and `limit` from any obstacle if not.
+        With `walled`, everything off the map is an obstacle; otherwise it is `limit` away from any obstacle.
         """
         bordered = np.pad(obstacles, 1, constant_values=walled)
         distance = np.full(bordered.shape, limit, dtype=np.float32)
@@ -65,28 +64,28 @@ class DistanceField:
         self._axes = np.array([[c, -s], [s, c]]) / grid.resolution
         self._corner = np.array([[x], [y]]) / grid.resolution + 1
 
-    def told(self, of: Callable[[Float32], npt.NDArray[Kind]], kind: type[Kind]) -> npt.NDArray[Kind]:
-        """What is made of each distance, flat as the table; some at a time, for a large map's takes hundreds of MB."""
+    def tabulate(self, of: Callable[[Float32], npt.NDArray[Kind]], kind: type[Kind]) -> npt.NDArray[Kind]:
+        """Return a function of each distance, as a flat table. Computed in blocks to save memory on large maps."""
         result = np.empty(len(self.table), kind)
-        for begin in range(0, len(result), AT_ONCE):
-            result[begin : begin + AT_ONCE] = of(self.table[begin : begin + AT_ONCE])
+        for begin in range(0, len(result), BLOCK_CELLS):
+            result[begin : begin + BLOCK_CELLS] = of(self.table[begin : begin + BLOCK_CELLS])
         return result
 
     def coordinates(self, poses: Array) -> tuple[Float32, Float32]:
-        """Poses (n, 3) of the map frame: x and y (2, n) in cells of the bordered table, and headings (n,) in it."""
+        """Return positions (2, n) in cells of the bordered table, and headings (n,), of `poses` (n, 3)."""
         places = self._axes @ poses.T[:2] + self._corner
         return places.astype(np.float32), (poses[:, 2] + self._turn).astype(np.float32)
 
     def cells(self, x: Float32, y: Float32) -> Cells:
-        """Indices into `table` of points given in cells; any finite point will do. Overwrites `x` and `y`."""
+        """Return indices into `table` of points given in cells, which may be off the map. Overwrites `x` and `y`."""
         column = x.clip(0, self._width + 1, out=x).astype(np.int32)
         row = y.clip(0, self._height + 1, out=y).astype(np.int32)
         row *= self._width + 2
         row += column
         return row
 
-    def cells_seen(self, poses: Array, points: Plane) -> Cells:
-        """Indices (n, b) into `table` of `points` (b,) in the base frame as seen from each of `poses` (n, 3)."""
+    def endpoint_cells(self, poses: Array, points: Plane) -> Cells:
+        """Return indices (n, b) into `table` of `points` (b,) in the base frame, for each of the `poses` (n, 3)."""
         places, heading = self.coordinates(poses)
         count = len(heading)
         ends = np.ones((3, len(points)), dtype=np.float32)

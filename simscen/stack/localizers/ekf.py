@@ -11,8 +11,8 @@ from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
+from simscen.stack.frames import is_plausible
 from simscen.stack.localizers.dead_reckoning import start_of
-from simscen.stack.odometry_history import is_plausible
 
 X, Y, YAW, VX, VY, VYAW, BIAS = range(7)
 """State: the pose in the map frame, the velocity in the base frame, and the bias of the gyroscope."""

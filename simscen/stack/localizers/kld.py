@@ -11,27 +11,27 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 
-BIN_METERS = 0.5
-BINS_OF_YAW = 36
+BIN_SIZE_M = 0.5
+YAW_BINS = 36
 _HALF = 1 << 21
 Keys = npt.NDArray[np.int64]
 
 
 def bins(poses: Array) -> Keys:
     """Return the keys (n,) of the histogram bins of `poses` (n, 3). Headings a full turn apart share one."""
-    places = np.clip(np.floor(poses[:, :2] / BIN_METERS), -_HALF + 2, _HALF - 2).astype(np.int64)
-    yaw = np.floor(poses[:, 2] * (BINS_OF_YAW / (2 * np.pi))).astype(np.int64) % BINS_OF_YAW
+    places = np.clip(np.floor(poses[:, :2] / BIN_SIZE_M), -_HALF + 2, _HALF - 2).astype(np.int64)
+    yaw = np.floor(poses[:, 2] * (YAW_BINS / (2 * np.pi))).astype(np.int64) % YAW_BINS
     return join(places[:, 0], places[:, 1], yaw)
 
 
 def join(x: Keys, y: Keys, yaw: Keys) -> Keys:
     """Return the keys of bins with these integer coordinates."""
-    return ((x + _HALF) * (2 * _HALF) + (y + _HALF)) * BINS_OF_YAW + yaw
+    return ((x + _HALF) * (2 * _HALF) + (y + _HALF)) * YAW_BINS + yaw
 
 
 def split(keys: Keys) -> tuple[Keys, Keys, Keys]:
     """Return the integer coordinates x, y, yaw of bins."""
-    places, yaw = np.divmod(keys, BINS_OF_YAW)
+    places, yaw = np.divmod(keys, YAW_BINS)
     x, y = np.divmod(places, 2 * _HALF)
     return x - _HALF, y - _HALF, yaw
 
@@ -52,8 +52,8 @@ class KldBound:
     def samples(self, occupied: npt.ArrayLike) -> Keys:
         """Return the samples needed for a number of occupied bins, between `least` and `most`.
 
-        Fox's bound is zero for a single bin. (nav2_amcl asks for `most` there: a quirk that makes the filter work
-        hardest when it is surest.)
+        Fox's bound is zero for a single bin. nav2_amcl uses `most` there, although one bin
+        means that the pose is certain.
         """
         free = np.maximum(np.asarray(occupied, dtype=np.float64) - 1, 1e-9)
         spread = 2 / (9 * free)
@@ -61,8 +61,8 @@ class KldBound:
         return np.clip(np.ceil(needed), self.least, self.most).astype(np.int64)
 
     def enough(self, keys: Keys) -> int | None:
-        """The first number of samples that is enough, given the bins (n,) they fell into in order; None if none is."""
-        if len(keys) == self.least:  # the bound is nowhere below
+        """Return the first sufficient number of samples, given their bins (n,) in order; None if there is none."""
+        if len(keys) == self.least:  # no smaller number can be sufficient
             return self.least if self.least >= self.samples(len(np.unique(keys))) else None
         new = np.zeros(len(keys), dtype=np.int64)
         new[np.unique(keys, return_index=True)[1]] = 1

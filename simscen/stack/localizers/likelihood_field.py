@@ -1,7 +1,7 @@
 """Likelihood field sensor models: likelihood of a scan by the distance of its endpoints from obstacles.
 
 Likelihood fields: Thrun, Burgard & Fox, Probabilistic Robotics, section 6.4 and table 6.3; nav2_amcl's
-likelihood_field_model.cpp and likelihood_field_model_prob.cpp. Beams that hit nothing say nothing.
+likelihood_field_model.cpp and likelihood_field_model_prob.cpp. Beams that hit nothing are ignored.
 """
 
 import math
@@ -14,92 +14,92 @@ import numpy.typing as npt
 from simscen.core.environment.occupancy_grid import OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Array
 from simscen.stack.localizers.beams import Beams
-from simscen.stack.localizers.distance_field import DistanceField, Float32, by_blocks
+from simscen.stack.localizers.distance_field import DistanceField, Float32, evaluate_in_blocks
 
-PEAK_OF_SUMS = 16.0
-"""Of models whose particles weigh 1 + Σ p³: over 60 beams, one that fits makes a particle but 1 or 2 % heavier."""
-STRAYS_OF_SUMS = 0.05
-"""Of the same models: a particle anywhere weighs half as much as a good one, and outlives many scans."""
+PEAK_POWER_OF_SUMS = 16.0
+"""`peak_power` of models with weights 1 + Σ p³: over 60 beams, one that fits makes a particle only 1 to 2 % heavier."""
+MAX_RANDOM_SHARE_OF_SUMS = 0.05
+"""`max_random_share` of these models: a random particle weighs half as much as a good one, and survives many scans."""
 
 
 class SensorModel(Protocol):
-    """Judges particles by a scan."""
+    """Evaluates particles by a scan."""
 
     @property
-    def peak(self) -> float:
-        """The power that brings out which particles are best: 1 where weights are the likelihood of all beams."""
+    def peak_power(self) -> float:
+        """Power of the weights that emphasizes the best particles: 1 if weights are the likelihood of all beams."""
         ...
 
     @property
-    def strays(self) -> float:
-        """The largest share of new particles that recovery may put anywhere with each scan."""
+    def max_random_share(self) -> float:
+        """Maximum share of random particles that recovery may add with each scan."""
         ...
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
-        """Logarithms (n,) of how likely the beams are at each of `poses` (n, 3); -inf for impossible, never nan.
+        """Return the log likelihoods (n,) of the beams at each of the `poses` (n, 3); -inf if impossible, never nan.
 
-        `converged` says that the particles are one narrow group.
+        `converged`: the particles are one narrow cluster.
         """
         ...
 
     def tempering(self, beams: Beams) -> float:
-        """The exponent that puts likelihoods of any scan on one scale: 1/beams for a product, 1 for a bounded sum."""
+        """Return the exponent that puts the likelihoods of scans on one scale: 1/beams for a product, 1 for a sum."""
         ...
 
 
 def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
-    """Distances to the surfaces of what is occupied; off the map counts as far from everything, as in nav2_amcl.
+    """Return distances to the surfaces of occupied areas; off the map is far from everything, as in nav2_amcl.
 
-    A beam cannot end inside a solid. Nav2's maps come from SLAM, which draws surfaces only; a map that was rasterized
-    from a model is filled, and if the inside counted as near, particles would be drawn into what they look at.
+    Maps from SLAM contain surfaces only. A map that was drawn from a model is filled. Beams cannot end inside of it,
+    but if they could, particles would be attracted to the inside.
     """
     return DistanceField(grid, surfaces(grid.cells == OCCUPIED), max_distance, walled=False)
 
 
 def surfaces(solid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Solid cells (height, width) with a neighbor that is not; what is off the map does not count as one."""
+    """Return the solid cells (height, width) with a free neighbor on the map."""
     padded = np.pad(solid, 1, constant_values=True)
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
     return solid & ~inside
 
 
 class LikelihoodField:
-    """Nav2's default: a particle weighs 1 + Σ p³ over its beams.
+    """Default of nav2_amcl: a particle weighs 1 + Σ p³ over its beams.
 
-    Not a product of probabilities: Nav2 calls it "an ad-hoc weighting scheme" that "works well". It forgives beams
-    that hit what is not on the map, and it never says that a pose is impossible.
+    This is not a product of probabilities; nav2_amcl calls it an "ad-hoc weighting scheme". It tolerates beams that hit
+    something that is not on the map, and no pose is impossible.
     """
 
-    peak, strays = PEAK_OF_SUMS, STRAYS_OF_SUMS
+    peak_power, max_random_share = PEAK_POWER_OF_SUMS, MAX_RANDOM_SHARE_OF_SUMS
 
     def __init__(self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float) -> None:
         self._field, self._z_rand = field, np.float32(z_rand)
         self._hit = _hit_likelihoods(field, z_hit, sigma_hit)
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
-        """Logarithms (n,) of 1 + Σ p³."""
+        """Return the logarithms (n,) of 1 + Σ p³."""
         z_rand = self._z_rand / np.float32(beams.range_max)
 
-        def judge(block: Array) -> Array:
+        def weigh(block: Array) -> Array:
             p = self._hit.take(beams.cells(self._field, block))
             p += z_rand
             logarithm: Array = np.log1p(np.sum(p * p * p, axis=1, dtype=np.float64))
             return logarithm
 
-        return by_blocks(judge, poses)
+        return evaluate_in_blocks(weigh, poses)
 
     def tempering(self, beams: Beams) -> float:
-        """A sum of cubes says little however many beams there are."""
+        """Return 1: a sum of cubes has the same scale for any number of beams."""
         return 1.0
 
 
 @dataclass(frozen=True)
 class BeamSkipping:
-    """When converged, leave out beams that too few particles can explain: people, not the map.
+    """Parameters of beam skipping, which ignores beams that hit people or other obstacles that are not on the map.
 
-    A beam counts as explained by a particle when it ends less than `distance` m from an obstacle. It is left out
-    when at most the share `threshold` of the particles explain it, unless the share of beams to be left out reaches
-    `error_threshold`: then it is the pose that is wrong, and every beam counts.
+    A particle explains a beam that ends less than `distance` m from an obstacle. Beams that at most the share
+    `threshold` of the particles explain are skipped. If this applies to the share `error_threshold` of the beams or
+    more, the pose is wrong, and no beam is skipped.
     """
 
     distance: float
@@ -113,7 +113,7 @@ class LikelihoodFieldProb:
     Subclasses may set `exponent` and override `_hit_likelihoods`.
     """
 
-    peak, strays = 1.0, 1.0
+    peak_power, max_random_share = 1.0, 1.0
     exponent = 1.0
     """Power to which the product is raised."""
 
@@ -135,7 +135,7 @@ class LikelihoodFieldProb:
             # All indices are valid; mode="wrap" skips the check.
             return (logarithms.take(cells, mode="wrap") @ exponents).astype(np.float64)
 
-        return by_blocks(weigh, poses)
+        return evaluate_in_blocks(weigh, poses)
 
     def tempering(self, beams: Beams) -> float:
         """Return the exponent of the geometric mean over the beams that hit something."""
@@ -171,4 +171,6 @@ class LikelihoodFieldProb:
 
 def _hit_likelihoods(field: DistanceField, z_hit: float, sigma_hit: float) -> Float32:
     """Return z_hit · exp(-d² / 2σ²) of each cell's distance d to the nearest obstacle."""
-    return field.told(lambda d: np.float32(z_hit) * np.exp(np.square(d) / np.float32(-2 * sigma_hit**2)), np.float32)
+    return field.tabulate(
+        lambda d: np.float32(z_hit) * np.exp(np.square(d) / np.float32(-2 * sigma_hit**2)), np.float32
+    )

@@ -1,8 +1,8 @@
-"""Motion models: how odometry moves particles.
+"""Motion models of nav2_amcl: move particles by odometry, with noise.
 
-The odometry motion model of Thrun, Burgard & Fox, Probabilistic Robotics, section 5.4 and table 5.6, with the
-variances of nav2_amcl: alphas multiply *squared* motions, backward motion is as noisy as forward motion, and a
-translation below 1 cm has no bearing.
+Source: the odometry motion model of Probabilistic Robotics, section 5.4 and table 5.6, with the variances of nav2_amcl:
+the alphas multiply squared motions, backward motion is as noisy as forward motion, and the direction of a translation
+below 1 cm is ignored.
 """
 
 import math
@@ -13,31 +13,32 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.stack.localizers.particles import columns, wrapped
-from simscen.stack.localizers.planar_motion import swing
+from simscen.stack.localizers.planar_motion import propagate_covariance
 
-NO_BEARING = 0.01
+MIN_BEARING_DISTANCE_M = 0.01
+"""Shortest translation whose direction is used."""
 
 
 class MotionModel(Protocol):
-    """Moves particles; `delta` is the motion that odometry reports, in the base frame before it."""
+    """Moves particles by `delta`, the motion that odometry reports, in the base frame before the motion."""
 
     def sample(self, poses: Array, delta: Pose2, rng: np.random.Generator) -> Array:
-        """New poses (n, 3): each of `poses` (n, 3) moved by its own noisy copy of `delta`."""
+        """Return `poses` (n, 3), each moved by its own noisy copy of `delta`."""
         ...
 
-    def carry(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """The covariance (3, 3) after `delta`, to first order, of a pose that had `covariance` and heading `yaw`."""
+    def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
+        """Return the covariance (3, 3) after `delta`, to first order. `yaw` is the heading before the motion."""
         ...
 
 
 @dataclass(frozen=True)
-class Differential:
-    """Turn, drive, turn (table 5.6), for robots that cannot move sideways. `alpha` are alpha1 … alpha4."""
+class DifferentialMotionModel:
+    """Rotation, translation, rotation (table 5.6), for robots that cannot move sideways. `alpha`: alpha1 … alpha4."""
 
     alpha: tuple[float, float, float, float]
 
     def sample(self, poses: Array, delta: Pose2, rng: np.random.Generator) -> Array:
-        """New poses (n, 3)."""
+        """Return the moved poses (n, 3)."""
         motion, variances = self._steps(delta)
         std = [math.sqrt(variance) for variance in variances]
         turn, drive, turn_again = rng.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
@@ -48,23 +49,23 @@ class Differential:
         moved[:, 2] = wrapped(heading + turn_again)
         return moved
 
-    def carry(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """The covariance (3, 3) to first order."""
+    def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
+        """Return the covariance (3, 3) after the motion, to first order."""
         (turn, drive, _), (turned, driven, again) = self._steps(delta)
         c, s = math.cos(yaw + turn), math.sin(yaw + turn)
         dx, dy, across = drive * c, drive * s, (driven - drive**2 * turned) * c * s
-        return swing(covariance, dx, dy, (
+        return propagate_covariance(covariance, dx, dy, (
             dy * dy * turned + c * c * driven, across, -dy * turned,
             dx * dx * turned + s * s * driven, dx * turned,
             turned + again,
         ))  # fmt: skip
 
     def _steps(self, delta: Pose2) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """The three steps of a motion and the variances of their noise."""
+        """Return the first rotation, the translation and the second rotation, and the variances of their noise."""
         drive = math.hypot(delta.x, delta.y)
-        turn = math.atan2(delta.y, delta.x) if drive >= NO_BEARING else 0.0
+        turn = math.atan2(delta.y, delta.x) if drive >= MIN_BEARING_DISTANCE_M else 0.0
         again = wrap(delta.yaw - turn)
-        turned, turned_again = _either_way(turn) ** 2, _either_way(again) ** 2
+        turned, turned_again = _fold_backward(turn) ** 2, _fold_backward(again) ** 2
         a1, a2, a3, a4 = self.alpha
         driven = drive * drive
         return (turn, drive, again), (
@@ -73,13 +74,13 @@ class Differential:
 
 
 @dataclass(frozen=True)
-class Omni:
-    """Drive, strafe and turn at once, for holonomic robots (nav2_amcl::OmniMotionModel). `alpha` are alpha1 … 5."""
+class OmniMotionModel:
+    """Drive, strafe, and turn at once, for holonomic robots (nav2_amcl::OmniMotionModel). `alpha`: alpha1 … alpha5."""
 
     alpha: tuple[float, float, float, float, float]
 
     def sample(self, poses: Array, delta: Pose2, rng: np.random.Generator) -> Array:
-        """New poses (n, 3)."""
+        """Return the moved poses (n, 3)."""
         motion, std = (math.hypot(delta.x, delta.y), 0.0, delta.yaw), self._noise(delta)
         drive, strafe, turn = rng.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
         bearing = poses[:, 2] + math.atan2(delta.y, delta.x)
@@ -90,26 +91,26 @@ class Omni:
         moved[:, 2] = wrapped(poses[:, 2] + turn)
         return moved
 
-    def carry(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """The covariance (3, 3) to first order."""
+    def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
+        """Return the covariance (3, 3) after the motion, to first order."""
         bearing = yaw + math.atan2(delta.y, delta.x)
         drive, c, s = math.hypot(delta.x, delta.y), math.cos(bearing), math.sin(bearing)
         driven, strafed, turned = (std**2 for std in self._noise(delta))
-        return swing(covariance, drive * c, drive * s, (
+        return propagate_covariance(covariance, drive * c, drive * s, (
             c * c * driven + s * s * strafed, c * s * (driven - strafed), 0.0,
             s * s * driven + c * c * strafed, 0.0,
             turned,
         ))  # fmt: skip
 
     def _noise(self, delta: Pose2) -> tuple[float, float, float]:
-        """Standard deviations of driving, strafing and turning."""
+        """Return the standard deviations of driving, strafing, and turning."""
         driven, turned = delta.x**2 + delta.y**2, delta.yaw**2
         a1, a2, a3, a4, a5 = self.alpha
         drive = math.sqrt(a3 * driven + a4 * turned)
         return drive, math.sqrt(a4 * turned + a5 * driven), math.sqrt(a1 * turned + a2 * driven)
 
 
-def _either_way(angle: float) -> float:
-    """The size of an angle when driving backward counts as driving forward."""
+def _fold_backward(angle: float) -> float:
+    """Return the absolute value of a rotation, where driving backward counts as driving forward."""
     size = abs(angle)
     return min(size, math.pi - size)

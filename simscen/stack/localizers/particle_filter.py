@@ -13,12 +13,12 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.localizers import AmclParameters
 from simscen.stack.localizers.beams import Beams, select_beams
-from simscen.stack.localizers.clusters import BINS_IN_TOUCH, in_touch, summarize
+from simscen.stack.localizers.clusters import MAX_COMPACT_BINS, are_compact, summarize
 from simscen.stack.localizers.kld import KldBound
 from simscen.stack.localizers.likelihood_field import SensorModel
 from simscen.stack.localizers.motion_models import MotionModel
-from simscen.stack.localizers.particles import FreeSpace, Particles, alike
-from simscen.stack.localizers.recovery import PROBES, Recovery
+from simscen.stack.localizers.particles import FreeSpace, Particles, equal_weights
+from simscen.stack.localizers.recovery import PROBE_COUNT, Recovery
 from simscen.stack.localizers.resampling import adaptive, systematic
 
 CONVERGED_WITHIN_M = 0.5
@@ -42,13 +42,15 @@ class ParticleFilter:
             spec, motion, sensor, free_space, rng,
         )  # fmt: skip
         self._bound = KldBound(spec.pf_err, spec.pf_z, spec.min_particles, spec.max_particles)
-        self._few_suffice = bool(self._bound.samples(BINS_IN_TOUCH) <= self._bound.least)
+        self._few_suffice = bool(self._bound.samples(MAX_COMPACT_BINS) <= self._bound.least)
         self.begin(Estimate(None))
 
     def begin(self, estimate: Estimate) -> None:
         """Restart with particles around the estimate's pose, or over all free space if it has none."""
         self.particles = self._free_space.begin(estimate, self._bound.most, self._rng)
-        self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.strays)
+        self._recovery = Recovery(
+            self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.max_random_share
+        )
         self._random: npt.NDArray[np.bool_] | None = None  # (n,) put anywhere after the last scan
         self._descendants: npt.NDArray[np.bool_] | None = None  # (n,) these and what descends from such
         self._corrections = 0
@@ -81,11 +83,11 @@ class ParticleFilter:
         shift = best if best > -np.inf else 0.0
         weights = self.particles.weights * np.exp(logarithm - shift)
         total = float(np.add.reduce(weights))
-        if self._recovery.wanted:
+        if self._recovery.is_enabled:
             self._observe(beams, weights, shift, exponent)
-        weights = weights / total if total > 0 else alike(len(poses))
+        weights = weights / total if total > 0 else equal_weights(len(poses))
         self.particles = self.particles.weighted(weights)
-        estimate = summarize(self.particles, self._sensor.peak) if total > 0 else None
+        estimate = summarize(self.particles, self._sensor.peak_power) if total > 0 else None
         self._resample()
         return estimate
 
@@ -101,7 +103,7 @@ class ParticleFilter:
         kept = slice(None) if self._random is None or self._random.all() else ~self._random
         likely = float(weights[kept].sum() / self.particles.weights[kept].sum())
         tracked = math.log(likely) + shift if likely > 0 else -math.inf
-        probes = self._free_space.draw(PROBES, self._rng)
+        probes = self._free_space.draw(PROBE_COUNT, self._rng)
         anywhere = exponent * self._sensor.log_likelihood(probes, beams, False)
         scale = self._sensor.tempering(beams)
         self._recovery.observe(tracked * scale, anywhere * scale)
@@ -114,7 +116,7 @@ class ParticleFilter:
             return
         if self._spec.selective_resampling and self.particles.effective > len(self.particles.weights) / 2:
             return
-        if self._few_suffice and self._recovery.share == 0 and in_touch(self.particles):
+        if self._few_suffice and self._recovery.share == 0 and are_compact(self.particles):
             chosen = systematic(self.particles.weights, self._bound.least, self._rng)
             self.particles = Particles.equal(self.particles.poses.T.take(chosen, axis=1).T)
             self._descendants = None

@@ -1,6 +1,7 @@
-"""How the uncertainty of a planar pose grows along a step of dead reckoning, to first order.
+"""Growth of the covariance of a planar pose along a step of dead reckoning, to first order.
 
-Probabilistic Robotics, section 5.4; errors of a step are independent, so that variances add up along the way.
+Source: Probabilistic Robotics, section 5.4. The errors of steps are independent, so their covariances add up. The
+functions compute with floats, because numpy is slower for nine numbers.
 """
 
 import math
@@ -10,32 +11,32 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 
 Noise = tuple[float, float, float, float, float, float]
-"""The upper triangle of a covariance by rows: xx, xy, xa, yy, ya, aa."""
+"""The upper triangle of a covariance by rows: xx, xy, xa, yy, ya, aa (a: heading)."""
 
 
-def swing(covariance: Array, dx: float, dy: float, noise: Noise) -> Array:
-    """A covariance (3, 3) after a move by (dx, dy) in the map frame: an uncertain heading swings the place.
+def propagate_covariance(covariance: Array, dx: float, dy: float, noise: Noise) -> Array:
+    """Return the covariance (3, 3) after a motion by (dx, dy) in the map frame with this noise.
 
-    `noise` is what the move itself adds. In floats: nine numbers are too few for arrays.
+    An error of the heading before the motion becomes an error of the position after it.
     """
     (xx, xy, xa), (_, yy, ya), (_, _, aa) = covariance.tolist()
     xx_new, xy_new, xa_new, yy_new, ya_new, aa_new = noise
-    xa_swung, ya_swung = xa - dy * aa, ya + dx * aa
-    xx_new += xx - dy * (xa + xa_swung)
-    xy_new += xy + dx * xa - dy * ya_swung
-    yy_new += yy + dx * (ya + ya_swung)
-    xa_new, ya_new = xa_new + xa_swung, ya_new + ya_swung
+    xa_moved, ya_moved = xa - dy * aa, ya + dx * aa
+    xx_new += xx - dy * (xa + xa_moved)
+    xy_new += xy + dx * xa - dy * ya_moved
+    yy_new += yy + dx * (ya + ya_moved)
+    xa_new, ya_new = xa_new + xa_moved, ya_new + ya_moved
     return np.array(((xx_new, xy_new, xa_new), (xy_new, yy_new, ya_new), (xa_new, ya_new, aa_new + aa)))
 
 
-def turn(yaw: float) -> Array:
-    """The matrix (3, 3) that turns errors (x, y, yaw) of a frame at heading `yaw` into those of its parent."""
+def rotation_matrix(yaw: float) -> Array:
+    """Return the matrix (3, 3) that rotates errors from a frame at heading `yaw` to its parent frame."""
     c, s = math.cos(yaw), math.sin(yaw)
     return np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
 
 
-def turned(covariance: Array, yaw: float) -> Noise:
-    """A covariance (3, 3) of a frame at heading `yaw`, in its parent's: for `swing`, and in floats as that."""
+def rotate_covariance(covariance: Array, yaw: float) -> Noise:
+    """Return a covariance (3, 3) of a frame at heading `yaw` in its parent frame, as an upper triangle."""
     c, s = math.cos(yaw), math.sin(yaw)
     (xx, xy, xa), (_, yy, ya), (_, _, aa) = covariance.tolist()
     return (
@@ -44,14 +45,17 @@ def turned(covariance: Array, yaw: float) -> Noise:
     )  # fmt: skip
 
 
-def grown(covariance: Array, yaw: float, step: Pose2, translation_noise: float, rotation_noise: float) -> Array:
-    """A covariance (3, 3) after `step` in the base frame, taken at heading `yaw`.
+def grow_covariance(
+    covariance: Array, yaw: float, step: Pose2, translation_noise: float, rotation_noise: float
+) -> Array:
+    """Return the covariance (3, 3) after `step` in the base frame, which starts at heading `yaw`.
 
-    `translation_noise` is the standard deviation in m along the way after one meter, `rotation_noise` that of the
+    `translation_noise` is the standard deviation along the path in m after one meter, `rotation_noise` that of the
     heading in rad after one meter or one rad.
     """
     c, s = math.cos(yaw), math.sin(yaw)
     dx, dy, length = c * step.x - s * step.y, s * step.x + c * step.y, math.hypot(step.x, step.y)
     along = translation_noise**2 / length if length > 0 else 0.0
-    turned = rotation_noise**2 * (length + abs(step.yaw))
-    return swing(covariance, dx, dy, (along * dx**2, along * dx * dy, 0.0, along * dy**2, 0.0, turned))
+    heading = rotation_noise**2 * (length + abs(step.yaw))
+    noise = along * dx**2, along * dx * dy, 0.0, along * dy**2, 0.0, heading
+    return propagate_covariance(covariance, dx, dy, noise)

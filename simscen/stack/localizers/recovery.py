@@ -9,67 +9,67 @@ import numpy as np
 
 from simscen.core.geometry import Array
 
-PROBES = 200
-"""Poses from anywhere that each scan is compared with."""
-KNOWS_NOTHING = 0.1
-"""The share of places that explain the scans as well as the particles do, from which on they may be lost."""
-SCANS = 4.0
-_MOST = 50.0
-"""No logarithm of how much likelier counts for more, so that its exponential is a number."""
+PROBE_COUNT = 200
+"""Number of random poses at which each scan is evaluated."""
+MIN_BETTER_SHARE = 0.1
+"""Minimum share of random poses that explain recent scans better than the particles if the filter is lost."""
+MAX_STRAY_SCANS = 4.0
+"""Random particles and their descendants are at most as many as this number of scans may add."""
+_MAX_LOG_RATIO = 50.0
+"""Maximum logarithm of a likelihood ratio, so that its exponential stays finite."""
 
 
 class Recovery:
-    """Compares a fast with a slow running average of how much better the particles explain a scan than anywhere does.
+    """Decides how many random particles to add, from a fast and a slow running average of how well scans fit.
 
-    The book and nav2_amcl average the likelihood itself. It varies with the scene as much as with the pose: people,
-    glass and a map that is out of date lower it, although the robot is where it thinks it is, and then good particles
-    are thrown away. Here each scan is its own yardstick: it is weighed at PROBES random poses, too, and what is
-    averaged is how many times likelier it is at the particles than there. Particles are put anywhere while the fast
-    average is below the slow one *and* at least KNOWS_NOTHING of the places of the map explained the recent scans
-    better than the particles; and never more than the share `most` with one scan: where weights are flat, scans weed
-    them out slowly, and the third of the particles that averages soon ask for would take a good cloud apart. So would
-    a few with each of many scans: all that stray, descendants included, are at most what SCANS scans put anywhere, and
-    make room for new ones. When they are right the averages soon say that nobody is lost, and then nothing bounds them.
+    The book and nav2_amcl average the likelihood of the scans. It depends on the scene as much as on the pose: people,
+    glass, and an outdated map lower it although the pose is right, and then good particles are replaced. Here, each
+    scan is also evaluated at PROBE_COUNT random poses, and the average is that of the ratio of its likelihood at the
+    particles to that at the random poses.
 
-    nav2_amcl sets both averages to zero when it put particles anywhere ("to avoid spiraling off into complete
-    randomness"), which ends a recovery after a few dozen of them. Nothing spirals here: particles that were put
-    anywhere by the last scan are not asked how well the filter knows its place. The averages are normalized from the
-    first scan on; the book begins at zero, nav2_amcl at the first scan's.
+    Random particles are added while the fast average is below the slow one and at least MIN_BETTER_SHARE of the random
+    poses explain the recent scans better than the particles. One scan adds at most the share `max_share`, because with
+    flat weights it takes many scans to remove wrong particles. For the same reason, random particles and their
+    descendants are limited as a whole; older ones make room for new ones.
+
+    nav2_amcl resets both averages after it has added random particles, which ends a recovery after a few dozen
+    particles. This is not necessary here, because particles that the last scan added at random are not part of the
+    ratio. The averages are normalized from the first scan on.
     """
 
-    def __init__(self, alpha_slow: float, alpha_fast: float, most: float = 1.0) -> None:
-        self.wanted, self._most = alpha_fast > 0, most
+    def __init__(self, alpha_slow: float, alpha_fast: float, max_share: float = 1.0) -> None:
+        self.is_enabled, self._max_share = alpha_fast > 0, max_share
         self._slow, self._fast = RunningAverage(alpha_slow), RunningAverage(alpha_fast)
         self._better = RunningAverage(alpha_fast)
 
     def observe(self, tracked: float, anywhere: Array) -> None:
-        """Take in the logarithms of how likely a scan is: of the average over the particles, and at random poses (n,).
+        """Add a scan, by the log likelihoods of the mean over the particles (`tracked`) and at random poses (n,).
 
-        They are of one scale from scan to scan: see SensorModel.tempering.
+        The scale must be the same for all scans, see SensorModel.tempering.
         """
         best = float(anywhere.max())
         average = best + math.log(float(np.mean(np.exp(anywhere - best)))) if best > -np.inf else -np.inf
-        likelier = math.exp(min(tracked - average, _MOST)) if tracked > -np.inf else 0.0
+        likelier = math.exp(min(tracked - average, _MAX_LOG_RATIO)) if tracked > -np.inf else 0.0
         self._slow.add(likelier)
         self._fast.add(likelier)
         self._better.add(float(np.mean(anywhere > tracked)))
 
     @property
     def share(self) -> float:
-        """The share of new particles to put anywhere: 1 - fast / slow, but at most what the model bears; or zero."""
+        """Share of new particles to draw at random: 1 - fast / slow, limited to the maximum; 0 if not lost."""
         slow, fast = self._slow.value, self._fast.value
-        if slow <= 0 or self._better.value < KNOWS_NOTHING:
+        if slow <= 0 or self._better.value < MIN_BETTER_SHARE:
             return 0.0
-        return min(self._most, max(0.0, 1 - fast / slow))
+        return min(self._max_share, max(0.0, 1 - fast / slow))
 
     def kept(self, straying: float) -> float:
-        """What share of the particles that stray is kept beside new ones, if these weigh `straying` (0 … 1)."""
-        room = min(1.0, SCANS * self._most) - self.share
+        """Return the share of earlier random particles and descendants to keep, given their weight (0 … 1)."""
+        room = min(1.0, MAX_STRAY_SCANS * self._max_share) - self.share
         return 1.0 if straying <= room else max(0.0, room / straying)
 
 
 class RunningAverage:
-    """An exponentially weighted average of everything so far; of equal weights if `alpha` is zero.
+    """Exponentially weighted average; with equal weights if `alpha` is zero.
 
     The weights are normalized from the first value on (Kingma & Ba, Adam, 2015, section 3).
     """
@@ -78,11 +78,11 @@ class RunningAverage:
         self._alpha, self._sum, self._weight = alpha, 0.0, 0.0
 
     def add(self, value: float) -> None:
-        """Take in the next value."""
+        """Add a value."""
         kept = 1 - self._alpha
         self._sum, self._weight = kept * self._sum + value, kept * self._weight + 1
 
     @property
     def value(self) -> float:
-        """The average; zero before the first value."""
+        """The average, 0 before the first value."""
         return self._sum / self._weight if self._weight else 0.0

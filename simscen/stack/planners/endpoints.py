@@ -45,34 +45,32 @@ def find_endpoints(rates: TraversalCosts, start: Pose2, goal: Pose2, tolerance: 
         raise NavigationFailure(ErrorCode.START_OCCUPIED, f"no free place within {MAX_ESCAPE_M} m of the start")
     if next(near(rates, free, goal, tolerance), None) is None:
         raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, f"no room for the robot within {tolerance} m of the goal")
-    pieces, _ = label(free)
-    reachable = pieces == pieces[_cell(rates, begin)]
+    reachable = reachable_cells(rates, begin)
     end = next(near(rates, reachable, goal, tolerance), None)
     if end is None:
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, "start and goal are not connected")
     return Endpoints(begin, end, reachable)
 
 
+def reachable_cells(rates: TraversalCosts, start: tuple[float, float]) -> npt.NDArray[np.bool_]:
+    """Return the cells (height, width) that are connected with a free start."""
+    pieces, _ = label(rates.free)
+    return np.asarray(pieces == pieces[rates.cell(start)])
+
+
 def _possible(rates: TraversalCosts, pose: Pose2, outside: ErrorCode, occupied: ErrorCode, what: str) -> None:
-    row, column = _cell(rates, (pose.x, pose.y))
+    row, column = rates.cell((pose.x, pose.y))
     if not (0 <= row < rates.height and 0 <= column < rates.width):
         raise NavigationFailure(outside, f"{what} ({pose.x:.2f}, {pose.y:.2f}) is outside the map")
     if rates.costmap.distance[row, column] == 0.0:
         raise NavigationFailure(occupied, f"{what} ({pose.x:.2f}, {pose.y:.2f}) is in an obstacle")
 
 
-def _cell(rates: TraversalCosts, point: tuple[float, float]) -> tuple[int, int]:
-    return (
-        math.floor((point[1] - rates.origin[1]) / rates.resolution),
-        math.floor((point[0] - rates.origin[0]) / rates.resolution),
-    )
-
-
 def near(
     rates: TraversalCosts, free: npt.NDArray[np.bool_], pose: Pose2, within: float
 ) -> Iterator[tuple[float, float]]:
     """Yield the point itself if its cell is free, then centers of free cells at most `within` m away."""
-    row, column = _cell(rates, (pose.x, pose.y))
+    row, column = rates.cell((pose.x, pose.y))
     if free[row, column]:
         yield pose.x, pose.y
     reach = math.ceil(within / rates.resolution)
@@ -92,3 +90,15 @@ def _open(rates: TraversalCosts, start: Pose2, place: tuple[float, float]) -> bo
     way = spaced(np.array([(start.x, start.y), place]), 0.5 * rates.resolution)
     columns, rows = np.floor((way - rates.origin) / rates.resolution).astype(np.int64).T
     return bool((rates.costmap.distance[rows, columns] > 0.0).all())
+
+
+def reachable_bounds(costs: TraversalCosts, ends: Endpoints) -> tuple[float, float, float, float]:
+    """Return the bounding box (min x, min y, max x, max y) of everything that can be reached, in m."""
+    rows, columns = np.flatnonzero(ends.reachable.any(axis=1)), np.flatnonzero(ends.reachable.any(axis=0))
+    (x, y), size = costs.origin, costs.resolution
+    return (
+        float(x + columns[0] * size),
+        float(y + rows[0] * size),
+        float(x + (columns[-1] + 1) * size),
+        float(y + (rows[-1] + 1) * size),
+    )

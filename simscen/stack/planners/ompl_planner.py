@@ -1,16 +1,22 @@
 """The planner of the reference stack: a search by OMPL over the costs of the costmap."""
 
+from dataclasses import replace
+from typing import Literal
+
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.planners import OmplPlanner as PlannerSpec
-from simscen.stack.planners.endpoints import Endpoints, find_endpoints
+from simscen.model.planners import StateSpace
+from simscen.stack.planners.endpoints import Endpoints, find_endpoints, reachable_bounds, reachable_cells
 from simscen.stack.planners.ompl_search import OmplSearch, Problem
 from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, spaced, with_headings
 from simscen.stack.planners.planning_window import plan_in_windows
+from simscen.stack.planners.pose_planner import PosePlanner
 from simscen.stack.planners.traversal_costs import TraversalCosts
-from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
+from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
+from simscen.stack.setting import Setting
 
 FINE_CELLS = 0.125
 """Spacing of the checks of another search, if the path of the first one leads through something between its checks."""
@@ -31,9 +37,18 @@ class OmplPlanner:
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         costs = TraversalCosts(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
         ends = find_endpoints(costs, start, goal, self._spec.tolerance)
+        costs, ends = self._avoid_narrow_gaps(costs, ends)
         points = np.array([ends.start]) if ends.start == ends.goal else self._search(costs, ends, seed)
         points = spaced(np.vstack(((start.x, start.y), points)), SPACING_M)
         return Path(with_headings(points, goal))
+
+    def _avoid_narrow_gaps(self, costs: TraversalCosts, ends: Endpoints) -> tuple[TraversalCosts, Endpoints]:
+        """Return costs with narrow gaps blocked, if start and goal are connected without them."""
+        if self._spec.gap_clearance == 0.0:
+            return costs, ends
+        wide = costs.without_narrow_gaps(self._spec.gap_clearance, (ends.start, ends.goal))
+        reachable = reachable_cells(wide, ends.start)
+        return (wide, replace(ends, reachable=reachable)) if reachable[wide.cell(ends.goal)] else (costs, ends)
 
     def _search(self, costs: TraversalCosts, ends: Endpoints, seed: int) -> Array:
         """Return the points (n, 2) of a path that leads through no blocked cell."""
@@ -56,13 +71,28 @@ def whole_problem(costs: TraversalCosts, ends: Endpoints) -> Problem:
     return Problem(ends.start, ends.goal, reachable_bounds(costs, ends), costs.between)
 
 
-def reachable_bounds(costs: TraversalCosts, ends: Endpoints) -> tuple[float, float, float, float]:
-    """Return the bounding box (min x, min y, max x, max y) of everything that can be reached, in m."""
-    rows, columns = np.flatnonzero(ends.reachable.any(axis=1)), np.flatnonzero(ends.reachable.any(axis=0))
-    (x, y), size = costs.origin, costs.resolution
-    return (
-        float(x + columns[0] * size),
-        float(y + rows[0] * size),
-        float(x + (columns[-1] + 1) * size),
-        float(y + (rows[-1] + 1) * size),
-    )
+LONG_HULL_RATIO = 2.0
+"""Ratio of circumscribed to inscribed radius from which a hull is planned with its heading."""
+
+
+def ompl_planner(spec: PlannerSpec, setting: Setting) -> Planner:
+    """Build a planner in the requested state space, or in the one that fits the robot."""
+    space = state_space_for(spec.state_space, setting.robot)
+    if space == "holonomic":
+        return OmplPlanner(spec, setting.robot)
+    return PosePlanner(spec, setting.robot, setting.footprint, space)
+
+
+def state_space_for(requested: StateSpace, robot: RobotModel) -> Literal["holonomic", "se2", "dubins", "reeds_shepp"]:
+    """Return the state space to plan in.
+
+    auto: Reeds-Shepp for a base with a turning radius, otherwise "se2" for a long hull, otherwise the plane. For a base
+    that cannot move sideways, "se2" becomes Dubins paths with tight arcs: its heading is that of its path.
+    """
+    space = requested
+    if space == "auto":
+        if robot.turning_radius > 0.0:
+            space = "reeds_shepp"
+        else:
+            space = "se2" if robot.circumscribed_radius > LONG_HULL_RATIO * robot.inscribed_radius else "holonomic"
+    return "dubins" if space == "se2" and not robot.holonomic else space

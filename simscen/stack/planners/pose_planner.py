@@ -9,10 +9,9 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.planners import OmplParameters
-from simscen.stack.cusps import cusps
 from simscen.stack.footprint import Footprint
-from simscen.stack.planners.endpoints import Endpoints, find_endpoints, near
-from simscen.stack.planners.ompl_planner import reachable_bounds
+from simscen.stack.path_geometry import cusps
+from simscen.stack.planners.endpoints import Endpoints, find_endpoints, near, reachable_bounds
 from simscen.stack.planners.pose_search import POSE_SPACING_M, DistanceLookup, Space, Valid, escape_arcs, search_poses
 from simscen.stack.planners.traversal_costs import NO_INFORMATION, TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel

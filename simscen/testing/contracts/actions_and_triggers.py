@@ -40,7 +40,6 @@ class ActionContract(Contract):
         require(self.performed() == self.performed(), "does something else the second time")
 
 
-# MERGED: The promises of a trigger.
 MOMENTS = (
     {"tick": 0},
     {"tick": 240, "robot": Pose2(1.0, 0.0, 0.0), "travelled": 1.0},

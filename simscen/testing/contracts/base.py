@@ -16,7 +16,7 @@ import numpy as np
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.spec.base import Component
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.stack.setting import Setting
 from simscen.testing.flatland import RATE, Flatland, setting
@@ -109,7 +109,6 @@ def time_limit(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-# MERGED: What the contracts of all components of a stack share.
 @dataclass(frozen=True, eq=False)
 class ComponentContract(Contract):
     """The promises of a component that is built as `Class(spec, setting)`, tried with this robot."""
@@ -144,7 +143,7 @@ def call_component(when: str, call: Callable[..., T], *given: Any, **named: Any)
 
 def view_of(world: Flatland, robot: RobotModel, bounds: tuple[float, float, float, float]) -> CostmapView:
     """A costmap of all that is in the world, in cells of 5 cm."""
-    return Costmap(CostmapSpec(), Surroundings(robot, world.grid(bounds), RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid(bounds), RATE)).view
 
 
 def copy_costmap(view: CostmapView) -> CostmapView:

@@ -9,8 +9,8 @@ import numpy as np
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
-from simscen.stack.arcs import poses_along
 from simscen.stack.footprint import Footprint
+from simscen.stack.path_geometry import poses_along
 from simscen.stack.protocols import Controller, CostmapView, NavigationFailure
 from simscen.testing.contracts.base import (
     ComponentContract,

@@ -101,7 +101,6 @@ class CriterionContract(Contract):
             )
 
 
-# MERGED: The promises of a metric.
 @dataclass(frozen=True, eq=False)
 class MetricContract(Contract):
     """Tried on the trace of a drive, of a robot that stands, and of a log that was cut off."""

@@ -147,7 +147,6 @@ def _belief(number: int) -> Belief:
     return Belief(pose, 0.01 * np.eye(3), pose.compose(odometry.inverse()), updated=24 * number)
 
 
-# MERGED: The promises of a sensor.
 NAME = "it"
 READING_COUNT = 20
 MAY_BE_MISSING = ("ranges", "depth")

@@ -1,6 +1,6 @@
-"""Horizontal cross sections of meshes, and the distance from a point to a mesh in plan.
+"""Horizontal cross sections of meshes, and the horizontal distance from a point to a mesh.
 
-A cross section holds what a level lidar at that height can see.
+A cross section is what a level lidar at that height can see.
 """
 
 import math
@@ -14,122 +14,122 @@ from simscen.core.geometry.shapes import TriangleMesh
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
-    """Directed segments (n, 2, 2) in meters with the solid on their left, and the owner (n,) of each."""
+class CrossSection:
+    """Directed segments (n, 2, 2) in meters with the solid on their left, and the number (n,) of each one's solid."""
 
     segments: Array
     owners: npt.NDArray[np.int32]
 
 
-def outlines(mesh: TriangleMesh, height: float) -> Array:
-    """The cut of the mesh at `height` as segments (n, 2, 2): [k, 0] is where segment k begins, [k, 1] its end."""
-    return section(mesh, height).segments
+def section_segments(mesh: TriangleMesh, height: float) -> Array:
+    """Return the segments (n, 2, 2) of the cross section at `height`; [k, 0] is the start of segment k."""
+    return cross_section(mesh, height).segments
 
 
-def section(mesh: TriangleMesh, height: float) -> Section:
-    """The cut of the mesh at `height`; closed loops wherever the mesh is closed.
+def cross_section(mesh: TriangleMesh, height: float) -> CrossSection:
+    """Cut the mesh at `height`; the segments form closed loops wherever the mesh is closed.
 
-    A vertex at exactly `height` counts as above it, so a box is cut from its underside (not included) to its top
-    (included) and no cut is ever a point or a whole face. Both triangles at an edge compute the same point, bit
-    for bit, as both walk the edge upwards.
+    A vertex at exactly `height` counts as above it. A box is therefore cut from its underside (excluded) to its top
+    (included), and no cut is a single point or a whole face. Two triangles that share an edge compute the same point,
+    bit for bit, because both follow the edge upwards.
     """
     above = mesh.vertices[:, 2] >= height
-    count = above[mesh.faces].sum(axis=1)
-    cut = (count == 1) | (count == 2)
-    faces, lone_above = mesh.faces[cut], count[cut] == 1
-    lone = np.argmax(above[faces] == lone_above[:, None], axis=1)
-    turned = faces[np.arange(len(faces))[:, None], (lone[:, None] + np.arange(3)) % 3]
-    tip, left, right = mesh.vertices[turned].swapaxes(0, 1)
-    first, second = _crossing(tip, left, height, lone_above), _crossing(tip, right, height, lone_above)
-    segments = np.where(lone_above[:, None, None], np.stack((first, second), 1), np.stack((second, first), 1))
-    long = np.any(segments[:, 0] != segments[:, 1], axis=1)
-    return Section(segments[long], mesh.owners[cut][long])
+    count_above = above[mesh.faces].sum(axis=1)
+    is_cut = (count_above == 1) | (count_above == 2)
+    faces, is_tip_above = mesh.faces[is_cut], count_above[is_cut] == 1
+    tip_corner = np.argmax(above[faces] == is_tip_above[:, None], axis=1)
+    tip_first = faces[np.arange(len(faces))[:, None], (tip_corner[:, None] + np.arange(3)) % 3]
+    tip, left, right = mesh.vertices[tip_first].swapaxes(0, 1)
+    first, second = _edge_crossing(tip, left, height, is_tip_above), _edge_crossing(tip, right, height, is_tip_above)
+    segments = np.where(is_tip_above[:, None, None], np.stack((first, second), 1), np.stack((second, first), 1))
+    has_length = np.any(segments[:, 0] != segments[:, 1], axis=1)
+    return CrossSection(segments[has_length], mesh.owners[is_cut][has_length])
 
 
-def _crossing(tip: Array, base: Array, height: float, tip_above: npt.NDArray[np.bool_]) -> Array:
-    """Where the edges between `tip` (n, 3) and `base` (n, 3) pass the height, as (n, 2)."""
-    low, high = np.where(tip_above[:, None], base, tip), np.where(tip_above[:, None], tip, base)
-    along = (height - low[:, 2]) / (high[:, 2] - low[:, 2])
-    point: Array = low[:, :2] + along[:, None] * (high - low)[:, :2]
+def _edge_crossing(tip: Array, base: Array, height: float, is_tip_above: npt.NDArray[np.bool_]) -> Array:
+    """Return the points (n, 2) where the edges between `tip` (n, 3) and `base` (n, 3) pass the height."""
+    low, high = np.where(is_tip_above[:, None], base, tip), np.where(is_tip_above[:, None], tip, base)
+    share = (height - low[:, 2]) / (high[:, 2] - low[:, 2])
+    point: Array = low[:, :2] + share[:, None] * (high - low)[:, :2]
     return point
 
 
-def distance_in_plan(
+def horizontal_distance(
     mesh: TriangleMesh, point: tuple[float, float], z_range: tuple[float, float], within: float = math.inf
 ) -> float:
-    """Horizontal distance in meters from a point to what a mesh has between two heights; 0 inside of it.
+    """Return the distance in meters from a point to the mesh between two heights, seen from above; 0 inside.
 
-    inf if there is nothing at those heights, or nothing nearer than `within`.
+    Returns inf if the mesh has nothing between these heights, or nothing nearer than `within`.
     """
     low, high = z_range
     bottom, top = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
     if bottom >= high or top <= low:
         return math.inf
     middle = (max(bottom, low) + min(top, high)) / 2
-    if winds_about(outlines(mesh, middle), point):
+    if winds_around(section_segments(mesh, middle), point):
         return 0.0
-    corners, valid = _clipped(_close(mesh, point, within), low, high)
+    corners, valid = _clip_to_heights(_triangles_near(mesh, point, within), low, high)
     corners, valid = corners[valid.any(axis=1)] - point, valid[valid.any(axis=1)]
     if not len(corners):
         return math.inf
-    return 0.0 if _around_origin(corners, valid).any() else _nearest(corners, valid)
+    return 0.0 if _contains_origin(corners, valid).any() else _distance_from_origin(corners, valid)
 
 
-def _close(mesh: TriangleMesh, point: tuple[float, float], within: float) -> Array:
-    """The triangles (m, 3, 3) whose bounding rectangle is not further from the point than `within`."""
+def _triangles_near(mesh: TriangleMesh, point: tuple[float, float], distance: float) -> Array:
+    """Return the triangles (m, 3, 3) whose bounding rectangle is at most `distance` away from the point."""
     triangles = mesh.vertices[mesh.faces]
-    plan = triangles[:, :, :2] - point
-    close = np.all((plan.min(axis=1) <= within) & (plan.max(axis=1) >= -within), axis=1)
-    near: Array = triangles[close]
+    corners = triangles[:, :, :2] - point
+    is_near = np.all((corners.min(axis=1) <= distance) & (corners.max(axis=1) >= -distance), axis=1)
+    near: Array = triangles[is_near]
     return near
 
 
-def winds_about(segments: Array, point: tuple[float, float]) -> bool:
-    """Whether outlines wind anticlockwise about a point, as seen both towards +x and towards -x.
+def winds_around(segments: Array, point: tuple[float, float]) -> bool:
+    """Return whether segments (n, 2, 2) wind anticlockwise around a point, counted both towards +x and towards -x.
 
-    For closed outlines both counts are the same; where a mesh has holes, one alone would find insides that leak.
+    For closed outlines both counts are equal. For meshes with holes, a single count would report points outside.
     """
     (x0, y0), (x1, y1) = segments[:, 0].T - np.array(point)[:, None], segments[:, 1].T - np.array(point)[:, None]
     crosses = (y0 > 0) != (y1 > 0)
     x0, y0, x1, y1 = x0[crosses], y0[crosses], x1[crosses], y1[crosses]
-    ahead = x0 - y0 * (x1 - x0) / (y1 - y0) > 0
-    upwards = np.where(y1 > y0, 1, -1)
-    return bool(upwards[ahead].sum() > 0 and -upwards[~ahead].sum() > 0)
+    is_towards_positive_x = x0 - y0 * (x1 - x0) / (y1 - y0) > 0
+    direction = np.where(y1 > y0, 1, -1)
+    return bool(direction[is_towards_positive_x].sum() > 0 and -direction[~is_towards_positive_x].sum() > 0)
 
 
-def _clipped(triangles: Array, low: float, high: float) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """The part of triangles (m, 3, 3) between two heights, in plan: up to 9 corners (m, 9, 2) and which of them count.
+def _clip_to_heights(triangles: Array, low: float, high: float) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Clip triangles (m, 3, 3) to the slab between two heights; return corners (m, 9, 2) and which of them are valid.
 
-    A clipped triangle is convex, so its own corners inside the slab and the points where its edges pass the slab's
-    faces are all there is to know.
+    A clipped triangle is convex. It is the hull of its own corners in the slab and of the points where its edges pass
+    the two faces of the slab.
     """
     z = triangles[:, :, 2]
     corners, valid = [triangles[:, :, :2]], [(z >= low) & (z <= high)]
     ends, end_z = np.roll(triangles, -1, axis=1)[:, :, :2], np.roll(z, -1, axis=1)
     for height in (low, high):
         crosses = (z > height) != (end_z > height)
-        along = (height - z) / np.where(crosses, end_z - z, 1.0)
-        corners.append(triangles[:, :, :2] + along[:, :, None] * (ends - triangles[:, :, :2]))
+        share = (height - z) / np.where(crosses, end_z - z, 1.0)
+        corners.append(triangles[:, :, :2] + share[:, :, None] * (ends - triangles[:, :, :2]))
         valid.append(crosses)
     return np.concatenate(corners, axis=1), np.concatenate(valid, axis=1)
 
 
-def _around_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Which convex sets have the origin inside: seen from it, no gap between their corners is 180° or more."""
+def _contains_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Return which convex hulls of corners (m, 9, 2) contain the origin: no angle between corners reaches 180°."""
     angles = np.where(valid, np.arctan2(corners[:, :, 1], corners[:, :, 0]), np.nan)
     angles = np.sort(angles, axis=1)
     last = np.nanmax(angles, axis=1) - 2 * math.pi
     gaps = np.diff(np.column_stack((last, angles)), axis=1)
-    inside: npt.NDArray[np.bool_] = np.nanmax(gaps, axis=1) < math.pi - 1e-9
-    return inside
+    is_inside: npt.NDArray[np.bool_] = np.nanmax(gaps, axis=1) < math.pi - 1e-9
+    return is_inside
 
 
-def _nearest(corners: Array, valid: npt.NDArray[np.bool_]) -> float:
-    """Distance from the origin to the nearest of convex sets that do not hold it: their edges are among all pairs."""
+def _distance_from_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> float:
+    """Return the distance to the nearest convex hull; none contains the origin, so the nearest point is on an edge."""
     first, second = np.triu_indices(corners.shape[1])
-    both = valid[:, first] & valid[:, second]
-    a, b = corners[:, first][both], corners[:, second][both]
-    step = b - a
-    squared = np.einsum("ij,ij->i", step, step)
-    along = np.clip(-np.einsum("ij,ij->i", a, step) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
-    return float(np.sqrt(np.min(np.sum((a + along[:, None] * step) ** 2, axis=1))))
+    both_valid = valid[:, first] & valid[:, second]
+    a, b = corners[:, first][both_valid], corners[:, second][both_valid]
+    edge = b - a
+    squared_length = np.einsum("ij,ij->i", edge, edge)
+    share = np.clip(-np.einsum("ij,ij->i", a, edge) / np.where(squared_length > 0, squared_length, 1.0), 0.0, 1.0)
+    return float(np.sqrt(np.min(np.sum((a + share[:, None] * edge) ** 2, axis=1))))

@@ -1,6 +1,6 @@
-"""What of a static world is in a robot's way: all of it but the ground that it can drive on.
+"""Obstacles for a robot that can climb: static solids without the ground that its wheels can drive on.
 
-A ramp is no obstacle to a robot that climbs it, yet its sides are, where they are higher than a step.
+A ramp is no obstacle for a robot that can climb it. Its sides are obstacles where they are higher than a step.
 """
 
 import math
@@ -14,73 +14,75 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.meshes import Owners, drivable_solids, face_normals, is_convex, submesh
 from simscen.core.geometry.shapes import Box, Mesh, Solid, TriangleMesh
-from simscen.worlds.geometry.prisms import is_flat
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.prisms import is_surely_flat
+from simscen.worlds.geometry.triangulation import merge_solids
 
-PIECE = 0.1
-"""m of an edge whose height is taken as one."""
-BESIDE = 0.01
-"""m to both sides of an edge where the ground is looked at."""
-THICKNESS = 0.01
-"""m of what stands for an edge."""
-UPRIGHT = 0.5
-"""z of the unit normal up to which a face is the edge of something (60°), not a slope."""
+EDGE_PIECE_M = 0.1
+"""Length of a piece of an edge, for which one height is measured."""
+SAMPLE_OFFSET_M = 0.01
+"""Distance to both sides of an edge at which the ground height is measured."""
+WALL_THICKNESS_M = 0.01
+"""Thickness of the walls and prisms that stand for edges and steep faces."""
+MAX_WALL_NORMAL_Z = 0.5
+"""z component of the unit normal up to which a face is a wall (60°), not a slope."""
 
-
-def drive_obstacles(solids: tuple[Solid, ...], reach: float, slope: float, step: float) -> tuple[Solid, ...]:
-    """The same solids, where none is ground to wheels, else what of them is in the way of a robot.
-
-    `reach` is the radius of its wheels in m, `slope` in rad and `step` in m what it climbs at most.
-    """
-    if slope <= 0 or is_flat(solids, reach):
-        return solids
-    mesh = fuse(solids)
-    ground = frozenset(owner for owner in drivable_solids(mesh, reach) if _is_plain(mesh, owner))
-    if not ground:
-        return solids
-    stays = [solid for number, solid in enumerate(solids) if number not in ground]
-    return (*stays, *_edges(mesh, ground, step), *_too_steep(mesh, ground, slope))
-
-
-def _is_plain(mesh: TriangleMesh, owner: int) -> bool:
-    """Whether a solid is convex, or a height field: of any other shape what is high above a low part is in the way."""
-    mine = mesh.owners == owner
-    return is_convex(submesh(mesh.vertices, mesh.faces[mine])) or bool((face_normals(mesh)[mine, 2] >= 0).all())
-
-
-def _too_steep(mesh: TriangleMesh, ground: Owners, slope: float) -> Iterator[Solid]:
-    """Each face of the ground that is too steep, as a prism down to its foot."""
-    up = face_normals(mesh)[:, 2]
-    for face in np.flatnonzero(_of(mesh, ground) & (up > UPRIGHT) & (up < math.cos(slope) - 1e-9)).tolist():
-        corners = mesh.vertices[mesh.faces[face]]
-        foot = corners.copy()
-        foot[:, 2] = corners[:, 2].min() - THICKNESS
-        yield Solid(Mesh(np.concatenate((foot, corners)), _PRISM), name=mesh.names[int(mesh.owners[face])])
-
-
-def _of(mesh: TriangleMesh, ground: Owners) -> npt.NDArray[np.bool_]:
-    return np.isin(mesh.owners, sorted(ground))
-
-
-_PRISM = np.array(
+_PRISM_FACES = np.array(
     [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]], dtype=np.int32
 )
 
 
-def _edges(mesh: TriangleMesh, ground: Owners, step: float) -> Iterator[Solid]:
-    """Upright faces of the ground as thin walls, where the ground beside them is lower by more than a step."""
-    chosen = np.flatnonzero(_of(mesh, ground) & (np.abs(face_normals(mesh)[:, 2]) <= UPRIGHT))
-    pieces = list(_pieces(mesh, chosen))
+def drive_obstacles(
+    solids: tuple[Solid, ...], wheel_radius: float, max_slope: float, max_step: float
+) -> tuple[Solid, ...]:
+    """Return the solids in the way of a robot; the same tuple if none of them is ground.
+
+    The robot has wheels of `wheel_radius` m and climbs slopes up to `max_slope` rad and steps up to `max_step` m.
+    """
+    if max_slope <= 0 or is_surely_flat(solids, wheel_radius):
+        return solids
+    mesh = merge_solids(solids)
+    ground = frozenset(owner for owner in drivable_solids(mesh, wheel_radius) if _is_simple(mesh, owner))
+    if not ground:
+        return solids
+    obstacles = [solid for number, solid in enumerate(solids) if number not in ground]
+    return (*obstacles, *_walls_at_edges(mesh, ground, max_step), *_steep_faces(mesh, ground, max_slope))
+
+
+def _is_simple(mesh: TriangleMesh, owner: int) -> bool:
+    """Return whether a solid is convex or a height field; other shapes may overhang and remain obstacles."""
+    is_own = mesh.owners == owner
+    return is_convex(submesh(mesh.vertices, mesh.faces[is_own])) or bool((face_normals(mesh)[is_own, 2] >= 0).all())
+
+
+def _steep_faces(mesh: TriangleMesh, ground: Owners, max_slope: float) -> Iterator[Solid]:
+    """Yield each ground face that is too steep, as a prism down to its lowest corner."""
+    normal_z = face_normals(mesh)[:, 2]
+    is_steep = (normal_z > MAX_WALL_NORMAL_Z) & (normal_z < math.cos(max_slope) - 1e-9)
+    for face in np.flatnonzero(_is_ground_face(mesh, ground) & is_steep).tolist():
+        corners = mesh.vertices[mesh.faces[face]]
+        foot = corners.copy()
+        foot[:, 2] = corners[:, 2].min() - WALL_THICKNESS_M
+        yield Solid(Mesh(np.concatenate((foot, corners)), _PRISM_FACES), name=mesh.names[int(mesh.owners[face])])
+
+
+def _is_ground_face(mesh: TriangleMesh, ground: Owners) -> npt.NDArray[np.bool_]:
+    return np.isin(mesh.owners, sorted(ground))
+
+
+def _walls_at_edges(mesh: TriangleMesh, ground: Owners, max_step: float) -> Iterator[Solid]:
+    """Yield upright ground faces as thin walls, where the ground beside them is lower by more than a step."""
+    is_wall = np.abs(face_normals(mesh)[:, 2]) <= MAX_WALL_NORMAL_Z
+    pieces = list(_edge_pieces(mesh, np.flatnonzero(_is_ground_face(mesh, ground) & is_wall)))
     if not pieces:
         return
     middles = np.array([(edge.start + edge.end) / 2 for edge in pieces])
-    out = np.array([edge.outward for edge in pieces])
-    behind = middles - (BESIDE + np.array([[edge.depth] for edge in pieces])) * out
-    heights = _heights(mesh, ground, np.concatenate((behind, middles + BESIDE * out)))
+    outward = np.array([edge.outward for edge in pieces])
+    inside = middles - (SAMPLE_OFFSET_M + np.array([[edge.depth] for edge in pieces])) * outward
+    heights = _ground_heights(mesh, ground, np.concatenate((inside, middles + SAMPLE_OFFSET_M * outward)))
     walls: list[tuple[_Edge, float, float]] = []
     for edge, high, low in zip(pieces, *np.round(np.split(heights, 2), 4).tolist(), strict=True):
-        if high - low > step:
-            if walls and walls[-1][1:] == (high, low) and walls[-1][0].runs_on_to(edge):
+        if high - low > max_step:
+            if walls and walls[-1][1:] == (high, low) and walls[-1][0].is_continued_by(edge):
                 walls[-1] = (walls[-1][0]._replace(end=edge.end), high, low)
             else:
                 walls.append((edge, high, low))
@@ -89,9 +91,9 @@ def _edges(mesh: TriangleMesh, ground: Owners, step: float) -> Iterator[Solid]:
 
 
 class _Edge(NamedTuple):
-    """A piece of what an upright face is in plan: its ends (2,), the unit vector outwards, and whose face it is.
+    """A piece of an upright face seen from above: its ends (2,), the outward unit vector, and the face's owner.
 
-    One that leans covers `depth` meters inwards of that line.
+    A leaning face covers `depth` meters inwards of the line between the ends.
     """
 
     start: Array
@@ -100,44 +102,47 @@ class _Edge(NamedTuple):
     owner: int
     depth: float
 
-    def runs_on_to(self, other: "_Edge") -> bool:
-        """Whether the other begins where this one ends, of the same face."""
+    def is_continued_by(self, other: "_Edge") -> bool:
+        """Return whether the other piece is of the same face and starts at the end of this piece."""
         return self.owner == other.owner and self.outward is other.outward and bool((self.end == other.start).all())
 
     def wall(self, high: float, low: float, name: str) -> Solid:
-        """A thin wall between two heights."""
-        x, y = ((self.start + self.end) / 2 - self.outward * THICKNESS / 2).tolist()
+        """Return a thin wall between two heights."""
+        x, y = ((self.start + self.end) / 2 - self.outward * WALL_THICKNESS_M / 2).tolist()
         along = self.end - self.start
-        place = Pose3.planar(Pose2(x, y, math.atan2(along[1], along[0])), (low + high) / 2)
-        return Solid(Box((float(np.linalg.norm(along)), THICKNESS, high - low)), place, name)
+        pose = Pose3.planar(Pose2(x, y, math.atan2(along[1], along[0])), (low + high) / 2)
+        return Solid(Box((float(np.linalg.norm(along)), WALL_THICKNESS_M, high - low)), pose, name)
 
 
-def _pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_Edge]:
-    """The edges that upright faces are in plan, each once, in pieces."""
+def _edge_pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_Edge]:
+    """Yield the lines of upright faces seen from above, each line once, in pieces."""
     seen = set()
-    across = face_normals(mesh)[:, :2]
+    horizontal_normals = face_normals(mesh)[:, :2]
     for face in faces.tolist():
-        outward, owner = across[face] / np.linalg.norm(across[face]), int(mesh.owners[face])
+        length = np.linalg.norm(horizontal_normals[face])
+        if length == 0:  # a triangle without area has no normal
+            continue
+        outward, owner = horizontal_normals[face] / length, int(mesh.owners[face])
         along = np.array([-outward[1], outward[0]])
         corners = mesh.vertices[mesh.faces[face], :2]
-        places, offsets = corners @ along, corners @ outward
-        first, last = (place * along + offsets.max() * outward for place in (places.min(), places.max()))
+        positions, offsets = corners @ along, corners @ outward
+        first, last = (position * along + offsets.max() * outward for position in (positions.min(), positions.max()))
         key = (owner, *np.round(np.concatenate((first, last, outward)), 4).tolist())
-        if key in seen or not np.ptp(places):
+        if key in seen or not np.ptp(positions):
             continue
         seen.add(key)
-        shares = np.linspace(0.0, 1.0, max(1, math.ceil(float(np.ptp(places)) / PIECE)) + 1)
+        shares = np.linspace(0.0, 1.0, max(1, math.ceil(float(np.ptp(positions)) / EDGE_PIECE_M)) + 1)
         ends = first + shares[:, None] * (last - first)
         yield from (_Edge(a, b, outward, owner, float(np.ptp(offsets))) for a, b in pairwise(ends))
 
 
-def _heights(mesh: TriangleMesh, ground: Owners, points: Array) -> Array:
-    """How high the ground is at points (n, 2) in m: the uppermost of what wheels may be on, at least 0."""
+def _ground_heights(mesh: TriangleMesh, ground: Owners, points: Array) -> Array:
+    """Return the height of the highest ground at points (n, 2) in m, at least 0."""
     from simscen.worlds.raycasting.ray_scene import RayScene
 
-    mine = _of(mesh, ground)
-    scene = RayScene(TriangleMesh(mesh.vertices, mesh.faces[mine], mesh.owners[mine], mesh.names))
-    top = float(mesh.vertices[mesh.faces[mine], 2].max()) + 1.0
+    is_ground = _is_ground_face(mesh, ground)
+    scene = RayScene(TriangleMesh(mesh.vertices, mesh.faces[is_ground], mesh.owners[is_ground], mesh.names))
+    top = float(mesh.vertices[mesh.faces[is_ground], 2].max()) + 1.0
     origins = np.column_stack((points, np.full(len(points), top)))
     down = np.broadcast_to(np.array([0.0, 0.0, -1.0]), origins.shape)
     heights: Array = np.maximum(0.0, top - scene.cast(origins, down))

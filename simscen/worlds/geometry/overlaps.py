@@ -1,6 +1,6 @@
 """Tests whether a disc or a footprint overlaps a solid, with the name of the first solid that does.
 
-Upright prisms are tested in plain Python, so that `validate` needs no numpy for most scenarios.
+Upright prisms are tested in plain Python, so that `validate` needs neither triangles nor scipy for most scenarios.
 """
 
 import math
@@ -15,19 +15,24 @@ from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid
 from simscen.worlds.geometry.prisms import upright_prism
 
 ZRange = tuple[float, float]
+"""Lower and upper height in meters."""
+TOUCHING_SHARE = 1e-3
+"""Share by which an outline is shrunk before the test, because touching is not overlapping."""
 
 
 def blocking_solid(world: World, point: tuple[float, float], radius: float, z_range: ZRange) -> str | None:
-    """The name of the first static solid that a disc at `point` would overlap, or None.
+    """Return the name of the first static solid that a disc at `point` would overlap, or None.
 
     The disc is a cylinder of `radius` meters between the heights `z_range`; touching is not overlapping. Takes a
-    few milliseconds for thousands of solids, as only those whose bounding ball is near are looked at.
+    few milliseconds for thousands of solids, because distant solids are skipped by their bounding balls.
     """
-    return first_blocking(world.solids, point, radius, z_range)
+    return first_solid_in_disc(world.solids, point, radius, z_range)
 
 
-def first_blocking(solids: Iterable[Solid], point: tuple[float, float], radius: float, z_range: ZRange) -> str | None:
-    """Like `blocking_solid`, among some solids."""
+def first_solid_in_disc(
+    solids: Iterable[Solid], point: tuple[float, float], radius: float, z_range: ZRange
+) -> str | None:
+    """Return the name of the first of the solids that a disc at `point` overlaps, or None; see `blocking_solid`."""
     for solid in solids:
         if is_near(solid, point, radius) and _distance(solid, point, z_range, radius) < radius:
             return solid.name
@@ -35,23 +40,23 @@ def first_blocking(solids: Iterable[Solid], point: tuple[float, float], radius: 
 
 
 def _distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within: float) -> float:
-    """Horizontal distance in meters to what a solid has between two heights; inf if that is not `within`."""
+    """Return the horizontal distance in meters to a solid between two heights; inf if it is not `within` that."""
     prism = upright_prism(solid)
     if prism is not None:
         return prism.distance(point, z_range)
-    from simscen.worlds.geometry.cross_section import distance_in_plan
-    from simscen.worlds.geometry.triangulation import fuse
+    from simscen.worlds.geometry.cross_section import horizontal_distance
+    from simscen.worlds.geometry.triangulation import merge_solids
 
-    return distance_in_plan(fuse([solid]), point, z_range, within)
+    return horizontal_distance(merge_solids([solid]), point, z_range, within)
 
 
 def is_near(solid: Solid, point: tuple[float, float], radius: float) -> bool:
-    """Whether the ball that holds a solid comes as near as `radius` meters to a point, in plan."""
-    return math.hypot(solid.pose.x - point[0], solid.pose.y - point[1]) <= radius + _reach(solid.shape)
+    """Return whether the bounding ball of a solid is at most `radius` meters away from a point, seen from above."""
+    return math.hypot(solid.pose.x - point[0], solid.pose.y - point[1]) <= radius + _bounding_radius(solid.shape)
 
 
-def _reach(shape: Shape) -> float:
-    """The radius of a ball about the shape's origin that holds it."""
+def _bounding_radius(shape: Shape) -> float:
+    """Return the radius of a ball around the shape's origin that contains the shape."""
     match shape:
         case Box(size):
             return math.hypot(*size) / 2
@@ -69,38 +74,35 @@ def _reach(shape: Shape) -> float:
             return float(np.linalg.norm(vertices, axis=1).max(initial=0.0))
 
 
-TOUCHING = 1e-3
-"""Share by which an outline is drawn smaller: to touch is not to overlap."""
-
-
-def placed(outline: Polygon, pose: Pose2) -> Polygon:
-    """An outline in its own frame, where it stands."""
+def place_polygon(outline: Polygon, pose: Pose2) -> Polygon:
+    """Return an outline, given in its own frame, at a pose."""
     c, s = math.cos(pose.yaw), math.sin(pose.yaw)
     return tuple((pose.x + c * x - s * y, pose.y + s * x + c * y) for x, y in outline)
 
 
-def first_overlapping(solids: Iterable[Solid], outline: Polygon, pose: Pose2, z_range: ZRange) -> str | None:
-    """The name of the first solid that `outline`, placed at `pose`, overlaps between two heights; or None."""
-    reach = max(math.hypot(x, y) for x, y in outline)
-    corners = placed(tuple((x * (1 - TOUCHING), y * (1 - TOUCHING)) for x, y in outline), pose)
+def first_solid_in_footprint(solids: Iterable[Solid], outline: Polygon, pose: Pose2, z_range: ZRange) -> str | None:
+    """Return the name of the first solid that `outline` at `pose` overlaps between two heights, or None."""
+    radius = max(math.hypot(x, y) for x, y in outline)
+    corners = place_polygon(tuple((x * (1 - TOUCHING_SHARE), y * (1 - TOUCHING_SHARE)) for x, y in outline), pose)
     for solid in solids:
-        if is_near(solid, (pose.x, pose.y), reach) and _overlaps(solid, corners, z_range):
+        if is_near(solid, (pose.x, pose.y), radius) and _overlaps(solid, corners, z_range):
             return solid.name
     return None
 
 
-def polygons_overlap(one: Sequence[tuple[float, float]], other: Sequence[tuple[float, float]]) -> bool:
-    """Whether two filled polygons share inner points.
+def polygons_overlap(first: Sequence[tuple[float, float]], second: Sequence[tuple[float, float]]) -> bool:
+    """Return whether two filled polygons share inner points.
 
-    A corner on the other's border tells nothing, as where both are the same: then their middles do.
+    A corner on the border of the other polygon proves nothing, for example for equal polygons. The centers are
+    therefore tested as well.
     """
-    if polygon_contains(one, other[0]) or polygon_contains(other, one[0]):
+    if polygon_contains(first, second[0]) or polygon_contains(second, first[0]):
         return True
-    middles = [(sum(x for x, _ in ring) / len(ring), sum(y for _, y in ring) / len(ring)) for ring in (one, other)]
-    if any(polygon_contains(one, middle) and polygon_contains(other, middle) for middle in middles):
+    centers = [(sum(x for x, _ in ring) / len(ring), sum(y for _, y in ring) / len(ring)) for ring in (first, second)]
+    if any(polygon_contains(first, center) and polygon_contains(second, center) for center in centers):
         return True
-    edges = list(zip(other, (*other[1:], other[0]), strict=True))
-    return any(segments_cross(a, b, c, d) for a, b in zip(one, (*one[1:], one[0]), strict=True) for c, d in edges)
+    edges = list(zip(second, (*second[1:], second[0]), strict=True))
+    return any(segments_cross(a, b, c, d) for a, b in zip(first, (*first[1:], first[0]), strict=True) for c, d in edges)
 
 
 def _overlaps(solid: Solid, corners: Polygon, z_range: ZRange) -> bool:
@@ -108,6 +110,6 @@ def _overlaps(solid: Solid, corners: Polygon, z_range: ZRange) -> bool:
     if prism is not None:
         low, high = z_range
         return prism.bottom < high and prism.top > low and polygons_overlap(prism.base, corners)
-    from simscen.worlds.routes.clearance import cut_overlaps
+    from simscen.worlds.routes.clearance import footprint_overlaps_solid
 
-    return cut_overlaps(solid, corners, z_range)
+    return footprint_overlaps_solid(solid, corners, z_range)

@@ -1,7 +1,6 @@
-"""Upright prisms over convex bases, computed in plain Python.
+"""Upright prisms over convex bases, computed in plain Python without triangulation; and bounds of any solid.
 
-Commands that must answer at once use these instead of triangle meshes, so that they need not import numpy. The bases
-equal those of `triangulation.triangulate`, corner for corner.
+Commands that must answer at once use prisms. Their bases equal those of `triangulation.triangulate`, corner for corner.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from simscen.worlds.geometry.circle_facets import facet_count
 
 
 class UprightPrism(NamedTuple):
-    """A prism over a convex polygon, anticlockwise, from the height `bottom` to the height `top`, in meters."""
+    """A prism over a convex anticlockwise polygon, from the height `bottom` to the height `top`, in meters."""
 
     base: Polygon
     bottom: float
@@ -29,12 +28,12 @@ class UprightPrism(NamedTuple):
 
     @property
     def rectangle(self) -> tuple[float, float, float, float]:
-        """What it covers at most, as (min x, min y, max x, max y)."""
+        """Bounding rectangle as (min x, min y, max x, max y)."""
         xs, ys = [x for x, _ in self.base], [y for _, y in self.base]
         return min(xs), min(ys), max(xs), max(ys)
 
     def distance(self, point: tuple[float, float], z_range: tuple[float, float]) -> float:
-        """Horizontal distance from a point to what it has between two heights: 0 inside, inf if there is nothing."""
+        """Return the horizontal distance to the prism between two heights: 0 inside, inf if it is not there."""
         low, high = z_range
         if self.bottom >= high or self.top <= low:
             return math.inf
@@ -46,9 +45,9 @@ class UprightPrism(NamedTuple):
 
 
 def upright_prism(solid: Solid, frame: Pose3 | None = None) -> UprightPrism | None:
-    """The prism that a solid is; None for one that is tilted, round upwards, or has a base that is not convex.
+    """Return a solid as a prism; None if it is tilted, not a prism, or has a base that is not convex.
 
-    `frame` is where the owner of the solid stands.
+    `frame` is the pose of the frame in which the solid is placed.
     """
     poses = (solid.pose,) if frame is None else (solid.pose, frame)
     if any(pose.qx != 0 or pose.qy != 0 for pose in poses):
@@ -64,8 +63,8 @@ def upright_prism(solid: Solid, frame: Pose3 | None = None) -> UprightPrism | No
         case _:
             return None
     for pose in poses:
-        base, bottom, top = _placed(base, pose), bottom + pose.z, top + pose.z
-    base = next((way for way in (base, base[::-1]) if _convex(way)), ())
+        base, bottom, top = _place(base, pose), bottom + pose.z, top + pose.z
+    base = next((ring for ring in (base, base[::-1]) if _is_convex_and_anticlockwise(ring)), ())
     return UprightPrism(base, bottom, top) if base else None
 
 
@@ -75,40 +74,43 @@ def _circle(radius: float) -> Polygon:
     return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
 
 
-def _placed(base: Polygon, pose: Pose3) -> Polygon:
+def _place(base: Polygon, pose: Pose3) -> Polygon:
     c, s = 1 - 2 * pose.qz * pose.qz, 2 * pose.qz * pose.qw
     return tuple((c * x - s * y + pose.x, s * x + c * y + pose.y) for x, y in base)
 
 
-def _convex(base: Polygon) -> bool:
-    """Whether every corner turns left, and all of them together turn around once: a star turns around twice."""
-    ways = [(bx - ax, by - ay) for (ax, ay), (bx, by) in zip(base, (*base[1:], base[0]), strict=True)]
+def _is_convex_and_anticlockwise(base: Polygon) -> bool:
+    """Return whether every corner turns left and the sum of turns is 360°; for a star it is 720°."""
+    edges = [(bx - ax, by - ay) for (ax, ay), (bx, by) in zip(base, (*base[1:], base[0]), strict=True)]
     turns = [
         math.atan2(ax * by - ay * bx, ax * bx + ay * by)
-        for (ax, ay), (bx, by) in zip(ways, (*ways[1:], ways[0]), strict=True)
+        for (ax, ay), (bx, by) in zip(edges, (*edges[1:], edges[0]), strict=True)
     ]
     return all(0 < turn < math.pi for turn in turns) and sum(turns) < 3 * math.pi
 
 
-def is_flat(solids: Iterable[Solid], reach: float) -> bool:
-    """Whether it is plain without a look at triangles that wheels get onto no solid."""
+def is_surely_flat(solids: Iterable[Solid], max_height: float) -> bool:
+    """Return True if wheels cannot drive onto any solid: all are prisms, and higher than `max_height` or flat.
+
+    False means that the triangles must be examined.
+    """
     prisms = [upright_prism(solid) for solid in solids]
-    return all(prism is not None and (prism.top > reach or prism.top <= FLOOR_HEIGHT_M) for prism in prisms)
+    return all(prism is not None and (prism.top > max_height or prism.top <= FLOOR_HEIGHT_M) for prism in prisms)
 
 
-def plan_rectangle(solid: Solid, frame: Pose3 | None = None) -> tuple[float, float, float, float]:
-    """What a solid covers in plan at most, as (min x, min y, max x, max y); `frame` is where it is placed."""
+def bounding_rectangle(solid: Solid, frame: Pose3 | None = None) -> tuple[float, float, float, float]:
+    """Return the rectangle around a solid as (min x, min y, max x, max y); `frame` is the frame it is placed in."""
     prism = upright_prism(solid, frame)
     if prism is not None:
         return prism.rectangle
-    (left, low), (right, high) = plan_extents(solid, frame).tolist()
-    return left, low, right, high
+    (left, bottom), (right, top) = mesh_bounds_2d(solid, frame).tolist()
+    return left, bottom, right, top
 
 
-def plan_extents(solid: Solid, frame: Pose3 | None = None) -> Array:
-    """The lower left and upper right corner (2, 2) of what any solid covers in plan; `frame` is where it is placed."""
+def mesh_bounds_2d(solid: Solid, frame: Pose3 | None = None) -> Array:
+    """Return the lower left and upper right corner (2, 2) of the rectangle around a solid's triangles."""
     from simscen.worlds.geometry.triangulation import triangulate
 
     pose = frame.compose(solid.pose) if frame else solid.pose
-    corners = pose.apply(triangulate(solid.shape).vertices)[:, :2]
-    return np.stack((corners.min(axis=0), corners.max(axis=0)))
+    vertices = pose.apply(triangulate(solid.shape).vertices)[:, :2]
+    return np.stack((vertices.min(axis=0), vertices.max(axis=0)))

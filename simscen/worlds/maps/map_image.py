@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 Bytes8 = npt.NDArray[np.uint8]
 Quanta = npt.NDArray[np.uint16]
 
-MOST_PIXELS = 16 * 2**20
-MOST_BYTES = 64 * 2**20
+MAX_PIXELS = 16 * 2**20
+MAX_BYTES = 64 * 2**20
 CODE = "SC320"
 
 _GAP = rb"(?:\s|#[^\r\n]*[\r\n])+"
@@ -37,7 +37,7 @@ class MapImage:
     alpha: Bytes8 | None = None
 
 
-class BadImage(Exception):
+class UnreadableImage(Exception):
     """What is wrong with an image, as a sentence."""
 
 
@@ -48,7 +48,7 @@ def read_image(path: Path) -> MapImage:
         if data[:2] in (b"P2", b"P5"):
             return MapImage(_eight_bits(_portable(data)))
         return _compressed(data)
-    except BadImage as bad:
+    except UnreadableImage as bad:
         raise InvalidInput([Problem(str(path), 0, 0, CODE, str(bad))]) from None
 
 
@@ -56,39 +56,39 @@ def _bytes_of(path: Path) -> bytes:
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
-            raise BadImage("not a regular file")
-        if status.st_size > MOST_BYTES:
-            raise BadImage(f"map too large: {status.st_size} bytes, more than {MOST_BYTES}")
+            raise UnreadableImage("not a regular file")
+        if status.st_size > MAX_BYTES:
+            raise UnreadableImage(f"map too large: {status.st_size} bytes, more than {MAX_BYTES}")
         record_read_file(path.resolve())
         return path.read_bytes()
     except OSError as error:
         reason = (error.strerror or "cannot be read").lower()
-        raise BadImage(f"cannot read the map's image: {reason}") from None
+        raise UnreadableImage(f"cannot read the map's image: {reason}") from None
 
 
 def _check_size(width: int, height: int) -> None:
     if width < 1 or height < 1:
-        raise BadImage(f"the image has no pixels: {width} x {height}")
-    if width * height > MOST_PIXELS:
-        raise BadImage(f"map too large: {width} x {height} pixels, more than {MOST_PIXELS}")
+        raise UnreadableImage(f"the image has no pixels: {width} x {height}")
+    if width * height > MAX_PIXELS:
+        raise UnreadableImage(f"map too large: {width} x {height} pixels, more than {MAX_PIXELS}")
 
 
 def _portable(data: bytes) -> Quanta:
-    """A PGM as 16-bit grays (h, w). Source: netpbm's pgm(5); larger samples are big-endian."""
+    """Return a PGM as 16-bit grays (h, w). Source: netpbm's pgm(5); samples of two bytes are big-endian."""
     match = _PNM_HEADER.match(data)
     if match is None:
-        raise BadImage("the PGM header is damaged; expected width, height and maxval")
+        raise UnreadableImage("the PGM header is damaged; expected width, height and maxval")
     width, height, maximum = (int(text) for text in match.groups()[1:])
     _check_size(width, height)
     if not 1 <= maximum <= 65535:
-        raise BadImage(f"maxval must be between 1 and 65535, not {maximum}")
+        raise UnreadableImage(f"maxval must be between 1 and 65535, not {maximum}")
     raster = data[match.end() :]
     values = _ascii(raster) if match[1] == b"P2" else _binary(raster, width * height, maximum)
     if len(values) < width * height:
-        raise BadImage(f"the PGM is truncated: {len(values)} of {width * height} pixels")
+        raise UnreadableImage(f"the PGM is truncated: {len(values)} of {width * height} pixels")
     values = values[: width * height].reshape(height, width)
     if values.max() > maximum:
-        raise BadImage(f"a pixel is {values.max()}, above the maxval of {maximum}")
+        raise UnreadableImage(f"a pixel is {values.max()}, above the maxval of {maximum}")
     scale = np.round(np.arange(maximum + 1) * (65535 / maximum)).astype(np.uint16)
     quanta: Quanta = scale[values]
     return quanta
@@ -102,7 +102,7 @@ def _binary(raster: bytes, count: int, maximum: int) -> npt.NDArray[np.generic]:
 def _ascii(raster: bytes) -> npt.NDArray[np.generic]:
     text = re.sub(rb"#[^\r\n]*", b"", raster)
     if re.search(rb"[^\d\s]", text):
-        raise BadImage("the PGM holds something that is not a number")
+        raise UnreadableImage("the PGM holds something that is not a number")
     if len(text) > 0 and text.isspace():
         return np.empty(0, dtype=np.int64)
     return np.fromstring(text, dtype=np.int64, sep=" ")
@@ -116,7 +116,7 @@ def _compressed(data: bytes) -> MapImage:
     elif data[:2] == b"BM" and len(data) >= 26:
         kind, (width, height) = "BMP", _bmp_size(data)
     else:
-        raise BadImage("not a PGM (P2, P5), PNG or BMP image")
+        raise UnreadableImage("not a PGM (P2, P5), PNG or BMP image")
     _check_size(width, height)
     try:
         with warnings.catch_warnings():
@@ -125,9 +125,9 @@ def _compressed(data: bytes) -> MapImage:
             _check_size(*image.size)
             image.load()
     except UnidentifiedImageError:  # its message holds the address of an object
-        raise BadImage(f"the {kind} cannot be decoded") from None
+        raise UnreadableImage(f"the {kind} cannot be decoded") from None
     except (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError) as error:
-        raise BadImage(f"the {kind} cannot be decoded: {error}") from None
+        raise UnreadableImage(f"the {kind} cannot be decoded: {error}") from None
     return _gray_and_alpha(image)
 
 

@@ -1,21 +1,21 @@
-"""How large the map of a world is, in plain numbers, so that `validate` can tell without drawing it."""
+"""Size of the occupancy map of a world, computed without drawing the map and without importing numpy."""
 
 import math
 from typing import NamedTuple
 
-MARGIN = 1.0
-"""Meters of map around everything there is, so that a robot outside of the last wall is still on the map."""
-MOST_CELLS = 16_000_000
-"""Of a map that is drawn: 200 x 200 m at 5 cm."""
-RESOLUTION = 0.05
-"""Meters of a cell of the robot's map, as is usual with SLAM."""
+MAP_MARGIN_M = 1.0
+"""Width of the map's border around the world, so that a robot outside the outermost wall is still on the map."""
+MAX_MAP_CELLS = 16_000_000
+"""Maximum number of cells of a map: 200 x 200 m at 5 cm."""
+MAP_RESOLUTION_M = 0.05
+"""Default edge length of a cell, as is usual with SLAM."""
 
 Bounds = tuple[float, float, float, float]
-"""min x, min y, max x, max y in meters."""
+"""Rectangle (min x, min y, max x, max y) in meters."""
 
 
 class MapSize(NamedTuple):
-    """First column and row as multiples of the resolution, and how many there are."""
+    """First column and first row as multiples of the resolution, and the number of columns and rows."""
 
     left: int
     bottom: int
@@ -23,16 +23,16 @@ class MapSize(NamedTuple):
     height: int
 
 
-def map_size(bounds: Bounds, resolution: float = RESOLUTION) -> MapSize:
-    """The cells over `bounds` and MARGIN; the lines of the map are multiples of `resolution` in meters."""
-    left, bottom = (math.floor(round((edge - MARGIN) / resolution, 6)) for edge in bounds[:2])
-    right, top = (math.ceil(round((edge + MARGIN) / resolution, 6)) for edge in bounds[2:])
+def map_size(bounds: Bounds, resolution: float = MAP_RESOLUTION_M) -> MapSize:
+    """Return the size of a map over `bounds` and a margin; its grid lines are multiples of `resolution` in meters."""
+    left, bottom = (math.floor(round((edge - MAP_MARGIN_M) / resolution, 6)) for edge in bounds[:2])
+    right, top = (math.ceil(round((edge + MAP_MARGIN_M) / resolution, 6)) for edge in bounds[2:])
     return MapSize(left, bottom, right - left, top - bottom)
 
 
-def too_large(bounds: Bounds, resolution: float = RESOLUTION) -> str | None:
-    """Why no map can be drawn over `bounds`."""
+def map_size_error(bounds: Bounds, resolution: float = MAP_RESOLUTION_M) -> str | None:
+    """Return a message if a map over `bounds` would have more than MAX_MAP_CELLS cells."""
     size = map_size(bounds, resolution)
-    if size.width * size.height <= MOST_CELLS:
+    if size.width * size.height <= MAX_MAP_CELLS:
         return None
-    return f"map too large: {size.width} x {size.height} cells of {resolution:g} m, more than {MOST_CELLS} cells"
+    return f"map too large: {size.width} x {size.height} cells of {resolution:g} m, more than {MAX_MAP_CELLS} cells"

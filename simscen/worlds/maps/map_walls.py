@@ -1,4 +1,4 @@
-"""A map as a world: walls that rise from the occupied cells."""
+"""Walls of a world from the occupied cells of a map."""
 
 import numpy as np
 import numpy.typing as npt
@@ -11,19 +11,19 @@ from simscen.core.geometry.shapes import Mesh, Solid
 Cells = npt.NDArray[np.bool_]
 Runs = npt.NDArray[np.int64]
 
-OCCUPIED_FROM = 65
-"""Cells from here to 100 are walls: Nav2's occupied_thresh, for maps read in mode scale or raw."""
-MOST_EDGES = 500_000
-"""A map of pure noise has an edge for every cell; a building of 16 million cells has some ten thousand."""
+MIN_OCCUPIED_VALUE = 65
+"""Cells with values from this to 100 are walls: Nav2's occupied_thresh, for maps in mode scale or raw."""
+MAX_EDGES = 500_000
+"""Maximum number of straight edges. A building of 16 million cells has about 10 000, noise has one per cell."""
 
 
-def walls_of(grid: OccupancyGrid, height: float, name: str = "map") -> list[Solid]:
-    """The occupied cells of a map as one closed mesh of walls, `height` meters tall; nothing if there are none.
+def walls_from_map(grid: OccupancyGrid, height: float, name: str = "map") -> list[Solid]:
+    """Return the occupied cells of a map as one closed mesh, `height` m tall; empty without occupied cells.
 
-    A straight edge becomes one face, however many cells long it is, and there are no faces between cells, so that
-    nothing can catch on a seam. Raises InvalidInput for a map with more than MOST_EDGES straight edges.
+    A straight edge of any length becomes one face, and there are no faces between cells, so that no object can catch on
+    a seam. Raises InvalidInput for a map with more than MAX_EDGES straight edges.
     """
-    occupied = grid.cells >= OCCUPIED_FROM
+    occupied = grid.cells >= MIN_OCCUPIED_VALUE
     if not occupied.any():
         return []
     corners = np.concatenate((_sides(occupied, name), _caps(occupied, name)))
@@ -34,13 +34,13 @@ def walls_of(grid: OccupancyGrid, height: float, name: str = "map") -> list[Soli
 
 
 def _sides(occupied: Cells, name: str) -> Array:
-    """Upright faces (n, 4, 3) in cell units, height 1: one for each maximal straight edge of the outline."""
+    """Return the upright faces (n, 4, 3) in cells, with height 1: one for each straight edge of the outline."""
     sides = []
     for swapped, cells in ((False, occupied), (True, occupied.T)):
         change = np.diff(np.pad(cells.astype(np.int8), ((1, 1), (0, 0))), axis=0)
         for sign in (1, -1):
             line, start, stop = _runs(change == sign, name).T
-            # The wall must be on the left of the way from a to b: begin at `start` where it begins above the line.
+            # The wall must be on the left of the line from a to b.
             a, b = (start, stop) if (sign == 1) != swapped else (stop, start)
             ends = [np.column_stack((end, line) if not swapped else (line, end)) for end in (a, b, b, a)]
             sides.append(
@@ -50,7 +50,7 @@ def _sides(occupied: Cells, name: str) -> Array:
 
 
 def _caps(occupied: Cells, name: str) -> Array:
-    """Undersides and tops (n, 4, 3): runs of cells, those of equal extent in consecutive rows taken together."""
+    """Return the faces (n, 4, 3) of bottom and top, one for equal runs of cells in consecutive rows."""
     row, start, stop = _runs(occupied, name).T
     order = np.lexsort((row, stop, start))
     row, start, stop = row[order], start[order], stop[order]
@@ -67,11 +67,11 @@ def _caps(occupied: Cells, name: str) -> Array:
 
 
 def _runs(lines: Cells, name: str) -> Runs:
-    """The maximal runs of True along the rows, as (n, 3): row, first column, column after the last."""
+    """Return the runs of True along the rows (n, 3): row, first column, column after the last."""
     steps = np.diff(np.pad(lines.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     count = int(np.count_nonzero(steps == 1))
-    if count > MOST_EDGES:
-        message = f"map too ragged to make walls of: more than {MOST_EDGES} separate edges"
+    if count > MAX_EDGES:
+        message = f"map too ragged to make walls of: more than {MAX_EDGES} separate edges"
         raise InvalidInput([Problem(name, 0, 0, "SC331", message, "remove the speckles from the map")])
     begin, end = np.argwhere(steps == 1), np.argwhere(steps == -1)
     return np.column_stack((begin, end[:, 1]))

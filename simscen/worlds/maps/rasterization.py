@@ -1,20 +1,20 @@
-"""From the outlines of solids to the cells they touch; all segments at once, nothing per cell in Python."""
+"""Rasterization: the cells that solids touch, from their outlines. All segments are processed at once."""
 
 import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
-from simscen.worlds.geometry.cross_section import Section
+from simscen.worlds.geometry.cross_section import CrossSection
 
 Cells = npt.NDArray[np.bool_]
 
-INWARDS = 1e-6
-"""Cells by which outlines are drawn inside their solid: a wall that ends on a cell's edge stays out of the cell."""
+INWARD_OFFSET_CELLS = 1e-6
+"""Inward offset of outlines, so that a wall that ends at the edge of a cell does not touch this cell."""
 
 
-def touched(cut: Section, shape: tuple[int, int]) -> Cells:
-    """Which cells of a lattice (rows, columns) share inner points with the solids; outlines in cell units."""
-    cells = filled(cut, shape)
+def touched_cells(cut: CrossSection, shape: tuple[int, int]) -> Cells:
+    """Return which cells of a grid of `shape` (rows, columns) overlap solids, with outlines in cells."""
+    cells = filled_cells(cut, shape)
     rows, columns = _on_outline(cut.segments)
     inside = (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
     cells[rows[inside], columns[inside]] = True
@@ -22,35 +22,36 @@ def touched(cut: Section, shape: tuple[int, int]) -> Cells:
 
 
 def _on_outline(segments: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """The cells that the segments pass: each is cut at the lattice lines, and every piece lies in one cell."""
+    """Return rows and columns of the cells on the segments, which are split at the grid lines."""
     start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
     owner = [np.arange(len(segments)), np.arange(len(segments))]
     along = [np.zeros(len(segments)), np.ones(len(segments))]
     for axis in (0, 1):
         low, high = np.sort(segments[:, :, axis], axis=1).T
         first, last = np.floor(low).astype(np.int64) + 1, np.ceil(high).astype(np.int64) - 1
-        which, lines = ranges(first, last + 1)
+        which, lines = expand_ranges(first, last + 1)
         owner.append(which)
         along.append((lines - start[which, axis]) / step[which, axis])
     owners, cuts = np.concatenate(owner), np.concatenate(along)
     order = np.lexsort((cuts, owners))
     owners, cuts = owners[order], cuts[order]
     lengths = np.linalg.norm(step, axis=1)
-    # A piece as short as this is a rounding error across a lattice line, not a wall in the next cell.
-    same = (owners[:-1] == owners[1:]) & (np.diff(cuts) * lengths[owners[:-1]] > INWARDS)
+    # A shorter piece is a rounding error at a grid line, not a wall in the next cell.
+    same = (owners[:-1] == owners[1:]) & (np.diff(cuts) * lengths[owners[:-1]] > INWARD_OFFSET_CELLS)
     middles = ((cuts[:-1] + cuts[1:]) / 2)[same]
     which = owners[:-1][same]
-    left = np.column_stack((-step[:, 1], step[:, 0])) / lengths[:, None]
-    points = start[which] + middles[:, None] * step[which] + INWARDS * left[which]
+    # Only for kept pieces: two different points can be equal in cells, and then have no direction.
+    left = np.column_stack((-step[which, 1], step[which, 0])) / lengths[which, None]
+    points = start[which] + middles[:, None] * step[which] + INWARD_OFFSET_CELLS * left
     cells = np.floor(points).astype(np.int64)
     return cells[:, 1], cells[:, 0]
 
 
-def filled(cut: Section, shape: tuple[int, int]) -> Cells:
-    """The cells whose center is inside: the winding number of the outlines about it is positive.
+def filled_cells(cut: CrossSection, shape: tuple[int, int]) -> Cells:
+    """Return the cells whose center is inside a solid, i.e. the winding number of the outlines is positive.
 
-    Rows in which an owner's outline is not closed (meshes with holes) are left to its outline, and so are owners
-    that turn their inside out, such as a room modeled as a box seen from within.
+    Rows in which the outline of a solid is not closed (meshes with holes) are not filled, nor are solids with inverted
+    faces, e.g. a room that is modeled as a box seen from inside.
     """
     rows, columns, signs, owners = _crossings(cut, shape)
     keep = _balanced(rows + shape[0] * owners.astype(np.int64), signs) & ~_inside_out(cut)[owners]
@@ -62,29 +63,29 @@ def filled(cut: Section, shape: tuple[int, int]) -> Cells:
 
 
 def _crossings(
-    cut: Section, shape: tuple[int, int]
+    cut: CrossSection, shape: tuple[int, int]
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Array, npt.NDArray[np.int32]]:
-    """Where outlines cross the middle lines of the rows: row, first column whose center is beyond, sign, owner."""
+    """Return the crossings of outlines with the center lines of rows: row, first column beyond, sign, owner."""
     (x0, y0), (x1, y1) = cut.segments[:, 0].T, cut.segments[:, 1].T
     first = np.clip(np.ceil(np.minimum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
     last = np.clip(np.ceil(np.maximum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
-    which, rows = ranges(first, last)
+    which, rows = expand_ranges(first, last)
     slope = (x1 - x0)[which] / (y1 - y0)[which]
     x = x0[which] + (rows + 0.5 - y0[which]) * slope
-    # A solid is on the left of its outline: going up, what lies beyond (at larger x) is outside.
+    # A solid is on the left of its outline: beyond an upward segment (at larger x) is the outside.
     signs = np.where((y1 > y0)[which], -1.0, 1.0)
     return rows, np.ceil(x - 0.5).astype(np.int64), signs, cut.owners[which]
 
 
 def _balanced(keys: npt.NDArray[np.int64], signs: Array) -> Cells:
-    """Which crossings belong to a (row, owner) whose signs add up to nothing."""
+    """Return which crossings belong to a (row, owner) whose signs have the sum 0."""
     _, group = np.unique(keys, return_inverse=True)
     balanced: Cells = (np.bincount(group, weights=signs) == 0)[group]
     return balanced
 
 
-def _inside_out(cut: Section) -> Cells:
-    """For each owner, whether its outline runs clockwise."""
+def _inside_out(cut: CrossSection) -> Cells:
+    """Return for each owner whether its outline is clockwise."""
     if not len(cut.owners):
         return np.zeros(0, dtype=np.bool_)
     (x0, y0), (x1, y1) = cut.segments[:, 0].T, cut.segments[:, 1].T
@@ -92,10 +93,10 @@ def _inside_out(cut: Section) -> Cells:
     return clockwise
 
 
-def ranges(
+def expand_ranges(
     first: npt.NDArray[np.int64], stop: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """All integers of the half-open ranges, one range after the other, and which range each is from."""
+    """Return the index of the range and the value, for all integers of half-open ranges."""
     lengths = np.maximum(stop - first, 0)
     which = np.repeat(np.arange(len(first)), lengths)
     offsets = np.arange(len(which)) - np.repeat(np.cumsum(lengths) - lengths, lengths)

@@ -1,4 +1,4 @@
-"""ROS maps, read and written as Nav2's map_server does it (nav2_map_server/src/map_io.cpp)."""
+"""ROS maps, read and written as by Nav2's map_server (nav2_map_server/src/map_io.cpp)."""
 
 import json
 from pathlib import Path
@@ -14,17 +14,17 @@ from simscen.model.ros_map import RosMapSpec
 from simscen.worlds.maps.map_image import CODE, read_image
 
 UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 205, 254, 0
-"""The grays in which map_saver writes trinary maps."""
+"""Gray values of trinary maps written by map_saver."""
 
-FARTHEST = 1e4
-"""m from the origin: where coordinates end in all files."""
+MAX_DISTANCE_M = 1e4
+"""Maximum distance from the origin, as for coordinates in all files."""
 
 
-def load_grid(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[str, ...]]:
-    """The map of an image, and warnings about it; raises InvalidInput for an image that cannot be read.
+def load_map(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[str, ...]]:
+    """Return the map of an image, and warnings. Raises InvalidInput for an image that cannot be read.
 
-    Every pixel is judged by its 8-bit gray alone, in single precision like map_server; in trinary and scale mode
-    pixels that are not opaque are unknown.
+    As in map_server, only the 8-bit gray of a pixel counts, computed in single precision. In the modes trinary and
+    scale, pixels that are not opaque are unknown.
     """
     image = read_image(image_path)
     _refuse_distance(spec, image.gray.shape[::-1], image_path)
@@ -33,22 +33,21 @@ def load_grid(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[
     if image.alpha is not None and spec.mode != "raw":
         cells[image.alpha < 255] = UNKNOWN
     grid = OccupancyGrid(np.ascontiguousarray(cells[::-1]), spec.resolution, Pose2(*spec.origin))
-    return grid, _doubts(spec, table, int(np.count_nonzero(image.gray == UNKNOWN_GRAY)))
+    return grid, _warnings(spec, table, int(np.count_nonzero(image.gray == UNKNOWN_GRAY)))
 
 
 def _refuse_distance(spec: RosMapSpec, pixels: tuple[int, ...], image_path: Path) -> None:
-    """Meters taken for millimeters would make a map that takes forever to prepare."""
+    """Raise InvalidInput for a too large map, e.g. with a resolution in the wrong unit."""
     reach = max(pixels) * spec.resolution + max(abs(spec.origin[0]), abs(spec.origin[1]))
-    if reach > FARTHEST:
+    if reach > MAX_DISTANCE_M:
         size = " x ".join(str(count) for count in pixels)
-        message = (
-            f"map too large: {size} pixels of {spec.resolution:g} m reach {reach:g} m, farther than {FARTHEST:g} m"
-        )
+        message = f"map too large: {size} pixels of {spec.resolution:g} m reach {reach:g} m"
+        message += f", farther than {MAX_DISTANCE_M:g} m"
         raise InvalidInput([Problem(str(image_path), 0, 0, CODE, message, "check the map's `resolution`")])
 
 
 def cell_values(spec: RosMapSpec) -> npt.NDArray[np.int8]:
-    """What each of the 256 grays means as a cell of nav_msgs/OccupancyGrid."""
+    """Return the cell value (256,) of nav_msgs/OccupancyGrid for each gray."""
     grays = np.arange(256)
     if spec.mode == "raw":
         return np.where(grays <= OCCUPIED, grays, UNKNOWN).astype(np.int8)
@@ -65,7 +64,7 @@ def cell_values(spec: RosMapSpec) -> npt.NDArray[np.int8]:
     return values.astype(np.int8)
 
 
-def _doubts(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_grays: int) -> tuple[str, ...]:
+def _warnings(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_grays: int) -> tuple[str, ...]:
     if spec.mode == "raw" or spec.negate or not unknown_grays or table[UNKNOWN_GRAY] != FREE:
         return ()
     return (
@@ -75,9 +74,10 @@ def _doubts(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_grays: int) -
 
 
 def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
-    """Write a map as `yaml_path` and a PGM beside it, which load as exactly this grid. Raises OSError.
+    """Write a map as `yaml_path` and a PGM file with the same name. Loading them gives the same grid. Raises OSError.
 
-    Trinary with map_saver's grays and thresholds, or raw where cells hold more than free, occupied and unknown.
+    The mode is trinary, with map_saver's grays and thresholds, or raw if there are other values than free, occupied and
+    unknown.
     """
     image_path = yaml_path.with_suffix(".pgm")
     require_regular_file(image_path)
@@ -85,11 +85,11 @@ def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
     height, width = grid.shape
     header = f"P5\n{width} {height}\n255\n".encode()
     image_path.write_bytes(header + _grays(grid.cells, trinary)[::-1].tobytes())
-    origin = ", ".join(decimal(value) for value in grid.origin)
+    origin = ", ".join(format_decimal(value) for value in grid.origin)
     lines = (
         f"image: {json.dumps(image_path.name)}",
         f"mode: {'trinary' if trinary else 'raw'}",
-        f"resolution: {decimal(grid.resolution)}",
+        f"resolution: {format_decimal(grid.resolution)}",
         f"origin: [{origin}]",
         "negate: 0",
         "occupied_thresh: 0.65",
@@ -100,10 +100,10 @@ def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
 
 def _grays(cells: npt.NDArray[np.int8], trinary: bool) -> npt.NDArray[np.uint8]:
     if not trinary:
-        return np.where(cells < 0, 255, cells).astype(np.uint8)
+        return np.where(cells < 0, np.uint8(255), cells.astype(np.uint8))
     return np.select((cells == FREE, cells == OCCUPIED), (FREE_GRAY, OCCUPIED_GRAY), UNKNOWN_GRAY).astype(np.uint8)
 
 
-def decimal(value: float) -> str:
-    """The shortest decimal that reads back as the same number; without an exponent, which YAML 1.1 takes for text."""
+def format_decimal(value: float) -> str:
+    """Return the shortest decimal with the same value, without an exponent, which YAML 1.1 reads as text."""
     return np.format_float_positional(value, unique=True, trim="0")

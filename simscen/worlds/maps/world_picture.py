@@ -1,4 +1,4 @@
-"""A picture of a world from above: its cut at lidar height, the map over it, bodies, places and regions."""
+"""Picture of a world from above: its cross section, the map, bodies, places and regions."""
 
 import math
 from collections.abc import Sequence
@@ -11,8 +11,8 @@ from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
 from simscen.core.environment.world_model import BuiltWorld, Polygon
 from simscen.core.geometry import Array
 from simscen.core.geometry.shapes import Body
-from simscen.worlds.geometry.cross_section import outlines
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.cross_section import section_segments
+from simscen.worlds.geometry.triangulation import merge_solids
 
 if TYPE_CHECKING:
     from PIL import Image, ImageDraw
@@ -24,17 +24,17 @@ MAPPED_WALL, WALL = (147, 178, 214, 255), (16, 42, 82, 255)
 BODY, PLACE, REGION, RULER = (214, 102, 20, 255), (20, 128, 74, 255), (122, 82, 178, 255), (120, 128, 140, 255)
 MARK = (200, 24, 40, 255)
 
-LONGEST = 1200
-"""Pixels along the longer side."""
-FINER = 2
-"""Everything is drawn this much larger and scaled down, which smooths the lines."""
-RING = 18 * FINER
-"""Canvas pixels from the middle of a gap to the ring around it."""
+MAX_SIDE_PIXELS = 1200
+"""Length of the longer side of the picture."""
+SUPERSAMPLING = 2
+"""Factor by which everything is drawn larger and then scaled down, for smooth lines."""
+GAP_RING_RADIUS = 18 * SUPERSAMPLING
+"""Radius of the ring around a gap, in canvas pixels."""
 
 
 @dataclass(frozen=True)
-class View:
-    """Where world points land on the canvas: `left`, `top` in meters, `scale` in canvas pixels per meter."""
+class Viewport:
+    """Mapping of the world to the canvas: `left` and `top` in m, `scale` in canvas pixels per m."""
 
     left: float
     top: float
@@ -42,21 +42,21 @@ class View:
     size: tuple[int, int]
 
     def pixels(self, points: Array) -> list[tuple[float, float]]:
-        """Canvas positions of world points (n, 2)."""
+        """Return the canvas positions of world points (n, 2)."""
         x, y = (points[:, 0] - self.left) * self.scale, (self.top - points[:, 1]) * self.scale
         return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
-def picture(
+def draw_world(
     built: BuiltWorld,
     height: float,
     footprints: Sequence[Polygon] = (),
     gaps: Sequence[tuple[float, float]] = (),
 ) -> "Image.Image":
-    """The world cut at `height` meters, as an RGB image of at most LONGEST pixels a side, north (y) up.
+    """Return an RGB image of the cross section at `height` m, at most MAX_SIDE_PIXELS wide and tall, with y upwards.
 
-    Dark lines are the cut, light blue cells the map over it, gray what the map does not know; bodies are orange where
-    they start, places green, regions violet. `footprints` are drawn in red, and red rings around `gaps`.
+    Dark lines are the cross section, light blue cells the walls of the map, and gray cells unknown. Bodies at their
+    start are orange, places green, and regions violet. `footprints` and rings around `gaps` are red.
     """
     from PIL import Image, ImageDraw
 
@@ -66,27 +66,31 @@ def picture(
     overlay = Image.new("RGBA", view.size, (0, 0, 0, 0))
     pen = ImageDraw.Draw(overlay)
     for polygon in built.world.regions.values():
-        pen.polygon(view.pixels(np.array(polygon)), fill=(*REGION[:3], 40), outline=REGION, width=FINER)
-    _lines(pen, view, outlines(built.mesh, height), WALL)
+        pen.polygon(view.pixels(np.array(polygon)), fill=(*REGION[:3], 40), outline=REGION, width=SUPERSAMPLING)
+    _lines(pen, view, section_segments(built.mesh, height), WALL)
     for body in built.world.bodies:
         _lines(pen, view, _body_outline(body, height), BODY)
     for outline in footprints:
-        pen.polygon(view.pixels(np.array(outline)), fill=(*MARK[:3], 60), outline=MARK, width=FINER + 1)
+        pen.polygon(view.pixels(np.array(outline)), fill=(*MARK[:3], 60), outline=MARK, width=SUPERSAMPLING + 1)
     _names(pen, view, built)
     for x, y in view.pixels(np.array(gaps).reshape(-1, 2)):
-        pen.ellipse((x - RING, y - RING, x + RING, y + RING), outline=MARK, width=2 * FINER)
+        pen.ellipse(
+            (x - GAP_RING_RADIUS, y - GAP_RING_RADIUS, x + GAP_RING_RADIUS, y + GAP_RING_RADIUS),
+            outline=MARK,
+            width=2 * SUPERSAMPLING,
+        )
     _ruler(pen, view)
     canvas.alpha_composite(overlay)
     width, rows = view.size
-    return canvas.convert("RGB").resize((width // FINER, rows // FINER), Image.Resampling.LANCZOS)
+    return canvas.convert("RGB").resize((width // SUPERSAMPLING, rows // SUPERSAMPLING), Image.Resampling.LANCZOS)
 
 
-def _view(grid: OccupancyGrid) -> View:
+def _view(grid: OccupancyGrid) -> Viewport:
     corners = grid.origin.apply(_corners(grid))
     (left, low), (right, top) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-    scale = FINER * LONGEST / max(right - left, top - low)
-    size = (max(FINER, math.ceil((right - left) * scale)), max(FINER, math.ceil((top - low) * scale)))
-    return View(left, top, scale, size)
+    scale = SUPERSAMPLING * MAX_SIDE_PIXELS / max(right - left, top - low)
+    size = (max(SUPERSAMPLING, math.ceil((right - left) * scale)), max(SUPERSAMPLING, math.ceil((top - low) * scale)))
+    return Viewport(left, top, scale, size)
 
 
 def _corners(grid: OccupancyGrid) -> Array:
@@ -94,14 +98,14 @@ def _corners(grid: OccupancyGrid) -> Array:
     return np.array([[0, 0], [width, 0], [width, height], [0, height]])
 
 
-def _map_layer(grid: OccupancyGrid, view: View) -> "Image.Image":
-    """The map's cells, turned by the yaw of its origin."""
+def _map_layer(grid: OccupancyGrid, view: Viewport) -> "Image.Image":
+    """Return the cells of the map, rotated by the yaw of its origin."""
     from PIL import Image
 
     shades = np.array([UNKNOWN_GROUND, FREE_GROUND, MAPPED_WALL], dtype=np.uint8)
     kind = np.where(grid.cells < 0, 0, np.where(grid.cells == FREE, 1, 2))
     cells = Image.fromarray(shades[kind], "RGBA")
-    # Pillow wants the cell for a pixel: canvas -> world -> the grid's own frame -> cells.
+    # Pillow needs the transform from pixels to cells: canvas -> world -> frame of the grid -> cells.
     ends = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) / view.scale * (1, -1) + (view.left, view.top)
     zero, right, down = grid.origin.inverse().apply(ends) / grid.resolution
     across, along = right - zero, down - zero
@@ -110,22 +114,22 @@ def _map_layer(grid: OccupancyGrid, view: View) -> "Image.Image":
 
 
 def _body_outline(body: Body, height: float) -> Array:
-    """The cut of a body where it starts; of one that is lower or higher than that, a cut at half its own height."""
-    mesh = fuse(body.solids)
+    """Return the cross section of a body at its start; at half its height if it does not reach `height`."""
+    mesh = merge_solids(body.solids)
     placed = type(mesh)(body.pose.apply(mesh.vertices), mesh.faces, mesh.owners, mesh.names)
-    cut = outlines(placed, height)
+    cut = section_segments(placed, height)
     if len(cut) or not len(placed.vertices):
         return cut
     low, high = placed.vertices[:, 2].min(), placed.vertices[:, 2].max()
-    return outlines(placed, float(low + high) / 2)
+    return section_segments(placed, float(low + high) / 2)
 
 
-def _lines(pen: "ImageDraw.ImageDraw", view: View, segments: Array, color: Color) -> None:
+def _lines(pen: "ImageDraw.ImageDraw", view: Viewport, segments: Array, color: Color) -> None:
     for a, b in zip(view.pixels(segments[:, 0]), view.pixels(segments[:, 1]), strict=True):
-        pen.line((a, b), fill=color, width=FINER + 1)
+        pen.line((a, b), fill=color, width=SUPERSAMPLING + 1)
 
 
-def _names(pen: "ImageDraw.ImageDraw", view: View, built: BuiltWorld) -> None:
+def _names(pen: "ImageDraw.ImageDraw", view: Viewport, built: BuiltWorld) -> None:
     for name, polygon in built.world.regions.items():
         upper_left = np.array([[min(x for x, _ in polygon), max(y for _, y in polygon)]])
         _text(pen, view.pixels(upper_left)[0], name, REGION)
@@ -134,8 +138,8 @@ def _names(pen: "ImageDraw.ImageDraw", view: View, built: BuiltWorld) -> None:
     for name, place in built.world.places.items():
         tip = place.apply(np.array([[0.0, 0.0], [0.3, 0.0]]))
         (x, y), end = view.pixels(tip)
-        radius = 4 * FINER
-        pen.line(((x, y), end), fill=PLACE, width=2 * FINER)
+        radius = 4 * SUPERSAMPLING
+        pen.line(((x, y), end), fill=PLACE, width=2 * SUPERSAMPLING)
         pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=PLACE)
         _text(pen, (x, y), name, PLACE)
 
@@ -143,16 +147,16 @@ def _names(pen: "ImageDraw.ImageDraw", view: View, built: BuiltWorld) -> None:
 def _text(pen: "ImageDraw.ImageDraw", place: tuple[float, float], text: str, color: Color) -> None:
     from PIL import ImageFont
 
-    font = ImageFont.load_default(13 * FINER)
-    x, y = place[0] + 6 * FINER, place[1] + 4 * FINER
-    pen.text((x, y), text, fill=color, font=font, stroke_width=FINER, stroke_fill=(255, 255, 255, 220))
+    font = ImageFont.load_default(13 * SUPERSAMPLING)
+    x, y = place[0] + 6 * SUPERSAMPLING, place[1] + 4 * SUPERSAMPLING
+    pen.text((x, y), text, fill=color, font=font, stroke_width=SUPERSAMPLING, stroke_fill=(255, 255, 255, 220))
 
 
-def _ruler(pen: "ImageDraw.ImageDraw", view: View) -> None:
-    """A scale bar in the lower left corner, about a fifth of the picture long: 1, 2 or 5 times a power of ten."""
+def _ruler(pen: "ImageDraw.ImageDraw", view: Viewport) -> None:
+    """Draw a scale bar in the lower left corner, up to a fifth of the width: 1, 2 or 5 times a power of ten."""
     wanted = view.size[0] / view.scale / 5
     power = 10.0 ** math.floor(math.log10(wanted))
     meters = max(step * power for step in (1, 2, 5) if step * power <= wanted)
-    x, y = 14 * FINER, view.size[1] - 14 * FINER
-    pen.line((x, y, x + meters * view.scale, y), fill=RULER, width=3 * FINER)
-    _text(pen, (x - 6 * FINER, y - 24 * FINER), f"{meters:g} m", RULER)
+    x, y = 14 * SUPERSAMPLING, view.size[1] - 14 * SUPERSAMPLING
+    pen.line((x, y, x + meters * view.scale, y), fill=RULER, width=3 * SUPERSAMPLING)
+    _text(pen, (x - 6 * SUPERSAMPLING, y - 24 * SUPERSAMPLING), f"{meters:g} m", RULER)

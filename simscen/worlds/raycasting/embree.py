@@ -1,6 +1,6 @@
-"""Embree by its own interface: scenes of triangles, and sixteen rays at a time.
+"""Direct calls of the Embree library: scenes of triangles, and rays in packets of 16.
 
-The package that brings it copies triangles number by number, and asks for one ray after the other.
+The embreex package, which contains the library, copies triangles number by number and casts rays one by one.
 """
 
 import ctypes
@@ -15,10 +15,10 @@ from simscen.core.geometry import Array
 from simscen.core.geometry.ray_fans import PACKET_SIZE, RayPackets
 from simscen.core.geometry.shapes import Mesh, TriangleMesh
 
-_LIBRARY = ctypes.PyDLL(rtcore_scene.__file__)  # whose names are also those of the libraries that it needs
+_LIBRARY = ctypes.PyDLL(rtcore_scene.__file__)  # also finds the functions of the libraries it is linked with
 _TRIANGLES, _ROBUST, _COHERENT, _ALL = 0, 1 << 2, 1 << 16, 0xFFFFFFFF
 _INDICES, _VERTICES, _THREE_WORDS, _THREE_FLOATS = 0, 1, 0x5003, 0x9003
-_FINE, _OUT_OF_MEMORY = 0, 4
+_NO_ERROR, _OUT_OF_MEMORY = 0, 4
 _ALIGNED = 64
 
 for _name, _result, _arguments in (
@@ -37,7 +37,7 @@ for _name, _result, _arguments in (
     ("rtcCommitGeometry", None, (c_void_p,)),
     ("rtcAttachGeometry", c_uint, (c_void_p, c_void_p)),
     ("rtcReleaseGeometry", None, (c_void_p,)),
-    ("rtcIntersect16", None, None),  # which is called most: it takes what is of the right kind as it is
+    ("rtcIntersect16", None, None),  # called most often: without argument types, arguments are not converted
 ):
     getattr(_LIBRARY, _name).restype = _result
     getattr(_LIBRARY, _name).argtypes = _arguments
@@ -50,29 +50,29 @@ class _Query(ctypes.Structure):
 
 
 _QUERY = _Query(_COHERENT, _ALL)
-_HOW = c_void_p(ctypes.addressof(_QUERY))
-_NUMBERS = np.full(PACKET_SIZE + _ALIGNED // 4, -1, dtype=np.int32)
-_EACH = c_void_p(_NUMBERS.ctypes.data + -_NUMBERS.ctypes.data % _ALIGNED)
-"""That each ray of a packet is meant."""
+_QUERY_ADDRESS = c_void_p(ctypes.addressof(_QUERY))
+_ALL_VALID = np.full(PACKET_SIZE + _ALIGNED // 4, -1, dtype=np.int32)
+_ALL_VALID_ADDRESS = c_void_p(_ALL_VALID.ctypes.data + -_ALL_VALID.ctypes.data % _ALIGNED)
+"""Address of the mask of a packet in which all rays are valid."""
 
 
 @cache
 def _device() -> c_void_p:
-    """Embree in one thread: others would not survive a fork, where scenes are to."""
+    """Return a device with one thread, because other threads would not exist after a fork."""
     return c_void_p(_LIBRARY.rtcNewDevice(b"threads=1"))
 
 
-class Scene:
-    """Triangles for rays to meet."""
+class EmbreeScene:
+    """Triangles that rays can hit."""
 
     def __init__(self, vertices: Array, mesh: TriangleMesh | Mesh) -> None:
-        """The faces of a mesh, whose vertices (n, 3) are given anew."""
+        """Build a scene of the faces of a mesh with other vertices (n, 3)."""
         device, count = _device(), len(mesh.faces)
         self._scene = c_void_p(_LIBRARY.rtcNewScene(device))
         finalize(self, _LIBRARY.rtcReleaseScene, self._scene).atexit = False
-        # Robust: without it rays may slip through the edge between two triangles.
+        # Without this flag, rays can pass through the edge between two triangles.
         _LIBRARY.rtcSetSceneFlags(self._scene, _ROBUST)
-        # Embree reads them where they are, and a word beyond the last vertex.
+        # Embree reads the arrays in place, and four bytes beyond the last vertex.
         self._vertices = np.zeros((len(vertices) + 1, 3), dtype=np.float32)
         self._vertices[:-1] = vertices
         self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
@@ -88,11 +88,11 @@ class Scene:
         error = _LIBRARY.rtcGetDeviceError(device)
         if error == _OUT_OF_MEMORY:
             raise MemoryError
-        if error != _FINE:
-            raise RuntimeError(f"Embree cannot take {count} triangles (its error {error})")
+        if error != _NO_ERROR:
+            raise RuntimeError(f"Embree cannot take {count} triangles (error {error})")
 
-    def cut(self, rays: RayPackets, some: slice = slice(None)) -> None:
-        """Rays end where they meet something; of `some` packets alone."""
+    def shorten(self, rays: RayPackets, packets: slice = slice(None)) -> None:
+        """End the rays of some `packets` at the first triangle that they hit."""
         intersect, scene = _LIBRARY.rtcIntersect16, self._scene
-        for packet in rays.addresses[some]:
-            intersect(_EACH, scene, packet, _HOW)
+        for packet in rays.addresses[packets]:
+            intersect(_ALL_VALID_ADDRESS, scene, packet, _QUERY_ADDRESS)

@@ -1,4 +1,4 @@
-"""Embree scenes: of a mesh, and of such a mesh where it is now."""
+"""Embree scenes of meshes, in their own frame and at a pose in the world."""
 
 import math
 
@@ -9,65 +9,62 @@ from simscen.core.decorators import cached_on_instance
 from simscen.core.geometry import Array, Pose3, Vector, rotated
 from simscen.core.geometry.ray_fans import ALL_PACKETS, PACKET_SIZE, RayFan, RayPackets, Singles
 from simscen.core.geometry.shapes import Mesh, TriangleMesh
-from simscen.worlds.raycasting.embree import Scene
+from simscen.worlds.raycasting.embree import EmbreeScene
 
-Heights = tuple[float, float]
-"""m between which rays stay."""
+HeightRange = tuple[float, float]
+"""Minimum and maximum height of rays in m."""
 Numbers = npt.NDArray[np.int64]
 
 
 class MeshScene:
-    """One Embree scene of a mesh, about the middle of that mesh.
+    """Embree scene of a mesh, relative to its center, because Embree works in single precision.
 
-    `radius` is that of the sphere around it, `extent` how far it reaches from the origin of its frame.
+    `radius` is that of the bounding sphere, `extent` the greatest distance of the mesh from the origin of its frame.
     """
 
     def __init__(self, mesh: TriangleMesh | Mesh, middle: Array | None = None) -> None:
-        """About a `middle` of something larger, if that is given."""
-        self.middle = middle_of(mesh.vertices) if middle is None else middle
+        """Build the scene relative to `middle` (3,); default: the center of the mesh."""
+        self.middle = bounding_box_center(mesh.vertices) if middle is None else middle
         x, y, z = self.middle.tolist()
         self.center = (x, y, z)
         corners = mesh.vertices - self.middle
-        # A little more, for rays that graze the furthest corner.
+        # Slightly more, for rays that touch the farthest corner.
         self.radius = 1.001 * float(np.linalg.norm(corners, axis=1).max(initial=0.0))
         self.extent = math.hypot(x, y, z) + self.radius
-        self._scene = Scene(corners, mesh)
+        self._scene = EmbreeScene(corners, mesh)
 
     def distances(self, origins: Array, directions: Array, ends: float | Singles) -> Singles:
-        """Distances (n,) in the mesh's own frame; where nothing is hit before a ray ends, that of its end."""
+        """Return the distances (n,) to the first hits of rays in the frame of the mesh, or to their ends."""
         rays = RayPackets(len(origins))
         rays.put(origins - self.middle, directions, ends)
-        self._scene.cut(rays)
+        self._scene.shorten(rays)
         return rays.distances()
 
     def sweep(self, fan: RayFan, place: Vector, packets: slice = ALL_PACKETS) -> None:
-        """The rays of a fan that begin in a place and point where they were turned to end at what they meet here.
-
-        Of some `packets` of them alone.
-        """
+        """Shorten some `packets` of a fan's rays, which start at `place` with their present directions."""
         (x, y, z), (mx, my, mz) = place, self.center
         fan.begin(x - mx, y - my, z - mz, packets)
-        self._scene.cut(fan.rays, packets)
+        self._scene.shorten(fan.rays, packets)
 
 
 @cached_on_instance
-def part_of(mesh: TriangleMesh) -> MeshScene:
-    """The scene of a mesh, for all that ask, and for what is forked; it goes with the mesh."""
+def cached_mesh_scene(mesh: TriangleMesh) -> MeshScene:
+    """Return the scene of a mesh, cached with the mesh, also for forked processes."""
     return MeshScene(mesh)
 
 
 class MovingMesh:
-    """A part where it is now; what rays need to know of that is worked out once one may meet it."""
+    """Mesh scene at a pose in the world. Its center and rotation are computed when rays come near."""
 
     def __init__(self, mesh: TriangleMesh, part: MeshScene, pose: Pose3) -> None:
-        """That of a mesh, with its frame at a pose in the world."""
+        """Place the scene `part` of a mesh at a pose of its frame in the world."""
         self.mesh, self.part, self.pose = mesh, part, pose
         self._middle: Vector | None = None
         self._rotation: Array | None = None
 
     @property
     def middle(self) -> Vector:
-        """Where its middle is in the world."""
+        """The center in the world."""
         if self._middle is None:
             x, y, z, i, j, k, w = self.pose
             p, q, r = rotated((i, j, k, w), self.part.center)
@@ -80,32 +77,32 @@ class MovingMesh:
             self._rotation = self.pose.rotation()
         return self._rotation
 
-    def away(self, place: Vector) -> float:
-        """How far in meters from a place in the world the nearest of it may be."""
+    def min_distance(self, place: Vector) -> float:
+        """Return a lower bound of the distance in m from a place in the world."""
         return math.dist(self.pose[:3], place) - self.part.extent
 
     def distances(self, origins: Array, directions: Array, ends: Singles) -> Singles:
-        """As those of a part, in the world."""
+        """Return the distances (n,) to the first hits of rays in the world frame, as `MeshScene.distances`."""
         turn = self._turn
         return self.part.distances((origins - self.pose[:3]) @ turn, directions @ turn, ends)
 
     def sweep(self, fan: RayFan, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
-        """Rays of a fan at `pose`, whose x and y axes are `axes`, end at what they meet here.
+        """Shorten the rays of a fan at `pose`, whose x and y axes are `axes`.
 
-        It is asked for those within the cone about the sphere around it, if any goes as far.
+        Only rays within the cone around the bounding sphere are cast, if any of them is long enough.
         """
-        for packets in towards(fan, pose, self.middle, self.part.radius):
-            self._cut(fan, packets, pose, axes)
+        for packets in packets_towards_sphere(fan, pose, self.middle, self.part.radius):
+            self._sweep_packets(fan, packets, pose, axes)
 
-    def _cut(self, fan: RayFan, packets: slice, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
+    def _sweep_packets(self, fan: RayFan, packets: slice, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
         (px, py, pz, *_), (ahead, left), (x, y, z, i, j, k, w) = pose, axes, self.pose
         back = -i, -j, -k, w
         fan.turn(rotated(back, ahead), rotated(back, left), packets)
         self.part.sweep(fan, rotated(back, (px - x, py - y, pz - z)), packets)
 
 
-def towards(fan: RayFan, pose: Pose3, middle: Vector, radius: float) -> list[slice]:
-    """The packets of a fan at `pose` with rays within the cone about a sphere, if any of them goes as far."""
+def packets_towards_sphere(fan: RayFan, pose: Pose3, middle: Vector, radius: float) -> list[slice]:
+    """Return the packets of a fan at `pose` with rays that may hit a sphere."""
     (x, y, z), (px, py, pz, i, j, k, w) = middle, pose
     way = x - px, y - py, z - pz
     far = math.hypot(*way)
@@ -113,12 +110,12 @@ def towards(fan: RayFan, pose: Pose3, middle: Vector, radius: float) -> list[sli
     cone = fan.towards(ahead, left, math.sqrt(far * far - radius * radius) if far > radius else -math.inf)
     ends = fan.rays.ends
     found = [slice(rays.start // PACKET_SIZE, -(-rays.stop // PACKET_SIZE)) for rays in cone]
-    # `max` takes ten times as long.
+    # `max` would take ten times as long as `item(argmax())`.
     return [packets for packets in found if (some := ends[packets]).item(some.argmax()) >= far - radius]
 
 
-def meeting(middle: Vector, radius: float, origins: Array, directions: Array, ends: Singles) -> Numbers:
-    """Which rays (n,) from several places meet a sphere before they end."""
+def rays_meeting_sphere(middle: Vector, radius: float, origins: Array, directions: Array, ends: Singles) -> Numbers:
+    """Return the indices of rays with different origins that hit a sphere before they end."""
     ways = middle - origins
     ahead = (ways * directions).sum(axis=1)
     beside = (ways * ways).sum(axis=1) - ahead**2
@@ -126,8 +123,8 @@ def meeting(middle: Vector, radius: float, origins: Array, directions: Array, en
     return met
 
 
-def middle_of(vertices: Array) -> Array:
-    """The middle of the box around vertices (n, 3)."""
+def bounding_box_center(vertices: Array) -> Array:
+    """Return the center (3,) of the bounding box of vertices (n, 3)."""
     if not len(vertices):
         return np.zeros(3)
     middle: Array = (vertices.min(axis=0) + vertices.max(axis=0)) / 2

@@ -1,4 +1,4 @@
-"""The lines that a way crosses: from one fixed thing to another, where a robot has to pass between them."""
+"""Passages of a path: lines between two solids that a robot has to cross."""
 
 import math
 from collections.abc import Iterator
@@ -8,27 +8,28 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.records.case import Passage, Point
-from simscen.grid_graph import resample_polyline
+from simscen.grid_graph import polyline_length, resample_polyline
 from simscen.worlds.routes.clearance import ClearanceField
-from simscen.worlds.routes.path_tightening import length
 
-WIDEST = 4.0
-"""Meters: no wider passage is looked at."""
-SPACING, MOST = 0.25, 80
-"""Meters of way from one line to the next, and how many lines a way has at most."""
-NARROW = 2.0
-"""Meters: passages up to this width are measured where they are narrowest, not where the way happens to cross."""
-FAN = np.array([[[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]] for a in np.radians(np.arange(-60, 61, 10))])
-"""Turns (n, 2, 2) of the rays that look for the other side: it need not be right opposite, at an oblique door."""
-MOST_POINTS = 400
-"""Of an outline on either side of a passage that is measured."""
+MAX_WIDTH_M = 4.0
+"""Maximum width of a passage."""
+SPACING_M, MAX_LINES = 0.25, 80
+"""Distance between two lines along a path, and maximum number of lines."""
+NARROW_WIDTH_M = 2.0
+"""Width up to which a passage is measured at its narrowest point instead of where the path crosses it."""
+RAY_ROTATIONS = np.array(
+    [[[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]] for a in np.radians(np.arange(-60, 61, 10))]
+)
+"""Rotations (n, 2, 2) of the rays towards the other side, which is not exactly opposite at an oblique door."""
+MAX_POINTS = 400
+"""Maximum number of points of the outline on each side of a passage."""
 
 
-def passages(way: Array, goal: str, field: ClearanceField) -> tuple[Passage, ...]:
-    """The passages of a way (n, 2) to `goal`, in its direction; widths are exact to some 2 cm."""
+def find_passages(way: Array, goal: str, field: ClearanceField) -> tuple[Passage, ...]:
+    """Return the passages of a path (n, 2) to `goal`, in its direction. Widths are exact to about 2 cm."""
     if field.outline is None:
         return ()
-    points = resample_polyline(way, max(SPACING, length(way) / MOST))
+    points = resample_polyline(way, max(SPACING_M, polyline_length(way) / MAX_LINES))
     found: dict[tuple[int, int], float] = {}
     for point in points:
         places = ((pair, _crossed(field.outline.data[list(pair)], points)) for pair in _pairs(point, field))
@@ -38,8 +39,8 @@ def passages(way: Array, goal: str, field: ClearanceField) -> tuple[Passage, ...
     return tuple(_passage(goal, pair, field) for pair in sorted(found, key=lambda pair: found[pair]))
 
 
-def passage_of(sides: tuple[Point, ...], goal: str, field: ClearanceField) -> Passage:
-    """The passage between the two points of the outline that are nearest to `sides`."""
+def passage_between(sides: tuple[Point, ...], goal: str, field: ClearanceField) -> Passage:
+    """Return the passage between the two points of the outline that are nearest to `sides`."""
     assert field.outline is not None
     one, other = (int(field.outline.query(np.array(side))[1]) for side in sides)
     return _passage(goal, (one, other), field)
@@ -51,38 +52,38 @@ def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage
 
 
 def _pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
-    """Points of the outline, by number, on either side of a point of the way: the nearest to each other first."""
+    """Yield pairs of points of the outline, by index, on both sides of a point of the path; the nearest pair first."""
     assert field.outline is not None
     distance, number = field.outline.query(point)
     one, apart = int(number), float(distance)
-    if not 0 < apart < WIDEST:
+    if not 0 < apart < MAX_WIDTH_M:
         return
     hits = _hits(point, field.outline.data[one], apart, field)
     reached = np.flatnonzero(np.isfinite(hits[:, 0]))
     if not len(reached):
         return
     nearest = reached[np.argmin(np.linalg.norm(hits[reached] - point, axis=1))]
-    for hit in dict.fromkeys((int(nearest), int(reached[np.argmin(np.abs(reached - len(FAN) // 2))]))):
+    for hit in dict.fromkeys((int(nearest), int(reached[np.argmin(np.abs(reached - len(RAY_ROTATIONS) // 2))]))):
         other = int(field.outline.query(hits[hit])[1])
         yield _narrowest(one, other, field)
         yield one, other
 
 
 def _hits(point: Array, side: Array, distance: float, field: ClearanceField) -> Array:
-    """Where the rays of the fan meet a solid (n, 2), nan for none; they leave `side`, `distance` away, behind."""
-    steps = np.arange(0.0, WIDEST - distance, field.grid.resolution / 2)
-    rays = point + steps[None, :, None] * (FAN @ ((point - side) / distance))[:, None]
+    """Return the points (n, 2) where rays from `point` away from `side` hit a solid; nan without a hit."""
+    steps = np.arange(0.0, MAX_WIDTH_M - distance, field.grid.resolution / 2)
+    rays = point + steps[None, :, None] * (RAY_ROTATIONS @ ((point - side) / distance))[:, None]
     cells = field.grid.cell_of(rays.reshape(-1, 2))
     inside = field.grid.inside(cells)
     solid = inside & (field.rough[tuple(np.where(inside[:, None], cells, 0).T)] <= 0)
-    first = solid.reshape(len(FAN), -1).argmax(axis=1)
-    numbers = np.arange(len(FAN))
-    hits: Array = np.where(solid.reshape(len(FAN), -1)[numbers, first][:, None], rays[numbers, first], np.nan)
+    first = solid.reshape(len(RAY_ROTATIONS), -1).argmax(axis=1)
+    numbers = np.arange(len(RAY_ROTATIONS))
+    hits: Array = np.where(solid.reshape(len(RAY_ROTATIONS), -1)[numbers, first][:, None], rays[numbers, first], np.nan)
     return hits
 
 
 def _crossed(ends: Array, way: Array) -> float | None:
-    """Where the line between two points first crosses the way, in pieces of it from its start; None if nowhere."""
+    """Return the index along the path where the line between two points first crosses it; None without a crossing."""
     (ax, ay), (bx, by) = ends.tolist()
     across = (bx - ax) * (way[:, 1] - ay) - (by - ay) * (way[:, 0] - ax)
     step = np.diff(way, axis=0)
@@ -96,25 +97,25 @@ def _crossed(ends: Array, way: Array) -> float | None:
 
 
 def _narrowest(one: int, other: int, field: ClearanceField) -> tuple[int, int]:
-    """The two points of the outline, near these two and on either side, that are nearest to each other."""
+    """Return the two points of the outline near these, on opposite sides, that are nearest to each other."""
     assert field.outline is not None
     data = field.outline.data
     width = float(np.linalg.norm(data[one] - data[other]))
-    if width > NARROW:
+    if width > NARROW_WIDTH_M:
         return one, other
     middle = (data[one] + data[other]) / 2
     around: npt.NDArray[np.int64] = np.array(field.outline.query_ball_point(middle, 0.75 * width, return_sorted=True))
     apart = data[around] - middle
     cosines = apart @ (data[one] - middle) / np.maximum(np.linalg.norm(apart, axis=1) * width / 2, 1e-9)
-    near, far = _some(around[cosines > 0.5], one), _some(around[cosines < -0.5], other)
+    near, far = _thin(around[cosines > 0.5], one), _thin(around[cosines < -0.5], other)
     between = np.linalg.norm(data[near][:, None] - data[far][None], axis=2)
     j, k = np.unravel_index(int(np.argmin(between)), between.shape)
     return int(near[j]), int(far[k])
 
 
-def _some(numbers: npt.NDArray[np.int64], also: int) -> npt.NDArray[np.int64]:
-    """At most MOST_POINTS of them, evenly, and one more."""
-    return np.append(numbers[:: 1 + len(numbers) // MOST_POINTS], also)
+def _thin(numbers: npt.NDArray[np.int64], also: int) -> npt.NDArray[np.int64]:
+    """Return at most MAX_POINTS of the indices, evenly spaced, and `also`."""
+    return np.append(numbers[:: 1 + len(numbers) // MAX_POINTS], also)
 
 
 def _name(number: int, field: ClearanceField) -> str:
@@ -123,7 +124,7 @@ def _name(number: int, field: ClearanceField) -> str:
 
 
 def _end(number: int, field: ClearanceField) -> Point:
-    """To the millimeter, so that a log stays small."""
+    """Return a point of the outline, rounded to 1 mm to keep logs small."""
     assert field.outline is not None
     x, y = field.outline.data[number].tolist()
     return round(x, 3), round(y, 3)

@@ -1,4 +1,4 @@
-"""The shortest way of a disc through the static world: what a driven path is measured against."""
+"""Shortest paths of a disc through the static world, with which driven paths are compared."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -13,35 +13,34 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.navigation import Goal
 from simscen.core.records.case import Passage
-from simscen.grid_graph import CellIndices, GridGraph
+from simscen.grid_graph import CellIndices, GridGraph, polyline_length, resample_polyline
 from simscen.worlds.maps.occupancy_map import empty_grid
-from simscen.worlds.routes.clearance import HALF_DIAGONAL, clearance_field
+from simscen.worlds.routes.clearance import HALF_DIAGONAL_CELLS, ClearanceField, clearance_field
 from simscen.worlds.routes.narrow_gaps import narrowest_gap_in
-from simscen.worlds.routes.passages import passage_of, passages
-from simscen.worlds.routes.path_tightening import is_clear, length, tighten
+from simscen.worlds.routes.passages import find_passages, passage_between
 
 Z_RANGE = (0.03, 0.4)
-"""What a robot may touch: above thresholds it rolls over, below what it passes under."""
-FINEST = 0.05
-"""m; the cells of the search."""
-MOST_CELLS = 1_000_000
-"""Of the search; larger worlds are searched more coarsely."""
+"""Heights in m between which a robot touches solids: above sills that it drives over, below what it passes under."""
+MIN_RESOLUTION_M = 0.05
+"""Size of the grid cells of the search."""
+MAX_CELLS = 1_000_000
+"""Maximum number of cells; the cells of larger worlds are larger."""
 
 
 @dataclass(frozen=True)
 class Leg:
-    """A shortest way to a goal: meters, inf where there is none, and what it passes between."""
+    """Shortest path to a goal: its length in m, inf if there is none, and its passages."""
 
     length: float
     passages: tuple[Passage, ...] = ()
 
 
 class ShortestPaths:
-    """Shortest ways for a disc of one radius in one world.
+    """Shortest paths of a disc of one radius in one world.
 
-    Lengths are within about 1 % of the truth; where two sides of an obstacle differ by less than 3 %, the longer one
-    may be taken. The smallest radius is 0.7 cells of the search, which are 5 cm in worlds of up to 50 x 50 m. A house
-    of 20 x 20 m takes some 30 ms to prepare and 30 ms for each way around corners.
+    Lengths are exact to about 1 %. If the paths around both sides of an obstacle differ by less than 3 %, the longer
+    one may be chosen. The smallest radius is 0.7 grid cells; a cell is 5 cm wide in worlds of up to 50 x 50 m. A house
+    of 20 x 20 m takes about 30 ms to prepare, and each path around corners 30 ms.
     """
 
     def __init__(
@@ -50,94 +49,95 @@ class ShortestPaths:
         bounds: tuple[float, float, float, float],
         radius: float,
         z_range: tuple[float, float] = Z_RANGE,
-        finest: float = FINEST,
+        finest: float = MIN_RESOLUTION_M,
     ) -> None:
-        """Searched in cells of `finest` meters, or larger ones in a large world."""
+        """Prepare the search with cells of `finest` m, or larger ones in a large world."""
         x0, y0, x1, y1 = bounds
-        room = 2 * radius  # all around the world, so that a way may lead around it
+        room = 2 * radius  # around the world, so that a path can lead around it
         bounds = (x0 - room, y0 - room, x1 + room, y1 + room)
-        resolution = max(finest, math.sqrt((x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2) / MOST_CELLS))
-        grid = empty_grid(bounds, resolution, "shortest way")
+        resolution = max(finest, math.sqrt((x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2) / MAX_CELLS))
+        grid = empty_grid(bounds, resolution, "shortest path")
         self._radius = max(radius, 0.71 * resolution)
         self._too_small = radius < self._radius
         self._field = clearance_field(mesh, grid, z_range)
         self._allowed = self._radius - 0.1 * resolution
 
     def length(self, start: Pose2, goal: Pose2) -> float:
-        """Meters of the shortest way between two positions; inf if there is none or the disc does not fit there."""
+        """Return the length in m of the shortest path between two positions; inf if there is none."""
         way = self.way(start, goal)
-        return math.inf if way is None else length(way)
+        return math.inf if way is None else polyline_length(way)
 
     def leg(self, start: Pose2, goal: Pose2, name: str) -> Leg:
-        """The shortest way to the goal called `name`; where there is none, the gap that is too narrow."""
+        """Return the shortest path to the goal `name`; if there is none, with the gap that is too narrow."""
         way = self.way(start, goal)
         if way is not None:
-            return Leg(length(way), passages(way, name, self._field))
+            return Leg(polyline_length(way), find_passages(way, name, self._field))
         return Leg(math.inf, self._too_narrow(start, goal, name))
 
     def _too_narrow(self, start: Pose2, goal: Pose2, name: str) -> tuple[Passage, ...]:
-        """Nothing where an end itself is in the way of something, or where there is no gap at all."""
+        """Return the gap that is too narrow; empty if start or goal is occupied, or if there is no gap."""
         if not self._field.keeps(np.array([start[:2], goal[:2]]), self._allowed).all():
             return ()
         gap = narrowest_gap_in(self._field, (start, goal), self._radius)
-        return (passage_of(gap.sides, name, self._field),) if len(gap.sides) == 2 else ()
+        return (passage_between(gap.sides, name, self._field),) if len(gap.sides) == 2 else ()
 
     def way(self, start: Pose2, goal: Pose2) -> Array | None:
-        """The corners (n, 2) of the shortest way, arcs as short chords; None if there is none."""
+        """Return the corners (n, 2) of the shortest path, with arcs as short chords; None if there is none."""
         ends = np.array([start[:2], goal[:2]])
         if not self._field.keeps(ends, self._allowed).all():
             return None
-        if is_clear(ends[0], ends[1], self._field, self._allowed):
+        if is_line_clear(ends[0], ends[1], self._field, self._allowed):
             return ends
-        bold = self._over(self._bold_lattice, ends)
-        if bold is None or self._is_clear(bold):
-            return bold
-        return self._over(self._strict_lattice, ends)
+        optimistic = self._search(self._optimistic_graph, ends)
+        if optimistic is None or self._is_clear(optimistic):
+            return optimistic
+        return self._search(self._strict_graph, ends)
 
     def may_reach(self, start: Pose2, goal: Pose2) -> bool:
-        """Whether a way may lead from one position to the other; False is a proof that there is none for the disc."""
+        """Return whether there may be a path between two positions; False proves that there is none."""
         if self._too_small:
             return True
-        first, last = (self._free_cell(self._bold_lattice, np.array(end[:2])) for end in (start, goal))
-        return not first or not last or self._bold_lattice.way(first, last) is not None
+        first, last = (self._free_cell(self._optimistic_graph, np.array(end[:2])) for end in (start, goal))
+        return not first or not last or self._optimistic_graph.way(first, last) is not None
 
     def may_come_to(self, starts: Sequence[Pose2], arrived: Callable[[Pose2], float]) -> bool:
-        """Whether the disc's middle may get from one of the starts to where `arrived` (a distance) is 0.
+        """Return whether the disc may get from one of the starts to a pose for which `arrived` returns 0.
 
-        False is a proof that it may not.
+        `arrived` returns the distance in m from a pose to the destination. False proves that there is no path.
         """
         if self._too_small:
             return True
         grid = self._field.grid
-        cells = self._bold_lattice.joined(
-            [self._free_cell(self._bold_lattice, np.array(start[:2])) for start in starts]
+        cells = self._optimistic_graph.joined(
+            [self._free_cell(self._optimistic_graph, np.array(start[:2])) for start in starts]
         )
-        slack = HALF_DIAGONAL * grid.resolution
+        slack = HALF_DIAGONAL_CELLS * grid.resolution
         return any(arrived(Pose2(x, y)) <= slack for x, y in grid.center_of(cells).tolist())
 
     @cached_property
-    def _bold_lattice(self) -> GridGraph:
-        """Every cell that the disc may pass, if not over its middle: no gap is missed, some are too narrow."""
-        return GridGraph(self._field.free_cells(self._radius - HALF_DIAGONAL * self._field.grid.resolution))
+    def _optimistic_graph(self) -> GridGraph:
+        """All cells that the disc may touch with its center: no gap is missed, but some are too narrow."""
+        return GridGraph(self._field.free_cells(self._radius - HALF_DIAGONAL_CELLS * self._field.grid.resolution))
 
     @cached_property
-    def _strict_lattice(self) -> GridGraph:
-        """The cells over whose middle the disc may pass: gaps less than a cell wider than the disc may be missed."""
+    def _strict_graph(self) -> GridGraph:
+        """The cells whose center the disc may occupy: gaps less than a cell wider than the disc may be missed."""
         return GridGraph(self._field.free_cells(self._radius))
 
-    def _over(self, lattice: GridGraph, ends: Array) -> Array | None:
+    def _search(self, lattice: GridGraph, ends: Array) -> Array | None:
+        """Return the tightened path (n, 2) over a graph; None if there is none."""
         first, last = (self._free_cell(lattice, end) for end in ends)
         cells = lattice.way(first, last) if first and last else None
         if cells is None:
             return None
         inner = self._field.grid.center_of(cells)
-        return tighten(np.concatenate((ends[:1], inner, ends[1:])), self._field, self._radius)
+        return tighten_path(np.concatenate((ends[:1], inner, ends[1:])), self._field, self._radius)
 
     def _is_clear(self, way: Array) -> bool:
-        return all(is_clear(a, b, self._field, self._allowed) for a, b in pairwise(way))
+        return all(is_line_clear(a, b, self._field, self._allowed) for a, b in pairwise(way))
 
     def _free_cell(self, lattice: GridGraph, point: Array) -> tuple[int, int] | None:
-        """The free cell nearest to a point, which may itself lie in a cell whose middle is too near a wall."""
+        """Return the free cell nearest to a point, whose own cell may be too near a wall; None without one nearby."""
         grid = self._field.grid
         around = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3), indexing="ij"), axis=-1).reshape(-1, 2)
         cells: CellIndices = grid.cell_of(point[None]) + around
@@ -149,23 +149,23 @@ class ShortestPaths:
         return row, column
 
 
-def ways_in(
+def shortest_paths_in(
     built: BuiltWorld,
     stops: Sequence[Pose2],
     radius: float,
     z_range: tuple[float, float] = Z_RANGE,
-    finest: float = FINEST,
+    finest: float = MIN_RESOLUTION_M,
 ) -> ShortestPaths:
-    """The shortest ways of a disc in a built world, wherever the stops are."""
-    return ShortestPaths(built.mesh, _around(built, stops), radius, z_range, finest)
+    """Return the shortest paths of a disc in a built world, extended to hold all `stops`."""
+    return ShortestPaths(built.mesh, _bounds_with(built, stops), radius, z_range, finest)
 
 
 def legs_between(
     built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float, z_range: tuple[float, float] = Z_RANGE
 ) -> list[Leg]:
-    """The shortest way of a disc from each pose to its goal; the same way is looked for once."""
+    """Return the shortest path of a disc from each pose to its goal. Repeated pairs are searched once."""
     stops = [pose for start, goal in ends for pose in (start, goal.pose)]
-    ways = ways_in(built, stops, radius, z_range) if stops else None
+    ways = shortest_paths_in(built, stops, radius, z_range) if stops else None
     found: dict[tuple[Pose2, Pose2], Leg] = {}
     legs = []
     for start, goal in ends:
@@ -176,8 +176,8 @@ def legs_between(
     return legs
 
 
-def _around(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float, float, float, float]:
-    """The world's bounds, or where it states none those of its map, widened to hold the stops."""
+def _bounds_with(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float, float, float, float]:
+    """Return the bounds of the world, or of its map if the world has none, extended to hold the stops."""
     x0, y0, x1, y1 = built.world.bounds
     corners = [(x0, y0), (x1, y1)]
     if not any(built.world.bounds):
@@ -186,3 +186,57 @@ def _around(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float, float, fl
     points = np.array([*corners, *(stop[:2] for stop in stops)])
     (left, low), (right, high) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     return left, low, right, high
+
+
+MIN_SHORTENING = 0.001
+"""Share of the length below which a round of tightening is the last. Paths over a lattice need two to five rounds."""
+MAX_ROUNDS = 12
+SMOOTHING_STEPS = 24
+"""Smoothing steps in each round; they affect about five points on either side of a corner."""
+
+
+def tighten_path(way: Array, field: ClearanceField, radius: float) -> Array:
+    """Return a path (n, 2) shortened as far as the clearance `radius` in m allows, with a tolerance of 0.1 cells.
+
+    String pulling makes the straight parts. Between them, an elastic band (Quinlan and Khatib 1993) moves the path onto
+    arcs with `radius` around obstacles.
+    """
+    allowed = radius - 0.1 * field.grid.resolution
+    for _ in range(MAX_ROUNDS):
+        before = polyline_length(way)
+        way = _smooth(resample_polyline(_straighten(way, field, allowed), field.grid.resolution), field, radius)
+        if polyline_length(way) > (1 - MIN_SHORTENING) * before:
+            break
+    return _straighten(way, field, allowed)
+
+
+def is_line_clear(a: Array, b: Array, field: ClearanceField, allowed: float) -> bool:
+    """Return whether a straight line keeps the clearance `allowed` in m, sampled twice per cell."""
+    count = 2 + math.ceil(2 * math.dist(a, b) / field.grid.resolution)
+    line = a + np.linspace(0.0, 1.0, count)[:, None] * (b - a)
+    return bool(field.keeps(line, allowed).all())
+
+
+def _straighten(way: Array, field: ClearanceField, allowed: float) -> Array:
+    """Return the path with straight lines to the farthest visible point, found by doubling and bisection."""
+    kept, last = [0], len(way) - 1
+    while kept[-1] < last:
+        here = kept[-1]
+        near, reach = here + 1, 2
+        while near < last and is_line_clear(way[here], way[min(here + reach, last)], field, allowed):
+            near, reach = min(here + reach, last), 2 * reach
+        far = min(here + reach, last)
+        while far - near > 1:
+            middle = (near + far) // 2
+            near, far = (middle, far) if is_line_clear(way[here], way[middle], field, allowed) else (near, middle)
+        kept.append(near)
+    return way[kept]
+
+
+def _smooth(way: Array, field: ClearanceField, radius: float) -> Array:
+    """Return a path after the smoothing steps of an elastic band."""
+    way = way.copy()
+    for _ in range(SMOOTHING_STEPS):
+        way[1:-1] = (way[:-2] + way[2:]) / 2
+        way[1:-1] += field.push(way[1:-1], radius)
+    return way

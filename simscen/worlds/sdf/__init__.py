@@ -1,4 +1,4 @@
-"""Gazebo worlds: SDF 1.3 to 1.12 read into the shapes that physics, rays and map share."""
+"""Import of Gazebo worlds: SDF 1.3 to 1.12 becomes the shapes that physics, ray casting and maps share."""
 
 from simscen.worlds.sdf.load import load_sdf
 

@@ -1,125 +1,130 @@
-"""Static links become solids, the others bodies that move as one piece.
+"""Groups links into static solids and movable bodies.
 
-Links that a joint connects stay rigidly connected here, whatever the joint: simscen has no jointed obstacles, and
-links drawn to overlap at a joint would burst apart without it. A joint to the world, or to something static, makes
-everything that hangs on it static. Links without a joint between them are bodies of their own, as in Gazebo.
+Links that are connected by a joint of any type form one rigid body: simscen has no jointed obstacles, and links that
+overlap at a joint would be pushed apart without it. A joint to the world or to a static model makes the whole group
+static. Links that no joint connects are separate bodies, as in Gazebo.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Body, Solid
-from simscen.worlds.sdf import values
+from simscen.worlds.sdf.elements import Element, read_bool
+from simscen.worlds.sdf.link_poses import PlacedLink
 from simscen.worlds.sdf.links import LinkContent
-from simscen.worlds.sdf.markup import Element
-from simscen.worlds.sdf.placing import PlacedLink
-from simscen.worlds.sdf.report import Report
-from simscen.worlds.sdf.tree import Model
+from simscen.worlds.sdf.model_tree import ModelNode
+from simscen.worlds.sdf.report import ImportReport
 
-MOST_BODIES = 2000
-HEAVIEST = 1e6
-"""kg: physics holds up to a thousand times more; from 1e12 on things fall through the floor."""
+MAX_BODIES = 2000
+MAX_MOVABLE_MASS_KG = 1e6
+"""Heavier bodies do not move. Physics is stable up to a thousand times this mass, and fails from 1e12 kg on."""
+_WORLD = -1
+"""Number of the world in LinkGroups."""
 
 
-@dataclass
-class Groups:
-    """Which links hang together (union-find over their numbers); the world itself is number -1."""
+class LinkGroups:
+    """Disjoint sets (union-find) of links, by number; the set that contains the world is static."""
 
-    parents: dict[int, int] = field(default_factory=lambda: {-1: -1})
+    def __init__(self) -> None:
+        self._parents: dict[int, int] = {_WORLD: _WORLD}
 
     def root(self, number: int) -> int:
-        """The number that stands for the whole group; -1 for the group of the world."""
-        self.parents.setdefault(number, number)
-        while self.parents[number] != number:
-            number = self.parents[number]
+        """Return the smallest number in the set of a link; _WORLD if the link is static."""
+        self._parents.setdefault(number, number)
+        while self._parents[number] != number:
+            number = self._parents[number]
         return number
 
-    def join(self, one: int, other: int) -> None:
-        """Let both groups be one."""
-        low, high = sorted((self.root(one), self.root(other)))
-        self.parents[high] = low
+    def join(self, first: int, second: int) -> None:
+        """Join the sets of two links."""
+        low, high = sorted((self.root(first), self.root(second)))
+        self._parents[high] = low
 
 
-def split(model: Model, pose: Pose3, contents: list[LinkContent], report: Report) -> tuple[list[Solid], list[Body]]:
-    """The static solids and the bodies of one top-level model that stands at `pose`, in document order.
+def split_model(
+    model: ModelNode, pose: Pose3, contents: list[LinkContent], report: ImportReport
+) -> tuple[list[Solid], list[Body]]:
+    """Return the static solids and the bodies of a top-level model at `pose`, in document order.
 
-    A model that is one body keeps its name and its frame, as in Gazebo; several bodies have those of their first link.
+    If the model is a single body, the body has the model's name and frame, as in Gazebo; otherwise each body has the
+    name and frame of its first link.
     """
-    groups = _groups(model, [content.link for content in contents], report)
+    groups = _link_groups(model, [content.link for content in contents], report)
     members: dict[int, list[LinkContent]] = {}
     for number, content in enumerate(contents):
         members.setdefault(groups.root(number), []).append(content)
-    static = [solid for content in members.pop(-1, []) for solid in content.solids]
-    moving = [group for group in members.values() if any(content.solids for content in group)]
-    if len(moving) == 1:
-        return static, [_body(model.name, pose, moving[0], report)]
-    return static, [_body(group[0].link.name, group[0].link.pose, group, report) for group in moving]
+    static = [solid for content in members.pop(_WORLD, []) for solid in content.solids]
+    movable = [group for group in members.values() if any(content.solids for content in group)]
+    if len(movable) == 1:
+        return static, [_body(model.name, pose, movable[0], report)]
+    return static, [_body(group[0].link.name, group[0].link.pose, group, report) for group in movable]
 
 
-def _groups(model: Model, links: list[PlacedLink], report: Report) -> Groups:
-    groups = Groups()
+def _link_groups(model: ModelNode, links: list[PlacedLink], report: ImportReport) -> LinkGroups:
+    groups = LinkGroups()
     numbers = {id(link.frame): number for number, link in enumerate(links)}
     for number, link in enumerate(links):
         groups.root(number)
         if link.model.static:
-            groups.join(-1, number)
+            groups.join(_WORLD, number)
     for owner in model.models():
         for joint in owner.joints:
-            with report.skipping():
-                _connect(owner, joint, numbers, groups, report)
+            with report.skip_unusable():
+                _join_links(owner, joint, numbers, groups, report)
     return groups
 
 
-def _connect(owner: Model, joint: Element, numbers: dict[int, int], groups: Groups, report: Report) -> None:
+def _join_links(
+    owner: ModelNode, joint: Element, numbers: dict[int, int], groups: LinkGroups, report: ImportReport
+) -> None:
     ends = []
     for tag in ("parent", "child"):
         end = joint.child(tag)
         if end is None or not end.text:
             raise joint.unusable(f"<{tag}> is missing")
-        link = owner.scope.link(end.text, end)
-        ends.append(-1 if link is None else numbers.get(id(link), -1))
-    kind = joint.attributes.get("type", "")
-    if kind != "fixed" and any(end != -1 and groups.root(end) != -1 for end in ends):
-        report.note(joint.place, f"a joint of type {kind[:20] or 'unknown'} is held rigid as it stands")
+        link = owner.scope.link_of_frame(end.text, end)
+        ends.append(_WORLD if link is None else numbers.get(id(link), _WORLD))
+    joint_type = joint.attributes.get("type", "")
+    if joint_type != "fixed" and any(end != _WORLD and groups.root(end) != _WORLD for end in ends):
+        report.note(joint.place, f"a joint of type {joint_type[:20] or 'unknown'} is held rigid as it stands")
     groups.join(*ends)
 
 
-def _body(name: str, pose: Pose3, group: list[LinkContent], report: Report) -> Body:
-    inverse = pose.inverse()
-    solids = tuple(replace(s, pose=inverse.compose(s.pose)) for content in group for s in content.solids)
-    mass = 0.0 if _is_kinematic(group, report) else _mass(group, report)
+def _body(name: str, pose: Pose3, group: list[LinkContent], report: ImportReport) -> Body:
+    body_from_world = pose.inverse()
+    solids = tuple(replace(s, pose=body_from_world.compose(s.pose)) for content in group for s in content.solids)
+    mass = 0.0 if _is_kinematic(group, report) else _movable_mass(group, report)
     return Body(name, solids, pose, mass)
 
 
-def _mass(group: list[LinkContent], report: Report) -> float:
-    """The mass of links that move as one; what is too heavy goes to the report and moves no more."""
+def _movable_mass(group: list[LinkContent], report: ImportReport) -> float:
+    """Return the total mass of a group in kg; 0 with an error in the report if the group is too heavy to move."""
     mass = sum(content.mass for content in group)
-    movable = mass <= HEAVIEST
-    with report.skipping():
-        if not movable:
-            heaviest = max(group, key=lambda content: content.mass).link.frame.element
-            hint = "if nothing moves it, make its model <static>"
-            raise heaviest.unusable(f"has a mass of {mass:g} kg; at most {HEAVIEST:g} kg can move", hint)
-    return mass if movable else 0.0
+    if mass <= MAX_MOVABLE_MASS_KG:
+        return mass
+    heaviest = max(group, key=lambda content: content.mass).link.frame.element
+    message = f"has a mass of {mass:g} kg; at most {MAX_MOVABLE_MASS_KG:g} kg can move"
+    report.add_error(heaviest.unusable(message, "if nothing moves it, make its model <static>"))
+    return 0.0
 
 
-def _is_kinematic(group: list[LinkContent], report: Report) -> bool:
-    kinematic = False
+def _is_kinematic(group: list[LinkContent], report: ImportReport) -> bool:
+    is_kinematic = False
     for content in group:
         element = content.link.frame.element
-        with report.skipping():
-            if not values.truth(element.child("gravity"), default=True):
+        with report.skip_unusable():
+            if not read_bool(element.child("gravity"), default=True):
                 report.note(element.place, "gravity cannot be switched off for a single link, so it will fall")
-            kinematic = kinematic or values.truth(element.child("kinematic"))
-    return kinematic
+            is_kinematic = is_kinematic or read_bool(element.child("kinematic"))
+    return is_kinematic
 
 
-def distinct(bodies: list[Body], report: Report, world: Element) -> tuple[Body, ...]:
-    """The bodies with a number after every name that was taken; raises Unusable when there are too many."""
-    if len(bodies) > MOST_BODIES:
-        raise world.unusable(f"more than {MOST_BODIES} bodies")
+def with_unique_names(bodies: list[Body], report: ImportReport, world: Element) -> tuple[Body, ...]:
+    """Return the bodies, with a number appended to every repeated name; raises UnusableElement for too many bodies."""
+    if len(bodies) > MAX_BODIES:
+        raise world.unusable(f"more than {MAX_BODIES} bodies")
     taken: set[str] = set()
-    named = []
+    unique = []
     for body in bodies:
         name, number = body.name, 0
         while name.casefold() in taken:
@@ -128,5 +133,5 @@ def distinct(bodies: list[Body], report: Report, world: Element) -> tuple[Body, 
         if number:
             report.note(world.place, f"the name {body.name!r} is taken, the next one is called {name!r}")
         taken.add(name.casefold())
-        named.append(replace(body, name=name))
-    return tuple(named)
+        unique.append(replace(body, name=name))
+    return tuple(unique)

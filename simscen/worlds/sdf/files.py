@@ -1,40 +1,148 @@
-"""The files that an SDF file names; what is wrong with them is said at the element that asks for them."""
+"""Files that an SDF world refers to: finding them by URI, reading them, and opening included models."""
 
+import os
 from pathlib import Path
 
-from simscen.assets.folders import Absent, Folders, Trouble
-from simscen.worlds.sdf.markup import Element
-from simscen.worlds.sdf.report import Missing, Place, Unusable
+from simscen.assets.folders import AllowedFolders, NoSuchFile, UnusableFile
+from simscen.assets.uris import builtin_model_name
+from simscen.worlds.sdf.elements import Element, parse
+from simscen.worlds.sdf.report import ImportReport, MissingAsset, SourcePlace, UnusableElement
 
-WORLD_BYTES = 20 * 2**20
-MESH_BYTES = 64 * 2**20
-LONGEST_TOLD = 1000
+MAX_WORLD_BYTES = 20 * 2**20
+MAX_MESH_BYTES = 64 * 2**20
+MAX_SHOWN_URI_LENGTH = 1000
+OLDEST_VERSION, NEWEST_VERSION = (1, 3), (1, 12)
+_NEWEST_PATCH = (*NEWEST_VERSION, 99)
+BUILT_IN_MODELS = {
+    "sun": "<sdf version='1.6'><light name='sun' type='directional'/></sdf>",
+    "ground_plane": "<sdf version='1.6'><model name='ground_plane'><static>1</static><link name='link'>"
+    "<collision name='collision'><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>"
+    "</collision></link></model></sdf>",
+}
+"""Models that Gazebo installs and nearly every world includes; they need not be in a folder of the user."""
 
 
-class Library(Folders):
-    """Finds and reads files for elements."""
+class WorldFiles(AllowedFolders):
+    """Finds and reads the files that elements refer to; errors are raised at the element."""
 
     def locate(self, element: Element) -> Path:
-        """The real path of what a `<uri>` means; raises Unusable."""
+        """Return the real path of the file that a `<uri>` refers to; raises UnusableElement."""
         uri = element.text
         try:
             return self.find(uri, Path(element.source.folder), absolute=True)
-        except Absent as absent:
-            raise Missing(element.place, f"{uri}: {absent}", absent.hint, uri) from absent
-        except Trouble as trouble:
-            told = uri.isprintable() and uri and len(uri) <= LONGEST_TOLD
-            raise element.unusable(f"{uri}: {trouble}" if told else str(trouble), trouble.hint) from trouble
+        except NoSuchFile as error:
+            raise MissingAsset(element.place, f"{uri}: {error}", error.hint, uri) from error
+        except UnusableFile as error:
+            can_show_uri = uri.isprintable() and uri and len(uri) <= MAX_SHOWN_URI_LENGTH
+            raise element.unusable(f"{uri}: {error}" if can_show_uri else str(error), error.hint) from error
 
-    def read(self, path: Path, element: Element, limit: int) -> bytes:
-        """The bytes of a located file; raises Unusable at the element that asked for it."""
+    def read(self, path: Path, element: Element, max_bytes: int) -> bytes:
+        """Return the content of a located file; raises UnusableElement at `element`."""
         try:
-            return self.open(path, limit)[1]
-        except Trouble as trouble:
-            raise element.unusable(f"{self.shown(path)}: {trouble}") from trouble
+            return self.open(path, max_bytes)[1]
+        except UnusableFile as error:
+            raise element.unusable(f"{self.shown(path)}: {error}") from error
 
     def read_world(self, path: Path) -> tuple[Path, bytes]:
-        """Real path and bytes of the world itself; raises Unusable for the file as a whole."""
+        """Return the real path and the content of the world file itself; raises UnusableElement."""
         try:
-            return self.open(self.named(path), WORLD_BYTES)
-        except Trouble as trouble:
-            raise Unusable(Place(path.name), str(trouble)) from trouble
+            return self.open(self.named(path), MAX_WORLD_BYTES)
+        except UnusableFile as error:
+            raise UnusableElement(SourcePlace(path.name), str(error)) from error
+
+
+class IncludedFiles:
+    """Opens the world file and included files, each once, and rejects include cycles."""
+
+    def __init__(self, files: WorldFiles, report: ImportReport) -> None:
+        self._files, self._report = files, report
+        self._roots: dict[str, Element] = {}
+        self._open_paths: list[str] = []
+
+    def open_world(self, path: Path) -> Element:
+        """Return the root element of the world file."""
+        real_path, data = self._files.read_world(path)
+        self._open_paths = [str(real_path)]
+        root = parse(data, self._files.shown(real_path), str(real_path.parent))
+        _check_root(root)
+        return root
+
+    def enter(self, include: Element) -> Element:
+        """Return the root element of an included file; call `leave` afterwards. Raises UnusableElement."""
+        uri = include.child("uri")
+        if uri is None:
+            raise include.unusable("<uri> is missing")
+        path = self._path_or_builtin_name(uri)
+        if path in self._open_paths:
+            cycle = [*self._open_paths[self._open_paths.index(path) :], path]
+            raise uri.unusable("include cycle: " + " → ".join(self._files.shown(Path(p)) for p in cycle))
+        if path not in self._roots:
+            self._roots[path] = self._read_root(path, uri)
+        self._open_paths.append(path)
+        return self._roots[path]
+
+    def leave(self) -> None:
+        """Finish the include that was entered last."""
+        self._open_paths.pop()
+
+    def _read_root(self, path: str, uri: Element) -> Element:
+        if path in BUILT_IN_MODELS:
+            root = parse(BUILT_IN_MODELS[path].encode(), path, "")
+        else:
+            file = Path(path)
+            data = self._files.read(file, uri, MAX_WORLD_BYTES)
+            root = parse(data, self._files.shown(file), str(file.parent))
+        _check_root(root)
+        return root
+
+    def _path_or_builtin_name(self, uri: Element) -> str:
+        try:
+            found = self._files.locate(uri)
+        except UnusableElement:
+            builtin = builtin_model_name(uri.text)
+            if builtin is None:
+                raise
+            return builtin
+        return str(self._model_in_folder(found, uri) if found.is_dir() else found)
+
+    def _model_in_folder(self, folder: Path, uri: Element) -> Path:
+        """Return the SDF file that model.config names, or model.sdf if model.config is missing or unusable."""
+        config, model = folder / "model.config", folder / "model.sdf"
+        if not os.path.lexists(config):
+            if os.path.lexists(model):
+                return model
+            raise uri.unusable(f"{self._files.shown(folder)}: neither model.config nor model.sdf in this folder")
+        try:
+            data = self._files.read(config, uri, MAX_WORLD_BYTES)
+            return self._files.locate(_newest_model(parse(data, self._files.shown(config), str(folder))))
+        except UnusableElement as error:
+            if not os.path.lexists(model):
+                raise
+            self._report.note(error.place, f"{error.message}; model.sdf beside it is used")
+            return model
+
+
+def _newest_model(config: Element) -> Element:
+    """Return the `<sdf>` of a model.config with the newest supported version, as sdformat does."""
+    supported = [sdf for sdf in config.all("sdf") if sdf.text and _version(sdf) <= _NEWEST_PATCH]
+    if not supported:
+        raise config.unusable("no <sdf> of version 1.12 or older in this model.config")
+    return max(supported, key=_version)
+
+
+def _check_root(root: Element) -> None:
+    """Raise UnusableElement if this is not the root of an SDF file of a supported version."""
+    if root.tag == "robot":
+        raise root.unusable("this is a URDF, not an SDF", "use it as the model of a robot")
+    if root.tag != "sdf":
+        hint = "a <gazebo> is SDF 1.2 or older; rewrite it as <sdf version='1.6'>" if root.tag == "gazebo" else ""
+        raise root.unusable(f"the root element is <{root.tag}>, expected <sdf>", hint)
+    if not OLDEST_VERSION <= _version(root) <= _NEWEST_PATCH:
+        shown = root.attributes.get("version", "none")[:20]
+        raise root.unusable(f"SDF version {shown} is not read, only 1.3 to 1.12")
+
+
+def _version(element: Element) -> tuple[int, ...]:
+    """Return the `version` attribute as numbers, as 1.10 is newer than 1.9; (0,) if it is missing or invalid."""
+    words = element.attributes.get("version", "").strip().split(".")
+    return tuple(int(word) for word in words) if all(word.isdecimal() for word in words) else (0,)

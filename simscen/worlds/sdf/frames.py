@@ -1,116 +1,121 @@
-"""Which frame is where: SDF's frame semantics.
+"""Frame semantics of SDF: the poses of frames relative to each other, and the links that frames are attached to.
 
-Every model is a scope of its own with the implicit frame `__model__`, the world one with `world`. Names with `::`
-reach down into nested models, never up. Source: SDF proposals "Pose Frame Semantics" (1.7, 1.8) and sdformat's
-FrameSemantics.cc.
+Every model is a scope with the implicit frame `__model__`; the world is a scope with the frame `world`. Names with
+`::` refer to nested models, never to enclosing ones. Source: SDF proposals "Pose Frame Semantics" (1.7, 1.8) and
+sdformat's FrameSemantics.cc.
 """
 
 from dataclasses import dataclass, field
 
 from simscen.core.geometry import Pose3
-from simscen.worlds.sdf import values
-from simscen.worlds.sdf.markup import Element
+from simscen.worlds.sdf.elements import Element, read_pose, reference_frame
 
-MODEL, WORLD = "__model__", "world"
+MODEL_FRAME, WORLD_FRAME = "__model__", "world"
 
 
 @dataclass(eq=False)
 class Frame:
-    """A frame by its `<pose>` (`given`; None = identity), one object for each time its file is included.
+    """A named frame; a file that is included twice yields two frames.
 
-    The pose is relative to the frame it names, otherwise to `default`. `inner` is the scope of a model, whose frame
-    `placement` is what the pose places. `attached_to` names the frame whose link this one moves with.
+    `pose` is the `<pose>` element (None = identity), relative to the frame that it names, otherwise to
+    `default_reference`. The frame moves with the link or frame `attached_to`. For a model, `model_scope` holds its
+    frames, and the pose places its frame `placement_frame`.
     """
 
     name: str
     element: Element
-    given: Element | None
-    default: str = ""
+    pose: Element | None
+    default_reference: str = ""
     attached_to: str = ""
-    inner: "Scope | None" = None
-    placement: str = ""
+    model_scope: "FrameScope | None" = None
+    placement_frame: str = ""
 
 
 @dataclass(eq=False)
-class Scope:
-    """The frames of one model or of the world, whose own frame is called `implicit`.
+class FrameScope:
+    """The frames of one model or of the world.
 
-    `merged` are models included with merge: their names are visible here too. `canonical` is the frame that the
-    implicit one moves with; "" means the world.
+    `implicit_frame` is the name of the scope's own frame, which moves with the frame `canonical`; "" is the world.
+    The names in `merged_models` (included with merge="true") are visible in this scope too.
     """
 
-    implicit: str = MODEL
+    implicit_frame: str = MODEL_FRAME
     canonical: str = ""
     frames: dict[str, Frame] = field(default_factory=dict)
-    merged: list[Frame] = field(default_factory=list)
-    _known: dict[int, Pose3] = field(default_factory=dict)
-    _open: list[int] = field(default_factory=list)
+    merged_models: list[Frame] = field(default_factory=list)
+    _poses: dict[int, Pose3] = field(default_factory=dict)
+    _open_frames: list[int] = field(default_factory=list)
 
     def add(self, frame: Frame) -> None:
-        """Make a frame known by its name; the first of two with the same name keeps it."""
+        """Add a frame; the first of two frames with the same name wins."""
         self.frames.setdefault(frame.name, frame)
 
-    def place(self, frame: Frame) -> Pose3:
-        """`scope_from_frame`; raises Unusable for unknown frames and for cycles."""
+    def pose_of(self, frame: Frame) -> Pose3:
+        """Return `scope_from_frame`; raises UnusableElement for unknown frames and for cycles."""
         key = id(frame)
-        if key not in self._known:
-            where = frame.given or frame.element
-            if key in self._open:
-                raise where.unusable(f"the pose of {frame.name!r} depends on itself")
-            self._open.append(key)
+        if key not in self._poses:
+            user = frame.pose or frame.element
+            if key in self._open_frames:
+                raise user.unusable(f"the pose of {frame.name!r} depends on itself")
+            self._open_frames.append(key)
             try:
-                self._known[key] = self._compose(frame, where)
+                self._poses[key] = self._compute_pose(frame, user)
             finally:
-                self._open.pop()
-        return self._known[key]
+                self._open_frames.pop()
+        return self._poses[key]
 
-    def _compose(self, frame: Frame, where: Element) -> Pose3:
-        origin = self.find(values.relative_to(frame.given) or frame.default, where)
-        placed = origin.compose(values.pose(frame.given))
-        if frame.inner is not None and frame.placement:
-            placed = placed.compose(frame.inner.find(frame.placement, where).inverse())
-        return placed
+    def _compute_pose(self, frame: Frame, user: Element) -> Pose3:
+        reference = self.pose_of_name(reference_frame(frame.pose) or frame.default_reference, user)
+        pose = reference.compose(read_pose(frame.pose))
+        if frame.model_scope is not None and frame.placement_frame:
+            pose = pose.compose(frame.model_scope.pose_of_name(frame.placement_frame, user).inverse())
+        return pose
 
-    def find(self, name: str, user: Element) -> Pose3:
-        """`scope_from_name` of a frame that `user` mentions; raises Unusable when there is none."""
-        if name in ("", self.implicit):
+    def pose_of_name(self, name: str, user: Element) -> Pose3:
+        """Return `scope_from_name` for a frame name; raises UnusableElement at `user` if there is no such frame."""
+        if name in ("", self.implicit_frame):
             return Pose3()
         if name in self.frames:
-            return self.place(self.frames[name])
-        owner, rest = self._below(name)
-        if owner is None or owner.inner is None:
+            return self.pose_of(self.frames[name])
+        model, rest = self._model_with_frame(name)
+        if model is None or model.model_scope is None:
             raise user.unusable(f"unknown frame {name[:80]!r}")
-        return self.place(owner).compose(owner.inner.find(rest, user))
+        return self.pose_of(model).compose(model.model_scope.pose_of_name(rest, user))
 
-    def link(self, name: str, user: Element, seen: tuple[Frame, ...] = ()) -> Frame | None:
-        """The link that moves the frame `name`; None is the world. Raises Unusable when there is no such frame."""
-        if name == WORLD:
+    def link_of_frame(self, name: str, user: Element, visited: tuple[Frame, ...] = ()) -> Frame | None:
+        """Return the link that the frame `name` moves with, or None for the world.
+
+        Raises UnusableElement at `user` if there is no such frame.
+        """
+        if name == WORLD_FRAME:
             return None
-        if name in ("", self.implicit):
-            return self.link(self.canonical, user, seen) if self.canonical else None
+        if name in ("", self.implicit_frame):
+            return self.link_of_frame(self.canonical, user, visited) if self.canonical else None
         frame = self.frames.get(name)
         if frame is None:
-            owner, rest = self._below(name)
-            if owner is None or owner.inner is None:
+            model, rest = self._model_with_frame(name)
+            if model is None or model.model_scope is None:
                 raise user.unusable(f"unknown link or frame {name[:80]!r}")
-            return owner.inner.link(rest, user)
-        if frame in seen:
+            return model.model_scope.link_of_frame(rest, user)
+        if frame in visited:
             raise user.unusable(f"frame {name!r} is attached to itself")
-        if frame.inner is not None:
-            return frame.inner.link(MODEL, user)
-        return frame if frame.element.tag == "link" else self.link(frame.attached_to, user, (*seen, frame))
+        if frame.model_scope is not None:
+            return frame.model_scope.link_of_frame(MODEL_FRAME, user)
+        if frame.element.tag == "link":
+            return frame
+        return self.link_of_frame(frame.attached_to, user, (*visited, frame))
 
-    def _below(self, name: str) -> tuple[Frame | None, str]:
-        """The nested or merged model that knows `name`, and the name it knows it by."""
+    def _model_with_frame(self, name: str) -> tuple[Frame | None, str]:
+        """Return the nested or merged model that has the frame `name`, and the frame's name in that model."""
         head, _, rest = name.partition("::")
         nested = self.frames.get(head)
-        if rest and nested is not None and nested.inner is not None and nested.inner.knows(rest):
+        if rest and nested is not None and nested.model_scope is not None and nested.model_scope.has_frame(rest):
             return nested, rest
-        for model in self.merged:
-            if model.inner is not None and model.inner.knows(name):
+        for model in self.merged_models:
+            if model.model_scope is not None and model.model_scope.has_frame(name):
                 return model, name
         return None, name
 
-    def knows(self, name: str) -> bool:
-        """Whether `name` is a frame of this scope or below it."""
-        return name == self.implicit or name in self.frames or self._below(name)[0] is not None
+    def has_frame(self, name: str) -> bool:
+        """Return True if `name` is a frame of this scope or of a model in it."""
+        return name == self.implicit_frame or name in self.frames or self._model_with_frame(name)[0] is not None

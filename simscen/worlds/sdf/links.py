@@ -1,91 +1,147 @@
-"""What a link is made of: its collision solids and its mass."""
+"""Content of links: their collision solids in the world, with friction, and their mass."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from typing_extensions import assert_never
+
 from simscen.core.geometry import Pose3
-from simscen.core.geometry.shapes import Solid
-from simscen.worlds.sdf import values
-from simscen.worlds.sdf.markup import Element
-from simscen.worlds.sdf.placing import PlacedLink
-from simscen.worlds.sdf.report import Report
-from simscen.worlds.sdf.scaling import scaled
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
+from simscen.worlds.geometry.triangulation import triangulate
+from simscen.worlds.sdf.elements import Element, parse_bool, read_pose, read_positive, reference_frame
+from simscen.worlds.sdf.known_elements import report_unknown, report_unknown_children
+from simscen.worlds.sdf.link_poses import PlacedLink, Scale
+from simscen.worlds.sdf.report import ImportReport
 from simscen.worlds.sdf.shapes import ShapeReader
-from simscen.worlds.sdf.vocabulary import judge_children, judge_unknown
-from simscen.worlds.sdf.weight import DEFAULT_MASS, mass_of
+
+DEFAULT_FRICTION = 1.0
+"""Coefficient of friction of rubber wheels on dry concrete."""
+WATER_DENSITY = 1000.0
+"""Density in kg/m³ that SDF assumes for `<inertial auto="true">`."""
+DEFAULT_MASS_KG = 1.0
+"""SDF's default mass of a link."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinkContent:
-    """A link's collision `solids` in the world frame and its mass in kg."""
+    """A link, its collision `solids` in the world frame, and its mass in kg."""
 
     link: PlacedLink
     solids: tuple[Solid, ...]
     mass: float
 
 
-RUBBER = 1.0
-"""Friction of wheels on dry concrete."""
-
-
-def read_link(link: PlacedLink, reader: ShapeReader, report: Report) -> LinkContent:
-    """The content of a link; unusable collisions go to the report and are left out."""
+def read_link(link: PlacedLink, reader: ShapeReader, report: ImportReport) -> LinkContent:
+    """Read the content of a link; unusable collisions are added to the report and left out."""
     element = link.frame.element
     collisions: list[tuple[Element, list[Solid]]] = []
     for child in element.children:
-        with report.skipping():
+        with report.skip_unusable():
             if child.tag == "collision":
-                collisions.append((child, list(_collision(child, link, reader, report))))
+                collisions.append((child, list(_collision_solids(child, link, reader, report))))
             else:
-                judge_unknown(child, "link", report)
+                report_unknown(child, "link", report)
     if element.child("collision") is None and element.child("visual"):
         report.note(element.place, "has visuals only: nothing to collide with or to see for a lidar")
-    mass = DEFAULT_MASS
-    with report.skipping():
-        mass = mass_of(element.child("inertial"), collisions)
+    mass = DEFAULT_MASS_KG
+    with report.skip_unusable():
+        mass = _link_mass(element.child("inertial"), collisions)
     return LinkContent(link, tuple(solid for _, solids in collisions for solid in solids), mass)
 
 
-def _collision(element: Element, link: PlacedLink, reader: ShapeReader, report: Report) -> Iterator[Solid]:
-    judge_children(element, "collision", report)
-    geometry = element.child("geometry")
+def _collision_solids(
+    collision: Element, link: PlacedLink, reader: ShapeReader, report: ImportReport
+) -> Iterator[Solid]:
+    report_unknown_children(collision, "collision", report)
+    geometry = collision.child("geometry")
     if geometry is None:
-        raise element.unusable("<geometry> is missing")
-    _note_untouchable(element, report)
-    pose = link.pose.compose(_in_link(element.child("pose"), link))
-    name = f"{link.name}::{element.name}" if element.name else link.name
-    friction = _friction(element, report)
+        raise collision.unusable("<geometry> is missing")
+    _note_disabled_contacts(collision, report)
+    pose = link.pose.compose(_pose_in_link(collision.child("pose"), link))
+    name = f"{link.name}::{collision.name}" if collision.name else link.name
+    friction = _friction(collision, report)
     for solid in reader.solids(geometry, pose):
-        yield Solid(scaled(solid.shape, link.scale), pose.compose(solid.pose), name, friction)
+        yield Solid(_scaled(solid.shape, link.scale), pose.compose(solid.pose), name, friction)
 
 
-def _friction(collision: Element, report: Report) -> float:
-    """`<mu>` of ODE's surface, where that is less than a wheel's own: ODE takes the lesser of two (so does Gazebo)."""
-    found: Element | None = collision
+def _friction(collision: Element, report: ImportReport) -> float:
+    """Return `<mu>` of ODE's surface, at most the friction of a wheel: ODE and Gazebo use the lesser of two."""
+    mu_element: Element | None = collision
     for tag in ("surface", "friction", "ode", "mu"):
-        found = found.child(tag) if found is not None else None
-    if found is None:
-        return RUBBER
+        mu_element = mu_element.child(tag) if mu_element is not None else None
+    if mu_element is None:
+        return DEFAULT_FRICTION
     try:
-        mu = float(found.text)
+        mu = float(mu_element.text)
     except ValueError:
         mu = -1.0
     if not mu >= 0:
-        report.note(found.place, f"no coefficient of friction: {RUBBER:g} is taken")
-        return RUBBER
-    return min(RUBBER, mu)
+        report.note(mu_element.place, f"not a coefficient of friction: {DEFAULT_FRICTION:g} is used")
+        return DEFAULT_FRICTION
+    return min(DEFAULT_FRICTION, mu)
 
 
-def _in_link(given: Element | None, link: PlacedLink) -> Pose3:
-    """`link_from_collision`; a pose relative to another frame of the model is brought back to the link."""
-    frame, scope = values.relative_to(given), link.model.scope
-    if given is None or frame in ("", link.frame.name):
-        return values.pose(given)
-    return scope.place(link.frame).inverse().compose(scope.find(frame, given)).compose(values.pose(given))
+def _pose_in_link(pose: Element | None, link: PlacedLink) -> Pose3:
+    """Return `link_from_collision`; the pose may be relative to another frame of the model."""
+    frame, scope = reference_frame(pose), link.model.scope
+    if pose is None or frame in ("", link.frame.name):
+        return read_pose(pose)
+    return scope.pose_of(link.frame).inverse().compose(scope.pose_of_name(frame, pose)).compose(read_pose(pose))
 
 
-def _note_untouchable(collision: Element, report: Report) -> None:
-    for below in collision.descendants():
-        masked = below.tag == "collide_bitmask" and below.text.lower().removeprefix("0x").strip("0") == ""
-        if masked or (below.tag == "collide_without_contact" and below.text.lower() in ("1", "true")):
-            report.note(below.place, "not supported: the robot collides with it all the same")
+def _note_disabled_contacts(collision: Element, report: ImportReport) -> None:
+    for element in collision.descendants():
+        text = element.text.lower()
+        has_no_bits = element.tag == "collide_bitmask" and text.removeprefix("0x").strip("0") == ""
+        if has_no_bits or (element.tag == "collide_without_contact" and text in ("1", "true")):
+            report.note(element.place, "not supported: the robot collides with it all the same")
+
+
+def _scaled(shape: Shape, scale: Scale) -> Shape:
+    """Return a shape with its sizes multiplied; a radius is multiplied by the x component, as in Gazebo Classic."""
+    if scale == (1.0, 1.0, 1.0):
+        return shape
+    x, y, z = scale
+    match shape:
+        case Box((a, b, c)):
+            return Box((a * x, b * y, c * z))
+        case Cylinder(radius, length) | Capsule(radius, length) | Cone(radius, length):
+            return type(shape)(radius * x, length * z)
+        case Sphere(radius):
+            return Sphere(radius * x)
+        case Ellipsoid((a, b, c)):
+            return Ellipsoid((a * x, b * y, c * z))
+        case Extrusion(polygon, height):
+            return Extrusion(tuple((px * x, py * y) for px, py in polygon), height * z)
+        case Mesh(vertices, faces):
+            return Mesh(vertices * scale, faces)
+        case _:
+            assert_never(shape)
+
+
+def _link_mass(inertial: Element | None, collisions: Sequence[tuple[Element, Sequence[Solid]]]) -> float:
+    """Return the mass in kg that an `<inertial>` states, or the mass of the collisions if it is `auto`."""
+    if inertial is None:
+        return DEFAULT_MASS_KG
+    if parse_bool(inertial.attributes.get("auto", "0"), inertial):
+        mass = sum(_density(element, inertial) * _volume(s.shape) for element, solids in collisions for s in solids)
+        if mass > 0:
+            return mass
+    return read_positive(inertial, "mass") if inertial.child("mass") else DEFAULT_MASS_KG
+
+
+def _density(collision: Element, inertial: Element) -> float:
+    owner = next((owner for owner in (collision, inertial) if owner.child("density")), None)
+    return read_positive(owner, "density") if owner else WATER_DENSITY
+
+
+def _volume(shape: Shape) -> float:
+    """Return the volume in m³ enclosed by a shape's triangles, by the divergence theorem.
+
+    An open mesh encloses no volume. For an open mesh the result is the sum of the signed tetrahedra between the
+    origin and each triangle, as in sdformat.
+    """
+    mesh = triangulate(shape)
+    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
+    return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6

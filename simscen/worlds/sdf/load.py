@@ -1,6 +1,6 @@
-"""From an SDF file to a world."""
+"""Loads an SDF file as a world: static solids, bodies, bounds and notes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -10,57 +10,65 @@ import numpy as np
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Array
 from simscen.core.geometry.shapes import Body, Solid
-from simscen.worlds.geometry.prisms import plan_extents
-from simscen.worlds.maps.map_size import Bounds
+from simscen.worlds.geometry.prisms import mesh_bounds_2d
+from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.maps.map_size import Bounds, map_size_error
 from simscen.worlds.sdf.actors import read_actor
-from simscen.worlds.sdf.bodies import distinct, split
-from simscen.worlds.sdf.files import Library
-from simscen.worlds.sdf.includes import Shelf
+from simscen.worlds.sdf.bodies import split_model, with_unique_names
+from simscen.worlds.sdf.elements import Element
+from simscen.worlds.sdf.files import IncludedFiles, WorldFiles
+from simscen.worlds.sdf.link_poses import ModelState, WorldState, place_links, read_state
 from simscen.worlds.sdf.links import read_link
-from simscen.worlds.sdf.markup import Element
-from simscen.worlds.sdf.outliers import outliers
-from simscen.worlds.sdf.placing import place
-from simscen.worlds.sdf.planes import floor_height
-from simscen.worlds.sdf.report import Report, Unusable
-from simscen.worlds.sdf.shapes import ShapeReader
-from simscen.worlds.sdf.state import ModelState, WorldState, read_state
-from simscen.worlds.sdf.tree import Model, TreeReader
+from simscen.worlds.sdf.model_tree import ModelNode, TreeReader
+from simscen.worlds.sdf.report import ImportReport, UnusableElement
+from simscen.worlds.sdf.shapes import MIN_LEVEL_NORMAL_Z, ShapeReader
+
+MAX_OUTLIER_SHARE = 0.05
+"""Share of the models that may be outliers; with more, the world is regarded as large."""
+MAX_FLOOR_HEIGHT_M = 0.3
+"""Height up to which a level face can be the floor instead of a platform."""
+MIN_FLOOR_HEIGHT_M = 0.001
+"""Height up to which a floor is treated as lying at z = 0."""
+MIN_FLOOR_SHARE = 0.8
+"""Share of the world's extent that a floor must cover."""
+
+Placed = TypeVar("Placed", Solid, Body)
 
 
 def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bool = False) -> World:
-    """The world in a Gazebo `.sdf`, `.world` or model file of SDF 1.3 to 1.12.
+    """Load the world in a Gazebo `.sdf`, `.world` or model file of SDF 1.3 to 1.12.
 
-    Only collision geometry counts. Static models become solids, others bodies with their mass; actors become bodies
-    of mass 0 with a path. Everything is in the world's frame and in document order; a floor that lies above z = 0 is
-    brought down to it, where robots drive. Files that it names are looked for
-    beside it and in `search`, and must lie inside `root` or `search`.
+    Only collision geometry is used. Static models become solids, other models bodies with their mass, and actors
+    bodies of mass 0 with a path. Poses are in the world frame, and the order is that of the document. A floor above
+    z = 0 is lowered to z = 0, where robots drive. Files that the world refers to are searched beside it and in
+    `search`, and must lie inside `root` or `search`.
 
-    Raises InvalidInput with everything that would change the geometry and cannot be used; with `lenient` that is
-    left out and told in the world's `notes`, and only a world file that cannot be read at all is an error.
+    Raises InvalidInput with all elements that would change the geometry and cannot be used. With `lenient`, such
+    elements are left out with a note in `World.notes`, and only an unreadable world file is an error.
     """
-    report, library = Report(lenient=lenient), Library.of([root, *search])
+    report, files = ImportReport(lenient=lenient), WorldFiles.of([root, *search])
     try:
-        world = _read(path, library, report)
-    except Unusable as error:
-        raise report.fatal(error) from error
+        world = _load(path, files, report)
+    except UnusableElement as error:
+        raise report.fatal_error(error) from error
     report.raise_problems()
     return world
 
 
-def _read(path: Path, library: Library, report: Report) -> World:
-    shelf = Shelf(library, report)
-    document = shelf.open_world(path)
+def _load(path: Path, files: WorldFiles, report: ImportReport) -> World:
+    included_files = IncludedFiles(files, report)
+    document = included_files.open_world(path)
     try:
-        element = _top(document, report)
-        tree = TreeReader(shelf, report)
-        builder = _Builder(tree.world(element), ShapeReader(library, report), report)
-        return builder.build(read_state(element, report), tree)
+        element = _world_element(document, report)
+        tree = TreeReader(included_files, report)
+        importer = _WorldImporter(tree.read_world(element), ShapeReader(files, report), report)
+        return importer.build(read_state(element, report), tree)
     except RecursionError as error:
         raise document.unusable("includes, models or frames are nested too deeply") from error
 
 
-def _top(document: Element, report: Report) -> Element:
-    """The element to load: the first world (as Gazebo does), otherwise the file itself with its models."""
+def _world_element(document: Element, report: ImportReport) -> Element:
+    """Return the first `<world>`, as Gazebo does, or the root of a file that holds only models."""
     worlds = list(document.all("world"))
     for other in worlds[1:]:
         report.note(other.place, f"only the first world of a file is loaded, which is {worlds[0].name!r}")
@@ -71,104 +79,141 @@ def _top(document: Element, report: Report) -> Element:
     return document
 
 
-class _Builder:
+class _WorldImporter:
     """Collects the solids and bodies of one world."""
 
-    def __init__(self, whole: Model, shapes: ShapeReader, report: Report) -> None:
-        self.whole, self.shapes, self.report = whole, shapes, report
-        self.solids: list[Solid] = []
-        self.bodies: list[Body] = []
+    def __init__(self, root: ModelNode, shapes: ShapeReader, report: ImportReport) -> None:
+        self._root, self._shapes, self._report = root, shapes, report
+        self._solids: list[Solid] = []
+        self._bodies: list[Body] = []
 
     def build(self, state: WorldState, tree: TreeReader) -> World:
-        """The world after the saved `state` was applied to it."""
+        """Return the world with the saved `state` applied."""
         for element in state.inserted:
-            with self.report.skipping():
-                tree.nest(self.whole, tree.model(element, static=False))
-        for model in self.whole.parts:
-            if isinstance(model, Model) and model.name not in state.deleted:
-                with self.report.skipping():
-                    self._add(model, state)
-        for actor in self.whole.actors:
-            with self.report.skipping():
-                body = read_actor(actor, self.whole, self.shapes, self.report)
-                self.bodies += [body] if body else []
-        for joint in self.whole.joints:
-            self.report.note(joint.place, "a joint between models is ignored")
+            with self._report.skip_unusable():
+                tree.add_model(self._root, tree.read_model(element, static=False))
+        for model in self._root.parts:
+            if isinstance(model, ModelNode) and model.name not in state.deleted:
+                with self._report.skip_unusable():
+                    self._add_model(model, state)
+        for actor in self._root.actors:
+            with self._report.skip_unusable():
+                body = read_actor(actor, self._root, self._shapes, self._report)
+                self._bodies += [body] if body else []
+        for joint in self._root.joints:
+            self._report.note(joint.place, "a joint between models is ignored")
         return self._world()
 
-    def _add(self, model: Model, state: WorldState) -> None:
+    def _add_model(self, model: ModelNode, state: WorldState) -> None:
         saved = state.models.get(model.name, ModelState())
-        pose = saved.pose or self.whole.scope.place(model.frame)
-        contents = [read_link(link, self.shapes, self.report) for link in place(model, pose, self.report, saved)]
-        solids, bodies = split(model, pose, contents, self.report)
-        self.solids += solids
-        self.bodies += bodies
+        pose = saved.pose or self._root.scope.pose_of(model.frame)
+        links = place_links(model, pose, self._report, saved)
+        contents = [read_link(link, self._shapes, self._report) for link in links]
+        solids, bodies = split_model(model, pose, contents, self._report)
+        self._solids += solids
+        self._bodies += bodies
 
     def _world(self) -> World:
-        element = self.whole.element
-        if not self.solids and not self.bodies and not self.report.failed:
-            self._refuse_emptiness(element)
+        element = self._root.element
+        if not self._solids and not self._bodies and not self._report.has_problems:
+            self._report_empty_world(element)
         name = element.name or Path(element.source.name).stem
-        solids, bodies, bounds = self._within_reach(distinct(self.bodies, self.report, element))
+        solids, bodies, bounds = self._without_outliers(with_unique_names(self._bodies, self._report, element))
         height = floor_height(solids, bounds)
         if height:
-            self.report.note(element.place, f"its floor lies {height:.3f} m high; the world is lowered by as much")
+            self._report.note(element.place, f"its floor lies {height:.3f} m high; the world is lowered by as much")
         solids, bodies = _lowered(solids, height), _lowered(bodies, height)
-        return World(name, solids, bodies, bounds=bounds, notes=self.report.notes)
+        return World(name, solids, bodies, bounds=bounds, notes=self._report.notes)
 
-    def _within_reach(self, bodies: tuple[Body, ...]) -> tuple[tuple[Solid, ...], tuple[Body, ...], Bounds]:
-        """The solids and bodies without those parked far away from all others, and the rectangle around them."""
-        covered: dict[str, list[Array]] = {}
-        for solid in self.solids:
-            covered.setdefault(_model_of(solid), []).append(plan_extents(solid))
+    def _without_outliers(self, bodies: tuple[Body, ...]) -> tuple[tuple[Solid, ...], tuple[Body, ...], Bounds]:
+        """Return the solids and bodies without those far away from all others, and the bounds of the rest."""
+        extents: dict[str, list[Array]] = {}
+        for solid in self._solids:
+            extents.setdefault(_model_name(solid), []).append(mesh_bounds_2d(solid))
         for body in bodies:
-            covered.setdefault(body.name, []).extend(plan_extents(solid, body.pose) for solid in body.solids)
-        far = outliers({name: np.array(_around(corners)).reshape(2, 2) for name, corners in covered.items()})
+            extents.setdefault(body.name, []).extend(mesh_bounds_2d(solid, body.pose) for solid in body.solids)
+        far = outliers({name: np.array(_union(boxes)).reshape(2, 2) for name, boxes in extents.items()})
         for name, distance in far.items():
-            told = f"left out: {name!r} lies {distance:.0f} m away from the middle of all, too far for a map of them"
-            self.report.note(self.whole.element.place, told)
+            message = f"left out: {name!r} lies {distance:.0f} m away from the middle of all, too far for a map of them"
+            self._report.note(self._root.element.place, message)
         return (
-            tuple(solid for solid in self.solids if _model_of(solid) not in far),
+            tuple(solid for solid in self._solids if _model_name(solid) not in far),
             tuple(body for body in bodies if body.name not in far),
-            _around([corners for name, all_corners in covered.items() if name not in far for corners in all_corners]),
+            _union([box for name, boxes in extents.items() if name not in far for box in boxes]),
         )
 
-    def _refuse_emptiness(self, element: Element) -> None:
-        """Raise Unusable or report a world without obstacles, unless it is a ground plane on purpose."""
-        if self.report.skipped:
-            told = f"nothing is left of this world: {self.report.skipped} things in it were skipped"
-            raise element.unusable(told, "load it without --lenient to see what is missing")
-        if self.shapes.ground:
-            self.report.note(element.place, "holds nothing but a ground plane")
+    def _report_empty_world(self, element: Element) -> None:
+        """Report a world without obstacles as an error, unless it is a ground plane on purpose."""
+        if self._report.skipped_count:
+            message = f"nothing is left of this world: {self._report.skipped_count} things in it were skipped"
+            raise element.unusable(message, "load it without --lenient to see what is missing")
+        if self._shapes.has_ground:
+            self._report.note(element.place, "holds nothing but a ground plane")
             return
-        self.report.unusable(element.unusable(self._why_empty(), "load it leniently if an empty floor is meant"))
-
-    def _why_empty(self) -> str:
-        models = [m for part in self.whole.parts if isinstance(part, Model) for m in part.models()]
-        links = [part for model in models for part in model.parts if not isinstance(part, Model)]
-        if not models:
-            return "no collision geometry in this world: it has no models"
-        if not links:
-            return "no collision geometry in this world: its models have no links"
-        return "no collision geometry in this world: its links have visuals at most"
+        models = [m for part in self._root.parts if isinstance(part, ModelNode) for m in part.models()]
+        has_links = any(not isinstance(part, ModelNode) for model in models for part in model.parts)
+        reason = "it has no models"
+        if models:
+            reason = "its links have visuals at most" if has_links else "its models have no links"
+        message = f"no collision geometry in this world: {reason}"
+        self._report.add_error(element.unusable(message, "load it leniently if an empty floor is meant"))
 
 
-def _model_of(solid: Solid) -> str:
-    """The outermost model that a solid belongs to, by its scoped name."""
+def _model_name(solid: Solid) -> str:
+    """Return the name of the outermost model that a solid belongs to."""
     return solid.name.partition("::")[0]
 
 
-Placed = TypeVar("Placed", Solid, Body)
+def _lowered(placed: Sequence[Placed], height: float) -> tuple[Placed, ...]:
+    return tuple(replace(each, pose=each.pose._replace(z=each.pose.z - height)) for each in placed)
 
 
-def _lowered(things: Sequence[Placed], height: float) -> tuple[Placed, ...]:
-    return tuple(replace(thing, pose=thing.pose._replace(z=thing.pose.z - height)) for thing in things)
-
-
-def _around(extents: list[Array]) -> Bounds:
-    """The rectangle around rectangles (2, 2); zeros when there is none."""
-    if not extents:
+def _union(boxes: list[Array]) -> Bounds:
+    """Return the bounds of rectangles, each given by its corners (2, 2); zeros if there is none."""
+    if not boxes:
         return 0.0, 0.0, 0.0, 0.0
-    low = np.min([corners[0] for corners in extents], axis=0)
-    high = np.max([corners[1] for corners in extents], axis=0)
+    low = np.min([corners[0] for corners in boxes], axis=0)
+    high = np.max([corners[1] for corners in boxes], axis=0)
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def outliers(extents: Mapping[str, Array]) -> dict[str, float]:
+    """Return the models to leave out so that the others fit on a map, with their distances from the median in meters.
+
+    `extents` are the corners (2, 2) of the rectangle around each model. The result is empty if all models fit, or if
+    more than MAX_OUTLIER_SHARE of them would have to be left out.
+    """
+    names, corners = list(extents), np.array(list(extents.values())).reshape(-1, 2, 2)
+    if not names:
+        return {}
+    centers = corners.mean(axis=1)
+    distance = np.hypot(*(centers - np.median(centers, axis=0)).T)
+    farthest_first = np.argsort(distance, kind="stable")[::-1]
+    for count in range(min(int(MAX_OUTLIER_SHARE * len(names)) + 2, len(names))):
+        kept = corners[farthest_first[count:]]
+        left, bottom = kept[:, 0].min(axis=0).tolist()
+        right, top = kept[:, 1].max(axis=0).tolist()
+        if map_size_error((left, bottom, right, top)) is None:
+            return {names[k]: float(distance[k]) for k in farthest_first[:count]}
+    return {}
+
+
+def floor_height(solids: Sequence[Solid], bounds: Bounds) -> float:
+    """Return the height in meters of the floor on which everything in `bounds` stands; 0 if it is the ground plane.
+
+    A world may model its floor as geometry. For example, the floor of AWS's small_warehouse is a plate whose top is
+    2.7 cm above Gazebo's ground plane.
+    """
+    mesh = merge_solids(solids)
+    corners: Array = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    areas = np.linalg.norm(normals, axis=1)
+    top = corners[:, :, 2].max(axis=1)
+    is_level = normals[:, 2] >= MIN_LEVEL_NORMAL_Z * areas
+    is_candidate = is_level & (top > MIN_FLOOR_HEIGHT_M) & (top <= MAX_FLOOR_HEIGHT_M)
+    heights_mm = np.round(top[is_candidate] * 1000).astype(np.int64)
+    min_area = MIN_FLOOR_SHARE * (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
+    floors = [h for h in np.unique(heights_mm) if areas[is_candidate][heights_mm == h].sum() >= min_area]
+    if not floors:
+        return 0.0
+    return float(top[is_candidate][heights_mm == floors[-1]].max())

@@ -1,165 +1,63 @@
-"""Readers of DAE, STL and OBJ mesh files; all return parts in meters.
+"""Readers of COLLADA (DAE), STL and OBJ mesh files; vertices are in meters.
 
-COLLADA is read with pycollada, because trimesh drops the unit and the node names.
+COLLADA is read with pycollada, because trimesh drops the unit and the node names. STL and OBJ are parsed by trimesh's
+exchange functions without making `Trimesh` objects, which would compute normals of degenerate triangles.
 """
 
 import io
 import logging
-import warnings
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from simscen.assets import markup
 from simscen.core.geometry import Array
-from simscen.worlds.sdf.values import FARTHEST
+from simscen.worlds.sdf.elements import MAX_COORDINATE_M
 
 if TYPE_CHECKING:
     import collada
 
-MOST_FACES = 1_000_000
+MAX_FACES = 1_000_000
+MAX_NODES = 10_000
+STL_HEADER_BYTES, STL_TRIANGLE_BYTES = 84, 50
+MATERIAL_ELEMENTS = {"library_materials", "library_effects", "library_images", "bind_material"}
+UNSUPPORTED_ELEMENTS = {"tristrips", "trifans", "convex_mesh", "spline", "instance_controller"}
+
+# trimesh logs tracebacks of formats that it tries; without any handler, Python would print them to stderr.
+logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 
 class UnusableMesh(Exception):
-    """Why a mesh file cannot be used."""
+    """The reason why a mesh file cannot be used."""
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """A named part of a mesh: `vertices` (n, 3) in meters, `faces` (m, 3); `names` is what a submesh may call it."""
+class MeshPart:
+    """A part of a mesh: `vertices` (n, 3) in meters, `faces` (m, 3), and the names by which `<submesh>` finds it."""
 
     names: tuple[str, ...]
     vertices: Array
     faces: npt.NDArray[np.int64]
 
 
-def limit(faces: int) -> None:
-    """Raise UnusableMesh when there are too many triangles."""
-    if faces > MOST_FACES:
-        raise UnusableMesh(f"more than {MOST_FACES} triangles")
-
-
-MOST_NODES = 10_000
-LOOKS = {"library_materials", "library_effects", "library_images", "bind_material"}
-UNREAD = {"tristrips", "trifans", "convex_mesh", "spline", "instance_controller"}
-
-
-def read_dae(data: bytes, _: str) -> Iterator[Part]:
-    """The parts of a COLLADA scene in meters; raises UnusableMesh."""
-    import collada
-
-    try:
-        markup.refuse_doctype(data)
-    except markup.Broken as error:
-        raise UnusableMesh(f"line {error.line}: {error.message}") from error
-    try:
-        bare = _without_looks(data)
-        document = collada.Collada(io.BytesIO(bare), ignore=[collada.DaeError])
-        unit = float(document.assetInfo.unitmeter or 1.0)
-        nodes = document.scene.nodes if document.scene else []
-        _check_complete(document)
-        parts = list(_nodes(nodes, np.eye(4), ""))
-    except UnusableMesh:
-        raise
-    except Exception as error:  # pycollada raises what its XML and array code happen to meet
-        raise UnusableMesh("not a readable COLLADA file") from error
-    if not 0 < unit < FARTHEST:
-        raise UnusableMesh(f"a unit of {unit:g} m")
-    for part in parts:
-        yield Part(part.names, part.vertices * unit, part.faces)
-
-
-def _without_looks(data: bytes) -> bytes:
-    """The file without materials: pycollada would drop every geometry whose material or image is missing."""
-    root = ET.fromstring(data)
-    for parent in list(root.iter()):
-        for child in [child for child in parent if _kind(child) in LOOKS]:
-            parent.remove(child)
-    return ET.tostring(root)
-
-
-def _check_complete(document: "collada.Collada") -> None:
-    """pycollada leaves out what it cannot read without a word; raises UnusableMesh when that is geometry."""
-    known = {geometry.id for geometry in document.geometries}
-    for element in document.xmlnode.getroot().iter():
-        name = element.get("url", "").removeprefix("#")
-        if _kind(element) == "instance_geometry" and name not in known:
-            raise UnusableMesh(f"its geometry {name[:80]!r} is missing or cannot be read")
-        if _kind(element) in UNREAD:
-            raise UnusableMesh(f"<{_kind(element)}> is not read, only triangles, polylists and polygons")
-
-
-def _kind(element: "ET.Element") -> str:
-    return str(element.tag).rpartition("}")[2]
-
-
-def _nodes(nodes: list[object], matrix: Array, name: str) -> Iterator[Part]:
-    """The parts of a COLLADA scene, in its own unit; a part is called after the nearest named node above it."""
-    from collada.scene import GeometryNode, Node
-
-    waiting = [(node, matrix, name) for node in reversed(nodes)]
-    visited = faces = 0
-    while waiting:
-        node, parent, called = waiting.pop()
-        visited += 1
-        if visited > MOST_NODES:
-            raise UnusableMesh(f"more than {MOST_NODES} nodes")
-        if isinstance(node, GeometryNode):
-            for part in _primitives(node.geometry, parent, called):
-                faces += len(part.faces)
-                limit(faces)
-                yield part
-        elif isinstance(node, Node):
-            own = node.xmlnode.get("name") or called
-            placed = parent @ np.asarray(node.matrix, float)
-            waiting.extend((child, placed, own) for child in reversed(node.children or []))
-
-
-def _primitives(geometry: object, matrix: Array, called: str) -> Iterator[Part]:
-    names = tuple(name for name in (called, geometry.name, geometry.id) if name)  # type: ignore[attr-defined]
-    for primitive in geometry.primitives:  # type: ignore[attr-defined]
-        triangles = primitive.triangleset() if hasattr(primitive, "triangleset") else primitive
-        if getattr(triangles, "vertex", None) is None or not hasattr(triangles, "ntriangles"):
-            continue  # lines, or an empty primitive
-        vertices = np.asarray(triangles.vertex, float) @ matrix[:3, :3].T + matrix[:3, 3]
-        faces = np.asarray(triangles.vertex_index, np.int64).reshape(-1, 3)
-        flip = np.linalg.det(matrix[:3, :3]) < 0
-        yield Part(names, vertices, faces[:, ::-1] if flip else faces)
-
-
-STL_HEADER, STL_TRIANGLE = 84, 50
-
-# trimesh logs the tracebacks of what it tries first; without any handler Python would print them to stderr.
-logging.getLogger("trimesh").addHandler(logging.NullHandler())
-
-
-def read_parts(data: bytes, suffix: str, file: str) -> tuple[Part, ...]:
-    """The parts of a .dae, .stl or .obj file; raises UnusableMesh."""
-    readers = {".dae": read_dae, ".stl": _stl, ".obj": _obj}
+def read_parts(data: bytes, suffix: str) -> tuple[MeshPart, ...]:
+    """Return the parts of a .dae, .stl or .obj file; raises UnusableMesh."""
+    readers = {".dae": _read_dae, ".stl": _read_stl, ".obj": _read_obj}
     if suffix not in readers:
         raise UnusableMesh(f"{suffix or 'files without suffix'} meshes are not read, only DAE, STL and OBJ")
-    # Broken numbers are refused below with a message; NumPy's and trimesh's warnings would only reach the terminal.
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore", RuntimeWarning)
-        parts = tuple(part for part in readers[suffix](data, file) if len(part.faces))
+    parts = tuple(part for part in readers[suffix](data) if len(part.faces))
     if not parts:
         raise UnusableMesh("the mesh has no triangles")
-    _check(parts)
-    return tuple(_compact(part) for part in parts)
+    _check_parts(parts)
+    return tuple(_without_unused_vertices(part) for part in parts)
 
 
-def _compact(part: Part) -> Part:
-    """Without the vertices that no triangle uses: they would shift the middle and the extent."""
-    used, faces = np.unique(part.faces, return_inverse=True)
-    return Part(part.names, part.vertices[used], faces.reshape(-1, 3))
-
-
-def _check(parts: tuple[Part, ...]) -> None:
-    limit(sum(len(part.faces) for part in parts))
+def _check_parts(parts: tuple[MeshPart, ...]) -> None:
+    _check_face_count(sum(len(part.faces) for part in parts))
     for part in parts:
         if part.vertices.ndim != 2 or part.vertices.shape[1] != 3:
             raise UnusableMesh("a vertex does not have three coordinates")
@@ -169,38 +67,143 @@ def _check(parts: tuple[Part, ...]) -> None:
             raise UnusableMesh("a vertex is not a finite number")
 
 
-def _stl(data: bytes, _: str) -> Iterator[Part]:
-    ascii_file = data[:5] == b"solid" and b"facet" in data[:2000]
-    if not ascii_file:
+def _check_face_count(count: int) -> None:
+    if count > MAX_FACES:
+        raise UnusableMesh(f"more than {MAX_FACES} triangles")
+
+
+def _without_unused_vertices(part: MeshPart) -> MeshPart:
+    """Return the part without the vertices that no triangle uses, which would shift its center and its extent."""
+    used, faces = np.unique(part.faces, return_inverse=True)
+    return MeshPart(part.names, part.vertices[used], faces.reshape(-1, 3))
+
+
+def _read_stl(data: bytes) -> Iterator[MeshPart]:
+    from trimesh.exchange.stl import load_stl
+
+    is_ascii = data[:5] == b"solid" and b"facet" in data[:2000]
+    if not is_ascii:
         _check_stl_header(data)
-    yield from _trimesh(data, "stl")
+    yield from _parts_from_trimesh(lambda: load_stl(io.BytesIO(data)), "STL")
 
 
 def _check_stl_header(data: bytes) -> None:
-    """A false count makes PyBullet read past the end of the file."""
-    if len(data) < STL_HEADER:
+    """Raise UnusableMesh if the number of triangles does not match the file size: PyBullet would read past the end."""
+    if len(data) < STL_HEADER_BYTES:
         raise UnusableMesh("too short for an STL file")
-    claimed = int.from_bytes(data[80:84], "little")
-    held, rest = divmod(len(data) - STL_HEADER, STL_TRIANGLE)
-    if claimed != held or rest:
-        raise UnusableMesh(f"STL header says {claimed} triangles, file holds {held}")
-    limit(claimed)
+    stated = int.from_bytes(data[80:84], "little")
+    count, rest = divmod(len(data) - STL_HEADER_BYTES, STL_TRIANGLE_BYTES)
+    if stated != count or rest:
+        raise UnusableMesh(f"STL header says {stated} triangles, file holds {count}")
+    _check_face_count(stated)
 
 
-def _obj(data: bytes, _: str) -> Iterator[Part]:
-    if data.count(b"\nf") > MOST_FACES:
-        limit(MOST_FACES + 1)
-    yield from _trimesh(data, "obj", skip_materials=True, split_objects=True, maintain_order=True)
+def _read_obj(data: bytes) -> Iterator[MeshPart]:
+    from trimesh.exchange.obj import load_obj
+
+    _check_face_count(data.count(b"\nf"))
+    options = {"skip_materials": True, "split_objects": True, "maintain_order": True}
+    yield from _parts_from_trimesh(lambda: load_obj(io.BytesIO(data), **options), "OBJ")
 
 
-def _trimesh(data: bytes, kind: str, **options: bool) -> Iterator[Part]:
-    import trimesh
+def _parts_from_trimesh(load: Callable[[], Mapping[str, Any]], file_format: str) -> Iterator[MeshPart]:
+    """Yield the parts in the keyword arguments that trimesh's loaders return for Trimesh or Scene."""
+    from trimesh.geometry import triangulate_quads
 
     try:
-        scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False, **options)
-    except Exception as error:  # trimesh lets whatever its parsers meet fall through
-        raise UnusableMesh(f"not a readable {kind.upper()} file") from error
-    for name, geometry in scene.geometry.items():
-        if isinstance(geometry, trimesh.Trimesh):
-            named = str(geometry.metadata.get("name") or name)
-            yield Part((named,), np.asarray(geometry.vertices, float), np.asarray(geometry.faces, np.int64))
+        loaded = load()
+        geometries: Mapping[str, Any] = loaded.get("geometry", {"": loaded})
+        parts = [
+            MeshPart((name,) if name else (), np.asarray(mesh["vertices"], float), triangulate_quads(mesh["faces"]))
+            for name, mesh in geometries.items()
+            if "faces" in mesh
+        ]
+    except Exception as error:  # trimesh passes on all exceptions of its parsers
+        raise UnusableMesh(f"not a readable {file_format} file") from error
+    yield from parts
+
+
+def _read_dae(data: bytes) -> Iterator[MeshPart]:
+    import collada
+
+    try:
+        markup.refuse_doctype(data)
+    except markup.MalformedXml as error:
+        raise UnusableMesh(f"line {error.line}: {error.message}") from error
+    try:
+        # Infinite or huge numbers in transformations raise FloatingPointError instead of a warning.
+        with np.errstate(divide="raise", over="raise", invalid="raise"):
+            document = collada.Collada(io.BytesIO(_without_materials(data)), ignore=[collada.DaeError])
+            meters_per_unit = float(document.assetInfo.unitmeter or 1.0)
+            nodes = document.scene.nodes if document.scene else []
+            _check_complete(document)
+            parts = list(_parts_of_nodes(nodes))
+    except UnusableMesh:
+        raise
+    except FloatingPointError as error:
+        raise UnusableMesh("a vertex or a transformation is not a finite number") from error
+    except Exception as error:  # pycollada passes on all exceptions of its XML and array code
+        raise UnusableMesh("not a readable COLLADA file") from error
+    if not 0 < meters_per_unit < MAX_COORDINATE_M:
+        raise UnusableMesh(f"a unit of {meters_per_unit:g} m")
+    for part in parts:
+        yield MeshPart(part.names, part.vertices * meters_per_unit, part.faces)
+
+
+def _without_materials(data: bytes) -> bytes:
+    """Return the file without materials: pycollada drops every geometry whose material or image is missing."""
+    root = ET.fromstring(data)
+    for parent in list(root.iter()):
+        for child in [child for child in parent if _local_name(child) in MATERIAL_ELEMENTS]:
+            parent.remove(child)
+    return ET.tostring(root)
+
+
+def _check_complete(document: "collada.Collada") -> None:
+    """Raise UnusableMesh for geometry that pycollada silently leaves out because it cannot read it."""
+    known = {geometry.id for geometry in document.geometries}
+    for element in document.xmlnode.getroot().iter():
+        name = element.get("url", "").removeprefix("#")
+        if _local_name(element) == "instance_geometry" and name not in known:
+            raise UnusableMesh(f"its geometry {name[:80]!r} is missing or cannot be read")
+        if _local_name(element) in UNSUPPORTED_ELEMENTS:
+            raise UnusableMesh(f"<{_local_name(element)}> is not read, only triangles, polylists and polygons")
+
+
+def _local_name(element: "ET.Element") -> str:
+    """Return the tag of an element without its XML namespace."""
+    return str(element.tag).rpartition("}")[2]
+
+
+def _parts_of_nodes(nodes: list[object]) -> Iterator[MeshPart]:
+    """Yield the parts of a COLLADA scene in its own unit; a part is first named after the nearest named node above."""
+    from collada.scene import GeometryNode, Node
+
+    pending = [(node, np.eye(4), "") for node in reversed(nodes)]
+    node_count = face_count = 0
+    while pending:
+        node, parent_matrix, node_name = pending.pop()
+        node_count += 1
+        if node_count > MAX_NODES:
+            raise UnusableMesh(f"more than {MAX_NODES} nodes")
+        if isinstance(node, GeometryNode):
+            for part in _parts_of_geometry(node.geometry, parent_matrix, node_name):
+                face_count += len(part.faces)
+                _check_face_count(face_count)
+                yield part
+        elif isinstance(node, Node):
+            name = node.xmlnode.get("name") or node_name
+            matrix = parent_matrix @ np.asarray(node.matrix, float)
+            pending.extend((child, matrix, name) for child in reversed(node.children or []))
+
+
+def _parts_of_geometry(geometry: Any, matrix: Array, node_name: str) -> Iterator[MeshPart]:
+    names = tuple(name for name in (node_name, geometry.name, geometry.id) if name)
+    for primitive in geometry.primitives:
+        triangles = primitive.triangleset() if hasattr(primitive, "triangleset") else primitive
+        if getattr(triangles, "vertex", None) is None or not hasattr(triangles, "ntriangles"):
+            continue  # lines, or an empty primitive
+        vertices = np.asarray(triangles.vertex, float) @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = np.asarray(triangles.vertex_index, np.int64).reshape(-1, 3)
+        is_mirrored = np.linalg.det(matrix[:3, :3]) < 0
+        yield MeshPart(names, vertices, faces[:, ::-1] if is_mirrored else faces)

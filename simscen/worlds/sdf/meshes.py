@@ -1,114 +1,220 @@
-"""`<mesh>`: triangles of COLLADA, STL and OBJ files, concave ones as they are.
+"""Triangle meshes of `<mesh>` and `<heightmap>`; concave meshes are used as they are.
 
-A COLLADA `<unit>` is honored; `<up_axis>` is not, because Gazebo does not: its ColladaLoader never reads it and its
-AssimpLoader undoes the rotation that assimp adds. Worlds are drawn accordingly: Nav2's tb3_sandbox says Y_UP in
-meshes that stand upright along z.
+A COLLADA `<unit>` is used; `<up_axis>` is not, because Gazebo ignores it as well: its ColladaLoader does not read the
+element, and its AssimpLoader undoes the rotation that assimp adds. Published worlds rely on this: meshes of Nav2's
+tb3_sandbox state Y_UP and stand upright along z.
 """
 
+import hashlib
+import io
+import warnings
+from collections import OrderedDict
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from simscen.assets.folders import Trouble
+from simscen.assets.folders import UnusableFile
 from simscen.core.errors import InvalidInput, Problem
-from simscen.core.geometry.shapes import Mesh
-from simscen.worlds.sdf import values
-from simscen.worlds.sdf.files import MESH_BYTES, Library
-from simscen.worlds.sdf.markup import Element
-from simscen.worlds.sdf.mesh_files import Part, UnusableMesh
-from simscen.worlds.sdf.meshcache import READ
-from simscen.worlds.sdf.report import CODE, Report
+from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry.shapes import Mesh, Solid
+from simscen.worlds.sdf.elements import MAX_COORDINATE_M, Element, read_bool, read_numbers, read_sizes
+from simscen.worlds.sdf.files import MAX_MESH_BYTES, WorldFiles
+from simscen.worlds.sdf.mesh_files import MeshPart, UnusableMesh, read_parts
+from simscen.worlds.sdf.report import CODE, ImportReport
+
+MAX_CACHE_BYTES = 256 << 20
+MAX_HEIGHTMAP_PIXELS = 513
+"""Maximum pixels along an edge: Gazebo's heightmaps have 2^n + 1 pixels."""
+IMAGE_FORMATS = ("PNG", "BMP", "PPM", "JPEG", "TIFF")
+GRAY_MODES = ("L", "I", "I;16", "I;16B", "F")
+"""Pillow's single-channel modes, whose values are used as heights without conversion."""
+
+
+class MeshCache:
+    """Cache of parsed mesh files by content; the least recently used file is dropped first.
+
+    The cache is in memory only, because a run must not write outside its output folder. The warm process fills the
+    cache, and its forks inherit it. The returned arrays are shared and must not be changed.
+    """
+
+    def __init__(self, max_bytes: int = MAX_CACHE_BYTES) -> None:
+        self._max_bytes = max_bytes
+        self._parts: OrderedDict[str, tuple[MeshPart, ...]] = OrderedDict()
+
+    def read(self, data: bytes, suffix: str) -> tuple[MeshPart, ...]:
+        """Return the parts in the content of a file with this suffix; raises UnusableMesh."""
+        key = hashlib.sha256(suffix.encode() + b"\0" + data).hexdigest()
+        if key not in self._parts:
+            self._parts[key] = read_parts(data, suffix)
+            while len(self._parts) > 1 and sum(map(_size_in_bytes, self._parts.values())) > self._max_bytes:
+                self._parts.popitem(last=False)
+        self._parts.move_to_end(key)
+        return self._parts[key]
+
+
+def _size_in_bytes(parts: tuple[MeshPart, ...]) -> int:
+    return sum(part.vertices.nbytes + part.faces.nbytes for part in parts)
+
+
+MESH_CACHE = MeshCache()
+"""The cache of this process."""
 
 
 @dataclass(frozen=True)
-class _Wish:
-    """What a `<mesh>` asks for; equal wishes share one mesh."""
+class MeshRequest:
+    """The file, scale and submesh that a `<mesh>` refers to; equal requests share one mesh."""
 
     path: Path
-    scale: tuple[float, ...]
-    submesh: str
-    centered: bool
+    scale: tuple[float, ...] = (1.0, 1.0, 1.0)
+    submesh: str = ""
+    is_centered: bool = False
 
 
-class MeshShelf:
-    """Reads each mesh file once and hands out meshes; equal ones are the same object."""
+class MeshReader:
+    """Reads the meshes of one world; equal meshes are the same object."""
 
-    def __init__(self, library: Library, report: Report) -> None:
-        self.library, self.report = library, report
-        self._parts: dict[Path, tuple[Part, ...]] = {}
-        self._meshes: dict[_Wish, Mesh] = {}
+    def __init__(self, files: WorldFiles, report: ImportReport) -> None:
+        self._files, self._report = files, report
+        self._meshes: dict[MeshRequest, Mesh] = {}
 
     def read(self, element: Element) -> Mesh:
-        """The mesh a `<mesh>` element asks for; raises Unusable."""
+        """Return the mesh that a `<mesh>` element refers to; raises UnusableElement."""
         uri = element.child("uri")
         if uri is None:
             raise element.unusable("<uri> is missing")
-        wish = self._wish(element, self.library.locate(uri))
-        if wish not in self._meshes:
-            parts = self._chosen(self._open(wish.path, uri), wish, element)
-            mesh = _joined(parts, wish)
-            if np.abs(mesh.vertices).max() > values.FARTHEST:
-                raise element.unusable(f"the mesh reaches farther than {values.FARTHEST:g} m")
-            self._meshes[wish] = mesh
+        request = _mesh_request(element, self._files.locate(uri))
+        if request not in self._meshes:
+            parts = _select_submesh(self._read_file(request.path, uri), request, element)
+            if _reach(parts, request) > MAX_COORDINATE_M:
+                raise element.unusable(f"the mesh reaches farther than {MAX_COORDINATE_M:g} m")
+            self._meshes[request] = _joined(parts, request)
         if element.attributes.get("optimization") or element.child("convex_decomposition"):
-            self.report.note(element.place, "convex hulls are not made, the mesh is used as it is")
-        return self._meshes[wish]
+            self._report.note(element.place, "convex hulls are not made, the mesh is used as it is")
+        return self._meshes[request]
 
-    def _wish(self, element: Element, path: Path) -> _Wish:
-        scale, submesh = element.child("scale"), element.child("submesh")
-        factors = values.numbers(scale, 3) if scale else (1.0, 1.0, 1.0)
-        if scale and 0.0 in factors:
-            raise scale.unusable("a scale of zero")
-        if submesh is None:
-            return _Wish(path, factors, "", centered=False)
-        name = submesh.child("name")
-        if name is None or not name.text:
-            raise submesh.unusable("<name> is missing")
-        return _Wish(path, factors, name.text, values.truth(submesh.child("center")))
-
-    def _open(self, path: Path, uri: Element) -> tuple[Part, ...]:
-        if path not in self._parts:
-            data = self.library.read(path, uri, MESH_BYTES)
-            try:
-                self._parts[path] = READ.read(data, path.suffix.lower(), self.library.shown(path))
-            except UnusableMesh as error:
-                raise uri.unusable(f"{self.library.shown(path)}: {error}") from error
-        return self._parts[path]
-
-    @staticmethod
-    def _chosen(parts: tuple[Part, ...], wish: _Wish, element: Element) -> tuple[Part, ...]:
-        chosen = tuple(part for part in parts if not wish.submesh or wish.submesh in part.names)
-        if not chosen:
-            known = sorted({part.names[0] for part in parts if part.names})
-            hint = "it has " + ", ".join(known[:10]) if known else "it has no named parts"
-            raise element.unusable(f"no submesh {wish.submesh[:80]!r} in {wish.path.name}", hint)
-        return chosen
+    def _read_file(self, path: Path, uri: Element) -> tuple[MeshPart, ...]:
+        data = self._files.read(path, uri, MAX_MESH_BYTES)
+        try:
+            return MESH_CACHE.read(data, path.suffix.lower())
+        except UnusableMesh as error:
+            raise uri.unusable(f"{self._files.shown(path)}: {error}") from error
 
 
 def read_mesh(path: Path) -> Mesh:
-    """All triangles of a DAE, STL or OBJ file in meters, for a caller that knows that this file may be read.
+    """Return all triangles of a DAE, STL or OBJ file in meters, without checking whether the folder is allowed.
 
-    Raises InvalidInput for the file as a whole: not a regular file, too large, broken, no triangles.
+    Raises InvalidInput if the file is not a regular file, too large, broken, or without triangles.
     """
-    real = path.resolve()
+    real_path = path.resolve()
     try:
-        data = Library.of([real.parent]).open(real, MESH_BYTES)[1]
-        parts = READ.read(data, path.suffix.lower(), path.name)
-    except (Trouble, UnusableMesh) as error:
+        data = WorldFiles.of([real_path.parent]).open(real_path, MAX_MESH_BYTES)[1]
+        parts = MESH_CACHE.read(data, path.suffix.lower())
+    except (UnusableFile, UnusableMesh) as error:
         raise InvalidInput([Problem(str(path), 0, 0, CODE, str(error))]) from error
-    return _joined(parts, _Wish(path, (1.0, 1.0, 1.0), "", centered=False))
+    return _joined(parts, MeshRequest(path))
 
 
-def _joined(parts: tuple[Part, ...], wish: _Wish) -> Mesh:
+def _mesh_request(element: Element, path: Path) -> MeshRequest:
+    scale_element, submesh = element.child("scale"), element.child("submesh")
+    scale = read_numbers(scale_element, 3) if scale_element else (1.0, 1.0, 1.0)
+    if scale_element and 0.0 in scale:
+        raise scale_element.unusable("a scale of zero")
+    if submesh is None:
+        return MeshRequest(path, scale)
+    name = submesh.child("name")
+    if name is None or not name.text:
+        raise submesh.unusable("<name> is missing")
+    return MeshRequest(path, scale, name.text, read_bool(submesh.child("center")))
+
+
+def _select_submesh(parts: tuple[MeshPart, ...], request: MeshRequest, element: Element) -> tuple[MeshPart, ...]:
+    selected = tuple(part for part in parts if not request.submesh or request.submesh in part.names)
+    if not selected:
+        known = sorted({part.names[0] for part in parts if part.names})
+        hint = "it has " + ", ".join(known[:10]) if known else "it has no named parts"
+        raise element.unusable(f"no submesh {request.submesh[:80]!r} in {request.path.name}", hint)
+    return selected
+
+
+def _reach(parts: tuple[MeshPart, ...], request: MeshRequest) -> float:
+    """Return the largest absolute coordinate of the requested mesh.
+
+    Computed in Python floats: huge coordinates and scales overflow to infinity without a warning of NumPy.
+    """
+    reach = 0.0
+    for axis, factor in enumerate(request.scale):
+        low = min(float(part.vertices[:, axis].min()) for part in parts)
+        high = max(float(part.vertices[:, axis].max()) for part in parts)
+        center = (low + high) / 2 if request.is_centered else 0.0
+        reach = max(reach, abs((low - center) * factor), abs((high - center) * factor))
+    return reach
+
+
+def _joined(parts: tuple[MeshPart, ...], request: MeshRequest) -> Mesh:
     vertices = np.vstack([part.vertices for part in parts])
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     faces = np.vstack([part.faces + start for part, start in zip(parts, starts, strict=True)]).astype(np.int32)
-    if wish.centered:
+    if request.is_centered:
         vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    vertices = vertices * wish.scale
-    if np.prod(wish.scale) < 0:  # a mirrored triangle runs clockwise
+    vertices = vertices * request.scale
+    if sum(factor < 0 for factor in request.scale) % 2:  # a mirrored triangle runs clockwise
         faces = faces[:, ::-1]
     mesh = Mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
     mesh.vertices.flags.writeable = mesh.faces.flags.writeable = False
     return mesh
+
+
+def read_heightmap(element: Element, files: WorldFiles) -> Solid:
+    """Return the mesh of a `<heightmap>`, centered on `<pos>`; raises UnusableElement.
+
+    As in Gazebo (gz-common, ImageHeightmap.cc), the brightest pixel is as high as the z of `<size>`, and black is 0.
+    """
+    uri = element.child("uri")
+    if uri is None:
+        raise element.unusable("<uri> is missing")
+    x, y, z = read_sizes(element, "size", 3, default=(1.0, 1.0, 1.0))
+    pos = element.child("pos")
+    origin = read_numbers(pos, 3) if pos else (0.0, 0.0, 0.0)
+    return Solid(terrain_mesh(_read_relative_heights(uri, files) * z, x, y), Pose3(*origin))
+
+
+def _read_relative_heights(uri: Element, files: WorldFiles) -> Array:
+    """Return heights (rows, columns) in 0 … 1 from an image; the first row is the top of the image."""
+    from PIL import Image
+
+    path = files.locate(uri)
+    data = files.read(path, uri, MAX_MESH_BYTES)
+    try:
+        # Too many pixels are refused below, so Pillow's warning about them is not needed.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(io.BytesIO(data), formats=IMAGE_FORMATS)
+        with image:
+            if max(image.size) > MAX_HEIGHTMAP_PIXELS or min(image.size) < 2:
+                size = f"{image.size[0]} x {image.size[1]} pixels"
+                raise uri.unusable(f"{files.shown(path)}: {size}; 2 to {MAX_HEIGHTMAP_PIXELS} an edge are read")
+            gray = image if image.mode in GRAY_MODES else image.convert("L")
+            pixels = np.asarray(gray, dtype=np.float64)
+    except Image.DecompressionBombError as error:
+        raise uri.unusable(f"{files.shown(path)}: image too large") from error
+    except (OSError, ValueError, SyntaxError) as error:
+        raise uri.unusable(f"{files.shown(path)}: not a readable image (PNG, BMP, PGM, JPEG or TIFF)") from error
+    if not np.isfinite(pixels).all() or pixels.min() < 0:
+        raise uri.unusable(f"{files.shown(path)}: a height is negative or not a number", "save it as 16-bit gray")
+    brightest = float(pixels.max())
+    return pixels / brightest if brightest > 0 else pixels
+
+
+def terrain_mesh(heights: Array, width: float, depth: float) -> Mesh:
+    """Return two triangles per cell between the samples `heights` (rows, columns), centered on x and y.
+
+    The first row is at +y; all lengths are in meters.
+    """
+    rows, columns = heights.shape
+    x, y = np.meshgrid(np.linspace(-width / 2, width / 2, columns), np.linspace(depth / 2, -depth / 2, rows))
+    vertices = np.column_stack([x.ravel(), y.ravel(), heights.ravel()])
+    index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    nw, ne, sw, se = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
+    faces = np.concatenate([np.stack([nw, sw, se], axis=-1), np.stack([nw, se, ne], axis=-1)], axis=2)
+    return Mesh(vertices, faces.reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""What an importer could not use, told with file, line and element."""
+"""Problems and notes that the SDF importer collects, each with its file, line and element."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from simscen.core.errors import InvalidInput, Problem
 
 CODE = "SC310"
-"""The stable code of every problem of this importer; the message tells them apart."""
+"""Error code of all problems of the importer."""
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where something stands: the file as shown to users, line and column from 1, and the path of the element."""
+class SourcePlace:
+    """Position in a file: file name for messages, line and column from 1, path of the element, and text of the line."""
 
     file: str
     line: int = 0
@@ -21,101 +21,100 @@ class Place:
     source: str = ""
 
 
-class Unusable(Exception):
-    """A piece of a file that cannot be used and whose loss changes the geometry."""
+class UnusableElement(Exception):
+    """A part of a file that cannot be used and without which the geometry changes."""
 
-    harmless = False
-    """Whether nobody will miss it."""
+    is_harmless = False
+    """If True, the part is left out with a note, as leaving it out cannot affect a robot."""
 
-    def __init__(self, place: Place, message: str, hint: str = "") -> None:
+    def __init__(self, place: SourcePlace, message: str, hint: str = "") -> None:
         self.place, self.message, self.hint = place, message, hint
         super().__init__(f"{place.file}:{place.line}: {message}")
 
 
-class OutOfReach(Unusable):
-    """Something so far away that no robot gets there."""
+class OutOfReach(UnusableElement):
+    """Something so far away that no robot can reach it."""
 
-    harmless = True
+    is_harmless = True
 
 
-class Missing(Unusable):
-    """A file or model that is nowhere in the allowed folders; `what` is its uri."""
+class MissingAsset(UnusableElement):
+    """A file or model that does not exist in the allowed folders."""
 
-    def __init__(self, place: Place, message: str, hint: str, what: str) -> None:
+    def __init__(self, place: SourcePlace, message: str, hint: str, uri: str) -> None:
         super().__init__(place, message, hint)
-        self.what = what
+        self.uri = uri
 
 
-class Report:
-    """Collects what is wrong in the order in which it is found.
+class ImportReport:
+    """Collects problems and notes in the order in which they are found; repeated ones are kept once.
 
-    What changes the geometry is a problem, or merely a note when `lenient`; what is harmless is a note. The same
-    sentence is kept once, however often its file is included.
+    An unusable element is a problem, or a note if `lenient`.
     """
 
     def __init__(self, *, lenient: bool = False) -> None:
-        self.lenient, self.skipped = lenient, 0
+        self.lenient, self.skipped_count = lenient, 0
         self._problems: dict[Problem, None] = {}
         self._notes: dict[str, None] = {}
-        self._missing: dict[str, list[Missing]] = {}
+        self._missing: dict[str, list[MissingAsset]] = {}
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """`file: element/path: sentence`, one for each harmless thing."""
+        """All notes as `file: element/path: sentence`."""
         return tuple(self._notes)
 
-    def note(self, place: Place, message: str) -> None:
-        """Tell something that does not change the geometry."""
+    def note(self, place: SourcePlace, message: str) -> None:
+        """Add a note about something that is not an error."""
         self._notes[": ".join(part for part in (place.file, place.element, message) if part)] = None
 
-    def fatal(self, error: Unusable) -> InvalidInput:
-        """The error to raise when nothing can be read at all, lenient or not."""
-        self.lenient = False
-        self.unusable(error)
-        return InvalidInput(self._all())
-
-    def unusable(self, error: Unusable) -> None:
-        """Tell something that does."""
-        if error.harmless:
+    def add_error(self, error: UnusableElement) -> None:
+        """Add an unusable element, as a problem or as a note."""
+        if error.is_harmless:
             self.note(error.place, f"left out: {error.message}")
         elif self.lenient:
-            self.skipped += 1
+            self.skipped_count += 1
             self.note(error.place, f"skipped: {error.message}")
-        elif isinstance(error, Missing):
-            self._missing.setdefault(error.what, []).append(error)
+        elif isinstance(error, MissingAsset):
+            self._missing.setdefault(error.uri, []).append(error)
         else:
             self._problems[_problem(error)] = None
 
     @contextmanager
-    def skipping(self) -> Iterator[None]:
-        """Go on after this block when something in it is unusable, so that one look finds all mistakes."""
+    def skip_unusable(self) -> Iterator[None]:
+        """Add an UnusableElement raised in the block and continue after it, so that one run finds all mistakes."""
         try:
             yield
-        except Unusable as error:
-            self.unusable(error)
+        except UnusableElement as error:
+            self.add_error(error)
 
     @property
-    def failed(self) -> bool:
-        """Whether anything changes the geometry and may not be skipped."""
+    def has_problems(self) -> bool:
+        """True if the world cannot be loaded."""
         return bool(self._problems or self._missing)
 
     def raise_problems(self) -> None:
-        """Raise InvalidInput with everything that was found, if anything was."""
-        if self.failed:
-            raise InvalidInput(self._all())
+        """Raise InvalidInput with all problems, if there are any."""
+        if self.has_problems:
+            raise InvalidInput(self._all_problems())
 
-    def _all(self) -> list[Problem]:
-        return [*self._problems, *(_missing(errors) for errors in self._missing.values())]
+    def fatal_error(self, error: UnusableElement) -> InvalidInput:
+        """Return the exception for an error that ends the import, even a lenient one."""
+        self.lenient = False
+        self.add_error(error)
+        return InvalidInput(self._all_problems())
+
+    def _all_problems(self) -> list[Problem]:
+        return [*self._problems, *(_missing_asset_problem(errors) for errors in self._missing.values())]
 
 
-def _problem(error: Unusable, more: str = "") -> Problem:
+def _problem(error: UnusableElement, suffix: str = "") -> Problem:
     place = error.place
-    message = f"{place.element}: {error.message}{more}" if place.element else f"{error.message}{more}"
+    message = f"{place.element}: {error.message}{suffix}" if place.element else f"{error.message}{suffix}"
     return Problem(place.file, place.line, place.col, CODE, message, hint=error.hint, source=place.source)
 
 
-def _missing(errors: list[Missing]) -> Problem:
-    """A missing asset, told once however often it is asked for."""
-    places = dict.fromkeys(error.place for error in errors)
-    more = "" if len(places) == 1 else f" (and at {len(places) - 1} more place{'s' if len(places) > 2 else ''})"
-    return _problem(errors[0], more)
+def _missing_asset_problem(errors: list[MissingAsset]) -> Problem:
+    """Return one problem for a missing asset, with the number of other places that refer to the asset."""
+    count = len({error.place for error in errors}) - 1
+    suffix = f" (and at {count} more place{'s' if count > 1 else ''})" if count else ""
+    return _problem(errors[0], suffix)

@@ -9,8 +9,7 @@ from typing import Any, ClassVar
 from simscen.actions.base import Action
 from simscen.core.records.verdict import Finding, Status
 from simscen.core.stage import Effect
-from simscen.criteria.base import Criterion
-from simscen.criteria.plugin_metric import Measure
+from simscen.criteria.base import Criterion, Measure
 from simscen.faults.base import Disturbance, Fault
 from simscen.spec.base import Spec
 from simscen.triggers.base import Condition

@@ -5,7 +5,7 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from simscen.actions.registry import AnyAction
+from simscen.actions.base import AnyAction
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import MotionPath

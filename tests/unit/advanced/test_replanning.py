@@ -11,7 +11,7 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.core.records.events import Event
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as PlannerSpec
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
 from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot
@@ -53,7 +53,7 @@ class Bench:
     def __init__(self, **options: object) -> None:
         self.script = Scripted()
         grid = WORLD.grid((-0.5, -0.5, 8.5, 6.5))
-        self.costmap = Costmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE))
+        self.costmap = LayeredCostmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE))
         self.journal: list[Event] = []
         self.now = 0.0
         self.keeper = AdvancedPlanManager(

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.advanced.recovery.retrace import Retrace
-from simscen.advanced.recovery.trail import Trail
+from simscen.advanced.retrace import Retrace, Trail
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
@@ -16,10 +15,10 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.model import recovery as model
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.guards import CollisionMonitor as MonitorSpec
-from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import BackUp, Spin
 from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
+from simscen.stack.path_geometry import poses_along
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
@@ -30,7 +29,7 @@ POSTS = ((0.29, -0.03, 0.05), (-0.4, 0.17, 0.05))
 
 
 def view_of(robot: RobotModel, world: Flatland) -> CostmapView:
-    return Costmap(CostmapSpec(), Surroundings(robot, world.grid((-3.0, -3.0, 3.0, 3.0)), RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-3.0, -3.0, 3.0, 3.0)), RATE)).view
 
 
 def driven(*legs: tuple[Twist, float]) -> list[Pose2]:

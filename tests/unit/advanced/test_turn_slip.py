@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from simscen.advanced.localizers.spec import SlipEkf
-from simscen.advanced.turn_slip import MAX_CURVATURE_PER_M, TurnSlipObserver
+from simscen.advanced.stack import MAX_CURVATURE_PER_M, TurnSlipObserver
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Goal
@@ -52,7 +52,7 @@ def slipping(**smoothed: bool) -> Drive:
 
 def test_the_local_costmap_is_where_wheels_and_gyroscope_agree_and_not_where_the_wheels_turned_to() -> None:
     d = slipping()
-    view = d.stack.stack.inner._costmaps.near.view
+    view = d.stack.stack.inner._costmaps.local_costmap.view
     cells = np.argwhere(view.costs == 254)
     seen = (cells[:, ::-1] + 0.5) * view.resolution + view.origin
     assert len(seen) > 20

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.assets.folders import Absent, Folders, Trouble
+from simscen.assets.folders import AllowedFolders, NoSuchFile, UnusableFile
 
 
 def put(path: Path) -> Path:
@@ -14,15 +14,17 @@ def put(path: Path) -> Path:
 
 
 @pytest.fixture
-def folders(tmp_path: Path) -> Folders:
+def folders(tmp_path: Path) -> AllowedFolders:
     """A root called `root`, and a folder called `models` that the command line allows."""
     for name in ("root", "models"):
         (tmp_path / name).mkdir()
-    return Folders.of([tmp_path / "root", tmp_path / "models"])
+    return AllowedFolders.of([tmp_path / "root", tmp_path / "models"])
 
 
 @pytest.mark.parametrize("scheme", ["package://", "model://"])
-def test_a_package_is_one_of_the_command_line_else_one_around_else_one_below(folders: Folders, scheme: str) -> None:
+def test_a_package_is_one_of_the_command_line_else_one_around_else_one_below(
+    folders: AllowedFolders, scheme: str
+) -> None:
     root, models = folders.roots
     beside = root / "shop" / "worlds"
     found = []
@@ -32,7 +34,7 @@ def test_a_package_is_one_of_the_command_line_else_one_around_else_one_below(fol
     assert found == [root / "vendor" / "ros", root / "shop", models]
 
 
-def test_a_package_is_found_by_the_name_in_its_package_xml(folders: Folders) -> None:
+def test_a_package_is_found_by_the_name_in_its_package_xml(folders: AllowedFolders) -> None:
     root, _ = folders.roots
     mesh = put(root / "src" / "cart_repository" / "base.stl")
     manifest = mesh.parent / "package.xml"
@@ -40,31 +42,33 @@ def test_a_package_is_found_by_the_name_in_its_package_xml(folders: Folders) -> 
     assert folders.find("package://cart/base.stl", root / "worlds") == mesh
     assert folders.find("package://cart/base.stl", mesh.parent / "urdf") == mesh
     assert folders.package("cart", root) == mesh.parent
-    with pytest.raises(Absent):
+    with pytest.raises(NoSuchFile):
         folders.package("other", root)
 
 
-def test_a_package_xml_behind_a_link_is_not_read(folders: Folders, tmp_path: Path) -> None:
+def test_a_package_xml_behind_a_link_is_not_read(folders: AllowedFolders, tmp_path: Path) -> None:
     outside = tmp_path / "outside"
     outside.mkdir()
     (outside / "package.xml").write_text("<package><name>cart</name></package>")
     (folders.roots[0] / "linked").symlink_to(outside)
-    with pytest.raises(Absent):
+    with pytest.raises(NoSuchFile):
         folders.package("cart", folders.roots[0])
 
 
-def test_a_package_that_is_given_is_not_looked_for(folders: Folders, tmp_path: Path) -> None:
+def test_a_package_that_is_given_is_not_looked_for(folders: AllowedFolders, tmp_path: Path) -> None:
     root, models = folders.roots
     put(models / "cart" / "base.stl")
     own = put(root / "vendor" / "base.stl")
-    given = Folders(folders.roots, {"cart": root / "vendor"})
+    given = AllowedFolders(folders.roots, {"cart": root / "vendor"})
     assert given.find("package://cart/base.stl", root) == own
-    with pytest.raises(Absent, match="no such file"):
+    with pytest.raises(NoSuchFile, match="no such file"):
         given.find("package://cart/wheel.stl", root)
 
 
 @pytest.mark.parametrize("written", ["base.stl", "file://base.stl", "./base.stl"])
-def test_a_path_means_what_is_beside_the_file_else_what_the_command_line_allows(folders: Folders, written: str) -> None:
+def test_a_path_means_what_is_beside_the_file_else_what_the_command_line_allows(
+    folders: AllowedFolders, written: str
+) -> None:
     root, models = folders.roots
     there = put(models / "base.stl")
     assert folders.find(written, root) == there
@@ -91,30 +95,30 @@ def test_a_path_means_what_is_beside_the_file_else_what_the_command_line_allows(
     ],
 )
 def test_what_is_not_found_says_why_and_nothing_of_what_is_outside(
-    folders: Folders, tmp_path: Path, written: str, why: str
+    folders: AllowedFolders, tmp_path: Path, written: str, why: str
 ) -> None:
     root, _ = folders.roots
     put(tmp_path / "secret.stl")
     (root / "link.stl").symlink_to(tmp_path / "secret.stl")
     (root / "round.stl").symlink_to(root / "round.stl")
-    with pytest.raises(Trouble) as caught:
+    with pytest.raises(UnusableFile) as caught:
         folders.find(written, root)
     assert str(caught.value) == why
 
 
-def test_an_absolute_path_is_read_inside_where_it_may_be_absolute(folders: Folders) -> None:
+def test_an_absolute_path_is_read_inside_where_it_may_be_absolute(folders: AllowedFolders) -> None:
     there = put(folders.roots[0] / "base.stl")
     assert folders.find(str(there), folders.roots[1], absolute=True) == there
-    with pytest.raises(Trouble, match="outside"):
+    with pytest.raises(UnusableFile, match="outside"):
         folders.find("/etc/passwd", folders.roots[1], absolute=True)
 
 
-def test_a_missing_file_is_told_with_what_lies_where_it_was_looked_for(folders: Folders) -> None:
+def test_a_missing_file_is_told_with_what_lies_where_it_was_looked_for(folders: AllowedFolders) -> None:
     root, models = folders.roots
     put(models / "cart" / "Base.stl")
-    with pytest.raises(Absent) as caught:
+    with pytest.raises(NoSuchFile) as caught:
         folders.find("package://cart/base.stl", root)
     assert caught.value.hint == "did you mean `cart/Base.stl`?"
-    with pytest.raises(Absent) as caught:
+    with pytest.raises(NoSuchFile) as caught:
         folders.find("hull.stl", root)
     assert caught.value.hint == f"looked in ., {models}; allow its folder with --world-path"

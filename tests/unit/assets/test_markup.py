@@ -5,8 +5,8 @@ import pytest
 from simscen.assets import markup
 from simscen.core.errors import InvalidInput
 from simscen.sim.urdf.xml_source import parse_xml as parse_urdf
-from simscen.worlds.sdf.markup import parse as parse_sdf
-from simscen.worlds.sdf.report import Unusable
+from simscen.worlds.sdf.elements import parse as parse_sdf
+from simscen.worlds.sdf.report import UnusableElement
 
 BOMB = b'<?xml version="1.0"?>\n<!DOCTYPE a [<!ENTITY b "ha"><!ENTITY c "&b;&b;&b;">]>\n<a>&c;</a>'
 
@@ -28,7 +28,7 @@ def test_worlds_and_robots_refuse_alike(
 ) -> None:
     if "elements" in message:
         monkeypatch.setattr(markup, "MOST_ELEMENTS", 10)
-    with pytest.raises(Unusable) as world:
+    with pytest.raises(UnusableElement) as world:
         parse_sdf(data, "x.sdf", "")
     with pytest.raises(InvalidInput) as robot:
         parse_urdf(data, "x.urdf")
@@ -59,5 +59,5 @@ def test_hyphens_outside_comments_stay() -> None:
 
 
 def test_unclosed_comments_are_refused_in_linear_time() -> None:
-    with pytest.raises(Unusable, match="not well-formed"):
+    with pytest.raises(UnusableElement, match="not well-formed"):
         parse_sdf(b"<a>" + b"<!--" * 1_000_000, "x.sdf", "")

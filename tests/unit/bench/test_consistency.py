@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from filterpy.stats import NEES
 
-from simscen.bench.localization.trial import anees, bounds, bounds_over, nees, within_bounds
+from simscen.bench.localization.campaign import anees, anees_bounds, grouped_anees_bounds, nees, share_in_ellipsoid
 from simscen.core.geometry import Array
 
 
@@ -22,14 +22,14 @@ def test_a_belief_without_doubt_is_overconfident() -> None:
     ("runs", "low", "high"), [(20, 2.02, 4.17), (50, 2.36, 3.72), (100, 2.54, 3.50), (1000, 2.85, 3.15)]
 )
 def test_the_bounds_are_those_of_the_literature(runs: int, low: float, high: float) -> None:
-    assert bounds(runs) == pytest.approx((low, high), abs=0.01)
+    assert anees_bounds(runs) == pytest.approx((low, high), abs=0.01)
 
 
 def test_a_consistent_estimator_lies_within_the_bounds() -> None:
     rng = np.random.default_rng(7)
     covariance = np.diag([0.01, 0.04, 0.001])
     values = [nees(rng.multivariate_normal(np.zeros(3), covariance), covariance) for _ in range(1000)]
-    low, high = bounds(1000)
+    low, high = anees_bounds(1000)
     assert low < anees(values) < high
 
 
@@ -61,7 +61,7 @@ def test_bounds_over_buildings_cover_a_consistent_filter_and_no_other(shared: fl
 
     def kept(times: float) -> float:
         campaigns = (values * times).mean(axis=2)
-        limits = [bounds_over(campaign.tolist()) for campaign in campaigns]
+        limits = [grouped_anees_bounds(campaign.tolist()) for campaign in campaigns]
         return float(np.mean([low < one.mean() < high for one, (low, high) in zip(campaigns, limits, strict=True)]))
 
     assert 0.92 < kept(1.0) < 0.98
@@ -71,20 +71,20 @@ def test_bounds_over_buildings_cover_a_consistent_filter_and_no_other(shared: fl
 
 def test_bounds_of_independent_errors_are_too_narrow_for_logs_that_hang_together() -> None:
     values = filtered(np.random.default_rng(3), 400, 8, 0.3)
-    low, high = bounds(8 * 25)
+    low, high = anees_bounds(8 * 25)
     means = values.mean(axis=(1, 2))
     assert np.mean((low < means) & (means < high)) < 0.85
 
 
 def test_of_two_buildings_nobody_knows_how_much_buildings_differ() -> None:
-    assert bounds_over([2.0, 4.0]) is None
-    assert bounds_over([2.0, 4.0, float("inf")]) is None
+    assert grouped_anees_bounds([2.0, 4.0]) is None
+    assert grouped_anees_bounds([2.0, 4.0, float("inf")]) is None
 
 
 def test_bounds_over_buildings_are_those_of_students_t_for_the_logarithm() -> None:
-    low, high = bounds_over([2.0, 3.0, 4.0]) or (0.0, 0.0)
+    low, high = grouped_anees_bounds([2.0, 3.0, 4.0]) or (0.0, 0.0)
     assert np.log((low / 3.0, high / 3.0)) == pytest.approx((-0.8281, 0.8281), abs=1e-3)  # 4.3027 / (3 √3)
 
 
 def test_what_lies_in_the_ellipsoid_is_counted() -> None:
-    assert within_bounds([7.8, 7.83, 1.0, 30.0]) == 0.5
+    assert share_in_ellipsoid([7.8, 7.83, 1.0, 30.0]) == 0.5

@@ -1,4 +1,4 @@
-"""Generated logs of indoor bases are what they say, and AMCL's defaults track them."""
+"""Generated logs are reproducible and realistic, and AMCL localizes the robot in them."""
 
 from functools import cache
 from itertools import pairwise
@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from simscen.advanced.localizers.spec import ScanMatchingAmcl
-from simscen.bench.localization.buildings import building, distance_to, wall
-from simscen.bench.localization.campaign import PARAMETERS, Share, summed_up
-from simscen.bench.localization.generated_logs import Log, log
-from simscen.bench.localization.recorded_drive import errors_of, localize
-from simscen.bench.localization.trial import MOMENTS, ROBOT, Trial
+from simscen.bench.localization.buildings import box_distances, generate_building, wall_boxes
+from simscen.bench.localization.campaign import MOMENTS_S, PARAMETER_SETS, ROBOT, Share, Trial, summarize
+from simscen.bench.localization.generated_logs import Log, generate_log
+from simscen.bench.localization.recorded_drive import compare_with_reference, localize
 from simscen.core.environment.occupancy_grid import FREE, UNKNOWN
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.model.stack import StackSpec
@@ -21,16 +20,16 @@ from simscen.stack.protocols import Surroundings
 
 @cache
 def short(circumstance: str) -> Log:
-    return log(2001, 1, circumstance, seconds=15.0)
+    return generate_log(2001, 1, circumstance, seconds=15.0)
 
 
 def test_a_wall_has_its_openings() -> None:
-    assert wall((0, 1), (5, 1), 0.2, [(1, 2)]).tolist() == [[0, 0.9, 1, 1.1], [2, 0.9, 5, 1.1]]
-    assert wall((1, 0), (1, 2), 0.2).tolist() == [[0.9, 0, 1.1, 2]]
+    assert wall_boxes((0, 1), (5, 1), 0.2, [(1, 2)]).tolist() == [[0, 0.9, 1, 1.1], [2, 0.9, 5, 1.1]]
+    assert wall_boxes((1, 0), (1, 2), 0.2).tolist() == [[0.9, 0, 1.1, 2]]
 
 
 def test_a_rebuilt_floor_is_the_same_left_of_the_middle_and_another_right_of_it() -> None:
-    floor, again, rebuilt = building(2001), building(2001), building(2001, 1)
+    floor, again, rebuilt = generate_building(2001), generate_building(2001), generate_building(2001, 1)
     assert floor.size[0] > 40
     assert np.array_equal(floor.furniture, again.furniture)
     left = {tuple(row) for row in floor.furniture.tolist() if row[2] < floor.middle}
@@ -39,9 +38,12 @@ def test_a_rebuilt_floor_is_the_same_left_of_the_middle_and_another_right_of_it(
 
 
 def test_a_log_is_the_same_each_time_and_keeps_clear_of_walls_while_its_odometry_drifts() -> None:
-    made, again = short("tracked"), log(2001, 1, "tracked", seconds=15.0)
+    made, again = short("tracked"), generate_log(2001, 1, "tracked", seconds=15.0)
     assert np.array_equal(made.sensed.truth, again.sensed.truth)
-    assert min(distance_to(building(2001).walls, pose[:2]).min() for pose in made.sensed.truth[::20].tolist()) > 0.25
+    assert (
+        min(box_distances(generate_building(2001).walls, pose[:2]).min() for pose in made.sensed.truth[::20].tolist())
+        > 0.25
+    )
     scans = [one for one in made.sensed.readings if isinstance(one, Scan)]
     assert {len(one.ranges) for one in scans} == {361}
     odometry = [one.pose for one in made.sensed.readings if isinstance(one, Odometry)]
@@ -53,7 +55,7 @@ def test_a_log_is_the_same_each_time_and_keeps_clear_of_walls_while_its_odometry
 
 def test_of_half_a_map_nothing_is_known_right_of_the_middle() -> None:
     grid, whole = short("half").map, short("tracked").map
-    column = int((building(2001).middle - grid.origin.x) / grid.resolution)
+    column = int((generate_building(2001).middle - grid.origin.x) / grid.resolution)
     assert (grid.cells[:, column:] == UNKNOWN).all()
     assert np.array_equal(grid.cells[:, :column], whole.cells[:, :column])
     assert (whole.cells == FREE).mean() > 0.5
@@ -68,7 +70,7 @@ def test_a_robot_is_tracked_on_raw_odometry_and_found_on_a_floor_of_forty_meters
     made = short(circumstance)
     spec = StackSpec(localizer=ScanMatchingAmcl.model_validate({"parameters": parameters}))
     localized = localize(made.sensed, spec, Surroundings(ROBOT, made.map, TICK_RATE_HZ), made.estimate, 1)
-    errors = errors_of(localized, made.sensed, 1.0)
+    errors = compare_with_reference(localized, made.sensed, 1.0)
     assert errors is not None
     assert errors.distance[-40:].max() < 0.3
     assert circumstance == "unknown" or not errors.lost
@@ -76,17 +78,17 @@ def test_a_robot_is_tracked_on_raw_odometry_and_found_on_a_floor_of_forty_meters
 
 def test_a_row_counts_what_was_tracked_and_what_was_found_in_time() -> None:
     def one(number: int, circumstance: str, tracked: bool, found: float | None) -> Trial:
-        return Trial(number, 0, circumstance, tracked, 0.05 * number, 1.0, found, (3.0,) * len(MOMENTS), 1.0, 2.0)
+        return Trial(number, 0, circumstance, tracked, 0.05 * number, 1.0, found, (3.0,) * len(MOMENTS_S), 1.0, 2.0)
 
     trials = [one(n, c, n != 2, 30.0 * n) for n in (1, 2, 3) for c in ("tracked", "clean", "slipping", "unknown")]
-    row = summed_up("some", [*trials, one(1, "kidnapped", False, None), one(1, "outdated", True, 0.0)])
+    row = summarize("some", [*trials, one(1, "kidnapped", False, None), one(1, "outdated", True, 0.0)])
     assert row.shares["tracked"] == Share(2, 3, None)
     assert row.shares["unknown"].count == 2
     assert row.shares["kidnapped"] == Share(0, 1, None)
     assert row.median == pytest.approx(0.1)
     clean = row.sure["clean"]
-    assert clean.moments == [3.0] * len(MOMENTS)
+    assert clean.moments == [3.0] * len(MOMENTS_S)
     assert (clean.anees, clean.bounds, clean.inside) == (3.0, (3.0, 3.0), 1.0)
     assert row.sure["outdated"].bounds is None
     assert "half" not in row.sure
-    assert set(PARAMETERS) >= {"Nav2's", "default", "consistent"}
+    assert set(PARAMETER_SETS) >= {"amcl", "scan_matching_amcl", "scan_matching_amcl, consistent"}

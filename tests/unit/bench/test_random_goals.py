@@ -14,10 +14,10 @@ from simscen.bench.navigation.random_goals import FAULTS, MOVABLE, ROOM, degrade
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Body, Box, Solid
-from simscen.loading.files.worldfile import load_world_file
+from simscen.loading.builders import world_from_file
+from simscen.loading.files.single_files import load_world_file
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.loaders import world_from_file
-from simscen.worlds.build import build
+from simscen.worlds.built_world import build_world_and_map
 
 
 def two_rooms() -> BuiltWorld:
@@ -26,7 +26,7 @@ def two_rooms() -> BuiltWorld:
         Solid(Box((0.1, 6.0, 1.0)), Pose3(x, 3.0, 0.5), "wall") for x in (0.0, 5.0, 10.0)
     ]
     thing = Body("cart", (Solid(Box((0.4, 0.4, 0.4)), Pose3(), "cart"),), Pose3(2.0, 3.0, 0.2))
-    return build(World("rooms", tuple(solids), (thing,), bounds=(0.0, 0.0, 10.0, 6.0)), 0.2)
+    return build_world_and_map(World("rooms", tuple(solids), (thing,), bounds=(0.0, 0.0, 10.0, 6.0)), 0.2)
 
 
 def test_every_errand_can_be_driven_and_has_room_at_both_ends() -> None:
@@ -64,7 +64,7 @@ def test_a_building_is_a_map_with_one_large_free_part_that_loads(tmp_path: Path)
 
 def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
     file = write_building(3, tmp_path)
-    built = {file.name: build(world_from_file(load_world_file(file, tmp_path), tmp_path), 0.2)}
+    built = {file.name: build_world_and_map(world_from_file(load_world_file(file, tmp_path), tmp_path), 0.2)}
     plain = random_goals("random goals", tmp_path, built, (1, 2))
     weak, medium, strong = degraded(tmp_path / "degraded", built, 1, (tmp_path,))
     assert len(plain.drives) == 2

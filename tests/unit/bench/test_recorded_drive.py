@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.bench.localization.recorded_drive import Localized, errors_of
+from simscen.bench.localization.recorded_drive import Localized, compare_with_reference
 from simscen.record.localization_logs.read import LocalizationLog
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
 
@@ -16,7 +16,7 @@ def errors(reference_times, offset=0.2):
     known = np.asarray(reference_times, dtype=float)
     truth = np.column_stack([known, np.zeros(len(known)), np.zeros(len(known))])
     sensed = LocalizationLog((), np.round(known * TICK_RATE_HZ).astype(int), truth)
-    return errors_of(localized, sensed, 1.0)
+    return compare_with_reference(localized, sensed, 1.0)
 
 
 def test_a_dense_reference_is_compared_throughout():

@@ -1,7 +1,7 @@
 import json
 from dataclasses import replace
 
-from simscen.bench.localization.campaign import SURE, Share, Sureness
+from simscen.bench.localization.campaign import CONSISTENCY_CIRCUMSTANCES, Consistency, Share
 from simscen.bench.localization.campaign import Row as Numbers
 from simscen.bench.navigation.summary import Difference, DriveComparison, Row
 from simscen.cli.benchmarks.localization import SHARES
@@ -74,9 +74,9 @@ def test_json_contains_every_number() -> None:
 
 def test_localization_table_fits_a_narrow_terminal() -> None:
     shares = {name: Share(9, 10, (0.7, 1.0)) for name in SHARES}
-    sure = dict.fromkeys(SURE, Sureness(1.0, (2.1, 4.2), 0.951, (1.0,) * 5, (0.9, 6.34)))
-    row = Numbers("Nav2's, likelihood_field_prob", shares, 0.029, (0.021, 0.042), sure, 1.5, 189.0)
+    sure = dict.fromkeys(CONSISTENCY_CIRCUMSTANCES, Consistency(1.0, (2.1, 4.2), 0.951, (1.0,) * 5, (0.9, 6.34)))
+    row = Numbers("amcl, likelihood_field", shares, 0.029, (0.021, 0.042), sure, 1.5, 189.0)
     lines = localization([row], columns=80).splitlines()
     assert max(map(len, lines)) <= 80
     assert lines[:2] == [row.parameters, "  tracked 9 of 10 (0.70 … 1.00)  start unknown 9 of 10 (0.70 … 1.00)"]
-    assert localization([row]).splitlines()[1].startswith("Nav2's, likelihood_field_prob  9 of 10 (0.70 … 1.00)  ")
+    assert localization([row]).splitlines()[1].startswith("amcl, likelihood_field  9 of 10 (0.70 … 1.00)  ")

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from simscen.actions.registry import AnyAction
+from simscen.actions.base import AnyAction
 from simscen.cli.catalog.topics import Topic, fields_of, kind_of, topics
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.yaml.parser import parse_yaml
@@ -21,7 +21,7 @@ from simscen.model.stack_base import ControllerSpec, GoalTolerances
 from simscen.spec import registry
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Probability
-from simscen.triggers import registry as trigger_registry
+from simscen.triggers import base as trigger_registry
 
 TOPICS = topics()
 WORDS = [topic for topic in TOPICS if topic.group in ("trigger", "action", "fault", "criterion") and topic.model]

@@ -12,7 +12,7 @@ import pytest
 from simscen.bench.speed import run_speed
 from simscen.cli import installation
 from simscen.cli.commands import doctor
-from simscen.run.caching.disk_cache import DiskCache, cache_folder
+from simscen.run.disk_cache import DiskCache, cache_folder
 
 
 @pytest.fixture
@@ -96,8 +96,8 @@ def test_unsupported_packages_fail(monkeypatch) -> None:
 def test_unsupported_python_and_missing_packages_fail(monkeypatch) -> None:
     with pytest.raises(installation.CheckFailed, match="pip install no-such-package"):
         installation._version("no-such-package")
-    monkeypatch.setattr(sys, "version_info", (3, 12, 1))
-    with pytest.raises(installation.CheckFailed, match=r"needs Python 3\.10 or 3\.11"):
+    monkeypatch.setattr(sys, "version_info", (3, 14, 0))
+    with pytest.raises(installation.CheckFailed, match=r"needs Python 3\.10 to 3\.13"):
         installation.python()
 
 

@@ -8,7 +8,7 @@ import pytest
 from simscen.cli.process import caller_environment, config_file
 from simscen.cli.session.selection import Selection, load_all
 from simscen.core.errors import UsageError
-from simscen.run.reproducibility.digest import scenario_digest
+from simscen.run.reproducibility import scenario_digest
 
 SHORT = """\
 simscen: 1

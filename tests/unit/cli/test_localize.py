@@ -60,8 +60,8 @@ def test_log_without_reference_needs_a_start(simscen, tmp_path: Path) -> None:
     ("name", "text", "expected_text"),
     [
         ("bad.csv", "odom,0,1,2\n", "line 1: expected 3 numbers"),
-        ("bad.csv", "odometry,0,1,2,3\n", "no kind of row"),
-        ("bad.csv", "odom,0,1,2,3\n", "it holds no scans"),
+        ("bad.csv", "odometry,0,1,2,3\n", "unknown kind of row"),
+        ("bad.csv", "odom,0,1,2,3\n", "it has no scans"),
         ("bad.log", "FLASER 3 1.0 2.0\n", "line 1 is not a FLASER line"),
         ("bad.log", "ODOM 1 2 nan 0 0 0 1 host 1\n", "nan is not a number"),
         ("bad.mcap", "what", "not an MCAP file"),

@@ -232,14 +232,14 @@ def test_empty_scans_are_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     blind = rescanned((-SIDE, DEGREE, 181), lambda ranges: np.zeros(len(ranges)))
     write_mcap(tmp_path / "drive.mcap", blind)
-    assert "150 of 150 scans measured nothing" in localized(simscen, "drive.mcap")["err"]
+    assert "150 of 150 scans have no range" in localized(simscen, "drive.mcap")["err"]
 
 
 def test_lidar_without_mount_is_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_mcap(tmp_path / "drive.mcap", said(frame="velodyne"))
     found = localized(simscen, "drive.mcap")
-    assert "does not say where 'velodyne' is on 'base_link'" in found["err"]
+    assert "/tf_static does not connect 'velodyne' and 'base_link'" in found["err"]
     assert found["error"]["max"] < 0.2
 
 
@@ -247,7 +247,7 @@ def test_missing_stamps_are_replaced_by_log_times(simscen, tmp_path: Path) -> No
     write_map(tmp_path)
     write_mcap(tmp_path / "drive.mcap", said(stamp=lambda _: 0))
     found = localized(simscen, "drive.mcap")
-    assert "its stamps are all zero" in found["err"]
+    assert "all stamps are zero" in found["err"]
     assert found["error"]["max"] < 0.2
 
 
@@ -260,7 +260,7 @@ def test_reference_in_another_frame_is_reported(simscen, tmp_path: Path) -> None
         for one in said(every=3)
     ]
     write_mcap(tmp_path / "drive.mcap", changed)
-    assert "/gt is told in frame 'mocap'" in localized(simscen, "drive.mcap")["err"]
+    assert "/gt is in the frame 'mocap'" in localized(simscen, "drive.mcap")["err"]
 
 
 def test_invalid_poses_are_skipped_and_counted(simscen, tmp_path: Path) -> None:
@@ -272,8 +272,8 @@ def test_invalid_poses_are_skipped_and_counted(simscen, tmp_path: Path) -> None:
             inner.position.x = x
     write_mcap(tmp_path / "drive.mcap", broken)
     found = localized(simscen, "drive.mcap")
-    assert "/odom: 3 poses are not numbers" in found["err"]
-    assert "/gt: 3 poses are not numbers" in found["err"]
+    assert "/odom: 3 poses with invalid coordinates" in found["err"]
+    assert "/gt: 3 poses with invalid coordinates" in found["err"]
     assert found["error"]["max"] < 0.3
 
 
@@ -286,7 +286,7 @@ def test_scans_with_another_clock_are_rejected(simscen, tmp_path: Path) -> None:
     write_mcap(tmp_path / "drive.mcap", other)
     ended = simscen("localize", "drive.mcap", *GIVEN, "--start", "1,0.8,0")
     assert ended.code == 2
-    assert "no scan was taken while there was odometry" in ended.err
+    assert "no scan was measured while there was odometry" in ended.err
 
 
 def test_ignored_readings_are_reported(simscen, tmp_path: Path) -> None:
@@ -299,10 +299,13 @@ def test_ignored_readings_are_reported(simscen, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "expected_text"),
     [
-        (lambda one: replace(one, message=scan(one.time, [1.0], "laser", math.nan)), "its angles and ranges are"),
+        (
+            lambda one: replace(one, message=scan(one.time, [1.0], "laser", math.nan)),
+            "has invalid angles or range limits",
+        ),
         (lambda one: replace(one, message=replace(one.message, angle_increment=0.0)), "its angle_increment is 0"),
         (lambda one: replace(one, message=posed(one.time, (0, 0, 0))), "/scan is a geometry_msgs/msg/PoseStamped"),
-        (lambda one: replace(one, topic="/front/scan"), "it holds no scans"),
+        (lambda one: replace(one, topic="/front/scan"), "it has no scans"),
     ],
     ids=["angles that are not numbers", "angles that are all the same", "another type", "another topic"],
 )

@@ -101,14 +101,14 @@ def test_replay_needs_no_engine(out: Path, tmp_path: Path) -> None:
 
 
 def test_log_contains_both_costmaps_at_a_limited_rate(out: Path) -> None:
-    log = read_run(out / "runs" / "bad" / "seed-1" / "run.mcap", looks=True)
-    assert sorted(log.seen.costmaps) == ["/global_costmap/costmap", "/local_costmap/costmap"]
+    log = read_run(out / "runs" / "bad" / "seed-1" / "run.mcap", with_sensors=True)
+    assert sorted(log.sensors.costmaps) == ["/global_costmap/costmap", "/local_costmap/costmap"]
     for topic, period in (("/global_costmap/costmap", 480), ("/local_costmap/costmap", 240)):
-        messages = log.seen.costmaps[topic]
+        messages = log.sensors.costmaps[topic]
         assert (np.diff([tick for tick, _ in messages]) >= period).all()
-        frame, grid = log.seen.costmap(messages[-1][1])
+        frame, grid = log.sensors.costmap(messages[-1][1])
         assert frame == ("map" if topic.startswith("/global") else "odom")
         assert set(np.unique(grid.cells).tolist()) <= {-1, *range(101)}
-    _, wide = log.seen.costmap(log.seen.costmaps["/global_costmap/costmap"][-1][1])
-    assert log.about.map is not None and wide.shape == log.about.map.shape
-    assert (wide.cells[log.about.map.cells == 100] == 100).all() and 99 in wide.cells
+    _, wide = log.sensors.costmap(log.sensors.costmaps["/global_costmap/costmap"][-1][1])
+    assert log.header.map is not None and wide.shape == log.header.map.shape
+    assert (wide.cells[log.header.map.cells == 100] == 100).all() and 99 in wide.cells

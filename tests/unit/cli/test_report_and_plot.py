@@ -102,7 +102,7 @@ def test_full_disk_keeps_existing_reports(simscen, out: Path, monkeypatch: pytes
 
 
 def test_running_session_is_not_changed(simscen, out: Path) -> None:
-    journal = Journal(out, goes_on=True)
+    journal = Journal(out, resume=True)
     ended = simscen("report", "out")
     journal.close()
     assert ended.code == 2
@@ -112,7 +112,7 @@ def test_running_session_is_not_changed(simscen, out: Path) -> None:
 def test_folder_without_session_is_an_error(simscen, tmp_path: Path) -> None:
     ended = simscen("report", ".")
     assert ended.code == 2
-    assert "there is no events.jsonl in it" in ended.err
+    assert "the folder has no events.jsonl" in ended.err
 
 
 def test_run_is_drawn_from_its_log(simscen, out: Path, tmp_path: Path) -> None:

@@ -125,7 +125,7 @@ def test_log_contains_the_name_of_its_stack(simscen, project: Path) -> None:
     assert simscen("run", "a.scenario.yaml", *BOTH, "--out", "out").code == 0
     judged = json.loads(simscen("judge", "out", "--json").out)
     assert sorted(run["stack_name"] for run in judged["runs"]) == ["dwb", "ref"]
-    facts = read_log(project / "out/runs/a/seed-1-dwb/run.mcap").about.facts
+    facts = read_log(project / "out/runs/a/seed-1-dwb/run.mcap").header.facts
     assert facts["stack"] == "dwb=dwb.stack.yaml"
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from simscen.cli.session.selection import Selection, load_all
-from simscen.loading.resolved import resolved_text, spec_of_text
-from simscen.run.reproducibility.digest import scenario_digest
+from simscen.loading.scenario_text import resolved_text, spec_of_text
+from simscen.run.reproducibility import scenario_digest
 
 HEAD = """\
 simscen: 1

@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED
-from simscen.loading.files.worldfile import load_world_file
-from simscen.worlds.maps.ros_map import load_grid
+from simscen.loading.files.single_files import load_world_file
+from simscen.worlds.maps.ros_map import load_map
 
 ROOM = """\
 simscen: 1
@@ -75,7 +75,7 @@ def test_exported_map_equals_the_map_of_a_lidar(simscen, room: Path) -> None:
     assert (ended.code, ended.out) == (0, "maps/room.yaml: 162 x 122 cells of 0.05 m\n")
     loaded = load_world_file(room / "maps/room.yaml", room).map
     assert loaded is not None
-    grid, _ = load_grid(loaded.spec, loaded.image)
+    grid, _ = load_map(loaded.spec, loaded.image)
     points = np.array([[3.0, 2.0], [5.0, 1.0], [6.0, 2.0], [1.0, 1.0]])
     assert grid.values_at(points).tolist() == [OCCUPIED, FREE, OCCUPIED, FREE]
 

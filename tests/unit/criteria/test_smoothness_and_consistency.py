@@ -8,7 +8,7 @@ import pytest
 from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Status
 from simscen.core.statistics import nees_mean_bounds
-from simscen.criteria.localization_consistency import LocalizationConsistency
+from simscen.criteria.localization import LocalizationConsistency
 from simscen.criteria.smoothness import Smoothness
 from simscen.criteria.trace_signals.sparc_ldlj import sparc
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace

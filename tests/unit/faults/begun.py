@@ -9,8 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Odometry, Scan
-from simscen.faults.base import FaultSetting, Instance
-from simscen.faults.registry import AnyFault
+from simscen.faults.base import AnyFault, FaultSetting, Instance
 
 
 class Hand:

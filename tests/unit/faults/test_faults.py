@@ -6,8 +6,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Odometry, Scan
-from simscen.faults.base import FaultSetting
-from simscen.faults.registry import AnyFault
+from simscen.faults.base import AnyFault, FaultSetting
 
 
 def begun(fault: dict, separation=0.3, seed=1):

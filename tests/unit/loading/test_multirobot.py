@@ -3,8 +3,8 @@
 import pytest
 
 from simscen.core.errors import InvalidInput
+from simscen.loading.checks.scene_runner import check_in_world
 from simscen.loading.scenario import load_scenario, try_scenario
-from simscen.run.worldchecks.runner import check_in_world
 
 HEAD = """\
 simscen: 1

@@ -7,22 +7,22 @@ import numpy as np
 from simscen.core.environment.world_model import PedestrianAction, WalkingPedestrian
 from simscen.core.geometry import Pose2
 from simscen.pedestrians.crowd import Crowd
-from simscen.pedestrians.surroundings import ObservedRobot, Surroundings, Walls
+from simscen.pedestrians.surroundings import ObservedRobot, Surroundings, WallMap
 
 STEP = 0.05
 SQUARE = np.array([(0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)])
 
 
-def walls(*segments) -> Walls:
+def walls(*segments) -> WallMap:
     ends = np.array(segments, dtype=float).reshape(-1, 2, 2)
-    return Walls(ends, np.arange(len(ends)), np.ones(len(ends), dtype=bool))
+    return WallMap(ends, np.arange(len(ends)), np.ones(len(ends), dtype=bool))
 
 
-def corridor(width: float, length: float = 100.0) -> Walls:
+def corridor(width: float, length: float = 100.0) -> WallMap:
     return walls(*([[-length, y], [length, y]] for y in (-width / 2, width / 2)))
 
 
-def people(*walkers: WalkingPedestrian, around: Walls | None = None) -> Crowd:
+def people(*walkers: WalkingPedestrian, around: WallMap | None = None) -> Crowd:
     crowd = Crowd(around or walls())
     for walker in walkers:
         crowd.add(walker)

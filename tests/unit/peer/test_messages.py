@@ -13,8 +13,8 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Scan
 from simscen.peer import messages
 from simscen.peer.cdr import Reader
-from simscen.record.foreign.messages import path
 from simscen.record.messages import encode, encode_arrays
+from simscen.record.messages.decode import MessageReader, path
 
 STAMP = (12, 345_000_000)
 numbers = st.floats(-1e4, 1e4)
@@ -33,7 +33,9 @@ def test_a_path_is_what_the_engine_packs(points) -> None:
     ours, theirs = messages.path(STAMP, points), encode_arrays.PathPacker("map")(STAMP, table)
     assert len(ours) == len(theirs)
     assert ours[:24] == theirs[:24]
-    assert np.allclose(path(ours).poses, path(theirs).poses, rtol=1e-15, atol=1e-15)  # numpy's sine is not libm's
+    assert np.allclose(
+        path(MessageReader(ours)).poses, path(MessageReader(theirs)).poses, rtol=1e-15, atol=1e-15
+    )  # numpy's sine is not libm's
 
 
 @given(numbers, numbers, st.floats(-4, 4), st.lists(numbers, min_size=9, max_size=9))

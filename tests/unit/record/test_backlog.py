@@ -33,7 +33,7 @@ class Full:
 def test_all_that_is_told_comes_once_and_in_its_order(ticks: int) -> None:
     told: list[tuple[str, int]] = []
     backlog = MomentBuffer(ticks)
-    robots = [backlog.before(Heard(name, told)) for name in "ab"]
+    robots = [backlog.sink(Heard(name, told)) for name in "ab"]
     for moment in SOME:
         for robot in robots:
             robot.append(moment)
@@ -44,7 +44,7 @@ def test_all_that_is_told_comes_once_and_in_its_order(ticks: int) -> None:
 
 def test_nothing_waits_for_more_than_the_ticks_and_a_beat() -> None:
     told: list[tuple[str, int]] = []
-    log = MomentBuffer(48).before(Heard("", told))
+    log = MomentBuffer(48).sink(Heard("", told))
     for moment in SOME:
         log.append(moment)
         assert moment.tick - told[-1][1] <= 48
@@ -52,7 +52,7 @@ def test_nothing_waits_for_more_than_the_ticks_and_a_beat() -> None:
 
 def test_without_ticks_nothing_waits() -> None:
     told: list[tuple[str, int]] = []
-    log = MomentBuffer(0).before(Heard("", told))
+    log = MomentBuffer(0).sink(Heard("", told))
     for moment in SOME:
         log.append(moment)
         assert told[-1][1] == moment.tick
@@ -62,10 +62,10 @@ def test_the_file_is_told_each_time_that_all_which_waited_has_come() -> None:
     told: list[tuple[str, int]] = []
 
     class File:
-        def settle(self) -> None:
+        def flush_if_due(self) -> None:
             told.append(("file", told[-1][1]))
 
-    log = MomentBuffer(48, File()).before(Heard("", told))
+    log = MomentBuffer(48, File()).sink(Heard("", told))
     for moment in SOME:
         log.append(moment)
     settled = [tick for who, tick in told if who == "file"]
@@ -76,7 +76,7 @@ def test_the_file_is_told_each_time_that_all_which_waited_has_come() -> None:
 def test_each_log_of_a_robot_is_told_all() -> None:
     told: list[tuple[str, int]] = []
     backlog = MomentBuffer(60)
-    log = backlog.before(Heard("trace", told), Heard("log", told))
+    log = backlog.sink(Heard("trace", told), Heard("log", told))
     for moment in SOME:
         log.append(moment)
     backlog.flush()
@@ -87,7 +87,7 @@ def test_each_log_of_a_robot_is_told_all() -> None:
 def test_what_waits_when_a_run_breaks_off_is_written() -> None:
     told: list[tuple[str, int]] = []
     with pytest.raises(ZeroDivisionError), MomentBuffer(10_000) as backlog:
-        log = backlog.before(Heard("", told))
+        log = backlog.sink(Heard("", told))
         for moment in SOME:
             log.append(moment)
         raise ZeroDivisionError
@@ -96,6 +96,6 @@ def test_what_waits_when_a_run_breaks_off_is_written() -> None:
 
 def test_why_a_run_broke_off_is_told_although_its_log_has_no_room_for_the_rest() -> None:
     with pytest.raises(ZeroDivisionError), MomentBuffer(10_000) as backlog:
-        backlog.until = 1
-        backlog.before(Full()).append(SOME[0])
+        backlog.next_flush_tick = 1
+        backlog.sink(Full()).append(SOME[0])
         raise ZeroDivisionError

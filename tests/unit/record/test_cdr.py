@@ -54,7 +54,7 @@ def test_a_cursor_reads_what_a_template_wrote() -> None:
     cursor = CdrReader(bytes(message.buffer))
     assert cursor.take("B") == (7,)
     assert cursor.string() == "odom"
-    assert cursor.array("<f8", (3,)).tolist() == [1.0, 0.0, 1e-300]
+    assert cursor.array("f8", (3,)).tolist() == [1.0, 0.0, 1e-300]
 
 
 def test_a_message_that_ends_too_early_is_an_error() -> None:

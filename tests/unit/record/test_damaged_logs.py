@@ -53,7 +53,7 @@ def killed(folder: Path, seconds: float) -> Path:
         from simscen.record.recorder import MOMENT_DELAY_S, MomentBuffer
         from simscen.record.recorder import Recorder
         recorder = Recorder({str(folder / "run.mcap")!r}, CLOCK, about())
-        log = MomentBuffer(CLOCK.ticks(MOMENT_DELAY_S), recorder).before(recorder.robots[""])
+        log = MomentBuffer(CLOCK.ticks(MOMENT_DELAY_S), recorder).sink(recorder.robots[""])
         for moment in moments({seconds}):
             log.append(moment)
         os.kill(os.getpid(), signal.SIGKILL)
@@ -68,7 +68,7 @@ def test_a_killed_log_keeps_95_percent_of_its_messages(tmp_path: Path) -> None:
     whole = recorded(tmp_path / "whole.mcap", 20.0)
     log = read_log(partial)
     assert not log.complete
-    assert log.about.case == CASE
+    assert log.header.case == CASE
     assert len(log.trace.truth) >= 0.95 * len(whole.truth)
     assert log.trace.end >= 0.95 * whole.end
     assert log.trace.odometry.values.tolist() == whole.odometry.values[: len(log.trace.odometry)].tolist()
@@ -95,9 +95,9 @@ def problem(path: Path) -> str:
     [
         (lambda data: b"", "SC801 not a log of simscen: it is not an MCAP file"),
         (lambda data: b"name: goal\nworld: house\n", "SC801 not a log of simscen: it is not an MCAP file"),
-        (lambda data: data[:-1], "SC803 the log ends too early: its run broke off"),
-        (lambda data: data[: len(data) // 2], "SC803 the log ends too early: its run broke off"),
-        (lambda data: data[:60], "SC801 not a log of simscen: it does not say which run it is of"),
+        (lambda data: data[:-1], "SC803 the log is truncated: its run was aborted"),
+        (lambda data: data[: len(data) // 2], "SC803 the log is truncated: its run was aborted"),
+        (lambda data: data[:60], "SC801 not a log of simscen: it has no description of its run"),
     ],
 )
 def test_a_wrong_file_is_told_as_such(

@@ -79,7 +79,7 @@ def _messages(reader) -> Iterator[tuple[records.Channel, records.Message]]:
 
 def judged(read: Log):
     entries = [AnyCriterion.model_validate(words) for words in CRITERIA]
-    return judge_run(RunKey("a", 7), "a", entries, read.trace, read.about.case, coverage=read.coverage)
+    return judge_run(RunKey("a", 7), "a", entries, read.trace, read.header.case, coverage=read.coverage)
 
 
 def test_a_log_that_was_only_copied_passes(log: Path, tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def test_without_a_truth_nothing_is_known_of_it_and_the_reason_names_what_could_
     log = read(drive(), ForeignLogOptions())
     assert len(log.trace.truth) == 0
     assert log.coverage.missing[Evidence.TRUTH] == (
-        "nothing counts as the truth: name a topic or two frames with --truth; poses are on: /amcl_pose, /mocap, /odom"
+        "no ground truth: name a topic or two frames with --truth; topics with poses: /amcl_pose, /mocap, /odom"
     )
     assert "no topic /vicon" in read(drive(), ForeignLogOptions(truth="/vicon")).coverage.missing[Evidence.TRUTH]
 
@@ -146,7 +146,7 @@ def test_two_frames_of_tf_can_be_the_truth(read: Callable[..., ForeignLog]) -> N
 
 def test_a_truth_in_a_frame_of_its_own_is_not_compared_with_the_map(read: Callable[..., ForeignLog]) -> None:
     log = read(drive(mocap="vicon"))
-    assert "frame `vicon`, the map's is `map`" in log.coverage.missing[Evidence.ALIGNMENT]
+    assert "frame `vicon`, the map frame is `map`" in log.coverage.missing[Evidence.ALIGNMENT]
     assert Evidence.TRUTH not in log.coverage.missing
     same = read(drive(mocap="vicon"), ForeignLogOptions(truth="/mocap", same_frame=True))
     assert Evidence.ALIGNMENT not in same.coverage.missing
@@ -160,7 +160,7 @@ def test_repeated_and_late_stamps_are_put_in_order_and_told(read: Callable[..., 
     assert len(log.trace.truth) == 201
     assert (np.diff(log.trace.truth.ticks) > 0).all()
     assert (np.diff(log.trace.truth.values[:, 0]) > 0).all()
-    assert log.notes == ["/mocap: 1 came after a later one, 1 had the stamp of another, of which the last counts"]
+    assert log.notes == ["/mocap: 1 messages out of order, 1 repeated stamps, of which the last message is used"]
 
 
 def test_a_clock_that_jumps_back_is_refused(refused: Callable[..., str]) -> None:
@@ -180,27 +180,29 @@ def test_stamps_that_nobody_set_are_not_used(read: Callable[..., ForeignLog]) ->
     said += [Said("/mocap", BEGIN + k * SECOND // 20, stamped_pose(0, "map", SPEED * k / 20)) for k in range(201)]
     log = read(said)
     assert len(log.trace.truth) == 201
-    assert log.notes == ["/mocap: its stamps are all zero; its times are those of logging"]
+    assert log.notes == ["/mocap: all stamps are zero, so the times of logging are used"]
 
 
 def test_a_gap_in_the_truth_leaves_room_for_doubt(read: Callable[..., ForeignLog]) -> None:
     gone = (BEGIN + 4 * SECOND, BEGIN + 6 * SECOND)
     log = read([one for one in drive() if one.topic != "/mocap" or not gone[0] < one.time < gone[1]])
-    assert log.coverage.partial[Evidence.TRUTH].startswith("/mocap says nothing from t = 3.9")
+    assert log.coverage.partial[Evidence.TRUTH].startswith("/mocap has no message from t = 3.9")
     late = read([one for one in drive() if one.topic != "/mocap" or one.time > gone[1]])
-    assert late.coverage.partial[Evidence.TRUTH].startswith("/mocap says nothing from t = 0.00 s to 6.0")
+    assert late.coverage.partial[Evidence.TRUTH].startswith("/mocap has no message from t = 0.00 s to 6.0")
 
 
 def test_a_belief_that_begins_after_a_meter_of_driving_leaves_room_for_doubt(read: Callable[..., ForeignLog]) -> None:
     log = read([one for one in drive() if one.topic != "/amcl_pose" or one.time > BEGIN + 2 * SECOND])
-    assert log.coverage.partial[Evidence.BELIEF].startswith("/amcl_pose begins at t = 2.0")
+    assert log.coverage.partial[Evidence.BELIEF].startswith("/amcl_pose starts at t = 2.0")
 
 
 def test_a_twist_that_nobody_filled_in_is_no_standstill(read: Callable[..., ForeignLog]) -> None:
     said = [Said("/gps", BEGIN + k * SECOND // 20, odometry(BEGIN + k * SECOND // 20, "map", SPEED * k / 20, 0.0))
             for k in range(201)]  # fmt: skip
     log = read(said, ForeignLogOptions(truth="/gps"))
-    assert log.notes == ["/gps: its twist is zero though the robot moves; its poses say how fast"]
+    assert log.notes == [
+        "/gps: all twists are zero although the robot moves, so velocities are computed from the poses"
+    ]
     np.testing.assert_allclose(log.trace.velocity.values[:, 0], SPEED, atol=1e-6)
 
 
@@ -211,7 +213,7 @@ def test_a_log_that_breaks_off_has_no_end(tmp_path: Path, size: float) -> None:
     file.write_bytes(data[: int(len(data) * size)])
     log = read_foreign_log(file, MOCAP)
     assert not log.trace.events
-    assert log.notes == ["the log breaks off, so nothing passes on it"]
+    assert log.notes == ["the log is truncated, so no criterion can pass"]
 
 
 def test_a_log_of_ros_1_is_refused(refused: Callable[..., str], tmp_path: Path) -> None:
@@ -260,9 +262,9 @@ def test_big_endian_messages_are_read(tmp_path: Path) -> None:
 
 def test_a_log_of_none_of_the_topics_is_refused_with_those_it_has(refused: Callable[..., str]) -> None:
     told = refused([replace(one, topic="/robot1" + one.topic) for one in drive()])
-    assert told.startswith("SC804 it holds nothing that could be judged (its topics: /robot1/amcl_pose, ")
+    assert told.startswith("SC804 it has no messages that can be judged (its topics: /robot1/amcl_pose, ")
     other = refused([], ForeignLogOptions())
-    assert "its topics: none at all" in other
+    assert "its topics: none" in other
 
 
 def test_topics_may_have_other_names(read: Callable[..., ForeignLog]) -> None:

@@ -142,7 +142,7 @@ def test_without_a_truth_what_asks_for_it_is_inconclusive_and_says_so(simscen, l
     ended = simscen("drive.mcap", "--scenario", file)
     assert ended.code == 1
     assert "speed: inconclusive: the log does not say where the robot truly was nor how fast" in ended.out
-    assert "name a topic or two frames with --truth; poses are on: /amcl_pose, /mocap, /odom" in ended.out
+    assert "name a topic or two frames with --truth; topics with poses: /amcl_pose, /mocap, /odom" in ended.out
     assert "collisions: inconclusive: the log does not say what the robot touched" in ended.out
     assert ended.out.count("inconclusive") == 4
 
@@ -201,7 +201,7 @@ def test_regions_and_the_footprint_come_from_the_world_and_the_robot_of_the_file
     )
     robot = "robot: {model: turtlebot, pose: {x: 0, y: 0}}\n"
     file = limits("keepout: {region: aisle}", more="world: hall.world.yaml\n")
-    assert "the scenario names no `robot:`" in simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").out
+    assert "the scenario has no `robot:`" in simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").out
     file = limits("keepout: {region: aisle}", more=f"world: hall.world.yaml\n{robot}")
     assert simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").code == 0
 
@@ -221,7 +221,7 @@ def test_what_is_odd_about_a_log_is_noted_and_a_cut_one_passes_nothing(simscen, 
     (tmp_path / "drive.mcap").write_bytes(data[: len(data) - 400])
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap")
     assert ended.code == 1
-    assert ended.err == "note: drive.mcap: the log breaks off, so nothing passes on it\n"
+    assert ended.err == "note: drive.mcap: the log is truncated, so no criterion can pass\n"
     assert "so far, but the log stops at" in ended.out
 
 
@@ -230,7 +230,7 @@ def test_a_gap_in_the_truth_leaves_a_pass_inconclusive_but_not_a_failure(simscen
     said = [one for one in drive() if one.topic != "/mocap" or not gone[0] < one.time < gone[1]]
     write_mcap(tmp_path / "drive.mcap", said)
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap")
-    assert "so far, but /mocap says nothing from t = " in ended.out
+    assert "so far, but /mocap has no message from t = " in ended.out
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 0.1 m/s}"), "--truth", "/mocap")
     assert "speed: 0.50 m/s > 0.10 m/s" in ended.out
 

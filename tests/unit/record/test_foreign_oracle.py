@@ -86,8 +86,8 @@ def test_the_signals_are_the_same_to_the_last_bit(own: Path, disguised: Path) ->
 def test_verdicts_and_margins_agree(own: Path, disguised: Path, text: dict[str, object]) -> None:
     entry = AnyCriterion.model_validate(text)
     log, foreign = read_log(own), read_foreign_log(disguised, TRUTH)
-    (mine,) = judge([entry], log.trace, log.about.case)
-    (its,) = judge([entry], foreign.trace, log.about.case, foreign.coverage)
+    (mine,) = judge([entry], log.trace, log.header.case)
+    (its,) = judge([entry], foreign.trace, log.header.case, foreign.coverage)
     assert [finding.status for finding in mine.findings] == [finding.status for finding in its.findings]
     assert [f.margin for f in mine.findings] == pytest.approx([f.margin for f in its.findings], abs=1e-9)
     assert Status.INCONCLUSIVE not in {finding.status for finding in its.findings}

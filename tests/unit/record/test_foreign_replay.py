@@ -58,11 +58,11 @@ def mounted() -> Said:
 @pytest.mark.parametrize("write", [write_mcap, write_bag])
 def test_scans_the_map_and_where_lidars_sit_are_read(tmp_path: Path, write: Callable[..., object]) -> None:
     write(tmp_path / "log.mcap", [a_map(), mounted(), *drive(2.0)])
-    read = read_foreign_log(tmp_path / "log.mcap", ForeignLogOptions("/mocap"), looks=True)
+    read = read_foreign_log(tmp_path / "log.mcap", ForeignLogOptions("/mocap"), with_sensors=True)
     assert read.map is not None and read.map.shape == (3, 4) and read.map.origin[:2] == (-1.0, -2.0)
-    (messages,) = read.seen.scans.values()
+    (messages,) = read.sensors.scans.values()
     assert [tick for tick, _ in messages] == sorted(tick for tick, _ in messages) and len(messages) == 5
-    assert read.seen.mounts["laser"].x == pytest.approx(0.2)
+    assert read.sensors.mounts["laser"].x == pytest.approx(0.2)
 
 
 def test_a_page_is_made_with_criteria_and_without(simscen, tmp_path: Path) -> None:

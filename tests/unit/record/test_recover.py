@@ -9,9 +9,8 @@ from mcap.reader import make_reader
 from moments import CLOCK, about, moments
 
 from simscen.core.errors import InvalidInput
-from simscen.record.log_reader.read import read_log
-from simscen.record.log_reader.recover import recover
-from simscen.record.recorder import Recorder
+from simscen.record.log_reader.read import read_log, recover
+from simscen.record.recorder import MOMENT_DELAY_S, MomentBuffer, Recorder
 
 
 def messages(path: Path) -> list[tuple[str, int, bytes]]:
@@ -62,6 +61,22 @@ def test_71_a_killed_log_keeps_95_percent_for_other_readers(tmp_path: Path, whol
     cut = killed(tmp_path, 5.0)
     recover(cut)
     assert len(messages(cut)) >= 0.95 * len(messages(whole))
+
+
+@pytest.mark.parametrize("seconds", [0.95, 1.85, 2.75, 4.4])
+def test_a_killed_run_loses_at_most_one_simulated_second(tmp_path: Path, seconds: float) -> None:
+    child = os.fork()
+    if child == 0:  # writes through the same buffer as a run, and never flushes it by itself
+        recorder = Recorder(tmp_path / "run.mcap", CLOCK, about())
+        log = MomentBuffer(CLOCK.ticks(MOMENT_DELAY_S), recorder).sink(recorder.robots[""])
+        for moment in moments(seconds):
+            log.append(moment)
+        os.kill(os.getpid(), signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == -signal.SIGKILL
+    log_of_killed = read_log(tmp_path / "run.partial.mcap")
+    assert not log_of_killed.complete
+    assert CLOCK.ticks(seconds) - log_of_killed.trace.end <= CLOCK.ticks(1.0)
 
 
 def test_a_run_that_breaks_off_by_itself_leaves_a_log_that_opens(tmp_path: Path) -> None:

@@ -76,13 +76,13 @@ def test_a_log_knows_how_its_run_was_ordered(log: Path) -> None:
     assert read.complete
     assert read.result == RESULT
     for name in ("name", "seed", "case", "scenario", "robot_description", "files", "facts"):
-        assert getattr(read.about, name) == getattr(given_, name)
-    assert read.about.case == CASE
-    assert read.about.frames["camera"] == given_.frames["camera"]
+        assert getattr(read.header, name) == getattr(given_, name)
+    assert read.header.case == CASE
+    assert read.header.frames["camera"] == given_.frames["camera"]
 
 
 def test_the_map_is_read_back_exactly(log: Path) -> None:
-    ours, theirs = read_log(log).about.map, about().map
+    ours, theirs = read_log(log).header.map, about().map
     assert ours is not None
     assert theirs is not None
     assert exact(ours.cells) == exact(theirs.cells)

@@ -132,8 +132,8 @@ def test_frames_of_several_robots_are_in_one_tree(tmp_path: Path) -> None:
 
 
 def test_mounts_and_scans_of_several_robots_are_called_as_their_stacks_call_them(tmp_path: Path) -> None:
-    for log in read_log(several(tmp_path), looks=True).robots.values():
-        assert set(log.about.frames) == {"camera", "lidar", "rear lidar"}
+    for log in read_log(several(tmp_path), with_sensors=True).robots.values():
+        assert set(log.header.frames) == {"camera", "lidar", "rear lidar"}
         assert set(log.trace.objects) == {"cart", "a box"}
-        _, scan = log.seen.scans["/scan"][0]
-        assert log.seen.scan(scan).mount == Pose2(0.1, 0.0, 0.0)
+        _, scan = log.sensors.scans["/scan"][0]
+        assert log.sensors.scan(scan).mount == Pose2(0.1, 0.0, 0.0)

@@ -5,7 +5,7 @@ import json
 from schemas_from_rosbags import SCHEMAS, expected
 
 from simscen.record import topics
-from simscen.record.mcap_writer import load
+from simscen.record.mcap_writer import load_message_types
 from simscen.record.topics import Topic
 
 
@@ -16,4 +16,4 @@ def test_schemas_have_not_drifted_from_rosbags() -> None:
 def test_every_topic_has_a_message_type_that_ships() -> None:
     types = {topic.type for topic in vars(topics).values() if isinstance(topic, Topic)}
     types |= {value for name, value in vars(topics).items() if name.endswith("_TYPE")}
-    assert types == set(load())
+    assert types == set(load_message_types())

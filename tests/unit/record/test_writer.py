@@ -13,11 +13,11 @@ from mcap.writer import CompressionType, Writer
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.record import topics
-from simscen.record.mcap_writer import McapWriter, load
+from simscen.record.mcap_writer import McapWriter, load_message_types
 from simscen.record.messages import encode
 from simscen.record.publishers.channels import BatchWriter, LogPublisher
 
-TEXT = load()["std_msgs/msg/String"]
+TEXT = load_message_types()["std_msgs/msg/String"]
 MESSAGES = [(1 + i % 3, 1000 * (i // 2), random.Random(i).randbytes(300)) for i in range(2000)]
 
 
@@ -25,8 +25,8 @@ def ours() -> bytes:
     stream = io.BytesIO()
     writer = McapWriter(stream, "ros2", "simscen", chunk_size=1 << 16)
     channels = [writer.channel(f"/t{n}", TEXT, {"key": str(n)}) for n in range(3)]
-    writer.attach("a.txt", "text/plain", b"hello")
-    writer.note("facts", {"seed": "7"})
+    writer.add_attachment("a.txt", "text/plain", b"hello")
+    writer.add_metadata("facts", {"seed": "7"})
     for number, time, data in MESSAGES:
         channels[number - 1].write(time, data)
     writer.finish()
@@ -133,7 +133,7 @@ def test_messages_that_are_packed_together_give_the_bytes_of_single_ones() -> No
         stream = io.BytesIO()
         writer = McapWriter(stream, "ros2", "simscen", chunk_size=5000)
         out = LogPublisher(writer)
-        block = out.together(layouts) if together else BatchWriter(out, layouts)
+        block = out.batch_writer(layouts) if together else BatchWriter(out, layouts)
         for time in range(100):
             block.write(time, (time, 0), pose, twist, 0.25)
             if time % 7 == 0:

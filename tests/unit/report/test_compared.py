@@ -16,7 +16,7 @@ from simscen.core.records.session_events import (
     SessionStarted,
 )
 from simscen.report.comparison import comparison_lines, difference_columns, shorten
-from simscen.report.console import text_reporter
+from simscen.report.console_reporter import text_reporter
 from simscen.report.github import markdown
 from simscen.report.results_json import to_json
 from simscen.report.styled_line import plain_text
@@ -31,14 +31,14 @@ EXPECTED = """\
   navigation/goal          10/10      6/9
   obstacles/cart_crosses     1/1   0/0 1!
   all                      11/11   6/9 1!
-  ! = could not be completed, and counts neither way
+  ! = runs with errors, which are not counted
 
   mine against ref: 10 pairs of the same scenario and seed, 0 better, 1 worse (p = 1)
     worse  navigation/goal, seed 3: passed with ref, failed with mine: clearance: 0.03 m < 0.05 m, at t = 4.10 s, (2.59, 4.42)
     mean over pairs    ref   mine  difference  95 % interval  - / = / +
     time_to_goal, s  25.34  28.23       +2.89  +0.78 … +4.95  1 / 0 / 7
     replans           3.00   3.00       +0.00                 0 / 2 / 0
-    of 2 pairs only one run arrived, so how these drove is not compared
+    in 2 pairs only one run reached its goals, so their metrics are not compared
     left out: 1 pair with an error, 1 run without a partner
 
 """  # noqa: E501 - as it is printed

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.core.records.events import Disturbance, DisturbanceOutcome
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.report.console import text_reporter
+from simscen.report.console_reporter import text_reporter
 from simscen.report.github import annotations
 from simscen.report.junit import to_xml
 from simscen.report.suite import Session, to_html

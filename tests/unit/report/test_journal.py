@@ -43,10 +43,10 @@ def test_reports_made_from_the_journal_are_those_of_the_session(tmp_path, runs):
     ]
     written(tmp_path, inside, inside)
     past = read_journal(tmp_path)
-    assert past.answers == inside
+    assert past.runs == inside
     assert not past.interrupted
-    assert to_xml(past.answers) == to_xml(inside)
-    assert to_json(past.answers) == to_json(inside)
+    assert to_xml(past.runs) == to_xml(inside)
+    assert to_json(past.runs) == to_json(inside)
 
 
 def test_files_are_kept_relative_to_the_folder_so_that_it_can_be_moved(tmp_path, passed):
@@ -54,7 +54,7 @@ def test_files_are_kept_relative_to_the_folder_so_that_it_can_be_moved(tmp_path,
     log = str(tmp_path / "old" / "a" / "run.mcap")
     written(tmp_path / "old", [passed], [replace(passed, artifacts=replace(passed.artifacts, mcap=log))])
     (tmp_path / "old").rename(tmp_path / "new")
-    assert read_journal(tmp_path / "new").answers[0].artifacts.mcap == str(tmp_path / "new" / "a" / "run.mcap")
+    assert read_journal(tmp_path / "new").runs[0].artifacts.mcap == str(tmp_path / "new" / "a" / "run.mcap")
 
 
 def test_what_was_planned_but_not_answered_is_an_error(tmp_path, runs):
@@ -65,8 +65,8 @@ def test_what_was_planned_but_not_answered_is_an_error(tmp_path, runs):
     journal.close()
     past = read_journal(tmp_path)
     assert past.interrupted
-    assert [run.outcome for run in past.answers] == [Outcome.PASSED, Outcome.ERROR, Outcome.ERROR]
-    assert [run.result.error.kind for run in past.answers[1:]] == ["interrupted", "not-run"]
+    assert [run.outcome for run in past.runs] == [Outcome.PASSED, Outcome.ERROR, Outcome.ERROR]
+    assert [run.result.error.kind for run in past.runs[1:]] == ["interrupted", "not-run"]
 
 
 @pytest.mark.parametrize("lost", [1, 10, 200])
@@ -74,7 +74,7 @@ def test_a_line_that_was_cut_short_never_was(tmp_path, runs, lost):
     written(tmp_path, runs, runs, ended=False)
     file = tmp_path / JOURNAL_FILE
     file.write_bytes(file.read_bytes()[:-lost])
-    assert [run.result.error.kind if run.result.error else "" for run in read_journal(tmp_path).answers][
+    assert [run.result.error.kind if run.result.error else "" for run in read_journal(tmp_path).runs][
         -1
     ] == "interrupted"
 
@@ -83,12 +83,12 @@ def test_the_next_session_goes_on_behind_the_last_whole_line(tmp_path, runs):
     written(tmp_path, runs, runs, ended=False)
     with (tmp_path / JOURNAL_FILE).open("ab") as file:
         file.write(b'{"event": "fini')
-    journal = Journal(tmp_path, goes_on=True)
+    journal = Journal(tmp_path, resume=True)
     journal.plan(planned(runs[:1]), "0.1.0", 1)
     journal(runs[0])
     journal.close()
     assert all(json.loads(line) for line in (tmp_path / JOURNAL_FILE).read_bytes().splitlines())
-    assert [run.key for run in read_journal(tmp_path).answers] == [runs[0].key]
+    assert [run.key for run in read_journal(tmp_path).runs] == [runs[0].key]
 
 
 def test_a_folder_belongs_to_one_session_at_a_time(tmp_path, runs):
@@ -97,10 +97,10 @@ def test_a_folder_belongs_to_one_session_at_a_time(tmp_path, runs):
     with pytest.raises(UsageError, match=r"is in use by pid \d+"):
         require_free(tmp_path)
     with pytest.raises(UsageError, match="is in use by pid"):
-        Journal(tmp_path, goes_on=True)
+        Journal(tmp_path, resume=True)
     journal.close()
     require_free(tmp_path)
-    with pytest.raises(UsageError, match="holds a session already"):
+    with pytest.raises(UsageError, match="already contains a session"):
         Journal(tmp_path)
 
 
@@ -123,14 +123,14 @@ def test_a_full_disk_costs_lines_but_never_half_a_line(tmp_path, runs, monkeypat
     assert journal.error is not None
     journal(runs[1])
     journal.close()
-    assert [run.outcome for run in read_journal(tmp_path).answers] == [Outcome.ERROR, Outcome.FAILED, Outcome.ERROR]
+    assert [run.outcome for run in read_journal(tmp_path).runs] == [Outcome.ERROR, Outcome.FAILED, Outcome.ERROR]
 
 
 @pytest.mark.parametrize(
     ("content", "told"),
     [
-        (None, "there is no events.jsonl in it"),
-        (b"", "ended before it had planned its runs"),
+        (None, "the folder has no events.jsonl"),
+        (b"", "ended before it listed its runs"),
         (b"junk\n", "the journal is damaged"),
         (b'{"event": "planned", "format": 99, "runs": []}\n', "it has format 99"),
         (b'{"event": "planned", "format": 1, "runs": [{}], "version": "", "workers": 1, "at": 0}\n', "damaged"),

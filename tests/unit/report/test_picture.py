@@ -10,15 +10,17 @@ from simscen.core.geometry import Pose2
 from simscen.core.records.run_result import RunKey
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
-from simscen.report.picture import map_layer, palette
+from simscen.report.picture import map_picture, palette
 from simscen.report.picture.canvas import Canvas
-from simscen.report.picture.map_layer import MARGIN_M, draw_map, map_extent
 from simscen.report.picture.map_picture import (
     _MARGIN_PX,
     HEADER_HEIGHT_PX,
+    MARGIN_M,
     MAX_MAP_SIZE_PX,
+    draw_map,
     draw_map_picture,
     drawn_parts,
+    map_extent,
     write_picture,
 )
 from simscen.report.picture.path_layer import round_time_step
@@ -63,7 +65,7 @@ def pixel(image, x, y):
         MAX_MAP_SIZE_PX[0] / (WIDE * RESOLUTION + 2 * MARGIN_M), MAX_MAP_SIZE_PX[1] / (TALL * RESOLUTION + 2 * MARGIN_M)
     )
     u, v = (
-        (x + MARGIN_M) * scale + map_layer.LEFT_MARGIN_PX,
+        (x + MARGIN_M) * scale + map_picture.LEFT_MARGIN_PX,
         (TALL * RESOLUTION + MARGIN_M - y) * scale + HEADER_HEIGHT_PX + _MARGIN_PX,
     )
     return image.getpixel((int(u), int(v)))
@@ -125,11 +127,11 @@ def test_a_run_that_hardly_began_has_a_picture_too(seconds):
 
 
 def test_a_turned_map_is_painted_turned():
-    map_layer = room(yaw=np.pi / 2)
-    bounds = map_extent(map_layer, np.empty((0, 2)))
+    map_picture = room(yaw=np.pi / 2)
+    bounds = map_extent(map_picture, np.empty((0, 2)))
     assert bounds == pytest.approx((-6.4, -0.4, 0.4, 10.4))
     canvas = Canvas(bounds, 40.0, palette.UNKNOWN)
-    draw_map(canvas, map_layer)
+    draw_map(canvas, map_picture)
     image = canvas.finish()
     u, v = canvas.pixel(-1.0, 5.1)
     assert near(image.getpixel((int(u), int(v))), palette.WALL)
@@ -140,9 +142,9 @@ def test_a_turned_map_is_painted_turned():
 def test_thin_walls_of_a_huge_map_stay_whole():
     cells = np.zeros((2000, 2000), dtype=np.int8)
     cells[:, 1000] = 100
-    map_layer = OccupancyGrid(cells, 0.01)
-    canvas = Canvas(map_extent(map_layer, np.empty((0, 2))), 10.0, palette.UNKNOWN)
-    draw_map(canvas, map_layer)
+    map_picture = OccupancyGrid(cells, 0.01)
+    canvas = Canvas(map_extent(map_picture, np.empty((0, 2))), 10.0, palette.UNKNOWN)
+    draw_map(canvas, map_picture)
     image = np.asarray(canvas.finish()).astype(int)
     row = image[100:110, 95:115].sum(axis=2).min(axis=1)
     assert (row < 3 * 200).all()

@@ -21,7 +21,7 @@ from simscen.report.picture.canvas import LABEL_CELL_PX
 from simscen.report.picture.map_picture import draw_map_picture, drawn_parts
 from simscen.report.picture.scene import Scene, scene_with_robots
 from simscen.run.log_header import world_scenery as scenery_in
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
@@ -112,7 +112,7 @@ def test_a_door_that_shut_hangs_on_its_hinge_and_ends_at_its_post():
 
 def test_a_robot_that_is_carried_leaves_a_gap_with_a_mark_on_either_side():
     scene = everything()
-    ways = of(scene, "way")
+    ways = of(scene, "path")
     assert [np.round(way, 1).tolist() for way in ways] == [[[1, 1], [1, 3]], [[7, 1], [9, 1]]]
     assert np.round(of(scene, "lifted")[0], 1).tolist() == [[1, 3]]
     assert np.round(of(scene, "set down")[0], 1).tolist() == [[7, 1]]
@@ -120,7 +120,7 @@ def test_a_robot_that_is_carried_leaves_a_gap_with_a_mark_on_either_side():
 
 def test_a_short_teleport_leaves_a_gap_as_well():
     near = everything(truth=[[0, 1, 1], [4, 1, 3], [4.02, 1.1, 3], [10, 3, 3]])
-    assert len(of(near, "way")) == 2
+    assert len(of(near, "path")) == 2
 
 
 def test_a_belief_that_jumps_is_not_a_line_through_walls():
@@ -149,7 +149,7 @@ def test_a_failure_is_told_with_the_code_and_name_that_nav2_gives_it():
 def test_labels_keep_off_ways_robots_goals_and_each_other():
     canvas = map_picture._map(everything())
     busy, boxes = canvas.busy, []
-    for note in canvas.notes:
+    for note in canvas.texts:
         wide = map_picture.font(note.size).getlength(note.text)
         left, right = (note.x - wide / 2) / LABEL_CELL_PX, (note.x + wide / 2) / LABEL_CELL_PX
         top, low = (note.y - note.size / 2) / LABEL_CELL_PX, (note.y + note.size / 2) / LABEL_CELL_PX
@@ -176,7 +176,7 @@ def test_each_of_several_robots_is_drawn_with_its_name():
         name
         for name, _ in drawn_parts(scene_with_robots(one, {"a": (one.trace, one.case), "b": (one.trace, one.case)}))
     }
-    assert {"a: way", "b: way", "goal a: late reached", "a: robot at the end", "b: belief"} <= names
+    assert {"a: path", "b: path", "goal a: late reached", "a: robot at the end", "b: belief"} <= names
 
 
 DOORS = """\
@@ -204,9 +204,9 @@ def test_a_picture_from_the_log_alone_has_the_parts_of_that_of_the_run(tmp_path)
     run = simulate(prepared, log=tmp_path / "run.mcap")
     scene = Scene(run.trace, run.case, prepared.built.map, run.result, scenery_in(prepared))
     log = read_log(tmp_path / "run.mcap")
-    found = scenery_from_header(log.about)
+    found = scenery_from_header(log.header)
     assert found.map is not None
-    again = Scene(log.trace, log.about.case, found.map.grid, run.result, found)
+    again = Scene(log.trace, log.header.case, found.map.grid, run.result, found)
     assert told(again) == told(scene)
     (gate,), (slide,) = of(again, "door gate"), of(again, "door slide")
     assert (gate[:, 1].min(), gate[:, 1].max()) == pytest.approx((1.0, 2.0))

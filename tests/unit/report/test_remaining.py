@@ -36,22 +36,22 @@ def session(passed):
 
 
 def test_the_rest_takes_as_long_as_what_was(session):
-    assert session(done=4).seconds == 6.0
-    assert session(done=4).told == "4 of 10, about 5 s left"
+    assert session(done=4).remaining_s == 6.0
+    assert session(done=4).text == "4 of 10, about 5 s left"
 
 
 def test_what_was_kept_from_an_earlier_session_took_no_time(session):
-    assert session(done=2, kept=5).seconds == 3.0
+    assert session(done=2, kept=5).remaining_s == 3.0
 
 
 def test_after_one_run_it_is_too_early_to_say(session):
-    assert session(done=1).told == "1 of 10"
+    assert session(done=1).text == "1 of 10"
 
 
 def test_a_single_run_counts_nothing():
     remaining = ProgressEstimate(Clock())
     remaining(SessionStarted("0.1.0", 1, 1, 1))
-    assert remaining.told == ""
+    assert remaining.text == ""
 
 
 @pytest.mark.parametrize(

@@ -199,7 +199,7 @@ def test_grids_of_one_place_are_kept_as_their_differences() -> None:
     near = np.full((2, 2), 50, dtype=np.int8)
     seen = SensorMessages(SimTime(240))
     packed = [(0, cells), (240, cells + 7), (480, cells)]
-    take = seen.taker(GLOBAL_COSTMAP.name, GLOBAL_COSTMAP.type)
+    take = seen.handler(GLOBAL_COSTMAP.name, GLOBAL_COSTMAP.type)
     assert take is not None
     for tick, grid in packed:
         take(tick, occupancy_grid("map", (tick // 240, 0), OccupancyGrid(grid, 0.05, Pose2(1.0, 2.0))))

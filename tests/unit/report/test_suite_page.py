@@ -75,8 +75,8 @@ def test_each_violated_criterion_has_a_line_with_its_reason_and_where_it_is_writ
 
 
 def test_what_the_console_said_of_a_failure_is_there_to_be_copied(passed, failed):
-    assert "as the console told it" not in to_html(Session([passed]))
-    said = to_html(Session([failed])).partition("as the console told it")[2].partition("</pre>")[0]
+    assert "console output" not in to_html(Session([passed]))
+    said = to_html(Session([failed])).partition("console output")[2].partition("</pre>")[0]
     assert "stopped_within: 0.84 s &gt; 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)\n" in said
     assert "again     simscen run" in said
 
@@ -117,8 +117,8 @@ def test_the_same_results_give_the_same_bytes_in_whatever_order_they_came(passed
 def test_a_scenario_that_runs_several_times_is_a_group_with_a_sign_for_each_run(passed, failed):
     group = [called(passed, "a/speeds", seed, variation) for seed in (1, 2) for variation in ("slow", "fast")]
     html = to_html(Session([*group, called(failed, "a/speeds", 3, "slow"), called(passed, "b/alone")]))
-    assert "4 of 5 as they should be" in html
-    assert 'aria-label="each run: passed, passed, passed, passed, failed"' in html
+    assert "4 of 5 as expected" in html
+    assert 'aria-label="runs: passed, passed, passed, passed, failed"' in html
     assert html.count('class="group many" open') == 1
     assert html.count('class="group"') == 1
 
@@ -205,7 +205,7 @@ def test_sessions_before_it_are_told_the_newest_first_and_what_has_changed(sessi
     assert "1 newly passing" in html
     assert html.index("../two/report.html") < html.index("../one/report.html")
     assert '<a href="#run-a-flaky-seed-1">a/flaky, seed 1</a>: passed, failed before' in html
-    assert 'aria-label="last sessions and this: passed, failed, passed">✓✗✓</span>' in html
+    assert 'aria-label="earlier sessions and this one: passed, failed, passed">✓✗✓</span>' in html
     assert [run.get("data-changed") for run in runs_on(html)] == ["1", None]
 
 
@@ -218,7 +218,7 @@ def test_a_session_that_left_no_results_or_damaged_ones_is_passed_over(sessions,
 
 def test_a_page_of_a_session_that_goes_on_says_how_far_it_is_and_comes_again(passed, failed):
     html = to_html(Session([passed], live=RunningSession(3, (failed.key,))))
-    assert "1 of 3 runs done, under way: faults/lidar_off, seed 7" in html
+    assert "1 of 3 runs done, running: faults/lidar_off, seed 7" in html
     assert "<noscript><meta http-equiv=refresh" in html
     assert "refresh" not in to_html(Session([passed])).replace("refreshing", "").partition("<script>")[0]
 

@@ -10,7 +10,7 @@ import pytest
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey
 from simscen.core.records.session_events import SessionFinished, SessionStarted, session_started
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.report.console import text_reporter
+from simscen.report.console_reporter import text_reporter
 from simscen.report.live_console import ColorReporter, LiveReporter
 from simscen.report.styled_line import TerminalStyle, plain_text
 from simscen.report.text_reporters import SessionFormatter
@@ -170,8 +170,8 @@ def test_an_interrupted_session_ends_with_two_lines(session, passed, crashed):
     end = replace(session[-1], passed=1, failed=0, errors=4, interrupted=True)
     lines = told([passed, crashed, *gone, end])
     assert lines[-2:] == [
-        "interrupted: 1 passed, 1 error, 1 under way, 2 not begun",
-        "page: out/report.html   go on with --resume out",
+        "interrupted: 1 passed, 1 error, 1 unfinished, 2 not started",
+        "page: out/report.html   resume with --resume out",
     ]
     assert not any("not-run!" in line or "interrupted!" in line for line in lines)
 

@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 ROOM = """\

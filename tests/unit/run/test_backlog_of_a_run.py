@@ -8,7 +8,7 @@ import pytest
 
 from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 from simscen.spec.registry import Entry
 

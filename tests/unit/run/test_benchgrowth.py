@@ -4,9 +4,9 @@ import pytest
 
 from simscen.bench.speed.scaling import AXES, write_more
 from simscen.bench.speed.session_speed import SHORT, Suite, evenly_spaced, short_patrol
+from simscen.loading.builders import load_robot, load_world
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.loaders import load_robot, load_world
 
 
 def count(axis: str, loaded: LoadedScenario) -> int:

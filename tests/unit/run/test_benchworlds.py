@@ -3,9 +3,9 @@
 import pytest
 
 from simscen.bench.speed.large_worlds import MOVABLE, MOVING, STANDING, write_arena, write_hall, write_warehouse
+from simscen.loading.builders import load_world
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.loaders import load_world
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 
 
 def test_the_hall_holds_its_movable_meshes_and_a_way_past_them(tmp_path):

@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from simscen.cli.session.selection import Selection, load_all
-from simscen.run.reproducibility import digest as module
-from simscen.run.reproducibility.digest import scenario_digest
+from simscen.run import reproducibility as module
+from simscen.run.reproducibility import scenario_digest
 
 SCENARIO = """\
 extends: base.yaml

@@ -6,7 +6,7 @@ import pytest
 
 from simscen.loading.scenario import load_scenario
 from simscen.run.faults.map_faults import apply_map_faults
-from simscen.run.preparation.scenario import PreparedScenario, prepare
+from simscen.run.preparation import PreparedScenario, prepare
 
 SCENARIO = """\
 simscen: 1

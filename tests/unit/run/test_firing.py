@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.run.live_world.director import ConditionState, TriggerState
 from simscen.testing.fakes import FakeStage
-from simscen.triggers.registry import Trigger
+from simscen.triggers.base import Trigger
 
 
 @dataclass

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.loading.scenario import load_scenario
 from simscen.run import simulate
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.spec.registry import Entry
 
 SCENARIO = """\

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from simscen.loading.goals import event_goals, scenario_goals
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.goals import event_goals, scenario_goals
 
 SCENARIO = """
 simscen: 1

@@ -6,7 +6,7 @@ import pytest
 
 from simscen.core.records.verdict import Status
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 SCENARIO = """

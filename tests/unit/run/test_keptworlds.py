@@ -9,9 +9,9 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Solid
 from simscen.core.messages.navigation import Goal
 from simscen.loading.scenario import load_scenario
-from simscen.run.caching import scenario_cache
-from simscen.run.caching.disk_cache import DiskCache
-from simscen.run.caching.scenario_cache import CachedWorldBuilder, ScenarioCache
+from simscen.run import scenario_cache
+from simscen.run.disk_cache import DiskCache
+from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
 from simscen.run.simulate import simulate
 
 SCENARIO = """\
@@ -40,7 +40,7 @@ def test_logs_are_the_same_with_a_cold_a_warm_and_a_damaged_cache(tmp_path: Path
     without, cold = log(DiskCache(None)), log(DiskCache(cache))
     assert len(list(cache.iterdir())) == 2
     with monkeypatch.context() as broken:
-        broken.setattr(scenario_cache, "map_of", None)
+        broken.setattr(scenario_cache, "draw_map", None)
         broken.setattr(scenario_cache, "legs_between", None)
         warm = log(DiskCache(cache))
     for file in cache.iterdir():
@@ -79,6 +79,6 @@ def test_another_world_another_goal_and_another_robot_have_ways_of_their_own(tmp
 def test_results_of_other_code_are_not_used(monkeypatch) -> None:
     before = scenario_cache.cache_key("map", 1.0)
     scenario_cache._circumstances.cache_clear()
-    monkeypatch.setattr(scenario_cache, "source_digest", lambda *rooms: "of another version")
+    monkeypatch.setattr(scenario_cache, "source_digest", lambda *parts: "of another version")
     assert scenario_cache.cache_key("map", 1.0) != before
     scenario_cache._circumstances.cache_clear()

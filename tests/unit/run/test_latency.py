@@ -8,7 +8,7 @@ from simscen.core.errors import InvalidInput
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.loading.scenario import load_scenario
 from simscen.run.assembly import assemble
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.robot_interface import SensorSuite
 
 SCENARIO = """\

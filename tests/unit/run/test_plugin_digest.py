@@ -1,6 +1,6 @@
 """The digest of a plug-in follows its files, also within one process (`--watch`)."""
 
-from simscen.run.reproducibility.environment import plugin_fingerprints
+from simscen.run.reproducibility import plugin_fingerprints
 from simscen.spec.registry import Entry
 
 

@@ -4,7 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from simscen.run.preparation import warm_up
+from simscen.run.process import warm_up
 from simscen.spec.base import Component
 
 SCENARIO = """\

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from simscen.loading.scenario import try_variations
-from simscen.run.caching import scenario_cache
-from simscen.run.caching.disk_cache import DiskCache
-from simscen.run.caching.scenario_cache import CachedWorldBuilder, ScenarioCache
+from simscen.run import scenario_cache
+from simscen.run.disk_cache import DiskCache
+from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
 
 TEXT = """\
 simscen: 1

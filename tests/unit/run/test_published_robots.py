@@ -4,9 +4,9 @@ import pytest
 from pydantic import ValidationError
 
 from simscen.core.errors import InvalidInput
-from simscen.loading.files.robotfile import load_robot_file
+from simscen.loading.builders import robot_from_file
+from simscen.loading.files.single_files import load_robot_file
 from simscen.model.robot import RobotSpec
-from simscen.run.preparation.loaders import robot_from_file
 
 ROBOT = """\
 simscen: 1

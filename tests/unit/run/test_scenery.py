@@ -10,7 +10,7 @@ from simscen.loading.scenario import load_scenario
 from simscen.record.log_header import SCENERY_FILE, scenery_from_header
 from simscen.record.log_reader.read import read_log
 from simscen.run.log_header import world_scenery as scenery_in
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 ROOT = Path(__file__).parents[3]
@@ -78,11 +78,11 @@ pass: [{collisions: {max: 0}}]
     prepared = prepare(load_scenario(file, tmp_path))
     simulate(prepared, log=tmp_path / "run.mcap")
     log = read_log(tmp_path / "run.mcap")
-    found = scenery_from_header(log.about)
+    found = scenery_from_header(log.header)
     assert found == scenery_in(prepared)
     assert found.map is not None and np.array_equal(found.map.grid.cells, prepared.built.map.cells)
     assert found.places["dock"].x == 3
     (spilled,) = log.trace.of_kind(EventKind.FLOOR_CHANGED)
     assert (spilled.name, spilled.data["friction"], spilled.data["until"]) == ("patch", 0.1, 2.5)
     assert len(spilled.data["outline"]) == 32
-    assert SCENERY_FILE in log.about.files
+    assert SCENERY_FILE in log.header.files

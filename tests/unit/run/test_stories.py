@@ -6,7 +6,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.records.events import EventKind
 from simscen.run.live_world.director import RelativeSituation
 from simscen.testing.fakes import FakeStage
-from simscen.triggers.registry import Trigger
+from simscen.triggers.base import Trigger
 
 PUSH = "do: {push: {impulse: [0, 0.001]}}"
 STORY = f"""\

@@ -3,7 +3,7 @@
 import numpy as np
 
 from simscen.core.random_streams import Streams
-from simscen.sensors.normal_stream import BUFFER_SIZE, NormalStream
+from simscen.sensors.sensor import BUFFER_SIZE, NormalStream
 
 
 def test_numbers_drawn_ahead_are_those_of_single_draws_bit_for_bit():

@@ -17,7 +17,7 @@ from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.objects.actor import Actor
 from simscen.sim.objects.proximity import REQUERY_DISTANCE_M, DeferredActors, ProximityQuery
 from simscen.sim.simulation import RobotPlacement, Simulation
-from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
 NAMES = [f"thing {number}" for number in range(10)]
@@ -81,7 +81,9 @@ def course(seed, present):
         "a": RobotPlacement(quick, Pose2(0.0, 0.0)),
         "b": RobotPlacement(build_robot_body(shipped("jackal")), Pose2(2.0, 1.5)),
     }
-    simulation = Simulation(fuse([box("post", 3, -2, 0.3, 0.3)]), bodies, placed, triangulate, has_images=present)
+    simulation = Simulation(
+        merge_solids([box("post", 3, -2, 0.3, 0.3)]), bodies, placed, triangulate, has_images=present
+    )
     beats = []
     for beat in range(48):
         simulation.step(6)

@@ -15,7 +15,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.single_robot import SingleRobotSimulation
-from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
 solids = [box(f"box{{k}}", (k * 7 % 11) - 5, (k * 5 % 9) - 4, 0.3, 0.4) for k in range(60)]
 solids = [solid for solid in solids if abs(solid.pose.x) + abs(solid.pose.y) > 1.0]
@@ -26,7 +26,7 @@ bodies = [
 if {turned}:
     bodies.reverse()
 body = build_robot_body(shipped({robot!r}))
-simulation = SingleRobotSimulation(fuse(solids), bodies, body, Pose2(0.1, 0.2, 0.3), triangulate)
+simulation = SingleRobotSimulation(merge_solids(solids), bodies, body, Pose2(0.1, 0.2, 0.3), triangulate)
 for k in range(60):
     simulation.drive(Twist(0.5, 0.0, 0.4 - 0.02 * k))
     simulation.step(24)

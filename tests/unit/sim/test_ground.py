@@ -12,8 +12,8 @@ from simscen.core.geometry.shapes import Body, Box, Mesh, Solid
 from simscen.sim.body.climb import compute_climb_limits, grip_angle
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.worlds.geometry.drive_obstacles import drive_obstacles
-from simscen.worlds.geometry.ramp_wedges import wedge
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.world_file import ramp_solid
 
 TICKS = 240
 FOOT = 0.5
@@ -22,7 +22,7 @@ FOOT = 0.5
 def ramp(degrees, length=2.0, friction=1.0, width=2.0):
     """A ramp that begins FOOT ahead, and its height."""
     height = length * math.tan(math.radians(degrees))
-    return wedge((FOOT, 0.0), (FOOT + length, 0.0), width, height, "ramp", friction)
+    return ramp_solid((FOOT, 0.0), (FOOT + length, 0.0), width, height, "ramp", friction)
 
 
 @pytest.fixture
@@ -33,7 +33,10 @@ def on_ground(simulate):
         body = build_robot_body(shipped(robot))
         reach = max((wheel.radius for wheel in body.wheels), default=0.0)
         return simulate(
-            body, solids, obstacles=fuse(drive_obstacles(tuple(solids), reach, *compute_climb_limits(body))), **where
+            body,
+            solids,
+            obstacles=merge_solids(drive_obstacles(tuple(solids), reach, *compute_climb_limits(body))),
+            **where,
         )
 
     return make
@@ -152,7 +155,7 @@ def test_walls_leave_the_ground_flat(simulate):
     """Wheels touch nothing of a world of walls, so that its runs are what they were."""
     from simscen.core.geometry.meshes import drivable_solids
 
-    mesh = fuse([box("wall", 1, 0, 0.1, 4), box("crate", -1, 0, 0.5, 0.5, 0.4), box("line", 0, 1, 1, 1, 0.004)])
+    mesh = merge_solids([box("wall", 1, 0, 0.1, 4), box("crate", -1, 0, 0.5, 0.5, 0.4), box("line", 0, 1, 1, 1, 0.004)])
     assert drivable_solids(mesh, 0.1) == frozenset()
     simulation = simulate(solids=[box("wall", 1, 0, 0.1, 4)], drive=(0.2, 0, 0))
     simulation.drive(Twist(0.1, 0, 0))

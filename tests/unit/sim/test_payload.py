@@ -10,7 +10,7 @@ from simscen.core.geometry.kinematics import STOP
 from simscen.sim.body.climb import compute_climb_limits
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.body.robot_body import add_payload, center_of_mass, is_stable, scale_motor_torque
-from simscen.worlds.geometry.ramp_wedges import wedge
+from simscen.worlds.world_file import ramp_solid
 
 TICKS, GRAVITY = 240, 9.81
 
@@ -50,7 +50,7 @@ def test_weak_motors_climb_a_slope_whose_sine_is_their_force_over_the_weight(sim
     whole, slope = build_robot_body(shipped("turtlebot")), math.radians(5)
     body = scale_motor_torque(whole, share * math.sin(slope) * whole.mass * GRAVITY / force(whole))
     assert (compute_climb_limits(body).slope > slope) == climbs
-    simulation = simulate(body, [wedge((0.5, 0), (4.5, 0), 2, 4 * math.tan(slope), "ramp")], pose=Pose2(2, 0, 0),
+    simulation = simulate(body, [ramp_solid((0.5, 0), (4.5, 0), 2, 4 * math.tan(slope), "ramp")], pose=Pose2(2, 0, 0),
                           drive=(0.3, 0, 0))  # fmt: skip
     simulation.step(2 * TICKS)
     assert (simulation.base_pose().x > 2.0) == climbs
@@ -62,7 +62,7 @@ def test_a_high_load_tips_a_robot_backwards_on_a_slope_steeper_than_half_its_whe
 ):
     body, slope = add_payload(build_robot_body(shipped("jackal")), 50.0, (0.0, 0.0, height)), math.radians(15)
     assert (math.tan(slope) > 0.262 / 2 / center_of_mass(body)[2]) == tips
-    simulation = simulate(body, [wedge((0.5, 0), (3.5, 0), 2, 3 * math.tan(slope), "ramp")], pose=Pose2(2, 0, 0))
+    simulation = simulate(body, [ramp_solid((0.5, 0), (3.5, 0), 2, 3 * math.tan(slope), "ramp")], pose=Pose2(2, 0, 0))
     simulation.step(2 * TICKS)
     pose = simulation.base_pose()
     upright = 1 - 2 * (pose.qx**2 + pose.qy**2)

@@ -10,7 +10,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.ray_fans import RayFan
 from simscen.core.geometry.shapes import Body
 from simscen.run.live_world.ray_caster import LiveRayCaster
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 WALL = box("wall", 4.0, 0.0, 0.2, 8.0)
@@ -22,7 +22,7 @@ FAN = RayFan(-math.pi, math.pi / 45, 90)
 def drive(simulate, every, looking):
     """What a level fan meets, every fifth of a second; every so many ticks somebody else is `looking`."""
     simulation = simulate(solids=[WALL], bodies=CRATES, drive=(0.4, 0.0, 0.0))
-    rays, scans = LiveRayCaster(RayScene(fuse([WALL])), simulation.robot), []
+    rays, scans = LiveRayCaster(RayScene(merge_solids([WALL])), simulation.robot), []
     for tick in range(0, 3612, 12):
         if tick in (660, 840):
             simulation.drive(Twist(-0.3, 0.0, 0.0) if tick == 660 else Twist())
@@ -44,7 +44,7 @@ def test_who_else_looks_changes_not_one_bit_of_a_scan(simulate):
 
     def look(simulation):
         homes = simulation.robot.rest_poses
-        other or other.append(LiveRayCaster(RayScene(fuse([WALL])), simulation.robot, frozenset({"crate 1"})))
+        other or other.append(LiveRayCaster(RayScene(merge_solids([WALL])), simulation.robot, frozenset({"crate 1"})))
         other[0].sweep(FAN, Pose3.from_rpy(0.0, 0.5, 0.3, 0.1, 0.2, 0.0), 9.0)
         at_home.append({name for name, pose in simulation.objects().items() if homes.get(name) == pose})
 
@@ -61,9 +61,12 @@ def test_a_scan_sees_what_it_would_see_of_each_thing_alone(simulate):
     apart = []
 
     def look(simulation):
-        scene = RayScene(fuse([WALL]))
+        scene = RayScene(merge_solids([WALL]))
         scene.set_moving(
-            {name: (fuse(body.solids), pose) for name, (body, pose) in simulation.robot.bodies_and_poses().items()}
+            {
+                name: (merge_solids(body.solids), pose)
+                for name, (body, pose) in simulation.robot.bodies_and_poses().items()
+            }
         )
         apart.append(np.minimum(scene.sweep(FAN, simulation.base_pose()._replace(z=0.2), 6.0), 6.0))
 

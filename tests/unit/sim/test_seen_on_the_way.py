@@ -11,12 +11,12 @@ from simscen.core.geometry.scripted_poses import PosesAtTick
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.run.live_world import ray_caster
 from simscen.run.live_world.ray_caster import LiveRayCaster
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 WALL = box("wall", 4.0, 0.0, 0.2, 8.0)
 PARTS = (box("cart", 0.2, 0, 0.5, 0.3, 0.4),)
-MESH = fuse(PARTS)
+MESH = merge_solids(PARTS)
 FAN = RayFan(-math.pi, math.pi / 45, 90)
 REACH = 2.0
 CARTS = [f"cart {number}" for number in range(16)]
@@ -38,8 +38,8 @@ def test_a_scan_is_that_of_a_scene_that_was_told_of_everything(simulate, monkeyp
     """Whoever else looks, from wherever and however far; also once something is given a script."""
     monkeypatch.setattr(ray_caster, "REFRESH_DISTANCE_M", 0.5)
     simulation, rng = simulate(solids=[WALL], bodies=carts(), drive=(0.02, 0.0, 0.1)), np.random.default_rng(2)
-    robot, told = simulation.robot, RayScene(fuse([WALL]))
-    rays, watched = (LiveRayCaster(RayScene(fuse([WALL])), robot) for _ in range(2))
+    robot, told = simulation.robot, RayScene(merge_solids([WALL]))
+    rays, watched = (LiveRayCaster(RayScene(merge_solids([WALL])), robot) for _ in range(2))
     ahead, met = 0, set[str]()
     for beat in range(130):
         robot.sample(24)

@@ -11,7 +11,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.run.live_world.ray_caster import LiveRayCaster
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.simulation import RobotPlacement, Simulation
-from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 FRONT = Twist(0.3, 0.0, 0.0)
@@ -27,7 +27,7 @@ def meet():
             name: RobotPlacement(build_robot_body(shipped(model)), Pose2(*pose))
             for name, (model, *pose) in robots.items()
         }
-        made.append(Simulation(fuse(list(solids)), [], placed, triangulate))
+        made.append(Simulation(merge_solids(list(solids)), [], placed, triangulate))
         return made[-1]
 
     yield make
@@ -82,7 +82,7 @@ def test_each_is_among_the_things_that_the_other_sees(meet):
     a = simulation.robots["a"]
     assert list(a.truth().objects) == ["b"]
     assert a.truth().objects["b"] == simulation.robots["b"].base_pose()
-    rays = LiveRayCaster(RayScene(fuse([])), a)
+    rays = LiveRayCaster(RayScene(merge_solids([])), a)
     (ahead, back) = rays.cast(np.array([[0.3, 0.0, 0.1]] * 2), np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), 5.0)
     radius = build_robot_body(shipped("turtlebot")).radius
     assert ahead == pytest.approx(1.7 - radius, abs=0.02)

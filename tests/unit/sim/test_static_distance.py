@@ -19,7 +19,7 @@ from simscen.sim.contact.static_distance import (
     max_displacement,
     point_to_triangles,
 )
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 
 
 def test_distances_to_triangles_are_trimeshs():
@@ -60,7 +60,7 @@ def proximity():
         Solid(Extrusion(((0, 0), (2, 0), (2, 0.2), (0.2, 0.2), (0.2, 2), (0, 2)), 1.0), Pose3(5, 5), "corner"),
         Solid(Box((20, 20, 0.1)), Pose3(z=-0.05), "floor"),
     ]
-    made = StaticDistance(fuse(solids), build_robot_body(shipped("turtlebot")), 2.0)
+    made = StaticDistance(merge_solids(solids), build_robot_body(shipped("turtlebot")), 2.0)
     yield made
     made.close()
 
@@ -100,7 +100,7 @@ def test_distances_on_a_way_through_a_crowd_are_shapelys():
     corner = Extrusion(((0, 0), (1, 0), (1, 0.2), (0.2, 0.2), (0.2, 1), (0, 1)), 1.0)
     kinds = (Box((0.6, 0.4, 1.0)), Cylinder(0.3, 1.0), corner)
     places = [Pose3.from_rpy(x, y, 0.5, 0.0, 0.0, yaw) for x, y, yaw in rng.uniform((0, 0, -3), (24, 24, 3), (160, 3))]
-    mesh = fuse([Solid(kinds[k % 3], pose, str(k)) for k, pose in enumerate(places)])
+    mesh = merge_solids([Solid(kinds[k % 3], pose, str(k)) for k, pose in enumerate(places)])
     corners = mesh.vertices[mesh.faces]
     plan = shapely.union_all(shapely.polygons(corners[np.ptp(corners[:, :, 2], axis=1) == 0][:, :, :2]))
     poses = [Pose3(2.0, 2.0)]
@@ -120,7 +120,9 @@ def test_distances_on_a_way_through_a_crowd_are_shapelys():
 
 
 def test_the_nearest_of_two_changes_with_each_step_between_them():
-    made = StaticDistance(fuse([box("left", 0, 0.9, 1, 1), box("right", 0, -0.9, 1, 1)]), drum_robot(0.2, 0.4), 2.0)
+    made = StaticDistance(
+        merge_solids([box("left", 0, 0.9, 1, 1), box("right", 0, -0.9, 1, 1)]), drum_robot(0.2, 0.4), 2.0
+    )
     for k in range(20):
         y = 0.05 * (-1) ** (k // 2)
         assert made.distance(Pose3(0.01 * k - 0.1, y)) == pytest.approx(0.15, abs=1e-6)
@@ -128,7 +130,7 @@ def test_the_nearest_of_two_changes_with_each_step_between_them():
 
 
 def test_a_reach_ends_where_it_ends():
-    made = StaticDistance(fuse([box("ahead", 2.0, 0, 1, 1)]), drum_robot(0.2, 0.4), 1.0)
+    made = StaticDistance(merge_solids([box("ahead", 2.0, 0, 1, 1)]), drum_robot(0.2, 0.4), 1.0)
     assert made.distance(Pose3(0.2995)) == math.inf
     assert made.distance(Pose3(0.3005)) == pytest.approx(0.9995, abs=1e-6)
     assert made.distance(Pose3(0.2995)) == math.inf
@@ -137,7 +139,7 @@ def test_a_reach_ends_where_it_ends():
 
 def test_the_top_of_a_tilted_robot_may_be_nearest_to_what_its_base_is_far_from():
     made = StaticDistance(
-        fuse([box("ahead", 1.5, 0, 1, 4, 4), box("behind", -1.15, 0, 1, 4, 4)]), drum_robot(0.2, 1.5), 2.0
+        merge_solids([box("ahead", 1.5, 0, 1, 4, 4), box("behind", -1.15, 0, 1, 4, 4)]), drum_robot(0.2, 1.5), 2.0
     )
     leans = 1.5 * math.sin(0.3) + 0.2 * math.cos(0.3)
     assert made.distance(Pose3.from_rpy(0.0, 0.0, 0.0, 0.0, 0.3, 0.0)) == pytest.approx(1.0 - leans, abs=1e-3)
@@ -146,7 +148,7 @@ def test_the_top_of_a_tilted_robot_may_be_nearest_to_what_its_base_is_far_from()
 
 def test_what_stands_behind_nearer_solids_is_not_built():
     rows = [box(f"{y} {k}", 1.0 * k, y, 1.1, 0.4) for y in (-0.8, 0.8, -1.4, 1.4) for k in range(30)]
-    made = StaticDistance(fuse(rows), drum_robot(0.2, 0.4), 2.0)
+    made = StaticDistance(merge_solids(rows), drum_robot(0.2, 0.4), 2.0)
     for k in range(200):
         assert made.distance(Pose3(0.1 * k)) == pytest.approx(0.4, abs=1e-6)
     assert 20 <= len(made._shape_pairs) <= 44
@@ -166,7 +168,7 @@ def wall_of_many_triangles(columns, rows):
 def test_a_solid_of_more_triangles_than_bullet_takes_at_once_is_as_near_as_any():
     wall = wall_of_many_triangles(400, 60)
     assert len(wall.faces) == 48_000
-    made = StaticDistance(fuse([Solid(wall, Pose3(), "wall")]), build_robot_body(shipped("turtlebot")), 2.0)
+    made = StaticDistance(merge_solids([Solid(wall, Pose3(), "wall")]), build_robot_body(shipped("turtlebot")), 2.0)
     for y in (-9.0, -3.3, 0.0, 9.5):
         assert made.distance(Pose3(4.0, y)) == pytest.approx(1.0 - 0.22, abs=1e-3)
     made.close()
@@ -181,7 +183,7 @@ def test_every_face_is_in_one_tile():
 
 def test_a_hull_of_more_corners_than_bullet_takes_at_once_is_that_of_its_outermost():
     points = np.random.default_rng(4).uniform(-0.2, 0.2, size=(150_000, 3))
-    made = StaticDistance(fuse([]), build_robot_body(shipped("turtlebot")), 2.0)
+    made = StaticDistance(merge_solids([]), build_robot_body(shipped("turtlebot")), 2.0)
     shape = hull_shape(made._client, [Solid(Mesh(points, np.empty((0, 3), np.int32)), Pose3(), "cloud")])
     low, high = pybullet.getAABB(create_static_body(made._client, shape), physicsClientId=made._client)
     assert low == pytest.approx(points.min(axis=0), abs=0.05)
@@ -191,7 +193,7 @@ def test_a_hull_of_more_corners_than_bullet_takes_at_once_is_that_of_its_outermo
 
 def test_a_solid_as_large_as_a_map_is_asked_where_the_robot_is_only():
     wall = wall_of_many_triangles(400, 60)
-    made = StaticDistance(fuse([Solid(wall, Pose3(), "wall")]), build_robot_body(shipped("turtlebot")), 2.0)
+    made = StaticDistance(merge_solids([Solid(wall, Pose3(), "wall")]), build_robot_body(shipped("turtlebot")), 2.0)
     assert made.distance(Pose3(4.0, 0.0)) == pytest.approx(1.0 - 0.22, abs=1e-3)
     assert sum(len(made._parts.faces(part)) for part in made._shape_pairs) < 0.5 * len(wall.faces)
     assert made.nearest_owner((5.0, 1.0, 0.5)) == "wall"
@@ -206,7 +208,7 @@ def room_of_many_triangles():
 
 def test_a_place_is_inside_a_solid_of_many_tiles_as_in_any_other():
     made = StaticDistance(
-        fuse([Solid(room_of_many_triangles(), Pose3(z=1.0), "block"), box("shelf", 20, 0, 2, 2)]),
+        merge_solids([Solid(room_of_many_triangles(), Pose3(z=1.0), "block"), box("shelf", 20, 0, 2, 2)]),
         build_robot_body(shipped("turtlebot")),
         2.0,
     )

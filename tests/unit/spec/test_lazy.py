@@ -5,13 +5,13 @@ from typing import Annotated
 import pytest
 from pydantic import ValidationError
 
-from simscen.actions.registry import AnyAction
+from simscen.actions.base import AnyAction
 from simscen.criteria.registry import AnyCriterion
-from simscen.faults.registry import AnyFault
+from simscen.faults.base import AnyFault
 from simscen.model.world import Wall
 from simscen.spec.base import Spec
 from simscen.spec.lazy_spec import LazySpec, annotation_of
-from simscen.triggers.registry import AnyCondition as AnyTest
+from simscen.triggers.base import AnyCondition as AnyTest
 
 
 class Site(Spec):

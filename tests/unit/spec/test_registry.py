@@ -8,7 +8,7 @@ from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import Sensor
 from simscen.spec.choice import Choice
 from simscen.spec.registry import GROUPS, BrokenPlugin, entries, find, installed, shipped, unknown_groups
-from simscen.triggers.registry import Trigger
+from simscen.triggers.base import Trigger
 
 
 def test_shipped_types_are_listed_first_and_installed_ones_by_name(packages, calm_module) -> None:

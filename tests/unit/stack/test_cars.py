@@ -8,9 +8,9 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Path
 from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.stack.commands import VelocitySmoother
-from simscen.stack.costmap.costmap import CostmapView
-from simscen.stack.cusps import cusps
+from simscen.stack.costmap.layered_costmap import CostmapView
 from simscen.stack.followed_plan import FollowedPlan
+from simscen.stack.path_geometry import cusps
 from simscen.stack.protocols import RobotModel
 from simscen.testing.flatland import box_robot
 

@@ -21,20 +21,19 @@ from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.model.recovery import Recovery
 from simscen.model.recovery import Wait as WaitSpec
 from simscen.model.stack import StackSpec
-from simscen.stack.arcs import poses_along
-from simscen.stack.behaviors.motions import Wait
+from simscen.stack.behaviors.motions import BehaviorSequence, Wait
 from simscen.stack.checkers import STANDSTILL_CHECKS, ProgressChecker, SimpleGoalChecker
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import VelocitySmoother
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.controllers.collision_checker import time_to_collision
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
+from simscen.stack.costmap.speed_filter import SpeedFilter
 from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.footprint import Footprint
 from simscen.stack.moving_obstacles import MovingObstacles
+from simscen.stack.path_geometry import poses_along
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
-from simscen.stack.recovery import RoundRobin
-from simscen.stack.speed_filter import SpeedFilter
 from simscen.stack.tasks import Task
-from simscen.stack.time_to_collision import time_to_collision
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
 GOAL = Goal("g", Pose2(1.0, 0.0, 0.0), xy_tolerance=0.2, yaw_tolerance=0.2)
@@ -46,7 +45,7 @@ def checker_that(*, stateful: bool) -> SimpleGoalChecker:
 
 
 def view_of(world: Flatland, robot: RobotModel) -> CostmapView:
-    return Costmap(CostmapSpec(), Surroundings(robot, world.grid((-2.0, -2.0, 6.0, 2.0)), RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-2.0, -2.0, 6.0, 2.0)), RATE)).view
 
 
 @pytest.mark.parametrize(
@@ -314,18 +313,18 @@ def test_recoveries_are_handed_out_in_turn_until_the_retries_are_used_up() -> No
         def __init__(self, name: str) -> None:
             self.name = name
 
-    robin = RoundRobin([Named("a"), Named("b"), Named("c")], Recovery(number_of_retries=4))
+    robin = BehaviorSequence([Named("a"), Named("b"), Named("c")], Recovery(number_of_retries=4))
     assert [b.name for b in iter(lambda: robin.next(5.0), None)] == ["a", "b", "c", "a"]
     robin.reset()
     assert robin.next(5.0).name == "b"
-    assert RoundRobin([], Recovery(number_of_retries=3)).next(5.0) is None
+    assert BehaviorSequence([], Recovery(number_of_retries=3)).next(5.0) is None
 
 
 @pytest.mark.parametrize(
     ("anew", "there_are"), [(True, [True, True, False, True, True, False]), (False, [True, True, *[False] * 4])]
 )
 def test_the_retries_count_anew_for_who_has_come_a_meter_nearer(anew: bool, there_are: list[bool]) -> None:
-    robin = RoundRobin(
+    robin = BehaviorSequence(
         [Wait(WaitSpec(), setting(round_robot()))], Recovery(number_of_retries=2, retries_since_progress=anew)
     )
     assert [robin.next(to_go) is not None for to_go in (5.0, 6.0, 4.5, 3.4, 8.0, 3.4)] == there_are
@@ -345,8 +344,8 @@ def test_recoveries_help_after_the_codes_that_are_named_and_after_codes_that_nob
     code: int, advanced: bool, nav2: bool
 ) -> None:
     failure = NavigationFailure(code, "")
-    assert RoundRobin([], Recovery()).helps(failure) == nav2
-    assert RoundRobin([], StackSpec(profile="advanced").recovery).helps(failure) == advanced
+    assert BehaviorSequence([], Recovery()).helps(failure) == nav2
+    assert BehaviorSequence([], StackSpec(profile="advanced").recovery).helps(failure) == advanced
 
 
 def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> None:

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from simscen.stack import distance_transform
-from simscen.stack.distance_transform import squared_distance_blocks, squared_distances_within
+from simscen.stack.costmap import distance_transform
+from simscen.stack.costmap.distance_transform import squared_distance_blocks, squared_distances_within
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (64, 7), (130, 50)])

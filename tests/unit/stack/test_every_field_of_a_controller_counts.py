@@ -17,7 +17,7 @@ from simscen.core.messages.navigation import Goal, Path
 from simscen.model.controllers import CONTROLLERS, ControllerSpec, DynamicWindow, RegulatedPurePursuit
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.mppi import Mppi
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
@@ -143,7 +143,7 @@ PROBES: dict[type[ControllerSpec], list[Probe]] = {
 @cache
 def view_of(robot: RobotModel, boxes: tuple[tuple[float, float, float, float], ...]) -> CostmapView:
     grid = Flatland(list(boxes)).grid((-3.5, -2.5, 5.0, 3.5))
-    return Costmap(CostmapSpec(), Surroundings(robot, grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, grid, RATE)).view
 
 
 def dense(corners: tuple[tuple[float, float], ...]) -> Path:

@@ -198,6 +198,7 @@ ELSEWHERE = {
     "StackSpec.speed_mask": "tests/scenarios/test_masks.py",
     "StackSpec.nav2_params": "tests/unit/loading/nav2/test_nav2_parameters.py",
     "StackSpec.latency": "tests/unit/run/test_latency.py",  # `robot` is what the robot's file says
+    "OmplPlanner.gap_clearance": "tests/unit/stack/planners/test_ompl_planner.py",
     "Recovery.clear_entirely": "tests/unit/advanced/test_costmap_clearing.py",
     "ClearCostmap.clear_entirely": "tests/unit/stack/behaviors/test_motions.py",
     "Recovery.retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",

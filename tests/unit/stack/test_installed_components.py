@@ -39,7 +39,7 @@ from simscen.model.planners import OmplPlanner, PlannerSpec
 from simscen.model.recovery import BehaviorSpec
 from simscen.model.stack import InProcessStack
 from simscen.spec.quantities import PositiveLength
-from simscen.stack.planners.build import ompl_planner
+from simscen.stack.planners.ompl_planner import ompl_planner
 
 
 class Straight(PlannerSpec):

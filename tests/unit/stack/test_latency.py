@@ -14,9 +14,8 @@ from simscen.model.latency import Latency
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.frames import Frames
+from simscen.stack.frames import Frames, OdometryHistory
 from simscen.stack.latency_queue import LatencyQueue
-from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
 from simscen.stack.reference import ReferenceStack
 from simscen.testing.flatland import CONTROL, ODOMETRY, RATE, Drive, Flatland, drive, round_robot
@@ -90,12 +89,12 @@ def test_costmaps_show_late_what_was_where_it_was_seen() -> None:
     maps = Costmaps(StackSpec(), Surroundings(round_robot(), None, RATE), 0.5, latency=36)
     odometry, ranges = OdometryHistory(RATE), np.full(360, np.inf)
     ranges[180] = 1.0
-    maps.see(Scan("lidar", 0, ranges, -math.pi, math.pi / 180, 0.05, 12.0))
+    maps.add_reading(Scan("lidar", 0, ranges, -math.pi, math.pi / 180, 0.05, 12.0))
     for tick, x, shown in ((0, 0.0, 0), (24, 0.3, 0), (36, 0.5, 1), (48, 0.6, 1)):
         pose = Pose2(x, 0.0)
         odometry.add(tick, pose)
         maps.update(tick, Frames(pose, pose), odometry)
-        for view in (maps.near.view, maps.wide.view):
+        for view in (maps.local_costmap.view, maps.global_costmap.view):
             cells = np.argwhere(view.costs == 254)
             assert len(cells) == shown
             assert cells[:, 1] * view.resolution + view.origin[0] == pytest.approx([1.0] * shown, abs=0.051)

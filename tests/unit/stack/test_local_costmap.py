@@ -59,7 +59,7 @@ def lethal(view: CostmapView) -> np.ndarray:
 @pytest.mark.parametrize("jump", [Pose2(0.0, 0.3), Pose2(0.0, -0.3), Pose2(0.3, 0.0), Pose2(0.0, 0.0, 0.05)])
 def test_a_jump_of_the_localizer_leaves_no_ghost_in_the_local_costmap_and_no_jerk_in_the_command(jump: Pose2) -> None:
     d = jumped(jump, 4.5)
-    ghosts = CORRIDOR.distance(lethal(costmaps(d).near.view))  # here the odom frame is the true one
+    ghosts = CORRIDOR.distance(lethal(costmaps(d).local_costmap.view))  # here the odom frame is the true one
     assert len(ghosts) > 50
     assert np.abs(ghosts).max() < 0.1
     robot, period = d.robot, CONTROL / RATE
@@ -78,18 +78,18 @@ def test_after_a_jump_the_robot_follows_its_plan_where_it_now_believes_that_to_b
 def test_the_local_costmap_rolls_with_the_robot_and_knows_no_map() -> None:
     mapped = Flatland([*CORRIDOR.boxes, (3.0, 0.0, 3.1, 0.3)])
     d = drive(CORRIDOR, START, GOAL, grid=mapped.grid((-0.5, -0.5, 14.5, 2.1))).run(4.0)
-    view = costmaps(d).near.view
+    view = costmaps(d).local_costmap.view
     height, width = view.costs.shape
     middle = view.origin[0] + width * view.resolution / 2, view.origin[1] + height * view.resolution / 2
     assert math.dist(middle, d.pose[:2]) < 0.4
     assert np.abs(CORRIDOR.distance(lethal(view))).max() < 0.1
-    assert (mapped.distance(lethal(costmaps(d).wide.view)) < 0.05).all()
+    assert (mapped.distance(lethal(costmaps(d).global_costmap.view)) < 0.05).all()
 
 
 def test_its_size_resolution_and_rate_are_nav2s_or_what_is_asked_for() -> None:
     def shape(**options: float) -> tuple[tuple[int, int], float]:
         spec = StackSpec(localizer=TRUTH, local_costmap=LocalCostmap(**options))
-        view = costmaps(drive(CORRIDOR, START, GOAL, grid=None, spec=spec)).near.view
+        view = costmaps(drive(CORRIDOR, START, GOAL, grid=None, spec=spec)).local_costmap.view
         return view.costs.shape, view.resolution
 
     assert shape() == ((60, 60), 0.05)
@@ -100,7 +100,7 @@ def test_its_size_resolution_and_rate_are_nav2s_or_what_is_asked_for() -> None:
 def test_a_robot_that_is_faster_sees_as_far_as_it_looks_ahead() -> None:
     spec = StackSpec(localizer=TRUTH, controller={"type": "dwb", "max_vel_x": 3.0})
     fast = drive(CORRIDOR, START, GOAL, grid=None, robot=round_robot(speed=3.0), spec=spec)
-    view = costmaps(fast).near.view
+    view = costmaps(fast).local_costmap.view
     assert view.costs.shape[1] * view.resolution / 2 > 1.7 * 3.0 + 0.22
 
 
@@ -118,7 +118,7 @@ def test_keepout_zones_stand_in_the_local_costmap_where_the_robot_believes_them_
     d.stack = Corrected(d, 3.0, Pose2(0.2, 0.0))
     for end, shift in ((2.9, 0.0), (4.0, 0.2)):
         d.run(end - d.tick / RATE)
-        points = lethal(costmaps(d).near.view)
+        points = lethal(costmaps(d).local_costmap.view)
         inside = points[(points[:, 1] > 0.1) & (points[:, 1] < 0.38)]
         assert inside[:, 0].min() == pytest.approx(3.0 - shift, abs=0.06)
         assert inside[:, 0].max() == pytest.approx(3.4 - shift, abs=0.06)
@@ -134,4 +134,4 @@ def test_a_robot_that_backs_out_does_not_forget_what_stands_behind_it_where_its_
     kept = costmaps(d)
     for forget in (kept.clear_local, kept.clear_around, kept.clear):
         forget()
-        assert np.hypot(*(lethal(kept.near.view) - (2.0, 0.45)).T).min() < 0.1
+        assert np.hypot(*(lethal(kept.local_costmap.view) - (2.0, 0.45)).T).min() < 0.1

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.prediction.rollouts import HORIZON, TIMES, Followed
+from simscen.advanced.prediction.rollouts import HORIZON, TIMES, FollowedPath
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
@@ -43,7 +43,7 @@ def test_what_is_told_at_once_to_stay_off_a_way_stays_off_it_at_each_moment() ->
     rng, robot, clear, off = np.random.default_rng(7), round_robot(), 0, 0
     along = np.linspace(0.0, 5.0, 101)
     for _ in range(300):
-        path = Followed(np.column_stack((along, np.sin(along * rng.uniform(0.0, 2.0)))))
+        path = FollowedPath(np.column_stack((along, np.sin(along * rng.uniform(0.0, 2.0)))))
         here = Pose2(float(rng.uniform(-0.3, 3.0)), float(rng.uniform(-0.4, 0.4)), float(rng.uniform(-3.0, 3.0)))
         twist, wanted = (Twist(float(rng.uniform(-0.5, 0.5)), 0.0, 0.0) for _ in range(2))
         thing = MovingObstacle(complex(*rng.uniform(-4, 4, 2)), complex(*rng.uniform(-1, 1, 2)), 0.3, 0.01, 0.0, 0.02)

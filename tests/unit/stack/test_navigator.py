@@ -354,7 +354,7 @@ def test_a_lidar_that_is_late_marks_obstacles_where_they_are() -> None:
     scan, stack = d.scan, d.stack
     d.scan = lambda: (late.append(scan()), late[max(0, len(late) - 4)])[1]  # 0.3 s old
     d.run(3.0)
-    view = stack.inner._costmaps.wide.view
+    view = stack.inner._costmaps.global_costmap.view
     columns = (view.costs == 254).nonzero()[1]
     x = view.origin[0] + (columns + 0.5) * view.resolution
     assert len(x)

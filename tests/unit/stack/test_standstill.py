@@ -7,7 +7,7 @@ from simscen.core.messages.navigation import Goal
 from simscen.core.records.events import Event
 from simscen.model.latency import Latency
 from simscen.model.stack import StackSpec
-from simscen.stack.standstill import StandstillReporter
+from simscen.stack.publishing import StandstillReporter
 from simscen.testing.flatland import Flatland, drive
 
 

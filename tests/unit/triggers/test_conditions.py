@@ -11,7 +11,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief, Goal
 from simscen.core.records.events import Event, EventKind
-from simscen.triggers.registry import Trigger
+from simscen.triggers.base import Trigger
 
 STILL, CLOCK = Twist(0.0), Clock(240)
 HALL = ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))

@@ -5,21 +5,21 @@ import numpy as np
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Solid
-from simscen.worlds.build import build
+from simscen.worlds.built_world import build_world_and_map
 
 
 def test_an_empty_world_is_a_small_free_map():
-    built = build(World("nothing", ()), 0.2)
+    built = build_world_and_map(World("nothing", ()), 0.2)
     assert built.map.shape == (40, 40)
     assert not built.map.cells.any()
 
 
 def test_the_same_world_is_built_the_same_bit_for_bit():
     world = World("w", tuple(Solid(Box((1.0, 0.3, 1.0)), Pose3(k, 0.1 * k, 0.5), f"b{k}") for k in range(20)))
-    assert pickle.dumps(build(world, 0.3)) == pickle.dumps(build(world, 0.3))
+    assert pickle.dumps(build_world_and_map(world, 0.3)) == pickle.dumps(build_world_and_map(world, 0.3))
 
 
 def test_the_lidars_height_decides_what_is_on_the_map():
     world = World("w", (Solid(Box((1.0, 1.0, 0.2)), Pose3(z=0.1)),))
-    assert build(world, 0.1).map.cells.any()
-    assert not np.any(build(world, 0.3).map.cells)
+    assert build_world_and_map(world, 0.1).map.cells.any()
+    assert not np.any(build_world_and_map(world, 0.3).map.cells)

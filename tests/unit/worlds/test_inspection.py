@@ -3,8 +3,7 @@ import pytest
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, Box, Cylinder, Solid
-from simscen.worlds.build import build
-from simscen.worlds.inspection import inspect
+from simscen.worlds.built_world import build_world_and_map, inspect_world
 
 ROOM = World(
     "room",
@@ -22,7 +21,7 @@ ROOM = World(
 
 
 def test_a_world_is_told_in_numbers():
-    told = inspect(build(ROOM, 0.3))
+    told = inspect_world(build_world_and_map(ROOM, 0.3))
     assert [item.name for item in told.solids] == ["wall", "wall", "post"]
     assert told.shapes == (("box", 2), ("cylinder", 1))
     assert told.solids[2].extent == pytest.approx((0.5, -0.5, 0.0, 1.5, 0.5, 2.0))
@@ -35,12 +34,12 @@ def test_a_world_is_told_in_numbers():
 
 
 def test_the_shares_of_the_map_add_up():
-    occupied, free, unknown = inspect(build(ROOM, 0.3)).map_shares
+    occupied, free, unknown = inspect_world(build_world_and_map(ROOM, 0.3)).map_shares
     assert occupied + free + unknown == pytest.approx(1.0)
     assert occupied == pytest.approx((2 * 4 * 0.2 + 3.14 * 0.25) / (6.0 * 6.2), rel=0.12)
     assert unknown == 0.0
 
 
 def test_an_empty_world_can_be_inspected():
-    told = inspect(build(World("nothing", ()), 0.3))
+    told = inspect_world(build_world_and_map(World("nothing", ()), 0.3))
     assert (told.solids, told.bodies, told.triangles) == ((), (), 0)

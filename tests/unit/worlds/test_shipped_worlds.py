@@ -11,9 +11,9 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Goal
 from simscen.model.ros_map import RosMapSpec
-from simscen.worlds.build import build
-from simscen.worlds.geometry.triangulation import fuse
-from simscen.worlds.maps.ros_map import load_grid
+from simscen.worlds.built_world import build_world_and_map
+from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.maps.ros_map import load_map
 from simscen.worlds.raycasting.ray_scene import RayScene
 from simscen.worlds.routes.shortest_paths import legs_between
 from simscen.worlds.sdf import load_sdf
@@ -25,7 +25,7 @@ LIDAR = 0.18
 
 def shipped_map(path):
     spec = RosMapSpec.model_validate({"mode": "trinary", **yaml.safe_load(path.read_text())})
-    return load_grid(spec, path.parent / spec.image)[0]
+    return load_map(spec, path.parent / spec.image)[0]
 
 
 def free_poses(grid, count, seed):
@@ -61,7 +61,7 @@ def test_rays_in_tb3_sandbox_agree_with_its_shipped_map():
     starts, directions = beams_from(places, 90)
     origins = np.column_stack((starts, np.full(len(starts), LIDAR)))
     level = np.column_stack((directions, np.zeros(len(directions))))
-    ours = RayScene(fuse(world.solids)).cast(origins, level)
+    ours = RayScene(merge_solids(world.solids)).cast(origins, level)
     assert (np.abs(ours - ranges_on_map(grid, starts, directions)) < 0.15).mean() >= 0.92
 
 
@@ -69,7 +69,7 @@ def test_rays_in_tb3_sandbox_agree_with_its_shipped_map():
 def test_our_map_of_tb3_sandbox_agrees_with_the_shipped_one_where_a_robot_can_be():
     home = DATA / "nav2_tb3_sandbox"
     world = load_sdf(home / "worlds" / "tb3_sandbox.sdf.xacro", root=DATA, search=[home / "models"], lenient=True)
-    built = build(world, LIDAR)
+    built = build_world_and_map(world, LIDAR)
     theirs = shipped_map(home / "tb3_sandbox.yaml")
     places = free_poses(theirs, 500, seed=2)
     assert (built.map.values_at(places) == FREE).mean() > 0.98
@@ -80,6 +80,6 @@ def test_every_barn_world_admits_a_disc_of_37_cm_and_its_shortest_way_is_no_long
     rows = [line.split(",") for line in (DATA / "barn_sample" / "scenarios.csv").read_text().split()[1:]]
     for number, reference in ((row[0], float(row[9])) for row in rows):
         world = load_sdf(DATA / "barn_sample" / f"world_{number}.world", root=DATA, lenient=True)
-        built = build(world, 0.3)
+        built = build_world_and_map(world, 0.3)
         (leg,) = legs_between(built, [(Pose2(-2.25, 3.0), Goal("end", Pose2(-2.25, 13.0)))], 0.37)
         assert 9.99 < leg.length < 1.3 * reference

@@ -8,7 +8,7 @@ from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Solid
 from simscen.model.world import WorldSpec
-from simscen.worlds.world_file import build_own
+from simscen.worlds.world_file import world_from_spec
 
 
 def spec(**parts):
@@ -16,7 +16,7 @@ def spec(**parts):
 
 
 def test_walls_obstacles_and_objects_arrive_where_they_were_written():
-    world = build_own(
+    world = world_from_spec(
         spec(
             walls=[{"points": [[0.0, 0.0], [5.0, 0.0]]}, {"name": "shelf", "points": [[0.0, 2.0], [5.0, 2.0]]}],
             obstacles=[
@@ -48,7 +48,7 @@ def test_a_door_hangs_on_its_first_post_and_opens_by_a_quarter_turn():
         {"name": "shut", "points": [[1.0, 0.0], [1.0, 0.9]], "closed": True},
         {"name": "ajar", "points": [[1.0, 3.0], [1.0, 3.9]]},
     ]
-    shut, ajar = build_own(spec(doors=doors), "w").bodies
+    shut, ajar = world_from_spec(spec(doors=doors), "w").bodies
     panel = shut.pose.compose(shut.solids[0].pose)
     assert shut.solids[0].shape == Box((0.9, 0.05, 1.0))
     assert panel.position == pytest.approx((1.0, 0.45, 0.5))
@@ -58,7 +58,7 @@ def test_a_door_hangs_on_its_first_post_and_opens_by_a_quarter_turn():
 def test_an_object_that_moves_by_itself_keeps_to_its_speed_and_start():
     move = {"through": [[4.0, 1.0], [4.0, 3.0]], "speed": 0.5, "repeat": "back_and_forth", "start": "2 s"}
     objects = [{"name": "cart", "box": [0.5, 0.5, 0.5], "pose": {"x": 2.0, "y": 1.0}, "move": move}]
-    path = build_own(spec(objects=objects), "w").bodies[0].path
+    path = world_from_spec(spec(objects=objects), "w").bodies[0].path
     assert path.times == (0.0, 3.75, 4.0, 4.25, 8.0)
     assert (path.mode, path.start) == ("back_and_forth", 2.0)
     assert path.poses[-1] == pytest.approx((4.0, 3.0, math.pi / 2))
@@ -68,7 +68,7 @@ def test_a_map_becomes_walls_and_stays_the_map():
     cells = np.zeros((20, 20), np.int8)
     cells[5, 5:15] = OCCUPIED
     grid = OccupancyGrid(cells, 0.1, Pose2(1.0, 1.0, 0.0))
-    world = build_own(spec(map="m.yaml", map_height=2.0), "w", grid=grid, notes=("m.pgm: a doubt",))
+    world = world_from_spec(spec(map="m.yaml", map_height=2.0), "w", grid=grid, notes=("m.pgm: a doubt",))
     assert world.notes == ("m.pgm: a doubt",)
     assert [solid.name for solid in world.solids] == ["map"]
     assert world.grid is grid
@@ -81,6 +81,6 @@ def test_what_is_added_to_an_imported_world_comes_after_it_and_wins():
         obstacles=[{"name": "ours", "box": [1.0, 1.0, 1.0], "pose": {"x": 3.0, "y": 0.0}}],
         places={"a": {"x": 5.0, "y": 5.0}},
     )
-    world = build_own(own, "w", base=base)
+    world = world_from_spec(own, "w", base=base)
     assert [solid.name for solid in world.solids] == ["theirs", "ours"]
     assert world.places == {"a": Pose2(5, 5), "b": Pose2(1, 1)}

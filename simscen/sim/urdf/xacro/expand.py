@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from simscen.assets.folders import Absent, Folders, Trouble
+from simscen.assets.folders import AllowedFolders, NoSuchFile, UnusableFile
 from simscen.core.errors import InvalidInput, Problem
 from simscen.sim.urdf.xacro.definitions import (
     Macro,
@@ -40,7 +40,7 @@ class UnknownArgument(InvalidInput):
 
 
 def expand(
-    robot: Element, file: Path, folders: Folders, read: FileReader, arguments: Mapping[str, str] | None = None
+    robot: Element, file: Path, folders: AllowedFolders, read: FileReader, arguments: Mapping[str, str] | None = None
 ) -> Element:
     """Expand the `robot` of a xacro `file`; `arguments` override the defaults.
 
@@ -69,7 +69,7 @@ def declared_in(element: Element) -> set[str]:
 
 
 class _Expansion:
-    def __init__(self, file: Path, folders: Folders, read: FileReader, arguments: Mapping[str, str]) -> None:
+    def __init__(self, file: Path, folders: AllowedFolders, read: FileReader, arguments: Mapping[str, str]) -> None:
         self._budget = Budget()
         self._texts = TextEvaluator(folders, file, self._budget, arguments)
         self.declared: set[str] = set()
@@ -181,8 +181,8 @@ class _Expansion:
         try:
             found = self._folders.find(written, self._texts.file.parent, absolute=True)
             path = self._folders.check(found, URDF_BYTES)
-        except Trouble as trouble:
-            if isinstance(trouble, Absent) and parse_bool(source.attributes.get("optional", "false")):
+        except UnusableFile as trouble:
+            if isinstance(trouble, NoSuchFile) and parse_bool(source.attributes.get("optional", "false")):
                 return
             raise MissingFile(f"include {written[:200]!r}: {trouble}", trouble.hint) from trouble
         before, self._texts.file = self._texts.file, path

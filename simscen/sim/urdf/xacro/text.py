@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from simscen.assets.folders import Folders, Trouble
+from simscen.assets.folders import AllowedFolders, UnusableFile
 from simscen.sim.urdf.xacro.expression import evaluate
 from simscen.sim.urdf.xacro.limits import MAX_LENGTH, Budget, ExpansionError, MissingFile, Value, parse_literal
 from simscen.sim.urdf.xacro.scope import Block, Lazy, Resolving, Scope
@@ -16,7 +16,7 @@ TOKEN = re.compile(r"\$\$+[{(]|\$\{[^}]*\}|\$\([^)]*\)|[^$]+|\$[^{($]+|\$\Z")
 class TextEvaluator:
     """Evaluates texts; `file` is the one being expanded, `arguments` are those of `<xacro:arg>`."""
 
-    def __init__(self, folders: Folders, file: Path, budget: Budget, arguments: Mapping[str, str]) -> None:
+    def __init__(self, folders: AllowedFolders, file: Path, budget: Budget, arguments: Mapping[str, str]) -> None:
         self.budget, self.file = budget, file
         self.arguments = dict(arguments)
         self._folders = folders
@@ -110,7 +110,7 @@ class TextEvaluator:
     def _package(self, name: str) -> str:
         try:
             return str(self._folders.package(name, self.file.parent))
-        except Trouble as trouble:
+        except UnusableFile as trouble:
             raise MissingFile(f"$(find {name[:60]}): {trouble}", trouble.hint) from None
 
 

@@ -1,6 +1,6 @@
-"""Critics of DWB, which score the end of each trajectory (dwb_critics).
+"""Critics of DWB, which score and reject trajectories (dwb_critics).
 
-Raw scores are in cells, costs, rad or rad/s and are multiplied by the scale of the critic. As in Nav2, the scales of
+Raw scores are in cells, costs, rad, or rad/s and are multiplied by the scale of the critic. As in Nav2, the scales of
 critics that count cells are multiplied by half the resolution. MapGridCritic propagates Manhattan distances through
 all cells, obstacles included; here, they are computed in closed form.
 """
@@ -11,19 +11,27 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as DwbSpec
+from simscen.stack.controllers.collision_checker import APPROACH_TOLERANCE_M, UNCERTAINTY_SIGMAS
+from simscen.stack.controllers.dwb.trajectory_generator import Trajectories
+from simscen.stack.footprint import Footprint
+from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView
 
 Cells = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 UNKNOWN = 255
+PREFERRED_CLEARANCE_M = 0.05
+"""Clearance that a trajectory must have if any trajectory has it."""
+BATCH_TRAJECTORIES = 50
+"""Number of trajectories that are checked together. Usually one of the first is free."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Raw scores (n,) by Nav2's names of the critics, each with its scale, and which trajectories (n,) are legal."""
+    """Raw scores (n,) and scales by Nav2's names of the critics, and which trajectories (n,) are legal."""
 
     raw: dict[str, Array]
     scale: dict[str, float]
@@ -31,7 +39,7 @@ class Scores:
 
     @property
     def total(self) -> Array:
-        """The weighted sums (n,); infinite where a critic with a scale forbids the trajectory."""
+        """Weighted sums (n,); infinite for illegal trajectories."""
         total = np.zeros(len(self.legal))
         for name, raw in self.raw.items():
             total += self.scale[name] * raw
@@ -41,50 +49,49 @@ class Scores:
 def score_trajectories(
     spec: DwbSpec, costmap: CostmapView, pose: Pose2, goal: Pose2, plan: Array, velocities: Array, ends: Array
 ) -> Scores:
-    """Return the scores of trajectories with these end poses (n, 3); the plan (m, 2) has at least one point."""
-    ahead = spec.forward_point_distance
-    nose = ends[:, :2] + ahead * np.column_stack((np.cos(ends[:, 2]), np.sin(ends[:, 2])))
-    last, on_map = cells_of(costmap, ends[:, :2])
-    front, seen = cells_of(costmap, nose)
-    near = pose.distance(goal) <= ahead
-    half = 0.5 * costmap.resolution
+    """Return the scores of trajectories with these velocities (n, 3) and final poses (n, 3).
+
+    The plan (m, 2) has at least one point. A trajectory is legal if it ends on the costmap.
+    """
+    forward_distance = spec.forward_point_distance
+    forward = ends[:, :2] + forward_distance * np.column_stack((np.cos(ends[:, 2]), np.sin(ends[:, 2])))
+    end_cells, end_on_map = cells_of(costmap, ends[:, :2])
+    forward_cells, forward_on_map = cells_of(costmap, forward)
+    is_near_goal = pose.distance(goal) <= forward_distance
+    cell_scale = 0.5 * costmap.resolution
     scale = {
         "BaseObstacle": spec.base_obstacle_scale,
-        "GoalAlign": half * spec.goal_align_scale,
-        "PathAlign": 0.0 if near else half * spec.path_align_scale,
-        "PathDist": half * spec.path_dist_scale,
-        "GoalDist": half * spec.goal_dist_scale,
+        "GoalAlign": cell_scale * spec.goal_align_scale,
+        "PathAlign": 0.0 if is_near_goal else cell_scale * spec.path_align_scale,
+        "PathDist": cell_scale * spec.path_dist_scale,
+        "GoalDist": cell_scale * spec.goal_dist_scale,
         "Twirling": spec.twirling_scale,
     }
-    path, drawn = plan_cells(costmap, plan), plan_cells(costmap, _drawn_ahead(plan, pose, goal, ahead))
-    legal = on_map & (seen if scale["GoalAlign"] or scale["PathAlign"] else True)
-    rows, columns = np.clip(last.T, 0, np.array(costmap.costs.shape)[:, None] - 1)
+    path = plan_cells(costmap, plan)
+    extended_path = plan_cells(costmap, _extend_beyond_goal(plan, pose, goal, forward_distance))
+    legal = end_on_map & (forward_on_map if scale["GoalAlign"] or scale["PathAlign"] else True)
+    rows, columns = np.clip(end_cells.T, 0, np.array(costmap.costs.shape)[:, None] - 1)
     raw = {
         "BaseObstacle": costmap.costs[rows, columns].astype(np.float64),
-        "GoalAlign": _apart(front, drawn[-1:]),
-        "PathAlign": _apart(front, path),
-        "PathDist": _apart(last, path),
-        "GoalDist": _apart(last, path[-1:]),
+        "GoalAlign": manhattan_distances(forward_cells, extended_path[-1:]),
+        "PathAlign": manhattan_distances(forward_cells, path),
+        "PathDist": manhattan_distances(end_cells, path),
+        "GoalDist": manhattan_distances(end_cells, path[-1:]),
         "Twirling": np.abs(velocities[:, 2]),
     }
     return Scores(raw, scale, legal)
 
 
-def _apart(cells: Cells, sources: Cells) -> Array:
-    """Nothing to go by off the costmap: then all are alike."""
-    return manhattan(cells, sources) if len(sources) else np.zeros(len(cells))
-
-
-def _drawn_ahead(plan: Array, pose: Pose2, goal: Pose2, distance: float) -> Array:
-    """Return the plan with its end moved beyond the goal, as seen from the robot, for the GoalAlign critic."""
+def _extend_beyond_goal(plan: Array, pose: Pose2, goal: Pose2, distance: float) -> Array:
+    """Return the plan with its end moved beyond the goal by a distance in m, as seen from the robot."""
     angle = np.arctan2(goal.y - pose.y, goal.x - pose.x)
-    drawn = plan.copy()
-    drawn[-1] += distance * np.array((np.cos(angle), np.sin(angle)))
-    return np.asarray(drawn)
+    extended = plan.copy()
+    extended[-1] += distance * np.array((np.cos(angle), np.sin(angle)))
+    return np.asarray(extended)
 
 
 def cells_of(costmap: CostmapView, points: Array) -> tuple[Cells, Mask]:
-    """Cells (n, 2) as (row, column) under points (n, 2), and which lie on the costmap."""
+    """Return the cells (n, 2) as (row, column) below points (n, 2), and which of them are on the costmap."""
     cells = np.floor((points[:, ::-1] - np.array(costmap.origin)[::-1]) / costmap.resolution).astype(np.int64)
     on_map: Mask = np.asarray(((cells >= 0) & (cells < np.array(costmap.costs.shape))).all(axis=1))
     return cells, on_map
@@ -98,33 +105,141 @@ def plan_cells(costmap: CostmapView, plan: Array) -> Cells:
     if not known.any():
         return cells[:0]
     first = int(known.argmax())
-    gone = np.flatnonzero(~known[first:])
-    return cells[first : first + int(gone[0])] if len(gone) else cells[first:]
+    unknown = np.flatnonzero(~known[first:])
+    return cells[first : first + int(unknown[0])] if len(unknown) else cells[first:]
 
 
-def manhattan(cells: Cells, sources: Cells) -> Array:
-    """Return the Manhattan distance (n,) in cells from cells (n, 2) to the nearest of the sources (m, 2)."""
+def manhattan_distances(cells: Cells, sources: Cells) -> Array:
+    """Return the Manhattan distance (n,) in cells from cells (n, 2) to the nearest source (m, 2); 0 without sources."""
+    if not len(sources):
+        return np.zeros(len(cells))
     apart = np.abs(cells[:, None, 0] - sources[None, :, 0]) + np.abs(cells[:, None, 1] - sources[None, :, 1])
     return np.asarray(apart.min(axis=1), dtype=np.float64)
 
 
 class RotateToGoalCritic:
-    """Demands that the robot slows down at the goal, then that it only turns; scores by how far off its heading is."""
+    """Requires the robot to slow down at the goal and then to rotate in place. Scores the error of the heading."""
 
-    def __init__(self, stopped: float, slowing: float) -> None:
-        self._stopped, self._slowing = stopped, slowing
+    def __init__(self, stopped_velocity: float, slowing_factor: float) -> None:
+        """Take Nav2's trans_stopped_velocity in m/s and slowing_factor."""
+        self._stopped_velocity, self._slowing_factor = stopped_velocity, slowing_factor
         self.reset()
 
     def reset(self) -> None:
         """Forget the state of the previous goal."""
-        self._rotating = False
+        self._is_rotating = False
 
     def scores(self, now: Twist, goal_yaw: float, velocities: Array, end_yaws: Array) -> tuple[Array, Mask]:
-        """Scores (n,) at the goal and which velocities (n, 3) are legal there; end_yaws (n,) are where they lead."""
+        """Return the scores (n,) of velocities (n, 3) that lead to headings (n,), and which of them are legal."""
         speed = math.hypot(now.vx, now.vy)
-        self._rotating |= speed <= self._stopped
-        square = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
-        off = np.abs((end_yaws - goal_yaw + np.pi) % (2.0 * np.pi) - np.pi)
-        if self._rotating:
-            return off, np.asarray(square == 0.0)
-        return np.asarray(square * self._slowing + off), np.asarray(square < speed**2)
+        self._is_rotating |= speed <= self._stopped_velocity
+        squared_speed = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
+        angle = np.abs((end_yaws - goal_yaw + np.pi) % (2.0 * np.pi) - np.pi)
+        if self._is_rotating:
+            return angle, np.asarray(squared_speed == 0.0)
+        return np.asarray(squared_speed * self._slowing_factor + angle), np.asarray(squared_speed < speed**2)
+
+
+class ObstacleCritic:
+    """Selects the first trajectory without a collision (dwb_critics' ObstacleFootprint, including moving obstacles)."""
+
+    def __init__(self, footprint: Footprint) -> None:
+        self._footprint = footprint
+
+    def first_free(
+        self, costmap: CostmapView, pose: Pose2, trajectories: Trajectories, order: npt.NDArray[np.intp]
+    ) -> int | None:
+        """Return the first trajectory, in this order, that keeps the preferred clearance, or else one that is free.
+
+        A robot that is in collision takes the first one that leads out of it. If there are moving obstacles,
+        trajectories that meet none of them come first, then those that meet one as late as possible.
+        """
+        if len(costmap.moving):
+            meeting_times = self._meeting_times(costmap.moving, trajectories, order)
+            order = order[np.argsort(-meeting_times, kind="stable")]
+        clearance = np.empty((len(trajectories.x), len(order)), np.float32)
+        for start in range(0, len(order), BATCH_TRAJECTORIES):
+            batch = slice(start, start + BATCH_TRAJECTORIES)
+            poses = np.moveaxis(trajectories.poses(order[batch]), -1, 0)
+            clearance[:, batch] = self._footprint.discs.clearance(costmap, *poses)
+            has_clearance = (clearance[:, batch] > PREFERRED_CLEARANCE_M).all(axis=0)
+            if has_clearance.any():
+                return int(order[start + int(has_clearance.argmax())])
+        free = (clearance > 0.0).all(axis=0)
+        if not free.any():
+            poses = trajectories.poses(order).reshape(-1, 3)
+            free = self._footprint.free(costmap, poses).reshape(clearance.shape).all(axis=0)
+        if not free.any() and self._footprint.clearance(costmap, np.array([pose]))[0] <= 0.0:
+            comes_no_closer = (clearance >= clearance[0]).all(axis=0)
+            free = comes_no_closer & (clearance[-1] > clearance[0] + 0.5 * costmap.resolution)
+        return int(order[int(free.argmax())]) if free.any() else None
+
+    def _meeting_times(self, moving: MovingObstacles, trajectories: Trajectories, order: npt.NDArray[np.intp]) -> Array:
+        """Return the times (k,) in s at which trajectories come too close to a moving obstacle; inf if they do not."""
+        times = trajectories.times[:, trajectories.yaw_index[order]]
+        gaps = self._footprint.gap(moving, trajectories.poses(order), times, UNCERTAINTY_SIGMAS)
+        too_close = (gaps < PREFERRED_CLEARANCE_M) & (gaps < gaps[0] - APPROACH_TOLERANCE_M)
+        return np.where(too_close.any(axis=0), times[too_close.argmax(axis=0), np.arange(len(order))], np.inf)
+
+
+class DirectionHistory:
+    """Sign of one velocity component over time, and the sign that is allowed after it has reversed."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Allow both signs."""
+        self._sign = 0.0
+        self.allowed_sign = 0.0
+        """1 or -1 if only this sign is allowed; 0 if both are."""
+
+    def update(self, velocity: float) -> bool:
+        """Record a command; return whether it reversed the direction."""
+        if velocity == 0.0:
+            return False
+        sign = math.copysign(1.0, velocity)
+        has_reversed = self._sign == -sign
+        if has_reversed:
+            self.allowed_sign = sign
+        self._sign = sign
+        return has_reversed
+
+
+class OscillationCritic:
+    """Forbids a second reversal of the direction until the robot has moved or rotated far enough."""
+
+    def __init__(self, reset_distance: float, reset_angle: float, x_only_threshold: float) -> None:
+        """Take Nav2's oscillation_reset_dist (m), oscillation_reset_angle (rad), and x_only_threshold (m/s)."""
+        self._reset_distance, self._reset_angle = reset_distance, reset_angle
+        self._x_only_threshold = x_only_threshold
+        self._directions = (DirectionHistory(), DirectionHistory(), DirectionHistory())
+        self._reversed_at = Pose2(0.0, 0.0)
+
+    def reset(self) -> None:
+        """Forget the directions of the previous path."""
+        for direction in self._directions:
+            direction.reset()
+
+    def legal(self, velocities: Array) -> Mask:
+        """Return which of the velocities (n, 3) are allowed."""
+        legal: Mask = np.ones(len(velocities), dtype=bool)
+        for direction, velocity in zip(self._directions, velocities.T, strict=True):
+            legal &= velocity * direction.allowed_sign >= 0.0
+        return legal
+
+    def record(self, pose: Pose2, command: Twist) -> None:
+        """Record the command given at this pose. Lateral and angular reversals only count at low forward speed."""
+        x, y, theta = self._directions
+        has_reversed = x.update(command.vx)
+        if abs(command.vx) <= self._x_only_threshold:
+            has_reversed |= y.update(command.vy)
+            has_reversed |= theta.update(command.wz)
+        if has_reversed:
+            self._reversed_at = pose
+        if any(direction.allowed_sign for direction in self._directions) and self._has_moved(pose):
+            self.reset()
+
+    def _has_moved(self, pose: Pose2) -> bool:
+        angle = abs(wrap(pose.yaw - self._reversed_at.yaw))
+        return pose.distance(self._reversed_at) > self._reset_distance or angle > self._reset_angle

@@ -1,4 +1,4 @@
-"""Trajectory generator of DWB: sampled velocities and the trajectories to which they lead.
+"""Trajectory generator of DWB: sampled velocities and their trajectories.
 
 Corresponds to the kinematic parameters, XYThetaIterator and StandardTrajectoryGenerator of dwb_plugins.
 """
@@ -12,62 +12,64 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as DwbSpec
-from simscen.stack.controllers.cumulative_sum import accumulate_rows
-from simscen.stack.controllers.velocity_limits import VelocityLimits, velocity_limits
+from simscen.stack.controllers.kinematics import VelocityLimits, accumulate_rows, velocity_limits
 from simscen.stack.protocols import RobotModel
 
 SAME_VELOCITY_M_S = 1e-5
-"""Nav2's EPSILON: ends of a window no further apart than this are one velocity."""
+"""Nav2's EPSILON: a smaller range of velocities counts as one velocity."""
 SQUARED_SPEED_TOLERANCE = float(np.finfo(np.float32).eps)
 """Rounding error allowed for squared speeds."""
 
 
 @dataclass(frozen=True)
 class Kinematics(VelocityLimits):
-    """Limits, and what bounds combinations: least and greatest speed in m/s whichever way, least turn rate in rad/s."""
+    """Velocity limits, and limits of combinations.
+
+    These are the minimum and maximum speed in m/s in any direction, and the minimum turn rate in rad/s.
+    """
 
     min_speed_xy: float
     max_speed_xy: float
     min_speed_theta: float
 
-    def scaled(self, share: float) -> "Kinematics":
-        """Under a speed limit; Nav2 does not slow reversing, this does."""
-        return replace(super().scaled(share), max_speed_xy=self.max_speed_xy * min(share, 1.0))
+    def scaled(self, ratio: float) -> "Kinematics":
+        """Return the limits scaled by a speed limit. Unlike in Nav2, it also applies to reverse driving."""
+        return replace(super().scaled(ratio), max_speed_xy=self.max_speed_xy * min(ratio, 1.0))
 
     def valid(self, velocities: Array) -> Array:
-        """Those of the velocities (n, 3) that the base may drive; standing still is none of them."""
-        square = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
-        turn = np.abs(velocities[:, 2])
-        slow = (square + SQUARED_SPEED_TOLERANCE < self.min_speed_xy**2) & (
-            turn + SQUARED_SPEED_TOLERANCE < self.min_speed_theta
+        """Return those of the velocities (n, 3) that the base may drive. Standing still is not one of them."""
+        squared_speed = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
+        turn_rate = np.abs(velocities[:, 2])
+        is_slow = (squared_speed + SQUARED_SPEED_TOLERANCE < self.min_speed_xy**2) & (
+            turn_rate + SQUARED_SPEED_TOLERANCE < self.min_speed_theta
         )
-        still = (square == 0.0) & (turn == 0.0)
-        fine = (square <= self.max_speed_xy**2 + SQUARED_SPEED_TOLERANCE) & ~slow & ~still
+        is_zero = (squared_speed == 0.0) & (turn_rate == 0.0)
+        valid = (squared_speed <= self.max_speed_xy**2 + SQUARED_SPEED_TOLERANCE) & ~is_slow & ~is_zero
         if self.turning_radius > 0.0:
-            fine &= np.abs(velocities[:, 0]) >= turn * self.turning_radius
-        return np.asarray(velocities[fine])
+            valid &= np.abs(velocities[:, 0]) >= turn_rate * self.turning_radius
+        return np.asarray(velocities[valid])
 
 
-def kinematics_of(spec: DwbSpec, robot: RobotModel, fastest: float) -> Kinematics:
+def kinematics_of(spec: DwbSpec, robot: RobotModel, full_speed: float) -> Kinematics:
     """Return the limits of the specification, bounded by those of the robot."""
-    left = fastest if spec.max_vel_y is None else spec.max_vel_y
+    lateral = full_speed if spec.max_vel_y is None else spec.max_vel_y
     limits = velocity_limits(
         robot,
-        low=(spec.min_vel_x, -left if spec.min_vel_y is None else spec.min_vel_y, -spec.max_vel_theta),
-        high=(fastest, left, spec.max_vel_theta),
+        low=(spec.min_vel_x, -lateral if spec.min_vel_y is None else spec.min_vel_y, -spec.max_vel_theta),
+        high=(full_speed, lateral, spec.max_vel_theta),
         acceleration=(spec.acc_lim_x, spec.acc_lim_y, spec.acc_lim_theta),
         deceleration=(spec.decel_lim_x, spec.decel_lim_y, spec.decel_lim_theta),
     )
     return Kinematics(
         **vars(limits),
         min_speed_xy=spec.min_speed_xy,
-        max_speed_xy=fastest if spec.max_speed_xy is None else spec.max_speed_xy,
+        max_speed_xy=full_speed if spec.max_speed_xy is None else spec.max_speed_xy,
         min_speed_theta=spec.min_speed_theta,
     )
 
 
 def project_velocity(now: float, acceleration: float, deceleration: float, seconds: float, target: float) -> float:
-    """Return the velocity after so many seconds on the way to the target (dwb_plugins' projectVelocity)."""
+    """Return the velocity after a time in s on the way to the target (dwb_plugins' projectVelocity)."""
     if now < target:
         return min(target, now + acceleration * seconds)
     return max(target, now + deceleration * seconds)
@@ -76,102 +78,104 @@ def project_velocity(now: float, acceleration: float, deceleration: float, secon
 def velocity_samples(
     now: float, low: float, high: float, acceleration: float, deceleration: float, seconds: float, count: int
 ) -> list[float]:
-    """`count` velocities between those that can be reached within so many seconds, and 0 if it lies between two."""
+    """Return `count` velocities that can be reached within a time in s, and 0 if it lies between two of them."""
     now = min(max(now, low), high)
-    most = project_velocity(now, acceleration, deceleration, seconds, high)
-    least = project_velocity(now, acceleration, deceleration, seconds, low)
-    if abs(most - least) < SAME_VELOCITY_M_S:
-        return [least]
-    step = (most - least) / (max(2, count) - 1)
-    found = []
-    velocity = least
-    while velocity <= most + SAME_VELOCITY_M_S:
-        found.append(velocity)
-        if velocity < 0.0 < velocity + step <= most + SAME_VELOCITY_M_S:
-            found.append(0.0)
+    highest = project_velocity(now, acceleration, deceleration, seconds, high)
+    lowest = project_velocity(now, acceleration, deceleration, seconds, low)
+    if abs(highest - lowest) < SAME_VELOCITY_M_S:
+        return [lowest]
+    step = (highest - lowest) / (max(2, count) - 1)
+    samples = []
+    velocity = lowest
+    while velocity <= highest + SAME_VELOCITY_M_S:
+        samples.append(velocity)
+        if velocity < 0.0 < velocity + step <= highest + SAME_VELOCITY_M_S:
+            samples.append(0.0)
         velocity += step
-    return found
+    return samples
 
 
 def velocity_window(kinematics: Kinematics, now: Twist, seconds: float, counts: tuple[int, int, int]) -> Array:
-    """Velocities (n, 3) of vx, vy and turn rate that can be reached within so many seconds; vx changes slowest."""
-    k = kinematics
+    """Return the velocities (n, 3) of vx, vy, and turn rate that can be reached within a time in s, in order of vx."""
+    limits = kinematics
     axes = [
-        velocity_samples(velocity, low, high, up, down, seconds, count)
-        for velocity, low, high, up, down, count in zip(
-            now, k.low, k.high, k.acceleration, k.deceleration, counts, strict=True
+        velocity_samples(velocity, low, high, acceleration, deceleration, seconds, count)
+        for velocity, low, high, acceleration, deceleration, count in zip(
+            now, limits.low, limits.high, limits.acceleration, limits.deceleration, counts, strict=True
         )
     ]
-    return k.valid(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
+    return limits.valid(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """Positions (steps, n) of trajectories that begin where the robot is, and headings (steps, m) of the few turns.
+    """Positions `x` and `y` (steps, n) of trajectories, and headings `yaw` and `times` in s (steps, m).
 
-    `turn` (n,) says which of the headings are each trajectory's: most share theirs with others, and sines are dear.
-    `passed` (steps, m) are the seconds till then.
+    Many trajectories share the same headings, so that few sines are needed: `yaw_index` (n,) is the column of each
+    trajectory in `yaw` and `times`.
     """
 
     x: Array
     y: Array
     yaw: Array
-    turn: npt.NDArray[np.intp]
-    passed: Array
+    yaw_index: npt.NDArray[np.intp]
+    times: Array
 
     def __len__(self) -> int:
-        return len(self.turn)
+        return len(self.yaw_index)
 
     @property
     def ends(self) -> Array:
-        """The last poses (n, 3)."""
-        return np.column_stack((self.x[-1], self.y[-1], self.yaw[-1, self.turn]))
+        """Final poses (n, 3)."""
+        return np.column_stack((self.x[-1], self.y[-1], self.yaw[-1, self.yaw_index]))
 
-    def poses(self, which: npt.NDArray[np.intp]) -> Array:
-        """All poses (steps, k, 3) of k of them."""
-        return np.stack((self.x[:, which], self.y[:, which], self.yaw[:, self.turn[which]]), axis=-1)
+    def poses(self, indices: npt.NDArray[np.intp]) -> Array:
+        """Return the poses (steps, k, 3) of k trajectories."""
+        return np.stack((self.x[:, indices], self.y[:, indices], self.yaw[:, self.yaw_index[indices]]), axis=-1)
 
 
 def generate_trajectories(
     pose: Pose2, now: Twist, velocities: Array, kinematics: Kinematics, seconds: float, meters: float, radians: float
 ) -> Trajectories:
-    """Return the trajectories of a base that changes to each of the velocities (n, 3).
+    """Return the trajectories of a base that accelerates to each of the velocities (n, 3), over a time in s.
 
-    A trajectory has as many steps as it takes for none to be longer than `meters` or to turn by more than `radians`
-    at its velocity; those with fewer than others stay at their end. Each step keeps the heading it begins with.
+    Each has as many steps as needed for none to be longer than `meters` or to turn by more than `radians`. Shorter
+    trajectories are padded with their end. The heading is constant within a step.
     """
-    linear = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / meters
-    counts = np.maximum(1.0, np.ceil(np.maximum(linear, np.abs(velocities[:, 2]) * seconds / radians)))
-    _, one, turn = np.unique(velocities[:, 2] + 1j * counts, return_index=True, return_inverse=True)
-    count, dt = counts[one], seconds / counts[one]
-    number = np.arange(math.ceil(counts.max()) + 1)[:, None]
-    moments, number = np.minimum(number, count) * dt, number[1:]
-    after, lasts = moments[1:], np.where(number <= count, dt, 0.0)
-    bounds = list(zip(now, kinematics.acceleration, kinematics.deceleration, strict=True))
-    wz = _changing(velocities[one, 2], *bounds[2], after)
-    yaw = _from(pose.yaw, wz * lasts)
-    cosine, sine = (each.take(turn, axis=1) for each in (np.cos(yaw[:-1]) * lasts, np.sin(yaw[:-1]) * lasts))
-    passed = after.take(turn, axis=1)
-    vx = _changing(velocities[:, 0], *bounds[0], passed)
+    distance_steps = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / meters
+    turn_steps = np.abs(velocities[:, 2]) * seconds / radians
+    step_counts = np.maximum(1.0, np.ceil(np.maximum(distance_steps, turn_steps)))
+    _, first, yaw_index = np.unique(velocities[:, 2] + 1j * step_counts, return_index=True, return_inverse=True)
+    count, dt = step_counts[first], seconds / step_counts[first]
+    step = np.arange(math.ceil(step_counts.max()) + 1)[:, None]
+    times, step = np.minimum(step, count) * dt, step[1:]
+    yaw_times, durations = times[1:], np.where(step <= count, dt, 0.0)
+    axes = list(zip(now, kinematics.acceleration, kinematics.deceleration, strict=True))
+    wz = _ramp(velocities[first, 2], *axes[2], yaw_times)
+    yaw = _accumulate(pose.yaw, wz * durations)
+    cosine = (np.cos(yaw[:-1]) * durations).take(yaw_index, axis=1)
+    sine = (np.sin(yaw[:-1]) * durations).take(yaw_index, axis=1)
+    step_times = yaw_times.take(yaw_index, axis=1)
+    vx = _ramp(velocities[:, 0], *axes[0], step_times)
     dx, dy = vx * cosine, vx * sine
     if now.vy != 0.0 or velocities[:, 1].any():
-        vy = _changing(velocities[:, 1], *bounds[1], passed)
+        vy = _ramp(velocities[:, 1], *axes[1], step_times)
         dx, dy = dx - vy * sine, dy + vy * cosine
-    return Trajectories(_from(pose.x, dx), _from(pose.y, dy), yaw, turn, moments)
+    return Trajectories(_accumulate(pose.x, dx), _accumulate(pose.y, dy), yaw, yaw_index, times)
 
 
-def _changing(target: Array, start: float, up: float, down: float, passed: Array) -> Array:
-    """Return the velocities (steps, n) on the way from `start` to the targets (n,) at the given times in s."""
-    velocities = passed * np.where(start < target, up, down)
+def _ramp(target: Array, start: float, acceleration: float, deceleration: float, times: Array) -> Array:
+    """Return the velocities (steps, n) at times in s on the way from `start` to the targets (n,)."""
+    velocities = times * np.where(start < target, acceleration, deceleration)
     velocities += start
     np.maximum(velocities, np.minimum(start, target), out=velocities)
     return np.minimum(velocities, np.maximum(start, target), out=velocities)
 
 
-def _from(start: float, steps: Array) -> Array:
-    """Return the positions (m + 1, n) reached from a start by steps (m, n)."""
-    places = np.empty((len(steps) + 1, steps.shape[1]))
-    places[0], places[1:] = 0.0, steps
-    accumulate_rows(places[1:])
-    places += start
-    return places
+def _accumulate(start: float, steps: Array) -> Array:
+    """Return the values (m + 1, n) that result from a start and steps (m, n)."""
+    values = np.empty((len(steps) + 1, steps.shape[1]))
+    values[0], values[1:] = 0.0, steps
+    accumulate_rows(values[1:])
+    values += start
+    return values

@@ -1,7 +1,7 @@
 """Model predictive path integral control (Williams et al. 2017), as nav2_mppi_controller does it.
 
-A thousand noisy versions of the last control sequence are rolled out, each is scored, and the new sequence is their
-average weighted by exp(-score / temperature).
+Many noisy copies of the previous control sequence are simulated and scored. The new sequence is their average, weighted
+by exp(-cost / temperature).
 """
 
 import math
@@ -15,7 +15,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.mppi import Mppi as MppiSpec
 from simscen.stack.controllers.collision_checker import CollisionChecker
-from simscen.stack.controllers.goal_rotation import GoalRotation
+from simscen.stack.controllers.kinematics import VelocityLimits
 from simscen.stack.controllers.mppi.control_sequence import (
     PAST_COMMANDS,
     apply_limits,
@@ -24,7 +24,7 @@ from simscen.stack.controllers.mppi.control_sequence import (
     smooth_sequence,
 )
 from simscen.stack.controllers.mppi.critic_data import CriticData
-from simscen.stack.controllers.mppi.critic_manager import CriticManager
+from simscen.stack.controllers.mppi.critics import CriticManager
 from simscen.stack.controllers.mppi.rollouts import (
     VX,
     VY,
@@ -36,152 +36,161 @@ from simscen.stack.controllers.mppi.rollouts import (
     mppi_limits,
     predict_velocities,
 )
-from simscen.stack.controllers.path_follower import PathFollower
+from simscen.stack.controllers.path_follower import GoalRotation, PathFollower
 from simscen.stack.controllers.path_handler import LocalPlan, local_plan
-from simscen.stack.controllers.velocity_limits import VelocityLimits
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 Floats = npt.NDArray[np.float32]
 COMMAND_FREE_TIME_S = 0.5
-"""Seconds that the command itself must be free of collisions for."""
+"""Time for which the command itself must be free of collisions."""
 MIN_PLAN_LENGTH_M, PLAN_MARGIN_M = 2.0, 1.0
-"""Meters of plan that it looks at, at least, which is Nav2's prune_distance; and beyond what the rollouts
-reach, for the critics that look at points further on."""
+"""Minimum length of the local plan (Nav2's prune_distance), and its margin beyond the reach of the rollouts, which
+PathFollowCritic and PathAngleCritic need."""
 SPEED_STD_RATIO = 0.5
-"""Standard deviation of the sampled speeds, of the greatest. What draws the speed up grows with its square, what holds
-it back (gamma) with the speed: Nav2's 0.2 m/s comes to rest at about 0.5 m/s, whatever the limit."""
+"""Default standard deviation of the sampled speeds relative to the maximum speed. With Nav2's fixed 0.2 m/s, the robot
+settles at about 0.5 m/s whatever its maximum speed is."""
 
 
 class MppiController(PathFollower):
-    """Keeps a control sequence and improves it at each call."""
+    """Keeps a control sequence and improves it in each control period."""
 
     def __init__(self, spec: MppiSpec, setting: Setting) -> None:
         robot = setting.robot
         super().__init__(spec.vx_max, robot)
         self._spec, self._footprint, self._rng = spec, setting.footprint, setting.rng
-        self._base = mppi_limits(spec, robot, self._fastest)
-        model = spec.motion_model or ("Omni" if self._base.high[1] > 0.0 else "DiffDrive")
+        self._full_limits = mppi_limits(spec, robot, self._full_speed)
+        model = spec.motion_model or ("Omni" if self._full_limits.high[1] > 0.0 else "DiffDrive")
         self._axes = 3 if model == "Omni" else 2
         deviations = (
-            spec.vx_std or SPEED_STD_RATIO * self._fastest,
+            spec.vx_std or SPEED_STD_RATIO * self._full_speed,
             spec.wz_std,
-            spec.vy_std or SPEED_STD_RATIO * self._base.high[1],
+            spec.vy_std or SPEED_STD_RATIO * self._full_limits.high[1],
         )
         self._std = np.array(deviations[: self._axes], np.float32)
-        late = (spec.model_delay_vx, spec.model_delay_wz, spec.model_delay_vy)
-        self._delays = tuple(math.floor(each / spec.model_dt + 0.5) for each in late[: self._axes])
-        self._judgment = CriticManager(spec, omni=model == "Omni")
-        self._period, self._shift = setting.control_period, setting.control_period / spec.model_dt
-        self._goal_pose = GoalRotation(robot, spec.wz_max, robot.angular_acceleration, setting.control_period)
-        self._free_way = CollisionChecker(setting.footprint)
-        self._reach = max(MIN_PLAN_LENGTH_M, self._fastest * spec.time_steps * spec.model_dt + PLAN_MARGIN_M)
-        self._forget()
+        delays = (spec.model_delay_vx, spec.model_delay_wz, spec.model_delay_vy)
+        self._delay_steps = tuple(math.floor(delay / spec.model_dt + 0.5) for delay in delays[: self._axes])
+        self._critics = CriticManager(spec, omni=model == "Omni")
+        self._period, self._shift_steps = setting.control_period, setting.control_period / spec.model_dt
+        self._goal_rotation = GoalRotation(robot, spec.wz_max, robot.angular_acceleration, setting.control_period)
+        self._collision_checker = CollisionChecker(setting.footprint)
+        reach = self._full_speed * spec.time_steps * spec.model_dt
+        self._plan_length = max(MIN_PLAN_LENGTH_M, reach + PLAN_MARGIN_M)
+        self._reset()
 
-    def _forget(self) -> None:
-        """Begin with nothing, and with other noise: what was found leads nowhere."""
+    def _reset(self) -> None:
+        """Restart with a zero sequence and new noise."""
         axes, steps = self._axes, self._spec.time_steps
         self._sequence = np.zeros((axes, steps), np.float32)
-        self._sent = np.zeros((axes, max(PAST_COMMANDS, *self._delays)), np.float32)
-        self._draw()
-        self._driven: Rollouts | None = None
-        self._pose, self._from = Pose2(0.0, 0.0), Pose2(0.0, 0.0)
+        self._sent = np.zeros((axes, max(PAST_COMMANDS, *self._delay_steps)), np.float32)
+        self._draw_noise()
+        self._optimal: Rollouts | None = None
+        self._pose, self._optimal_from = Pose2(0.0, 0.0), Pose2(0.0, 0.0)
 
-    def _draw(self) -> None:
+    def _draw_noise(self) -> None:
         shape = (self._axes, self._spec.time_steps, self._spec.batch_size)
         self._noise = self._rng.standard_normal(shape, dtype=np.float32) * self._std[:, None, None]
 
     def begin(self) -> None:
-        """Another goal; the control sequence is kept as a start."""
-        self._goal_pose.reset()
+        """Reset the goal rotation for a path to another goal. The control sequence stays as the initial guess."""
+        self._goal_rotation.reset()
 
     @property
     def _limits(self) -> VelocityLimits:
-        return self._base.scaled(self._share)
+        return self._full_limits.scaled(self._speed_ratio)
 
     @property
     def local_plan(self) -> Path | None:
         """Trajectory of the control sequence."""
-        return None if self._driven is None else Path(self._poses(self._driven))
+        return None if self._optimal is None else Path(self._poses(self._optimal))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """Return the velocity to drive now. Raises NO_VALID_CONTROL when all rollouts, or their average, collide."""
-        track, self._pose = self._located(pose), pose
-        if self._goal_pose.reached(pose, twist, goal, track.remaining()):
-            self._forget()
-            command = self._goal_pose.turn_to_goal(pose, goal, twist)
+        """Return the velocity command. Raises NO_VALID_CONTROL if all rollouts, or their average, collide."""
+        tracker, self._pose = self._locate(pose), pose
+        if self._goal_rotation.reached(pose, twist, goal, tracker.remaining()):
+            self._reset()
+            command = self._goal_rotation.turn_to_goal(pose, goal, twist)
         else:
-            plan = local_plan(track, self._reach)
-            command = self._optimized(twist, lambda rolled: self._scene(rolled, plan, costmap, goal))
-        free = self._free_way.seconds(costmap, pose, command, COMMAND_FREE_TIME_S)
-        return self._free_way.within(command, free, COMMAND_FREE_TIME_S, COMMAND_FREE_TIME_S)
+            plan = local_plan(tracker, self._plan_length)
+            command = self._optimize(twist, lambda rollouts: self._critic_data(rollouts, plan, costmap, goal))
+        free_time = self._collision_checker.free_time(costmap, pose, command, COMMAND_FREE_TIME_S)
+        return self._collision_checker.slowed(command, free_time, COMMAND_FREE_TIME_S, COMMAND_FREE_TIME_S)
 
-    def _scene(self, rolled: Rollouts, plan: LocalPlan, costmap: CostmapView, goal: Goal) -> CriticData:
+    def _critic_data(self, rollouts: Rollouts, plan: LocalPlan, costmap: CostmapView, goal: Goal) -> CriticData:
         return CriticData(
-            rolled, plan, self._pose, goal.pose.yaw, costmap, self._footprint, self._limits, self._spec.model_dt,
+            rollouts, plan, self._pose, goal.pose.yaw, costmap, self._footprint, self._limits, self._spec.model_dt,
             goal.xy_tolerance,
         )  # fmt: skip
 
-    def _optimized(self, twist: Twist, seen: Callable[[Rollouts], CriticData]) -> Twist:
-        """Improve the sequence; what hits something is forgotten, and begun anew as often as is allowed."""
+    def _optimize(self, twist: Twist, critic_data: Callable[[Rollouts], CriticData]) -> Twist:
+        """Improve the sequence, and return its first command. After a collision, reset the sequence and retry."""
         for _ in range(1 + self._spec.retry_attempt_limit):
-            now = self._velocity(twist)
-            free = False
+            velocity = self._initial_velocity(twist)
+            is_free = False
             for _ in range(self._spec.iteration_count):
-                free = self._improve(now, seen)
-            rolled = integrate_velocities(self._sequence[:, :, None], self._pose.yaw, self._spec.model_dt)
-            if free and self._valid(seen(rolled)):
-                self._driven, self._from = rolled, self._pose
-                return self._next()
-            self._forget()
-        raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "all that the optimizer finds hits something")
+                is_free = self._iterate(velocity, critic_data)
+            optimal = integrate_velocities(self._sequence[:, :, None], self._pose.yaw, self._spec.model_dt)
+            if is_free and self._is_valid(critic_data(optimal)):
+                self._optimal, self._optimal_from = optimal, self._pose
+                return self._next_command()
+            self._reset()
+        raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "every trajectory of the optimizer collides")
 
-    def _velocity(self, twist: Twist) -> Floats:
-        """Return the velocity (axes,) when the command takes effect: between the measured and the last sent one."""
+    def _initial_velocity(self, twist: Twist) -> Floats:
+        """Return the velocity (axes,) at which the new command takes effect.
+
+        In open loop, it is the last command; otherwise, the velocity nearest to it that the base can have reached.
+        """
         sent, limits = self._sent[:, -1].astype(np.float64), self._limits
         if self._spec.open_loop:
             return self._sent[:, -1]
         measured = np.array((twist.vx, twist.wz, twist.vy))[: self._axes]
-        change = (axis_order(limits.deceleration) * self._period, axis_order(limits.acceleration) * self._period)
-        near = np.clip(sent, measured + change[0][: self._axes], measured + change[1][: self._axes])
-        return near.astype(np.float32)
+        decrease, increase = (
+            axis_order(limits.deceleration) * self._period,
+            axis_order(limits.acceleration) * self._period,
+        )
+        reachable = np.clip(sent, measured + decrease[: self._axes], measured + increase[: self._axes])
+        return reachable.astype(np.float32)
 
-    def _improve(self, now: Floats, seen: Callable[[Rollouts], CriticData]) -> bool:
-        """One iteration; whether any rollout hits nothing."""
+    def _iterate(self, velocity: Floats, critic_data: Callable[[Rollouts], CriticData]) -> bool:
+        """Replace the sequence by the weighted average of its noisy copies. Return whether any copy is free."""
         spec, limits, dt = self._spec, self._limits, self._spec.model_dt
-        self._sequence[:, 0] = now
+        self._sequence[:, 0] = velocity
         if spec.regenerate_noises:
-            self._draw()
+            self._draw_noise()
         controls = self._sequence[:, :, None] + self._noise
-        velocities = predict_velocities(now, controls, limits, dt)
-        apply_model_delay(velocities, self._sent, self._delays)
-        costs, all_hit = self._judgment.costs(seen(integrate_velocities(velocities, self._pose.yaw, dt)))
+        velocities = predict_velocities(velocity, controls, limits, dt)
+        apply_model_delay(velocities, self._sent, self._delay_steps)
+        costs, all_collide = self._critics.costs(critic_data(integrate_velocities(velocities, self._pose.yaw, dt)))
         deviations: list[float] = self._std.tolist()
         average = controls @ sample_weights(
             costs, self._sequence, self._noise, deviations, spec.gamma, spec.temperature
         )
         average = smooth_sequence(average, self._sent[:, -PAST_COMMANDS:], spec.sgf_order)
-        self._sequence = apply_limits(average, now, limits, dt)
-        return not all_hit
+        self._sequence = apply_limits(average, velocity, limits, dt)
+        return not all_collide
 
-    def _valid(self, scene: CriticData) -> bool:
-        """nav2_mppi_controller's DefaultOptimalTrajectoryValidator."""
-        spec, rolled = self._spec.TrajectoryValidator, scene.rolled
-        steps = min(round(spec.collision_lookahead_time / scene.dt), len(rolled.x))
+    def _is_valid(self, data: CriticData) -> bool:
+        """Return whether the optimal trajectory is free (nav2_mppi_controller's DefaultOptimalTrajectoryValidator)."""
+        spec, optimal = self._spec.TrajectoryValidator, data.rollouts
+        steps = min(round(spec.collision_lookahead_time / data.dt), len(optimal.x))
         if steps == 0:
             return True
-        whole = spec.consider_footprint is not False
-        gap = scene.gap(scene.spots(rolled.x[:steps], rolled.y[:steps]), rolled.yaw[:steps], whole)
-        return not scene.hit(gap, whole).any()
+        consider_footprint = spec.consider_footprint is not False
+        points = data.lookup(optimal.x[:steps], optimal.y[:steps])
+        clearance = data.clearance(points, optimal.yaw[:steps], consider_footprint)
+        return not data.collides(clearance, consider_footprint).any()
 
-    def _next(self) -> Twist:
-        """Return the command for the end of this control period, and shift the sequence by one period."""
-        self._sequence = shift_sequence(self._sequence, self._shift)
+    def _next_command(self) -> Twist:
+        """Shift the sequence by one control period, and return its first command."""
+        self._sequence = shift_sequence(self._sequence, self._shift_steps)
         first = self._sequence[:, :1]
         self._sent = np.concatenate((self._sent[:, 1:], first), axis=1)
         vx, wz = float(first[VX, 0]), float(first[WZ, 0])
         return Twist(vx, float(first[VY, 0]) if self._axes > VY else 0.0, wz)
 
-    def _poses(self, rolled: Rollouts) -> Array:
-        columns = (rolled.x[:, 0] + self._from.x, rolled.y[:, 0] + self._from.y, rolled.yaw[:, 0])
+    def _poses(self, rollouts: Rollouts) -> Array:
+        """Return the poses (steps, 3) of a single rollout in the odom frame."""
+        start = self._optimal_from
+        columns = (rollouts.x[:, 0] + start.x, rollouts.y[:, 0] + start.y, rollouts.yaw[:, 0])
         return np.column_stack(columns).astype(np.float64)

@@ -1,4 +1,4 @@
-"""Data for the critics of MPPI: the rollouts, the local plan, and the obstacles (Nav2's CriticData)."""
+"""Input of the MPPI critics: rollouts, local plan, and obstacles (nav2_mppi_controller's CriticData)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
+from simscen.stack.controllers.kinematics import VelocityLimits
 from simscen.stack.controllers.mppi.rollouts import Rollouts
 from simscen.stack.controllers.path_handler import LocalPlan
-from simscen.stack.controllers.velocity_limits import VelocityLimits
 from simscen.stack.footprint import CoveringDiscs, Footprint
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
 from simscen.stack.protocols import CostmapView
@@ -19,15 +19,18 @@ Floats = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
 INSCRIBED, UNKNOWN = 253, 255
 MOVING_CLEARANCE_M = 0.25
-"""Clearance of rollouts from moving obstacles, and standard deviation of the predicted positions."""
+"""Clearance that rollouts keep from moving obstacles, in addition to a standard deviation of their position."""
 COLLISION_DECAY_S = 1.2
-"""Seconds in which what may happen counts e times less."""
+"""Time in which the weight of a predicted encounter with a moving obstacle decays by a factor of e."""
 ESCAPE_TOLERANCE_M = 0.01
 """Distance by which a robot that is in collision may come nearer to the obstacle."""
 
 
 class CellLookup(NamedTuple):
-    """Points (…,) with the number of the costmap's cell under each; which lie on it, where not all do."""
+    """Points (…,) with the index of the costmap cell below each.
+
+    `on_map` tells which points are on the costmap; None if all of them are.
+    """
 
     x: Floats
     y: Floats
@@ -37,9 +40,12 @@ class CellLookup(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CriticData:
-    """All that a critic may look at. Lengths in m; the frame has the robot at its origin, unrotated."""
+    """Input of the critics. Lengths in m, in a frame with the robot at the origin and the axes of the costmap's frame.
 
-    rolled: Rollouts
+    `dt` is the time step of the rollouts in s, `tolerance` the position tolerance of the goal in m.
+    """
+
+    rollouts: Rollouts
     plan: LocalPlan
     pose: Pose2
     goal_yaw: float
@@ -52,131 +58,139 @@ class CriticData:
     @cached_property
     def path(self) -> tuple[Floats, Floats, Floats]:
         """x, y, yaw (m,) of the plan."""
-        return self.plan.about(self.pose)
+        return self.plan.relative_to(self.pose)
 
     @cached_property
-    def furthest(self) -> int:
-        """The furthest point of the plan that a rollout ends nearest to, no further along it than the rollout is long.
+    def furthest_point(self) -> int:
+        """Index of the furthest point of the plan that is nearest to the end of a rollout.
 
-        nav2_mppi_controller's findPathFurthestReachedPoint.
+        This is findPathFurthestReachedPoint of nav2_mppi_controller. In addition, a point counts as reached only if it
+        is no further along the plan than the rollout is long.
         """
         x, y, _ = self.path
-        length = self.rolled.speed[1:].sum(axis=0) * np.float32(self.dt)
-        reach = np.minimum(np.ceil(length / max(self.plan.spacing, 1e-9) - 1e-4), len(x) - 1)
-        square, up = np.subtract.outer(self.rolled.x[-1], x), np.subtract.outer(self.rolled.y[-1], y)
-        square *= square
-        up *= up
-        square += up
-        nearest = square.argmin(axis=1)
-        for one in np.flatnonzero(nearest > reach).tolist():
-            nearest[one] = square[one, : int(reach[one]) + 1].argmin()
+        length = self.rollouts.speed[1:].sum(axis=0) * np.float32(self.dt)
+        reachable = np.minimum(np.ceil(length / max(self.plan.spacing, 1e-9) - 1e-4), len(x) - 1)
+        squared, dy = np.subtract.outer(self.rollouts.x[-1], x), np.subtract.outer(self.rollouts.y[-1], y)
+        squared *= squared
+        dy *= dy
+        squared += dy
+        nearest = squared.argmin(axis=1)
+        for rollout in np.flatnonzero(nearest > reachable).tolist():
+            nearest[rollout] = squared[rollout, : int(reachable[rollout]) + 1].argmin()
         return int(nearest.max())
 
     @cached_property
     def free_points(self) -> Mask:
-        """Which points (m,) of the plan the middle of the robot can be at, as far as is known."""
-        costs = self.costs(self.spots(*self.path[:2]))
+        """Which points (m,) of the plan are not known to be occupied for the center of the robot."""
+        costs = self.costs(self.lookup(*self.path[:2]))
         return np.asarray((costs < INSCRIBED) | (costs == UNKNOWN))
 
     @cached_property
     def moving(self) -> MovingObstacles:
         """Moving obstacles that may come near a rollout, in the frame of the rollouts."""
-        rolled, moving = self.rolled, self.costmap.moving
+        rollouts, moving = self.rollouts, self.costmap.moving
         if not len(moving):
             return moving
-        gone, times = np.sqrt((rolled.x * rolled.x + rolled.y * rolled.y).max(axis=1)), self.times
-        reach, speed = self.footprint.circumscribed + MAX_UNCERTAINTY_M, float((gone / times).max())
+        farthest, times = np.sqrt((rollouts.x * rollouts.x + rollouts.y * rollouts.y).max(axis=1)), self.times
+        reach, speed = self.footprint.circumscribed + MAX_UNCERTAINTY_M, float((farthest / times).max())
         near = moving.near(self.pose.x, self.pose.y, reach, speed, float(times[-1]))
         return near.seen_from(Pose2(self.pose.x, self.pose.y, 0.0)) if len(near) else near
 
     @cached_property
     def times(self) -> Array:
-        """Seconds (steps,) from now to the steps of the rollouts."""
-        times: Array = self.dt * np.arange(1.0, len(self.rolled.x) + 1.0)
+        """Times (steps,) in s from now to the steps of the rollouts."""
+        times: Array = self.dt * np.arange(1.0, len(self.rollouts.x) + 1.0)
         return times
 
     @cached_property
-    def meeting(self) -> tuple[Floats, Floats]:
-        """Mean nearness of each rollout (n,) to moving obstacles, and 1 for a collision.
+    def moving_obstacle_costs(self) -> tuple[Floats, Floats]:
+        """Mean nearness of each rollout (n,) to moving obstacles, and whether it touches one (up to 1).
 
-        Both count less the later it is, for what moves may have turned by then.
+        Both decay with time, because moving obstacles may change their direction.
         """
-        rolled, times = self.rolled, self.times.astype(np.float32)[:, None]
-        reached, touched = self.footprint.discs.nearness(
-            self.moving, rolled.x, rolled.y, rolled.yaw, times, MOVING_CLEARANCE_M
+        rollouts, times = self.rollouts, self.times.astype(np.float32)[:, None]
+        nearness, touches = self.footprint.discs.nearness(
+            self.moving, rollouts.x, rollouts.y, rollouts.yaw, times, MOVING_CLEARANCE_M
         )
-        soon = np.exp(-times / np.float32(COLLISION_DECAY_S))
-        near = np.clip(reached, 0.0, 2.0)
-        near *= near
-        close: Floats = (near * soon).mean(axis=0)
-        met: Floats = (touched * soon).max(axis=0)
-        return close, met
+        decay = np.exp(-times / np.float32(COLLISION_DECAY_S))
+        squared = np.clip(nearness, 0.0, 2.0)
+        squared *= squared
+        proximity: Floats = (squared * decay).mean(axis=0)
+        collision: Floats = (touches * decay).max(axis=0)
+        return proximity, collision
 
     @cached_property
-    def _costs(self) -> npt.NDArray[np.uint8]:
+    def _flat_costs(self) -> npt.NDArray[np.uint8]:
         return self.costmap.costs.ravel()
 
     @cached_property
-    def _distances(self) -> Floats:
+    def _flat_distances(self) -> Floats:
         return self.costmap.distance.ravel()
 
-    def spots(self, x: Floats, y: Floats) -> CellLookup:
+    def lookup(self, x: Floats, y: Floats) -> CellLookup:
         """Return the cells below points (…,)."""
         view = self.costmap
         scale, (height, width) = np.float32(1.0 / view.resolution), view.costs.shape
-        across, up = x + np.float32(self.pose.x - view.origin[0]), y + np.float32(self.pose.y - view.origin[1])
-        across *= scale
-        up *= scale
+        column = x + np.float32(self.pose.x - view.origin[0])
+        row = y + np.float32(self.pose.y - view.origin[1])
+        column *= scale
+        row *= scale
         on_map: Mask | None = None
-        if across.min() < 0 or up.min() < 0 or across.max() >= width or up.max() >= height:
-            on_map = np.asarray((up >= 0) & (across >= 0) & (up < height) & (across < width))
-            across, up = np.clip(across, 0, width - 1), np.clip(up, 0, height - 1)
-        cell = up.astype(np.int32)
+        if column.min() < 0 or row.min() < 0 or column.max() >= width or row.max() >= height:
+            on_map = np.asarray((row >= 0) & (column >= 0) & (row < height) & (column < width))
+            column, row = np.clip(column, 0, width - 1), np.clip(row, 0, height - 1)
+        cell = row.astype(np.int32)
         cell *= width
-        cell += across.astype(np.int32)
+        cell += column.astype(np.int32)
         return CellLookup(x, y, cell, on_map)
 
-    def costs(self, spots: CellLookup) -> npt.NDArray[np.uint8]:
-        """Costs (…,) there; 0 off the costmap."""
-        costs = self._costs.take(spots.cell)
-        return costs if spots.on_map is None else np.where(spots.on_map, costs, np.uint8(0))
+    def costs(self, points: CellLookup) -> npt.NDArray[np.uint8]:
+        """Return the costs (…,) at points; 0 off the costmap."""
+        costs = self._flat_costs.take(points.cell)
+        return costs if points.on_map is None else np.where(points.on_map, costs, np.uint8(0))
 
-    def hit(self, gap: Floats, whole: bool) -> Mask:
-        """Which rollouts (n,) touch something where they keep such a `gap` (steps, n) to it.
+    def collides(self, clearance: Floats, consider_footprint: bool) -> Mask:
+        """Return which rollouts (n,) collide, given their `clearance` (steps, n).
 
-        What lies off the costmap is taken for free. A robot that is in collision already, or whose discs are as they
-        reach a little beyond its hull, may go anywhere but further into it, or it could never get out.
+        A robot that is already in collision, according to the costmap or because the discs are larger than its
+        footprint, may move unless that brings it further into the obstacle. Otherwise, it could never get out.
         """
-        return np.asarray(gap.min(axis=0) <= min(0.0, self._here[whole] - ESCAPE_TOLERANCE_M))
+        current = self._current_clearance[consider_footprint]
+        return np.asarray(clearance.min(axis=0) <= min(0.0, current - ESCAPE_TOLERANCE_M))
 
     @cached_property
-    def _here(self) -> tuple[float, float]:
-        """Distance in m of the nearest obstacle from the inscribed circle, and from the hull, at the robot's pose."""
+    def _current_clearance(self) -> tuple[float, float]:
+        """Clearance in m of the inscribed circle and of the footprint at the current pose of the robot."""
         origin, yaw = np.zeros((1, 1), np.float32), np.full((1, 1), self.pose.yaw, np.float32)
-        spots = self.spots(origin, origin)
-        return float(self.gap(spots, yaw, False)[0, 0]), float(self.gap(spots, yaw, True)[0, 0])
+        points = self.lookup(origin, origin)
+        inscribed, footprint = self.clearance(points, yaw, False), self.clearance(points, yaw, True)
+        return float(inscribed[0, 0]), float(footprint[0, 0])
 
-    def gap(self, spots: CellLookup, yaw: Floats, whole: bool) -> Floats:
-        """Return the distance (…,) in m between the hull, or its inscribed circle, and the nearest obstacle."""
+    def clearance(self, points: CellLookup, yaw: Floats, consider_footprint: bool) -> Floats:
+        """Return the distance (…,) in m from the robot at points to the nearest obstacle; negative in collision.
+
+        The robot is its inscribed circle or, with `consider_footprint`, the discs that cover its footprint. Off the
+        costmap, the distance is inf.
+        """
         discs: CoveringDiscs = self.footprint.discs
-        if not whole:
-            return np.asarray(self._distance(spots) - np.float32(self.footprint.inscribed))
+        if not consider_footprint:
+            return np.asarray(self._distance(points) - np.float32(self.footprint.inscribed))
         if discs.centered:
-            return np.asarray(self._distance(spots) - np.float32(discs.radius))
+            return np.asarray(self._distance(points) - np.float32(discs.radius))
         cosine, sine = np.cos(yaw), np.sin(yaw)
-        least = np.full(spots.x.shape, np.inf, np.float32)
+        least = np.full(points.x.shape, np.inf, np.float32)
         for offset in discs.offsets.astype(np.float32):
-            disc = self.spots(spots.x + offset * cosine, spots.y + offset * sine)
-            np.minimum(least, self._distance(disc), out=least)
+            center = self.lookup(points.x + offset * cosine, points.y + offset * sine)
+            np.minimum(least, self._distance(center), out=least)
         return np.asarray(least - np.float32(discs.radius))
 
-    def _distance(self, spots: CellLookup) -> Floats:
-        near = self._distances.take(spots.cell)
-        return near if spots.on_map is None else np.where(spots.on_map, near, np.float32(np.inf))
+    def _distance(self, points: CellLookup) -> Floats:
+        distance = self._flat_distances.take(points.cell)
+        return distance if points.on_map is None else np.where(points.on_map, distance, np.float32(np.inf))
 
 
-def distances_in_place(dx: Floats, dy: Floats) -> Floats:
-    """Distances from differences, which it uses up; np.hypot takes five times as long, for numbers past 1e19."""
+def hypot_in_place(dx: Floats, dy: Floats) -> Floats:
+    """Return the lengths of vectors, and overwrite the arguments. About five times as fast as np.hypot."""
     dx *= dx
     dy *= dy
     dx += dy

@@ -1,174 +1,241 @@
-"""Critics of MPPI, which score the rollouts (nav2_mppi_controller).
+"""Critics of MPPI, which score the rollouts (nav2_mppi_controller), and the manager that adds up their costs.
 
-A critic takes its parameters and the critic data, and returns one weighted cost per rollout (n,).
+A critic takes its parameters and the critic data, and returns the weighted cost of each rollout (n,).
 """
+
+from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.geometry import Array
 from simscen.model import mppi as model
-from simscen.stack.controllers.cumulative_sum import accumulate_rows
-from simscen.stack.controllers.mppi.critic_data import CriticData, Mask, distances_in_place
+from simscen.stack.controllers.kinematics import accumulate_rows
+from simscen.stack.controllers.mppi.critic_data import CriticData, Mask, hypot_in_place
 from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ
 
 Floats = npt.NDArray[np.float32]
 MIN_TURN_RATE_RAD_S = np.float32(1e-6)
-"""rad/s below which a car is not asked for its turning radius."""
+"""Turn rate that replaces smaller ones in the turning radius of a car, which would be infinite."""
+HALF_TURN_RAD = np.float32(np.pi)
+MAX_COST = 254.0
+"""Highest cost of a cell, by which CostCritic divides."""
+OPTIONAL_CRITICS = ("ObstaclesCritic", "TwirlingCritic", "VelocityDeadbandCritic")
+NAV2_CRITICS: tuple[model.CriticName, ...] = tuple(
+    name for name in get_args(model.CriticName) if name not in OPTIONAL_CRITICS
+)
+"""Default critics of Nav2."""
 
 
-HALF_TURN = np.float32(np.pi)
+class CriticManager:
+    """Evaluates the enabled critics in order and adds up their costs."""
+
+    def __init__(self, spec: model.Mppi, omni: bool) -> None:
+        """Take the specification; `omni` adds TwirlingCritic to the default critics."""
+        default = (*NAV2_CRITICS, "TwirlingCritic") if omni else NAV2_CRITICS
+        names: tuple[model.CriticName, ...] = default if spec.critics is None else tuple(spec.critics)
+        self._spec = spec
+        self._names = [name for name in names if getattr(spec, name).enabled]
+
+    def costs(self, data: CriticData) -> tuple[Array, bool]:
+        """Return the costs (n,) of the rollouts, and whether all of them collide."""
+        total = np.zeros(data.rollouts.x.shape[1])
+        all_collide = False
+        for name in self._names:
+            costs, collides = self._evaluate(name, data)
+            if costs is not None:
+                critic: model.MppiCritic = getattr(self._spec, name)
+                total += costs.astype(np.float64) ** critic.cost_power
+            if collides is not None:
+                all_collide = bool(collides.all())
+        return total, all_collide
+
+    def _evaluate(self, name: model.CriticName, data: CriticData) -> tuple[Floats | None, Mask | None]:
+        """Return the costs (n,) by a critic, None if it does not apply; and which rollouts collide, if it knows."""
+        spec, length = self._spec, data.plan.length
+        costs: Floats | None = None
+        match name:
+            case "ConstraintCritic":
+                costs = constraint_critic(spec.ConstraintCritic, data)
+            case "CostCritic":
+                return cost_critic(spec.CostCritic, data)
+            case "ObstaclesCritic":
+                return obstacles_critic(spec.ObstaclesCritic, data)
+            case "GoalCritic" if length <= spec.GoalCritic.threshold_to_consider:
+                costs = goal_critic(spec.GoalCritic, data)
+            case "GoalAngleCritic" if length <= spec.GoalAngleCritic.threshold_to_consider:
+                costs = goal_angle_critic(spec.GoalAngleCritic, data)
+            case "PathAlignCritic" if length >= spec.PathAlignCritic.threshold_to_consider:
+                costs = path_align_critic(spec.PathAlignCritic, data)
+            case "PathFollowCritic" if length >= spec.PathFollowCritic.threshold_to_consider:
+                costs = path_follow_critic(spec.PathFollowCritic, data)
+            case "PathAngleCritic" if length >= spec.PathAngleCritic.threshold_to_consider:
+                costs = path_angle_critic(spec.PathAngleCritic, data)
+            case "PreferForwardCritic" if length >= spec.PreferForwardCritic.threshold_to_consider:
+                costs = prefer_forward_critic(spec.PreferForwardCritic, data)
+            case "TwirlingCritic" if length >= data.tolerance:
+                costs = twirling_critic(spec.TwirlingCritic, data)
+            case "VelocityDeadbandCritic":
+                costs = velocity_deadband_critic(spec.VelocityDeadbandCritic, data)
+        return costs, None
 
 
-def constraint(spec: model.MppiConstraintCritic, scene: CriticData) -> Floats:
-    """m/s too many over the seconds; of a car also meters by which it turns too tightly."""
-    velocities, limits = scene.rolled.velocities, scene.limits
-    vx, (low, *_), (high, left, _) = velocities[VX], limits.low, limits.high
+def constraint_critic(spec: model.MppiConstraintCritic, data: CriticData) -> Floats:
+    """Return the velocity in excess of the limits, integrated over time.
+
+    For a car, the difference in m between the minimum turning radius and a tighter one is added.
+    """
+    velocities, limits = data.rollouts.velocities, data.limits
+    vx, (low, *_), (high, lateral, _) = velocities[VX], limits.low, limits.high
     excess = np.minimum(np.maximum(vx, np.float32(low)), np.float32(high))
     np.abs(np.subtract(vx, excess, out=excess), out=excess)
     if len(velocities) > VY:
-        excess += np.maximum(np.abs(velocities[VY]) - np.float32(left), 0)
+        excess += np.maximum(np.abs(velocities[VY]) - np.float32(lateral), 0)
     if limits.turning_radius > 0.0:
-        turn = np.maximum(np.abs(velocities[WZ]), MIN_TURN_RATE_RAD_S)
-        excess += np.maximum(np.float32(limits.turning_radius) - np.abs(vx) / turn, 0)
-    return np.asarray(spec.cost_weight * scene.dt * excess.sum(axis=0))
+        turn_rate = np.maximum(np.abs(velocities[WZ]), MIN_TURN_RATE_RAD_S)
+        excess += np.maximum(np.float32(limits.turning_radius) - np.abs(vx) / turn_rate, 0)
+    return np.asarray(spec.cost_weight * data.dt * excess.sum(axis=0))
 
 
-def cost(spec: model.MppiCostCritic, scene: CriticData) -> tuple[Floats, Mask]:
+def cost_critic(spec: model.MppiCostCritic, data: CriticData) -> tuple[Floats, Mask]:
     """Return the mean costmap cost along each rollout, and which rollouts collide."""
-    part = slice(None, None, spec.trajectory_point_step)
-    x, y, yaw = scene.rolled.x[part], scene.rolled.y[part], scene.rolled.yaw[part]
-    spots, whole = scene.spots(x, y), spec.consider_footprint is not False
-    hit = scene.hit(scene.gap(spots, yaw, whole), whole)
-    price = np.arange(256, dtype=np.float32) * np.float32(scene.plan.length >= spec.near_goal_distance)
-    price[spec.near_collision_cost :] = spec.critical_cost
-    paid = price.take(scene.costs(spots)).sum(axis=0)
-    total = np.where(hit, np.float32(spec.collision_cost), paid)
-    if len(scene.moving):
-        near, met = scene.meeting
-        total += len(x) * (spec.critical_cost * near + spec.collision_cost * met)
-    return np.asarray(spec.cost_weight / 254.0 / len(x) * total), hit
+    steps = slice(None, None, spec.trajectory_point_step)
+    x, y, yaw = data.rollouts.x[steps], data.rollouts.y[steps], data.rollouts.yaw[steps]
+    points, consider_footprint = data.lookup(x, y), spec.consider_footprint is not False
+    collides = data.collides(data.clearance(points, yaw, consider_footprint), consider_footprint)
+    score = np.arange(256, dtype=np.float32) * np.float32(data.plan.length >= spec.near_goal_distance)
+    score[spec.near_collision_cost :] = spec.critical_cost
+    along = score.take(data.costs(points)).sum(axis=0)
+    total = np.where(collides, np.float32(spec.collision_cost), along)
+    if len(data.moving):
+        proximity, collision = data.moving_obstacle_costs
+        total += len(x) * (spec.critical_cost * proximity + spec.collision_cost * collision)
+    return np.asarray(spec.cost_weight / MAX_COST / len(x) * total), collides
 
 
-def obstacles(spec: model.MppiObstaclesCritic, scene: CriticData) -> tuple[Floats, Mask]:
-    """Nearness within the margin, and within the inflation radius compared with the best; and which hit something."""
-    x, y, yaw = scene.rolled.x, scene.rolled.y, scene.rolled.yaw
-    whole = spec.consider_footprint is not False
-    spots = scene.spots(x, y)
-    gap = scene.gap(spots, yaw, whole)
-    hit = scene.hit(gap, whole)
-    near = np.maximum(np.float32(spec.collision_margin_distance) - gap, 0).sum(axis=0)
-    total = spec.critical_weight * np.where(hit, np.float32(spec.collision_cost), near)
-    if scene.plan.length >= spec.near_goal_distance:
-        costs = scene.costs(spots)
-        inflated = np.float32(scene.costmap.inflation_radius)
-        repulsion = np.where(costs >= 1, inflated - gap, np.float32(0)).sum(axis=0)
+def obstacles_critic(spec: model.MppiObstaclesCritic, data: CriticData) -> tuple[Floats, Mask]:
+    """Return costs for the nearness of obstacles, and which rollouts collide.
+
+    Obstacles within the collision margin count by their nearness. Those within the inflation radius count relative to
+    the rollout that is farthest from them.
+    """
+    x, y, yaw = data.rollouts.x, data.rollouts.y, data.rollouts.yaw
+    consider_footprint = spec.consider_footprint is not False
+    points = data.lookup(x, y)
+    clearance = data.clearance(points, yaw, consider_footprint)
+    collides = data.collides(clearance, consider_footprint)
+    near = np.maximum(np.float32(spec.collision_margin_distance) - clearance, 0).sum(axis=0)
+    total = spec.critical_weight * np.where(collides, np.float32(spec.collision_cost), near)
+    if data.plan.length >= spec.near_goal_distance:
+        inflation_radius = np.float32(data.costmap.inflation_radius)
+        repulsion = np.where(data.costs(points) >= 1, inflation_radius - clearance, np.float32(0)).sum(axis=0)
         total = total + spec.repulsion_weight * (repulsion - repulsion.min()) / len(x)
-    if len(scene.moving):
-        near_to, met = scene.meeting
-        total = total + spec.critical_weight * (near_to + spec.collision_cost * met)
-    return np.asarray(total), hit
+    if len(data.moving):
+        proximity, collision = data.moving_obstacle_costs
+        total = total + spec.critical_weight * (proximity + spec.collision_cost * collision)
+    return np.asarray(total), collides
 
 
-def goal(spec: model.MppiGoalCritic, scene: CriticData) -> Floats:
+def goal_critic(spec: model.MppiGoalCritic, data: CriticData) -> Floats:
     """Return the mean distance to the end of the plan."""
-    x, y, _ = scene.path
-    return np.asarray(
-        spec.cost_weight * distances_in_place(scene.rolled.x - x[-1], scene.rolled.y - y[-1]).mean(axis=0)
-    )
+    x, y, _ = data.path
+    distance = hypot_in_place(data.rollouts.x - x[-1], data.rollouts.y - y[-1])
+    return np.asarray(spec.cost_weight * distance.mean(axis=0))
 
 
-def goal_angle(spec: model.MppiGoalAngleCritic, scene: CriticData) -> Floats:
+def goal_angle_critic(spec: model.MppiGoalAngleCritic, data: CriticData) -> Floats:
     """Return the mean angle to the heading of the goal."""
-    off = absolute_angles(scene.rolled.yaw - np.float32(scene.goal_yaw))
+    angle = absolute_angles(data.rollouts.yaw - np.float32(data.goal_yaw))
     if spec.symmetric_yaw_tolerance:
-        off = np.minimum(off, np.float32(np.pi) - off)
-    return np.asarray(spec.cost_weight * off.mean(axis=0))
+        angle = np.minimum(angle, HALF_TURN_RAD - angle)
+    return np.asarray(spec.cost_weight * angle.mean(axis=0))
 
 
-def prefer_forward(spec: model.MppiPreferForwardCritic, scene: CriticData) -> Floats:
+def prefer_forward_critic(spec: model.MppiPreferForwardCritic, data: CriticData) -> Floats:
     """Return the distance driven backward, in m."""
-    return np.asarray(spec.cost_weight * scene.dt * -np.minimum(scene.rolled.velocities[VX], 0).sum(axis=0))
+    return np.asarray(spec.cost_weight * data.dt * -np.minimum(data.rollouts.velocities[VX], 0).sum(axis=0))
 
 
-def twirling(spec: model.MppiTwirlingCritic, scene: CriticData) -> Floats:
+def twirling_critic(spec: model.MppiTwirlingCritic, data: CriticData) -> Floats:
     """Return the mean turn rate."""
-    return np.asarray(spec.cost_weight * np.abs(scene.rolled.velocities[WZ]).mean(axis=0))
+    return np.asarray(spec.cost_weight * np.abs(data.rollouts.velocities[WZ]).mean(axis=0))
 
 
-def velocity_deadband(spec: model.MppiVelocityDeadbandCritic, scene: CriticData) -> Floats:
+def velocity_deadband_critic(spec: model.MppiVelocityDeadbandCritic, data: CriticData) -> Floats:
     """Return by how much velocities are below the deadband, integrated over time."""
-    ahead, sideways, turn = spec.deadband_velocities
-    least = {VX: ahead, WZ: turn, VY: sideways}
-    short = np.zeros_like(scene.rolled.velocities[VX])
-    for axis, velocities in enumerate(scene.rolled.velocities):
-        short += np.maximum(np.float32(least[axis]) - np.abs(velocities), 0)
-    return np.asarray(spec.cost_weight * scene.dt * short.sum(axis=0))
+    vx, vy, wz = spec.deadband_velocities
+    deadband = {VX: vx, WZ: wz, VY: vy}
+    deficit = np.zeros_like(data.rollouts.velocities[VX])
+    for axis, velocities in enumerate(data.rollouts.velocities):
+        deficit += np.maximum(np.float32(deadband[axis]) - np.abs(velocities), 0)
+    return np.asarray(spec.cost_weight * data.dt * deficit.sum(axis=0))
 
 
 def absolute_angles(angles: Floats) -> Floats:
-    """Angles between two directions: 0 … π."""
+    """Return the absolute values of angles, wrapped to 0 … π."""
     return np.asarray(np.abs((angles + np.float32(np.pi)) % np.float32(2 * np.pi) - np.float32(np.pi)))
 
 
-def path_align(spec: model.MppiPathAlignCritic, scene: CriticData) -> Floats | None:
+def path_align_critic(spec: model.MppiPathAlignCritic, data: CriticData) -> Floats | None:
     """Return the mean distance between each pose and the plan at the same path length.
 
-    None where the critic is silent: before the robot has got going, and where the plan is blocked.
+    Return None if the rollouts cover too little of the plan, or if too much of the covered plan is occupied.
     """
-    count = scene.furthest
+    count = data.furthest_point
     if count < max(1, spec.offset_from_furthest):
         return None
-    free = scene.free_points[:count]
-    blocked = count - int(np.count_nonzero(free))
-    if blocked > 2 and blocked / count > spec.max_path_occupancy_ratio:
+    free = data.free_points[:count]
+    occupied = count - int(np.count_nonzero(free))
+    if occupied > 2 and occupied / count > spec.max_path_occupancy_ratio:
         return None
-    part = slice(None, None, spec.trajectory_point_step)
-    x, y = scene.rolled.x[part], scene.rolled.y[part]
-    along = accumulate_rows(distances_in_place(x[1:] - x[:-1], y[1:] - y[:-1]))
-    along /= np.float32(scene.plan.spacing)
-    along += np.float32(0.5)
-    point = np.minimum(along.astype(np.int32), count - 1)
-    px, py, yaw = scene.path
-    off = distances_in_place(px.take(point) - x[1:], py.take(point) - y[1:])
+    steps = slice(None, None, spec.trajectory_point_step)
+    x, y = data.rollouts.x[steps], data.rollouts.y[steps]
+    index = accumulate_rows(hypot_in_place(x[1:] - x[:-1], y[1:] - y[:-1]))
+    index /= np.float32(data.plan.spacing)
+    index += np.float32(0.5)
+    point = np.minimum(index.astype(np.int32), count - 1)
+    path_x, path_y, path_yaw = data.path
+    distance = hypot_in_place(path_x.take(point) - x[1:], path_y.take(point) - y[1:])
     if spec.use_path_orientations:
-        off = distances_in_place(off, absolute_angles(yaw.take(point) - scene.rolled.yaw[part][1:]))
-    if not blocked:
-        return np.asarray(spec.cost_weight * off.mean(axis=0))
-    looked_at = free.take(point)
-    counted = np.maximum(looked_at.sum(axis=0), 1)
-    return np.asarray(spec.cost_weight * (off * looked_at).sum(axis=0) / counted)
+        angle = absolute_angles(path_yaw.take(point) - data.rollouts.yaw[steps][1:])
+        distance = hypot_in_place(distance, angle)
+    if not occupied:
+        return np.asarray(spec.cost_weight * distance.mean(axis=0))
+    is_free = free.take(point)
+    compared = np.maximum(is_free.sum(axis=0), 1)
+    return np.asarray(spec.cost_weight * (distance * is_free).sum(axis=0) / compared)
 
 
-def path_follow(spec: model.MppiPathFollowCritic, scene: CriticData) -> Floats:
+def path_follow_critic(spec: model.MppiPathFollowCritic, data: CriticData) -> Floats:
     """Return the distance from the end of each rollout to a free point beyond the furthest reached one."""
-    px, py, _ = scene.path
-    last = len(px) - 1
-    index = min(scene.furthest + spec.offset_from_furthest, last)
-    while index < last - 1 and not scene.free_points[index]:
+    x, y, _ = data.path
+    last = len(x) - 1
+    index = min(data.furthest_point + spec.offset_from_furthest, last)
+    while index < last - 1 and not data.free_points[index]:
         index += 1
-    return np.asarray(spec.cost_weight * np.hypot(scene.rolled.x[-1] - px[index], scene.rolled.y[-1] - py[index]))
+    return np.asarray(spec.cost_weight * np.hypot(data.rollouts.x[-1] - x[index], data.rollouts.y[-1] - y[index]))
 
 
-def path_angle(spec: model.MppiPathAngleCritic, scene: CriticData) -> Floats | None:
+def path_angle_critic(spec: model.MppiPathAngleCritic, data: CriticData) -> Floats | None:
     """Return the angle between the final heading of each rollout and the direction to a point of the plan.
 
-    None where the robot looks there already, but for `max_angle_to_furthest`.
+    Return None if the current heading is within `max_angle_to_furthest` of that direction.
     """
-    px, py, yaws = scene.path
-    index = min(scene.furthest + spec.offset_from_furthest, len(px) - 1)
-    x, y, yaw = px[index], py[index], yaws[index]
-    forward_only = spec.mode == 0 or (spec.mode == 1 and scene.limits.low[0] == 0.0)
-    off = float(absolute_angles(np.arctan2(y, x) - np.float32(scene.pose.yaw)))
-    if spec.mode == 2 and absolute_angles(np.arctan2(y, x) - yaw) > HALF_TURN / 2:
-        off = np.pi - off
+    path_x, path_y, path_yaw = data.path
+    index = min(data.furthest_point + spec.offset_from_furthest, len(path_x) - 1)
+    x, y, yaw = path_x[index], path_y[index], path_yaw[index]
+    forward_only = spec.mode == 0 or (spec.mode == 1 and data.limits.low[0] == 0.0)
+    angle = float(absolute_angles(np.arctan2(y, x) - np.float32(data.pose.yaw)))
+    if spec.mode == 2 and absolute_angles(np.arctan2(y, x) - yaw) > HALF_TURN_RAD / 2:
+        angle = np.pi - angle
     elif not forward_only and spec.mode == 1:
-        off = min(off, np.pi - off)
-    if off < spec.max_angle_to_furthest:
+        angle = min(angle, np.pi - angle)
+    if angle < spec.max_angle_to_furthest:
         return None
-    bearing = np.arctan2(y - scene.rolled.y[-1], x - scene.rolled.x[-1])
-    angles = absolute_angles(bearing - scene.rolled.yaw[-1])
+    bearing = np.arctan2(y - data.rollouts.y[-1], x - data.rollouts.x[-1])
+    angles = absolute_angles(bearing - data.rollouts.yaw[-1])
     if spec.mode == 2:
-        angles = np.where(absolute_angles(bearing - yaw) < HALF_TURN / 2, angles, HALF_TURN - angles)
+        angles = np.where(absolute_angles(bearing - yaw) < HALF_TURN_RAD / 2, angles, HALF_TURN_RAD - angles)
     elif not forward_only:
-        angles = np.minimum(angles, HALF_TURN - angles)
+        angles = np.minimum(angles, HALF_TURN_RAD - angles)
     return np.asarray(spec.cost_weight * angles)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.covariance_estimator import COUNTED, CovarianceEstimator
+from simscen.advanced.localizers.covariance_estimator import WINDOW, CovarianceEstimator
 from simscen.advanced.localizers.map_residuals import ScanResiduals
 from simscen.core.geometry import Array, Pose2
 
@@ -22,7 +22,7 @@ def drive(seed: int, lasting: float, error: Array, particles: Array, misfit: Sca
     """NEES of particles alone and of what is told, at the end and 9 m before; `lasting`: the correlation of one error
     (ahead, aside, in heading) with the next."""
     nees = []
-    for wrong, covariance in list(corrections(seed, lasting, error, particles, misfit))[COUNTED - 1 :: COUNTED]:
+    for wrong, covariance in list(corrections(seed, lasting, error, particles, misfit))[WINDOW - 1 :: WINDOW]:
         nees += [float(wrong @ np.linalg.solve(one, wrong)) for one in (particles, covariance)]
     return nees
 
@@ -34,14 +34,14 @@ def corrections(
     rng, scatter = np.random.default_rng(seed), CovarianceEstimator()
     truth, off = Pose2(3.0, -2.0, 1.0), error * rng.standard_normal(3)
     start = truth
-    for _ in range(2 * COUNTED):
+    for _ in range(2 * WINDOW):
         truth = truth.compose(STEP)
         off = lasting * off + np.sqrt(1 - lasting**2) * error * rng.standard_normal(3)
         c, s = np.cos(truth.yaw), np.sin(truth.yaw)
         wrong = np.array(((c, -s, 0), (s, c, 0), (0, 0, 1))) @ off
         x, y, yaw = (np.array(truth) + wrong).tolist()
         scatter.drive(start.between(truth), MATCHED)
-        yield wrong, scatter.widened(Pose2(x, y, yaw), particles, misfit)
+        yield wrong, scatter.estimate(Pose2(x, y, yaw), particles, misfit)
 
 
 @pytest.mark.parametrize("lasting", [0.85, 0.94])
@@ -49,8 +49,10 @@ def test_the_squared_error_is_about_what_it_is_said_to_be_although_the_particles
     lasting: float,
 ) -> None:
     """3 is right; of AMCL's errors one and the next, 25 cm on, are correlated by 0.94."""
-    alone, told = np.array([drive(seed, lasting, ERROR, TOO_SURE) for seed in range(20)]).reshape(-1, 2).mean(axis=0)
-    assert 1.0 < told < 4.5
+    alone, inflated = (
+        np.array([drive(seed, lasting, ERROR, TOO_SURE) for seed in range(20)]).reshape(-1, 2).mean(axis=0)
+    )
+    assert 1.0 < inflated < 4.5
     assert alone > 15
 
 
@@ -64,11 +66,11 @@ def test_errors_that_all_poses_share_are_told_by_beams_that_are_off() -> None:
             Pose2(0.0, 0.0, 0.0),
             TOO_SURE,
         )
-        for k in range(2 * COUNTED):
-            base, learning = base.compose(Pose2(0.25, 0.0, 0.0)), k < COUNTED
+        for k in range(2 * WINDOW):
+            base, learning = base.compose(Pose2(0.25, 0.0, 0.0)), k < WINDOW
             x = base.x + (0.05 * float(rng.standard_normal()) if learning else 0.1)
             scatter.drive(base, MATCHED)
-            covariance = scatter.widened(Pose2(x, 0.0, 0.0), TOO_SURE, AS_MAPPED if learning else misfit)
+            covariance = scatter.estimate(Pose2(x, 0.0, 0.0), TOO_SURE, AS_MAPPED if learning else misfit)
         return float(np.sqrt(covariance[0, 0]))
 
     assert doubt(ScanResiduals(0.98, 1.0)) > 2.0 * doubt(AS_MAPPED)
@@ -96,10 +98,10 @@ def test_what_matched_scans_drift_by_is_not_what_the_poses_are_off_by() -> None:
             Pose2(0.0, 0.0, 0.0),
             TOO_SURE,
         )
-        for k in range(2 * COUNTED):
+        for k in range(2 * WINDOW):
             base = base.compose(Pose2(0.25 + 0.05 * float(rng.standard_normal()), 0.0, 0.0))
             scatter.drive(base, doubt)
-            covariance = scatter.widened(Pose2(0.25 * k, 0.0, 0.0), TOO_SURE, AS_MAPPED)
+            covariance = scatter.estimate(Pose2(0.25 * k, 0.0, 0.0), TOO_SURE, AS_MAPPED)
         stds.append(float(np.sqrt(covariance[0, 0])))
     assert stds[1] < stds[0] / 3
 
@@ -107,7 +109,7 @@ def test_what_matched_scans_drift_by_is_not_what_the_poses_are_off_by() -> None:
 def test_the_first_correction_has_a_covariance_too() -> None:
     scatter = CovarianceEstimator()
     scatter.drive(Pose2(0.0, 0.0, 0.0), None)
-    covariance = scatter.widened(Pose2(1.0, 2.0, 3.0), TOO_SURE, None)
+    covariance = scatter.estimate(Pose2(1.0, 2.0, 3.0), TOO_SURE, None)
     assert (np.linalg.eigvalsh(covariance) > 0).all()
 
 
@@ -120,7 +122,7 @@ def test_it_is_the_same_wherever_the_frame_of_the_scans_lies(turn: float) -> Non
         scatter, covariance = CovarianceEstimator(), TOO_SURE
         for k, pose in enumerate(poses):
             scatter.drive(from_frame.compose(Pose2(0.29 * k, 0.0, 0.2 * k)), doubt)
-            covariance = scatter.widened(pose, TOO_SURE, AS_MAPPED)
+            covariance = scatter.estimate(pose, TOO_SURE, AS_MAPPED)
         found.append(covariance)
     assert np.allclose(*found)
 
@@ -131,9 +133,9 @@ def test_between_corrections_it_grows_as_odometry_was_seen_to_err() -> None:
         slipping.compare(Pose2(0.2, 0.0, 0.0), Pose2(0.25, 0.0, 0.02))
         holding.compare(Pose2(0.25, 0.0, 0.0), Pose2(0.25, 0.0, 0.0))
     step = Pose2(0.25, 0.0, 0.0)
-    wrong, right = (scatter.carry(np.zeros((3, 3)), 0.4, step) for scatter in (slipping, holding))
+    wrong, right = (scatter.propagate(np.zeros((3, 3)), 0.4, step) for scatter in (slipping, holding))
     assert np.sqrt(np.diag(wrong)) == pytest.approx((0.035, 0.035, 0.02), rel=0.1)
     assert (np.sqrt(np.diag(right)) < (0.008, 0.008, 0.008)).all()
-    swung = holding.carry(np.diag([0.0, 0.0, 0.01]), 0.0, step)
+    swung = holding.propagate(np.diag([0.0, 0.0, 0.01]), 0.0, step)
     assert swung[1, 1] == pytest.approx(0.01 * 0.25**2 + right[1, 1], rel=0.01)
-    assert (np.diag(slipping.carry(np.zeros((3, 3)), 0.0, turn)) > 0).all()
+    assert (np.diag(slipping.propagate(np.zeros((3, 3)), 0.0, turn)) > 0).all()

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.global_search import ANSWERS, SHARES, GlobalSearch, View, distinct
-from simscen.advanced.localizers.scan_memory import REMEMBERED, ScanMemory, ends_of
+from simscen.advanced.localizers.global_search import MAX_RESULTS, PASSED_SHARES, GlobalSearch, View, distinct
+from simscen.advanced.localizers.scan_memory import MEMORY_LENGTH_M, ScanMemory, endpoints_of
 from simscen.core.geometry import Pose2
 from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
 
@@ -13,8 +13,8 @@ PLACES = (Pose2(-2.5, -1.8, 0.6), Pose2(3.0, 1.8, -2.8), Pose2(-4.0, 2.9, 1.9))
 
 def scanned(pose: Pose2) -> View:
     ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
-    ends = ends_of(scan(ranges), 0.0, 100.0)
-    return View(ends, np.concatenate([ends * share for share in SHARES]))
+    ends = endpoints_of(scan(ranges), 0.0, 100.0)
+    return View(ends, np.concatenate([ends * share for share in PASSED_SHARES]))
 
 
 @pytest.mark.parametrize("pose", PLACES)
@@ -24,18 +24,18 @@ def test_the_place_that_fits_best_is_where_the_scan_was_taken(pose: Pose2) -> No
     assert np.hypot(off.x, off.y) < 0.1
     assert abs(off.yaw) < 0.03
     assert fits[0] > fits[1] + 0.05
-    assert len(poses) <= ANSWERS
+    assert len(poses) <= MAX_RESULTS
     assert (np.diff(fits) <= 0).all()
 
 
 @pytest.mark.parametrize("pose", PLACES)
 def test_a_robot_that_is_told_a_place_half_a_meter_off_is_found_nearby(pose: Pose2) -> None:
-    told = np.array(pose.compose(Pose2(0.4, -0.3, 0.2)))
-    poses, fits = GlobalSearch(grid()).near(scanned(pose), told)
+    estimate = np.array(pose.compose(Pose2(0.4, -0.3, 0.2)))
+    poses, fits = GlobalSearch(grid()).near(scanned(pose), estimate)
     off = pose.between(Pose2(*poses[0].tolist()))
     assert np.hypot(off.x, off.y) < 0.1
     assert abs(off.yaw) < 0.03
-    assert fits[0] > GlobalSearch(grid()).fit(told[np.newaxis], scanned(pose))[0] + 0.05
+    assert fits[0] > GlobalSearch(grid()).fit(estimate[np.newaxis], scanned(pose))[0] + 0.05
 
 
 def test_the_same_view_gives_the_same_places_bit_for_bit() -> None:
@@ -62,10 +62,10 @@ def test_the_memory_holds_the_last_meters_about_where_the_base_is() -> None:
     memory, view = ScanMemory(), scanned(PLACES[0])
     for meter in np.arange(0.0, 20.0, 0.5):
         memory.add(scan(np.full(8, 2.0)), Pose2(float(meter), 0.0, 0.0), 0.0, 100.0)
-    assert memory.length <= REMEMBERED
-    about = memory.about(Pose2(19.5, 0.0, 0.0))
-    assert about.ends.real.min() == pytest.approx(-2.0 - memory.length)
+    assert memory.length <= MEMORY_LENGTH_M
+    view_from = memory.view_from(Pose2(19.5, 0.0, 0.0))
+    assert view_from.ends.real.min() == pytest.approx(-2.0 - memory.length)
     assert len(view.passed) == 3 * len(view.ends)
     memory.forget(1)
     assert memory.length == 0
-    assert len(memory.about(Pose2(0, 0, 0)).ends) == 8
+    assert len(memory.view_from(Pose2(0, 0, 0)).ends) == 8

@@ -42,10 +42,10 @@ def test_beams_count_for_what_they_are_off_by_as_far_as_the_map_explains_them(aw
 
 
 def test_a_person_far_from_any_wall_makes_nothing_wrong_but_is_not_explained() -> None:
-    told = misfit(WALL, 2.0)
-    assert told is not None
-    assert told.fits == pytest.approx(explained(0.0) / 2)
-    assert told.squares == pytest.approx(0.0, abs=1e-9)
+    found = misfit(WALL, 2.0)
+    assert found is not None
+    assert found.explained == pytest.approx(explained(0.0) / 2)
+    assert found.mean_square == pytest.approx(0.0, abs=1e-9)
 
 
 def test_of_what_the_map_says_nothing_nothing_is_told() -> None:

@@ -64,7 +64,7 @@ def test_beams_that_leave_the_map_are_not_compared() -> None:
 
 def test_beams_that_hit_nothing_stay_when_some_of_the_others_are_left_out() -> None:
     beams = Beams(np.array([1.0, 9.0, 2.0, 3.0]), np.ones(4, dtype=np.complex128), 0j, 9.0)
-    kept = beams.of_hits(np.array([True, False, True]))
+    kept = beams.keeping_hits(np.array([True, False, True]))
     assert kept.ranges.tolist() == [1.0, 9.0, 3.0]
     assert kept.ends.tolist() == [1.0, 3.0]
 

@@ -8,14 +8,14 @@ from simscen.advanced.localizers.scan_matcher import Step
 from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
-from simscen.stack.localizers.motion_models import Differential
+from simscen.stack.localizers.motion_models import DifferentialMotionModel
 from simscen.testing.synthetic_room import grid
 
 
 def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:
     """Return the poses (n, 3) of particles that all started at the origin."""
     spec = ScanMatchingAmcl()
-    models, motion = map_models(grid(), spec), Differential((0.2, 0.2, 0.2, 0.2))
+    models, motion = map_models(grid(), spec), DifferentialMotionModel((0.2, 0.2, 0.2, 0.2))
     subject = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
     subject.begin(Estimate(Pose2(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     subject.follow(Step(scan_matching, np.diag(np.square((0.01, 0.01, 0.005)))), odometry)

@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.pose_prior import AROUND, DRIFT, TOLD, ObservedMotion, PosePrior
-from simscen.advanced.localizers.scan_matcher import Step, moved
+from simscen.advanced.localizers.pose_prior import (
+    CERTAIN_STD,
+    KNOWN_STEP_STD_M,
+    ODOMETRY_DRIFT,
+    ObservedMotion,
+    PosePrior,
+)
+from simscen.advanced.localizers.scan_matcher import Step, apply_step
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.clusters import errors_about
+from simscen.stack.localizers.clusters import pose_errors
 
 THEN = Pose2(1.0, 2.0, np.pi / 2)
 SURE = PosePrior.at(np.array([5.0, 5.0, 0.0]), THEN)
@@ -15,7 +21,7 @@ STEP = Step(Pose2(0.25, 0.0, 0.1), np.array([[4e-5, 1e-5, 0.0], [1e-5, 3e-5, 1e-
 
 
 def far(sure: PosePrior, base: Pose2, off: Array) -> float:
-    return float(sure.unlikely((sure.expected(base) + off)[None], base)[0])
+    return float(sure.negative_log_likelihood((sure.expected(base) + off)[None], base)[0])
 
 
 def test_it_is_expected_where_its_scans_say_that_it_went() -> None:
@@ -32,9 +38,9 @@ def test_errors_of_steps_add_up_as_they_do_for_many_robots_that_go_the_same_way(
     )
     robots = np.tile(np.array(sure.pose), (20_000, 1))
     for _ in range(20):
-        robots, before, base = moved(robots, STEP, rng), base, base.compose(STEP.delta)
+        robots, before, base = apply_step(robots, STEP, rng), base, base.compose(STEP.delta)
         sure = sure.after(before, base, 0.3, ObservedMotion(step=STEP))
-    off_by = errors_about(sure.expected(base), robots)
+    off_by = pose_errors(sure.expected(base), robots)
     aside, spread = np.array(off), off_by.T @ off_by / len(robots)
     assert far(sure, base, aside) == pytest.approx(0.5 * aside @ np.linalg.inv(spread) @ aside, rel=0.05)
 
@@ -43,9 +49,12 @@ def test_errors_of_steps_add_up_as_they_do_for_many_robots_that_go_the_same_way(
 @pytest.mark.parametrize(
     ("way", "drift"),
     [
-        (ObservedMotion(), (10 * DRIFT[0], 10 * DRIFT[0], 10 * DRIFT[1])),
-        (ObservedMotion(torn=Pose2(0.3, -0.4, 0.2), step=Step(STEP.delta, np.zeros((3, 3)))), (0.5, 0.5, 0.2)),
-        (ObservedMotion(step=Step(STEP.delta, np.diag([(4 * TOLD) ** 2, 0.0, 0.0]))), (3 * TOLD, 3 * TOLD, 0.0)),
+        (ObservedMotion(), (10 * ODOMETRY_DRIFT[0], 10 * ODOMETRY_DRIFT[0], 10 * ODOMETRY_DRIFT[1])),
+        (ObservedMotion(disagreement=Pose2(0.3, -0.4, 0.2), step=Step(STEP.delta, np.zeros((3, 3)))), (0.5, 0.5, 0.2)),
+        (
+            ObservedMotion(step=Step(STEP.delta, np.diag([(4 * KNOWN_STEP_STD_M) ** 2, 0.0, 0.0]))),
+            (3 * KNOWN_STEP_STD_M, 3 * KNOWN_STEP_STD_M, 0.0),
+        ),
     ],
     ids=["unseen", "torn", "a corridor without an end"],
 )
@@ -55,18 +64,23 @@ def test_where_scans_do_not_tell_the_next_step_errs_as_the_last_one(
     """Twice as far leads twice as far astray; errors by chance lead √2 as far, and those of a step count besides."""
     sure = SURE.after(THEN, THEN, 10.0, way).after(THEN, THEN, 10.0, way)
     rng = 0.0 if way.step is None else 2 * way.step.covariance[axis, axis]
-    off = np.eye(3)[axis] * 2 * np.sqrt((AROUND[axis] + 2 * drift[axis]) ** 2 + rng)
+    off = np.eye(3)[axis] * 2 * np.sqrt((CERTAIN_STD[axis] + 2 * drift[axis]) ** 2 + rng)
     assert far(sure, THEN, off) == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize(
     ("seen", "torn", "led"),
     [(0.25, 0.0, False), (0.16, -0.09, False), (0.05, -0.2, True), (0.5, 0.25, True), (0.0, -0.08, False)],
-    ids=["agreed", "wheels slip", "people walk along", "people come towards it", "hardly moved"],
+    ids=["agreed", "wheels slip", "people walk along", "people come towards it", "hardly apply_step"],
 )
 def test_scans_that_differ_by_more_than_wheels_slip_show_what_goes_along(seen: float, torn: float, led: bool) -> None:
-    assert ObservedMotion(torn=Pose2(torn, 0.0, 0.0), step=Step(Pose2(seen, 0.0, 0.0), np.zeros((3, 3)))).led is led
+    assert (
+        ObservedMotion(
+            disagreement=Pose2(torn, 0.0, 0.0), step=Step(Pose2(seen, 0.0, 0.0), np.zeros((3, 3)))
+        ).is_scene_moving
+        is led
+    )
 
 
 def test_wheels_alone_are_not_contradicted() -> None:
-    assert not ObservedMotion(torn=Pose2(1.0, 0.0, 0.0)).led
+    assert not ObservedMotion(disagreement=Pose2(1.0, 0.0, 0.0)).is_scene_moving

@@ -28,21 +28,21 @@ def corner_of_the_map() -> OccupancyGrid:
 
 
 def found(
-    off: Pose2, apart: float = 0.25, way: float = 2.0, settling: float = 0.0, told: Pose2 = Pose2(0, 0, 0),
+    off: Pose2, apart: float = 0.25, way: float = 2.0, settling: float = 0.0, estimated: Pose2 = Pose2(0, 0, 0),
     std: tuple[float, float, float] = (0.5, 0.5, 0.26), map_: OccupancyGrid | None = None,
 ) -> list[Array]:  # fmt: skip
     """Where a robot is put that starts at START, drives some `way`, scans each so many m and believes to be `off`.
 
-    It was `told` to be that far off, with standard deviations `std`.
+    It was `estimated` to be that far off, with standard deviations `std`.
     """
     known = map_ or grid()
     trust = MapTrust(obstacle_field(known, 2.0), beyond_the_map(known).ravel(), 0.45, 0.8)
-    finder, places = Relocalizer(GlobalSearch(known), trust, Estimate(START.compose(told), std), settling), []
+    finder, places = Relocalizer(GlobalSearch(known), trust, Estimate(START.compose(estimated), std), settling), []
     for driven in np.arange(0.0, way, apart).tolist():
         base = Pose2(driven, 0.0, 0.0)
         pose = START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
-        put = finder.places(scan(ranges), base, pose.compose(off), (0.0, 100.0))
+        put = finder.update(scan(ranges), base, pose.compose(off), (0.0, 100.0))
         if put is not None:
             places.append(np.array(pose.between(Pose2(*put[0][0].tolist()))))
     return places
@@ -103,8 +103,8 @@ def test_a_robot_that_saw_itself_carried_off_forgets_where_it_was(parted: bool, 
         base, carried = Pose2(driven, 0.0, 0.0), k >= 8
         pose = there.compose(Pose2(driven - 2.0, 0.0, 0.0)) if carried else START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
-        way = ObservedMotion(step=None if k == 8 else step, parted=parted and k == 8)
-        put = finder.places(scan(ranges), base, START.compose(base), (0.0, 100.0), way)
+        way = ObservedMotion(step=None if k == 8 else step, was_carried=parted and k == 8)
+        put = finder.update(scan(ranges), base, START.compose(base), (0.0, 100.0), way)
         if put is not None:
             puts.append(pose.between(Pose2(*put[0][0].tolist())))
     assert any(np.hypot(off.x, off.y) < 0.1 for off in puts) is found_again
@@ -119,8 +119,8 @@ def test_who_was_carried_off_is_found_by_what_is_too_little_for_who_left_the_map
         pose = START.compose(Pose2(driven, 0.0, 0.0))
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
         ranges[::6] *= 0.5  # people
-        way = ObservedMotion(parted=carried_off and k == 1)
-        put = finder.places(scan(ranges), Pose2(driven, 0.0, 0.0), pose.compose(away), (0.0, 100.0), way)
+        way = ObservedMotion(was_carried=carried_off and k == 1)
+        put = finder.update(scan(ranges), Pose2(driven, 0.0, 0.0), pose.compose(away), (0.0, 100.0), way)
         if put is not None:
             puts.append(pose.between(Pose2(*put[0][0].tolist())))
     assert [np.hypot(off.x, off.y) < 0.1 for off in puts[:1]] == [True] * carried_off

@@ -96,4 +96,4 @@ def test_it_is_no_surer_than_it_is_right_whatever_makes_its_wheels_slip(what: ob
 
 def test_odometry_that_comes_once_a_second_is_checked_step_by_step() -> None:
     watch = SlipDetector()
-    assert [watch.slipped(rate, 1e-4, 1e-6, 1.0) > 0.0 for rate in (0.0, 0.2, 0.0)] == [False, True, False]
+    assert [watch.update(rate, 1e-4, 1e-6, 1.0) > 0.0 for rate in (0.0, 0.2, 0.0)] == [False, True, False]

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.advanced.prediction import avoidance
 from simscen.advanced.prediction.avoidance import Avoidance
-from simscen.advanced.prediction.rollouts import Followed
+from simscen.advanced.prediction.rollouts import FollowedPath
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import Goal
@@ -132,7 +132,7 @@ def test_what_looks_at_the_cheapest_ways_only_finds_the_way_that_is_cheapest_of_
     rng = np.random.default_rng(2)
     costmap = CostmapView(np.zeros((200, 200), np.uint8), np.full((200, 200), 2.0, np.float32), 0.05, (-5.0, -5.0))
     costmap.distance[:, 120:] = np.maximum(2.0 - 0.05 * np.arange(80), 0.0)
-    path = Followed(np.column_stack((np.arange(0.0, 8.0, 0.05), np.zeros(160))))
+    path = FollowedPath(np.column_stack((np.arange(0.0, 8.0, 0.05), np.zeros(160))))
     given = list[list[Twist]]()
     drawn = [(rng.normal(0, 2, (3, 2)), rng.normal(0, 1, (3, 2)), rng.uniform(0, 1, 3)) for _ in range(24)]
     for at_once in (avoidance.AT_ONCE, 10**6):

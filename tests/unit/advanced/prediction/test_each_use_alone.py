@@ -34,7 +34,7 @@ def least(heed: str, controller: str = "regulated_pure_pursuit") -> float:
         if heed != "monitor":
             stack._monitor.on_moving(no_moving_obstacles())
         if heed != "controller":
-            stack._costmaps.near.moving = no_moving_obstacles()
+            stack._costmaps.local_costmap.moving = no_moving_obstacles()
 
     stack._on_costmaps_updated = update
     world.discs.append((4.5, 0.5, 0.3))

@@ -5,7 +5,7 @@ import pytest
 from filterpy.common import Q_discrete_white_noise
 from filterpy.kalman import KalmanFilter
 
-from simscen.advanced.prediction.track import ConstantVelocityFilter
+from simscen.advanced.prediction.tracks import ConstantVelocityFilter
 
 
 def test_it_is_filterpys_filter_of_either_axis() -> None:

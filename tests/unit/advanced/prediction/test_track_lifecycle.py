@@ -1,7 +1,6 @@
 """Which tracks are followed on, from updates written down by hand."""
 
-from simscen.advanced.prediction.track import Track
-from simscen.advanced.prediction.track_lifecycle import UNCOME, TrackLifecycle
+from simscen.advanced.prediction.tracks import UNCOME, Track, TrackLifecycle
 from simscen.model.guards import Prediction
 from simscen.testing.flatland import RATE
 

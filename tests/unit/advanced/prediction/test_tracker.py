@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from simscen.advanced.prediction.clusters import ENOUGH, answers, clusters, fitted, runs
+from simscen.advanced.prediction.clusters import ENOUGH, clusters, fit_circle, runs, valid_hits
 from simscen.advanced.prediction.tracker import Tracker
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
@@ -240,7 +240,7 @@ def test_posts_do_not_move_when_the_robot_skids_aside_and_its_wheels_do_not_know
 
 def test_the_last_piece_of_a_scan_is_as_near_as_its_last_hit() -> None:
     ranges, step = np.array([50.0] * 10 + [2.0, 1.95, 1.9]), 0.01
-    found = runs(answers(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0))
+    found = runs(valid_hits(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0))
     (piece,) = clusters(found, ranges, 0.0, step, 1.0)
     sine = math.sin(1.5 * step)
     assert piece.radius == pytest.approx(1.9 * sine / (1.0 - sine))
@@ -252,7 +252,7 @@ def test_hits_that_are_in_one_run_are_never_told_beforehand_to_be_in_several() -
     for _ in range(400):
         ranges = np.repeat(rng.uniform(1.0, 6.0, 18), 4) + rng.normal(0.0, 0.04, 72)
         ranges[rng.random(72) < 0.1] = np.inf
-        hits = answers(ranges, np.fmin(ranges, 1e5) * np.exp(1j * step * np.arange(72)), step, 0.1, 10.0)
+        hits = valid_hits(ranges, np.fmin(ranges, 1e5) * np.exp(1j * step * np.arange(72)), step, 0.1, 10.0)
         which = rng.random(len(hits.beams)) < 0.15
         told.append((runs(hits).together(which, 3), hits.may_be_together(which.nonzero()[0].tolist(), 3)))
         first, last = runs(hits).first, runs(hits).last
@@ -303,7 +303,7 @@ def test_a_circle_that_is_seen_in_part_is_found_from_half_its_radius_off(seen: f
     middle, radius = 2.0 + 1.0j, 0.3
     towards = math.pi + math.atan2(middle.imag, middle.real)
     arc = [middle + cmath.rect(radius, towards + seen * (k / 14 - 0.5)) for k in range(15)]
-    assert abs(fitted(arc, radius, middle + cmath.rect(radius / 2, towards + 0.4)) - middle) < ENOUGH
+    assert abs(fit_circle(arc, radius, middle + cmath.rect(radius / 2, towards + 0.4)) - middle) < ENOUGH
 
 
 @pytest.mark.filterwarnings("error")

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import InvalidInput
-from simscen.loading.places import resolve_places
-from simscen.loading.resolved import resolved_text, spec_of_text
+from simscen.loading.known_names import resolve_places
 from simscen.loading.scenario import load_scenario
+from simscen.loading.scenario_text import resolved_text, spec_of_text
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.stacks.stackfile import load_stack_file
 from simscen.model.stack import StackSpec

@@ -12,7 +12,7 @@ from simscen.core.external_command import ExternalCommand
 from simscen.core.records.case import Run
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -171,7 +171,7 @@ def test_a_stack_that_gives_up_on_its_way_says_why(play) -> None:
 def test_a_program_that_cannot_be_started_is_told(load, argv: tuple[str, ...]) -> None:
     from dataclasses import replace
 
-    from simscen.run.preparation.scenario import prepare
+    from simscen.run.preparation import prepare
     from simscen.run.simulate import simulate
 
     loaded = load("")

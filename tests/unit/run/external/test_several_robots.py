@@ -12,7 +12,7 @@ from simscen.cli.session.run_session import WARM_PROCESS
 from simscen.core.errors import RunError
 from simscen.core.records.run_result import Outcome
 from simscen.loading.scenario import load_scenario
-from simscen.run.preparation.scenario import prepare
+from simscen.run.preparation import prepare
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
 from simscen.run.simulate import execute_run, simulate
 

@@ -74,14 +74,16 @@ def test_a_belief_without_a_transform_corrects_the_odometry(play, tmp_path: Path
     )
     from mcap.reader import make_reader
 
-    from simscen.record.messages.decode import transforms
+    from simscen.record.messages.decode import MessageReader, transforms
 
     run = play(text, time_limit="1")
     assert run.trace.belief.values[-1][:2] == pytest.approx(
         run.trace.odometry.values[-1][:2] + np.array([3, 4]), abs=1e-9
     )
     with (tmp_path / "run.mcap").open("rb") as stream:
-        links = [link for _, _, m in make_reader(stream).iter_messages(["/tf"]) for link in transforms(m.data)]
+        links = [
+            link for _, _, m in make_reader(stream).iter_messages(["/tf"]) for link in transforms(MessageReader(m.data))
+        ]
     corrections = [link.pose for link in links if link.child == "odom"]
     assert corrections[-1][:2] == pytest.approx((3, 4), abs=1e-9)
 
@@ -111,7 +113,7 @@ def test_a_stack_that_is_told_the_truth_corrects_the_odometry_of_its_wheels(play
     """The true pose comes as an odometry, too, but is none of the frame `odom`."""
     from mcap.reader import make_reader
 
-    from simscen.record.messages.decode import transforms
+    from simscen.record.messages.decode import MessageReader, transforms
 
     text = 'peer = Peer("mine", topics=["/sensor_ground_truth/odom"])\nfor step in peer:\n' + (
         "    x, y, yaw = step.get('/sensor_ground_truth/odom').pose\n"
@@ -120,7 +122,9 @@ def test_a_stack_that_is_told_the_truth_corrects_the_odometry_of_its_wheels(play
     )
     play(text, time_limit="1", stack="{external: mine, ground_truth: true}")
     with (tmp_path / "run.mcap").open("rb") as stream:
-        links = [link for _, _, m in make_reader(stream).iter_messages(["/tf"]) for link in transforms(m.data)]
+        links = [
+            link for _, _, m in make_reader(stream).iter_messages(["/tf"]) for link in transforms(MessageReader(m.data))
+        ]
     corrections = [link.pose for link in links if link.child == "odom"]
     assert corrections[-1][:2] == pytest.approx((1, 1), abs=0.05)  # where the wheels began to count
 

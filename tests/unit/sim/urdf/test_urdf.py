@@ -15,7 +15,7 @@ from simscen.core.geometry.shapes import Box, Mesh
 from simscen.model.robot import RobotSpec
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.single_robot import SingleRobotSimulation
-from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 from simscen.worlds.sdf.mesh_files import UnusableMesh, read_parts
 
 JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf"
@@ -54,7 +54,7 @@ def spec(drive=DIFFERENTIAL, urdf="robot.urdf", **more):
 
 def read_mesh(path):
     try:
-        parts = read_parts(path.read_bytes(), path.suffix, path.name)
+        parts = read_parts(path.read_bytes(), path.suffix)
     except UnusableMesh as error:
         raise ValueError(str(error)) from error
     return Mesh(parts[0].vertices, parts[0].faces.astype("int32"))
@@ -142,7 +142,7 @@ def test_casters_that_stand_on_the_ground_are_left_to_the_bodys_own(load):
 
 
 def test_it_drives(load):
-    simulation = SingleRobotSimulation(fuse([]), [], load(robot()), Pose2(0, 0, 0), triangulate)
+    simulation = SingleRobotSimulation(merge_solids([]), [], load(robot()), Pose2(0, 0, 0), triangulate)
     simulation.drive(Twist(0.5, 0.0, 0.0))
     simulation.step(240)
     begin = simulation.truth().pose.x
@@ -156,7 +156,7 @@ def test_meshes_are_part_of_the_hull_as_their_convex_hull(load, tmp_path):
     body = load(robot(extra="", geometry='<mesh filename="tetra.stl" scale="0.001 0.001 0.001"/>'))
     (solid,) = (solid for solid in body.hull if solid.name == "base")
     assert solid.shape.vertices.max() == pytest.approx(0.3)
-    simulation = SingleRobotSimulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation = SingleRobotSimulation(merge_solids([]), [], body, Pose2(0, 0, 0), triangulate)
     simulation.step(10)
     simulation.close()
 
@@ -315,7 +315,7 @@ def test_a_car_is_steered_by_the_wheels_below_upright_joints(load):
     body = load(robot(extra=steering), drive=drive)
     assert [(w.steered, w.driven, round(w.x, 3)) for w in body.wheels] == [
         (False, True, 0.0), (False, True, 0.0), (True, False, 0.4), (True, False, 0.4)]  # fmt: skip
-    simulation = SingleRobotSimulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation = SingleRobotSimulation(merge_solids([]), [], body, Pose2(0, 0, 0), triangulate)
     simulation.drive(Twist(0.4, 0.0, 0.4))
     simulation.step(720)
     assert simulation.truth().twist == pytest.approx((0.4, 0.0, 0.4), abs=0.02)
@@ -337,7 +337,7 @@ def jackal():
              "turning_scale": 1.6}  # fmt: skip
     limits = {"linear": 2.0, "angular": 4.0, "linear_acceleration": 3.0, "angular_acceleration": 8.0}
     body = build_robot_body(spec(drive, "jackal.urdf", limits=limits), JACKAL / "jackal.robot.yaml", [JACKAL])
-    simulation = SingleRobotSimulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation = SingleRobotSimulation(merge_solids([]), [], body, Pose2(0, 0, 0), triangulate)
     yield simulation
     simulation.close()
 

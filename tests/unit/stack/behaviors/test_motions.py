@@ -9,9 +9,9 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model import recovery as model
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import BackUp, ClearCostmap, Spin, Wait
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
+from simscen.stack.path_geometry import poses_along
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
@@ -20,7 +20,7 @@ ROUND, LONG = round_robot(), box_robot()
 
 def view_of(robot: RobotModel, *boxes: tuple[float, float, float, float]) -> CostmapView:
     grid = Flatland(list(boxes)).grid((-3.0, -3.0, 3.0, 3.0))
-    return Costmap(CostmapSpec(), Surroundings(robot, grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, grid, RATE)).view
 
 
 def run(behavior: Behavior, view: CostmapView, pose: Pose2 = Pose2(0, 0)) -> tuple[Pose2, float, list[Twist]]:

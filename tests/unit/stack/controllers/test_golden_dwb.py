@@ -10,8 +10,7 @@ import yaml
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as Spec
-from simscen.stack.controllers.dwb.critics import RotateToGoalCritic, score_trajectories
-from simscen.stack.controllers.dwb.oscillation_critic import OscillationCritic
+from simscen.stack.controllers.dwb.critics import OscillationCritic, RotateToGoalCritic, score_trajectories
 from simscen.stack.controllers.dwb.trajectory_generator import (
     Kinematics,
     generate_trajectories,
@@ -84,7 +83,7 @@ def test_what_the_critics_say(case: dict[str, Any]) -> None:
 @of("rotate")
 def test_how_it_comes_to_rest_and_turns_at_the_goal(case: dict[str, Any]) -> None:
     given, expect = case["given"], case["expect"]
-    critic = RotateToGoalCritic(stopped=0.25, slowing=5.0)
+    critic = RotateToGoalCritic(stopped_velocity=0.25, slowing_factor=5.0)
     found, legal = critic.scores(
         Twist(*given["now"]), given["goal_yaw"], np.array(given["velocities"]), np.array(given["end_yaws"])
     )
@@ -96,7 +95,7 @@ def test_how_it_comes_to_rest_and_turns_at_the_goal(case: dict[str, Any]) -> Non
 def test_what_may_not_turn_round_again(case: dict[str, Any]) -> None:
     critic = OscillationCritic(0.05, 0.2, 0.05)
     for command, moved in zip(case["given"]["commands"], case["given"]["moved"], strict=True):
-        critic.debrief(Pose2(moved, 0.0), Twist(*command))
+        critic.record(Pose2(moved, 0.0), Twist(*command))
     tried = {"forward": (0.2, 0, 0), "backward": (-0.2, 0, 0), "left": (0, 0, 0.3), "right": (0, 0, -0.3)}
     legal = dict(zip(tried, critic.legal(np.array(list(tried.values()))).tolist(), strict=True))
     assert {name: legal[name] for name in case["expect"]} == case["expect"]

@@ -10,12 +10,12 @@ import yaml
 
 from simscen.core.geometry import Pose2
 from simscen.model.mppi import Mppi
+from simscen.stack.controllers.kinematics import VelocityLimits
 from simscen.stack.controllers.mppi.control_sequence import apply_limits, sample_weights, smooth_sequence
 from simscen.stack.controllers.mppi.critic_data import CriticData
-from simscen.stack.controllers.mppi.critic_manager import CriticManager
+from simscen.stack.controllers.mppi.critics import CriticManager
 from simscen.stack.controllers.mppi.rollouts import integrate_velocities, predict_velocities
 from simscen.stack.controllers.path_handler import LocalPlan
-from simscen.stack.controllers.velocity_limits import VelocityLimits
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView
 from simscen.testing.flatland import round_robot
@@ -52,9 +52,9 @@ def test_rollouts_critics_weights_and_the_sequence_that_comes_out_are_those_of_t
     limits = VelocityLimits((-0.2, -0.3, -1.5), (0.5, 0.3, 1.5), (1.2, 0.9, 2.0), (-1.8, -0.9, -2.0), given["radius"])
     sampled = controls(axes)
     seen = scene(given, sampled, limits)
-    ends = np.stack((seen.rolled.x[-1], seen.rolled.y[-1], seen.rolled.yaw[-1]), axis=-1)
+    ends = np.stack((seen.rollouts.x[-1], seen.rollouts.y[-1], seen.rollouts.yaw[-1]), axis=-1)
     assert ends == pytest.approx(np.array(case["ends"]), abs=2e-5)
-    assert seen.furthest == case["furthest"]
+    assert seen.furthest_point == case["furthest"]
     own: dict[str, dict[str, Any]] = {
         "CostCritic": {"consider_footprint": False},
         "PathAlignCritic": {"offset_from_furthest": 10},

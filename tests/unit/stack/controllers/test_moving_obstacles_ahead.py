@@ -14,13 +14,13 @@ from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
 from simscen.model.mppi import Mppi
 from simscen.stack.controllers.collision_checker import CollisionChecker
 from simscen.stack.controllers.dwb.controller import DynamicWindowController
+from simscen.stack.controllers.kinematics import VelocityLimits
 from simscen.stack.controllers.mppi import critics
 from simscen.stack.controllers.mppi.controller import MppiController
 from simscen.stack.controllers.mppi.critic_data import COLLISION_DECAY_S, MOVING_CLEARANCE_M, CriticData
 from simscen.stack.controllers.mppi.rollouts import Rollouts
 from simscen.stack.controllers.path_handler import LocalPlan
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit as Rpp
-from simscen.stack.controllers.velocity_limits import VelocityLimits
 from simscen.stack.footprint import Footprint
 from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import Controller, CostmapView
@@ -111,7 +111,7 @@ def test_mppi_scores_the_pose_of_each_step_against_the_places_of_that_step() -> 
         soon = np.exp(-times / COLLISION_DECAY_S)[:, None]
         near = (np.clip(1.0 - gap / MOVING_CLEARANCE_M, 0.0, 2.0) ** 2 * soon).mean(axis=0)
         hit = ((gap < 0.03) * soon).max(axis=0)
-        said, stuck = critics.cost(model.MppiCostCritic(), seen)
+        said, stuck = critics.cost_critic(model.MppiCostCritic(), seen)
         assert said == pytest.approx(3.81 / 254 * (300.0 * near + 1e6 * hit), rel=1e-4, abs=1e-4)
         assert bool(hit[1]) is (disc is COMES) and not hit[0]
         assert not stuck.any()  # who meets all has still somewhere to go
@@ -131,7 +131,7 @@ def test_a_hull_that_is_not_round_is_as_long_as_it_is_and_turns_with_the_robot()
 def test_a_way_of_less_than_the_time_between_two_moments_is_looked_at_from_end_to_end(horizon: float) -> None:
     """Of a carrot that is all but reached."""
     free = CollisionChecker(Footprint(ROBOT, 0.05))
-    assert free.letting_pass(SPEED, among(GONE), HERE, horizon) == SPEED
+    assert free.slowed_for_moving(SPEED, among(GONE), HERE, horizon) == SPEED
     ahead = among((HERE.x + 0.403, 0.0, 0.0, 0.0))
     expected = max(part for part in (1.0, 0.75, 0.5, 0.25, 0.0) if part * 0.5 * horizon <= 0.003)
-    assert free.letting_pass(SPEED, ahead, HERE, horizon).vx == pytest.approx(expected * 0.5)
+    assert free.slowed_for_moving(SPEED, ahead, HERE, horizon).vx == pytest.approx(expected * 0.5)

@@ -12,7 +12,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Goal, Path
 from simscen.model import mppi as model
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.arcs import poses_along
+from simscen.stack.controllers.kinematics import VelocityLimits
 from simscen.stack.controllers.mppi import critics
 from simscen.stack.controllers.mppi.control_sequence import apply_limits, shift_sequence, smooth_sequence
 from simscen.stack.controllers.mppi.controller import MppiController
@@ -24,9 +24,9 @@ from simscen.stack.controllers.mppi.rollouts import (
     predict_velocities,
 )
 from simscen.stack.controllers.path_handler import LocalPlan
-from simscen.stack.controllers.velocity_limits import VelocityLimits
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
+from simscen.stack.path_geometry import poses_along
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
@@ -36,7 +36,7 @@ LIMITS = VelocityLimits((-0.35, -0.5, -1.9), (0.5, 0.5, 1.9), (3.0, 3.0, 3.5), (
 
 def view_of(*boxes: tuple[float, float, float, float], length: float = 12.0) -> CostmapView:
     grid = Flatland(list(boxes)).grid((-2.0, -3.0, length, 3.0))
-    return Costmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE)).view
 
 
 def straight(length: float) -> np.ndarray:
@@ -151,13 +151,13 @@ def along(*speeds: float, steps: int = 10, turn: float = 0.0) -> np.ndarray:
 
 
 def test_constraint_critic_counts_meters_per_second_too_many_over_time() -> None:
-    said = critics.constraint(model.MppiConstraintCritic(), scene(along(0.5, 0.8, -0.45)))
+    said = critics.constraint_critic(model.MppiConstraintCritic(), scene(along(0.5, 0.8, -0.45)))
     assert said == pytest.approx([0.0, 4.0 * 0.3, 4.0 * 0.1], abs=1e-5)
 
 
 def test_constraint_critic_counts_how_much_too_tightly_a_car_turns() -> None:
     car = replace(LIMITS, turning_radius=1.0)
-    said = critics.constraint(model.MppiConstraintCritic(), scene(along(0.4, turn=0.8), limits=car))
+    said = critics.constraint_critic(model.MppiConstraintCritic(), scene(along(0.4, turn=0.8), limits=car))
     assert said == pytest.approx([4.0 * 0.5 * 1.0], abs=1e-5)
 
 
@@ -165,8 +165,8 @@ def test_cost_critic_is_the_mean_cost_over_254_and_a_collision_costs_a_million()
     view = view_of((1.0, -3.0, 1.2, 3.0))
     spec = model.MppiCostCritic(near_goal_distance=0.0, trajectory_point_step=1)
     seen = scene(along(0.0, 0.5, 1.5), view)
-    said, hit = critics.cost(spec, seen)
-    costs = seen.costs(seen.spots(seen.rolled.x, seen.rolled.y))
+    said, hit = critics.cost_critic(spec, seen)
+    costs = seen.costs(seen.lookup(seen.rollouts.x, seen.rollouts.y))
     assert hit.tolist() == [False, False, True]
     assert said[1] == pytest.approx(3.81 / 254 * costs[:, 1].mean(), rel=1e-5)
     assert said[2] == pytest.approx(3.81 / 254 / 10 * 1e6, rel=1e-5)
@@ -174,24 +174,25 @@ def test_cost_critic_is_the_mean_cost_over_254_and_a_collision_costs_a_million()
 
 def test_cost_critic_near_the_goal_counts_what_is_all_but_a_collision_and_no_more() -> None:
     view = view_of((1.0, -3.0, 1.2, 3.0))
-    said, _ = critics.cost(model.MppiCostCritic(), scene(along(0.5), view, length=0.9))
+    said, _ = critics.cost_critic(model.MppiCostCritic(), scene(along(0.5), view, length=0.9))
     assert said == pytest.approx([0.0])
-    said, _ = critics.cost(model.MppiCostCritic(near_collision_cost=20), scene(along(0.5), view, length=0.9))
+    said, _ = critics.cost_critic(model.MppiCostCritic(near_collision_cost=20), scene(along(0.5), view, length=0.9))
     assert said[0] > 1.0
 
 
 def test_obstacles_critic_counts_nearness_within_its_margin() -> None:
     view = view_of((1.0, -3.0, 1.2, 3.0))
     seen = scene(along(0.7), view)
-    gap = seen.gap(seen.spots(seen.rolled.x, seen.rolled.y), seen.rolled.yaw, whole=True)[:, 0]
-    said, hit = critics.obstacles(model.MppiObstaclesCritic(repulsion_weight=0.0), seen)
+    cells = seen.lookup(seen.rollouts.x, seen.rollouts.y)
+    gap = seen.clearance(cells, seen.rollouts.yaw, consider_footprint=True)[:, 0]
+    said, hit = critics.obstacles_critic(model.MppiObstaclesCritic(repulsion_weight=0.0), seen)
     assert not hit.any()
     assert said[0] == pytest.approx(20.0 * np.clip(0.1 - gap, 0, None).sum(), rel=1e-4)
 
 
 def test_a_robot_in_collision_may_go_out_of_it_and_not_further_in() -> None:
     view = view_of((0.15, -3.0, 1.0, 3.0))
-    _, hit = critics.cost(model.MppiCostCritic(), scene(along(0.4, -0.4), view))
+    _, hit = critics.cost_critic(model.MppiCostCritic(), scene(along(0.4, -0.4), view))
     assert hit.tolist() == [True, False]
 
 
@@ -200,36 +201,36 @@ def test_a_robot_that_stands_so_near_that_its_discs_touch_may_drive_along() -> N
     everywhere = np.full((60, 60), 0.16, np.float32)
     view = CostmapView(np.zeros((60, 60), np.uint8), everywhere, 0.05, (-1.5, -1.5))
     seen = replace(scene(along(0.3), view), footprint=Footprint(robot, 0.05))
-    gap = seen.gap(seen.spots(seen.rolled.x, seen.rolled.y), seen.rolled.yaw, whole=True)
+    gap = seen.clearance(seen.lookup(seen.rollouts.x, seen.rollouts.y), seen.rollouts.yaw, consider_footprint=True)
     assert gap.max() < 0.0 < Footprint(robot, 0.05).clearance(view, np.array([seen.pose]))[0]
-    _, hit = critics.cost(model.MppiCostCritic(), seen)
+    _, hit = critics.cost_critic(model.MppiCostCritic(), seen)
     assert not hit.any()
 
 
 def test_goal_critic_is_the_mean_distance_to_the_end_of_the_plan() -> None:
-    said = critics.goal(model.MppiGoalCritic(), scene(along(0.5), length=1.0))
+    said = critics.goal_critic(model.MppiGoalCritic(), scene(along(0.5), length=1.0))
     assert said == pytest.approx([5.0 * np.mean(1.0 - 0.05 * np.arange(1, 11))], rel=1e-5)
 
 
 def test_goal_angle_critic_is_the_mean_angle_and_knows_symmetric_robots() -> None:
     turning = scene(along(0.0), length=0.3, goal_yaw=math.pi - 0.2)
-    assert critics.goal_angle(model.MppiGoalAngleCritic(), turning) == pytest.approx([3.0 * (math.pi - 0.2)])
+    assert critics.goal_angle_critic(model.MppiGoalAngleCritic(), turning) == pytest.approx([3.0 * (math.pi - 0.2)])
     either = model.MppiGoalAngleCritic(symmetric_yaw_tolerance=True)
-    assert critics.goal_angle(either, turning) == pytest.approx([3.0 * 0.2], rel=1e-4)
+    assert critics.goal_angle_critic(either, turning) == pytest.approx([3.0 * 0.2], rel=1e-4)
 
 
 def test_the_furthest_point_of_the_plan_is_the_nearest_to_the_end_of_a_rollout() -> None:
-    assert scene(along(0.2, 0.5)).furthest == 10 - 1
+    assert scene(along(0.2, 0.5)).furthest_point == 10 - 1
 
 
 def test_path_align_critic_compares_with_the_plan_after_as_many_meters() -> None:
     beside = along(1.0, steps=17, turn=0.0)
     seen = scene(beside)
     offset = CriticData(
-        Rollouts(seen.rolled.x, seen.rolled.y + np.float32(0.3), seen.rolled.yaw, seen.rolled.velocities),
+        Rollouts(seen.rollouts.x, seen.rollouts.y + np.float32(0.3), seen.rollouts.yaw, seen.rollouts.velocities),
         *(getattr(seen, name) for name in ("plan", "pose", "goal_yaw", "costmap", "footprint", "limits", "dt")), 0.25,
     )  # fmt: skip
-    said = critics.path_align(model.MppiPathAlignCritic(), offset)
+    said = critics.path_align_critic(model.MppiPathAlignCritic(), offset)
     # Meters are counted from the first pose looked at, 0.1 m from the plan's first point: so it is 0.1 m ahead, too;
     # the last is compared with the point before the furthest.
     mean = (3 * math.hypot(0.3, 0.1) + math.hypot(0.3, 0.15)) / 4
@@ -237,13 +238,13 @@ def test_path_align_critic_compares_with_the_plan_after_as_many_meters() -> None
 
 
 def test_path_align_critic_is_silent_before_the_robot_has_got_going_and_where_the_plan_is_blocked() -> None:
-    assert critics.path_align(model.MppiPathAlignCritic(), scene(along(0.1))) is None
+    assert critics.path_align_critic(model.MppiPathAlignCritic(), scene(along(0.1))) is None
     blocked = scene(along(1.5), view_of((0.9, -0.1, 1.1, 0.1)))
-    assert critics.path_align(model.MppiPathAlignCritic(), blocked) is None
+    assert critics.path_align_critic(model.MppiPathAlignCritic(), blocked) is None
 
 
 def test_path_follow_critic_is_the_distance_to_a_free_point_beyond_the_furthest() -> None:
-    said = critics.path_follow(model.MppiPathFollowCritic(), scene(along(0.5, 0.2)))
+    said = critics.path_follow_critic(model.MppiPathFollowCritic(), scene(along(0.5, 0.2)))
     assert said == pytest.approx([5.0 * (0.45 + 0.25 - 0.5), 5.0 * (0.70 - 0.2)], rel=1e-3)
 
 
@@ -251,23 +252,25 @@ def test_path_follow_critic_is_the_distance_to_a_free_point_beyond_the_furthest(
 def test_path_angle_critic_lets_a_robot_that_may_reverse_look_back(mode: int, weighed: float | None) -> None:
     turned = scene(along(0.0), pose=Pose2(0.0, 0.0, math.pi))
     back = integrate_velocities(along(0.0).astype(np.float32), math.pi, 0.1)
-    turned = replace(turned, rolled=back)
-    said = critics.path_angle(model.MppiPathAngleCritic(mode=mode), turned)
+    turned = replace(turned, rollouts=back)
+    said = critics.path_angle_critic(model.MppiPathAngleCritic(mode=mode), turned)
     assert said is None if weighed is None else said == pytest.approx([2.0 * weighed], rel=1e-5)
 
 
 def test_prefer_forward_critic_counts_meters_driven_backward() -> None:
-    said = critics.prefer_forward(model.MppiPreferForwardCritic(), scene(along(0.3, -0.2)))
+    said = critics.prefer_forward_critic(model.MppiPreferForwardCritic(), scene(along(0.3, -0.2)))
     assert said == pytest.approx([0.0, 5.0 * 0.2], abs=1e-6)
 
 
 def test_velocity_deadband_critic_counts_what_velocities_fall_short_of_those_that_move_the_base() -> None:
     spec = model.MppiVelocityDeadbandCritic(deadband_velocities=(0.2, 0.3, 0.4))
-    said = critics.velocity_deadband(spec, scene(along(0.05, -0.25, turn=-0.1)))
+    said = critics.velocity_deadband_critic(spec, scene(along(0.05, -0.25, turn=-0.1)))
     assert said == pytest.approx([35.0 * (0.15 + 0.3), 35.0 * 0.3], rel=1e-5)
     strafing = np.concatenate((along(0.05, turn=-0.1), np.full((1, 10, 1), 0.1)))
-    assert critics.velocity_deadband(spec, scene(strafing)) == pytest.approx([35.0 * (0.15 + 0.3 + 0.2)], rel=1e-5)
+    assert critics.velocity_deadband_critic(spec, scene(strafing)) == pytest.approx(
+        [35.0 * (0.15 + 0.3 + 0.2)], rel=1e-5
+    )
 
 
 def test_twirling_critic_is_the_mean_turn_rate() -> None:
-    assert critics.twirling(model.MppiTwirlingCritic(), scene(along(0.3, turn=-0.5))) == pytest.approx([5.0])
+    assert critics.twirling_critic(model.MppiTwirlingCritic(), scene(along(0.3, turn=-0.5))) == pytest.approx([5.0])

@@ -9,7 +9,7 @@ from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.controllers import RegulatedPurePursuit as Spec
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot, setting
 
@@ -20,7 +20,7 @@ PLAIN = {"use_velocity_scaled_lookahead_dist": False, "lookahead_dist": 0.6}
 
 def view_of(*boxes: tuple[float, float, float, float]) -> CostmapView:
     grid = Flatland(list(boxes)).grid((-3.0, -4.0, 9.0, 4.0))
-    return Costmap(CostmapSpec(), Surroundings(ROBOT, grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, grid, RATE)).view
 
 
 def rpp(path: np.ndarray, **options: object) -> RegulatedPurePursuit:

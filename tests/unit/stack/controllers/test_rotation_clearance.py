@@ -7,7 +7,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.collision_checker import RotationClearance
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot
@@ -20,7 +20,7 @@ SLOT = Flatland([(-0.6, 0.3, 2.0, 0.5), (-0.6, -0.5, 2.0, -0.3)])
 
 
 def seen(world: Flatland, robot: RobotModel) -> CostmapView:
-    return Costmap(CostmapSpec(), Surroundings(robot, world.grid((-3.0, -3.0, 3.0, 3.0)), RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-3.0, -3.0, 3.0, 3.0)), RATE)).view
 
 
 def room_of(robot: RobotModel) -> RotationClearance:

@@ -12,7 +12,7 @@ from simscen.model.controllers import RegulatedPurePursuit as Spec
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.path_handler import PathTracker
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import distance_at
 from simscen.stack.protocols import CostmapView, Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot, setting
@@ -24,7 +24,7 @@ FAR = Goal("far", Pose2(8.0, 0.0, 0.0))
 
 def view_of(*boxes: tuple[float, float, float, float]) -> CostmapView:
     grid = Flatland(list(boxes)).grid((-3.0, -4.0, 9.0, 4.0))
-    return Costmap(CostmapSpec(), Surroundings(ROBOT, grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, grid, RATE)).view
 
 
 def bent(radius: float, straight: float = 3.0) -> np.ndarray:
@@ -76,7 +76,7 @@ def test_the_bend_of_a_circle_is_that_of_its_radius(radius: float) -> None:
     track = PathTracker(Path(bent(radius)))
     track.locate(Pose2(0.0, 0.0, 0.0))
     track.index = int(np.searchsorted(track.along, 3.2))
-    meters, places, bends = zip(*track.stations(0.1, radius * math.pi / 2 - 0.6), strict=True)
+    meters, places, bends = zip(*track.samples_ahead(0.1, radius * math.pi / 2 - 0.6), strict=True)
     assert bends == pytest.approx([1.0 / radius] * len(bends), rel=0.03)
     assert np.diff(meters) == pytest.approx(0.1, abs=0.051)
     assert [abs(place - complex(3.0, radius)) for place in places] == pytest.approx([radius] * len(places))
@@ -85,6 +85,6 @@ def test_the_bend_of_a_circle_is_that_of_its_radius(radius: float) -> None:
 def test_on_a_straight_way_there_is_no_bend_and_beyond_a_piece_nothing() -> None:
     x = np.concatenate((np.arange(0.0, 1.001, 0.05), np.arange(0.95, 0.19, -0.05)))
     track = PathTracker(Path(np.column_stack((x, np.zeros((len(x), 2))))))
-    stations = list(track.stations(0.1, 5.0))
+    stations = list(track.samples_ahead(0.1, 5.0))
     assert stations[-1][0] == pytest.approx(1.0)
     assert all(bend == 0.0 for _, _, bend in stations)

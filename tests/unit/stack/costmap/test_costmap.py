@@ -10,7 +10,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.costmaps import Costmap as Spec
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot
 
@@ -27,12 +27,12 @@ def scan_of(world: Flatland, pose: Pose2, beams: int = 360, range_max: float = 1
     return Scan("lidar", 0, np.where(ranges > range_max, np.inf, ranges), -math.pi, step, 0.05, range_max)
 
 
-def costmap(world: Flatland | None, spec: Spec | None = None, **options: object) -> Costmap:
+def costmap(world: Flatland | None, spec: Spec | None = None, **options: object) -> LayeredCostmap:
     grid = world.grid(BOUNDS) if world else None
-    return Costmap(spec or Spec(), Surroundings(ROBOT, grid, RATE, **options))
+    return LayeredCostmap(spec or Spec(), Surroundings(ROBOT, grid, RATE, **options))
 
 
-def at(costmap: Costmap, x: float, y: float) -> tuple[int, float]:
+def at(costmap: LayeredCostmap, x: float, y: float) -> tuple[int, float]:
     """Cost and distance under a point."""
     view = costmap.view
     row, column = int((y - view.origin[1]) / view.resolution), int((x - view.origin[0]) / view.resolution)
@@ -57,7 +57,7 @@ def test_costmaps_of_one_map_tell_each_their_own_distances() -> None:
     for radius in (0.1, 0.3, 0.1):
         robot, zone = round_robot(radius), ((4.0, 3.0), (4.5, 3.0), (4.5, 3.5))
         for keepout in ((), (zone,)):
-            map_ = Costmap(Spec(inflation_radius=0.2), Surroundings(robot, grid, RATE, keepout=keepout))
+            map_ = LayeredCostmap(Spec(inflation_radius=0.2), Surroundings(robot, grid, RATE, keepout=keepout))
             distance = distance_transform_edt(map_.view.costs != 254) * 0.05
             assert np.allclose(map_.view.distance, np.minimum(distance, radius + 0.5), atol=1e-6)
             assert at(map_, 4.3, 3.1)[0] == (254 if keepout else 0)
@@ -74,7 +74,7 @@ def test_costs_follow_nav2s_formula_between_the_inscribed_and_the_inflation_radi
 def test_unknown_cells_stay_unknown_unless_the_robot_would_touch_a_wall_there() -> None:
     cells = np.full((40, 40), -1, dtype=np.int8)
     cells[20, 20] = 100
-    map_ = Costmap(Spec(), Surroundings(ROBOT, OccupancyGrid(cells, 0.05), RATE))
+    map_ = LayeredCostmap(Spec(), Surroundings(ROBOT, OccupancyGrid(cells, 0.05), RATE))
     assert at(map_, 1.025, 1.125)[0] == 253
     assert at(map_, 1.025, 1.725)[0] == 255
 
@@ -83,7 +83,7 @@ def test_a_turned_map_is_sampled_into_an_unturned_costmap() -> None:
     cells = np.zeros((40, 60), dtype=np.int8)
     cells[10, 50] = 100
     grid = OccupancyGrid(cells, 0.05, Pose2(1.0, 2.0, math.pi / 2))
-    view = Costmap(Spec(), Surroundings(ROBOT, grid, RATE)).view
+    view = LayeredCostmap(Spec(), Surroundings(ROBOT, grid, RATE)).view
     row, column = np.argwhere(view.costs == 254)[0]
     x, y = grid.center_of(np.array([[10, 50]]))[0]
     assert view.origin[0] + (column + 0.5) * 0.05 == pytest.approx(x, abs=0.051)
@@ -320,8 +320,8 @@ def test_unknown_space_is_free_where_it_is_not_tracked() -> None:
     cells = np.full((40, 40), -1, dtype=np.int8)
     cells[20, 20] = 100
     surroundings = Surroundings(ROBOT, OccupancyGrid(cells, 0.05), RATE)
-    assert at(Costmap(Spec(), surroundings), 1.025, 1.825)[0] == 255
-    assert at(Costmap(Spec(track_unknown_space=False), surroundings), 1.025, 1.825)[0] == 0
+    assert at(LayeredCostmap(Spec(), surroundings), 1.025, 1.825)[0] == 255
+    assert at(LayeredCostmap(Spec(track_unknown_space=False), surroundings), 1.025, 1.825)[0] == 0
     assert at(costmap(None), 5.0, 5.0)[0] == 255
     assert at(costmap(None, Spec(track_unknown_space=False)), 5.0, 5.0)[0] == 0
 
@@ -332,7 +332,7 @@ def test_unknown_space_that_a_beam_passes_through_is_known_with_the_cost_it_has(
     spec = Spec(inflation_radius=inflation_radius)
     known = costmap(world, spec)
     grid = world.grid(BOUNDS)
-    map_ = Costmap(spec, Surroundings(ROBOT, OccupancyGrid(np.where(grid.cells, 100, -1).astype(np.int8), 0.05,
+    map_ = LayeredCostmap(spec, Surroundings(ROBOT, OccupancyGrid(np.where(grid.cells, 100, -1).astype(np.int8), 0.05,
                                                              grid.origin), RATE))  # fmt: skip
     pose = Pose2(4.0, 1.0)
     for each in (known, map_):

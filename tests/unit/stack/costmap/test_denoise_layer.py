@@ -9,8 +9,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.costmaps import Costmap as Spec
 from simscen.model.costmaps import DenoiseLayer
-from simscen.stack.costmap.costmap import Costmap
-from simscen.stack.costmap.denoise_layer import without_specks
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
+from simscen.stack.costmap.obstacle_layer import remove_small_groups
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot
 
@@ -39,7 +39,7 @@ NO_WALLS = np.zeros_like(MARKED)
 )
 def test_groups_of_fewer_cells_are_left_out(size: int, connectivity: int, left: int) -> None:
     spec = DenoiseLayer(enabled=True, minimal_group_size=size, group_connectivity_type=connectivity)
-    kept = without_specks(MARKED, NO_WALLS, spec)
+    kept = remove_small_groups(MARKED, NO_WALLS, spec)
     assert kept.sum() == left
     assert not (kept & ~MARKED).any()
 
@@ -47,7 +47,7 @@ def test_groups_of_fewer_cells_are_left_out(size: int, connectivity: int, left: 
 def test_a_cell_beside_a_wall_is_part_of_it() -> None:
     walls = NO_WALLS.copy()
     walls[3, :] = True
-    kept = without_specks(MARKED, walls, DenoiseLayer(enabled=True, minimal_group_size=8))
+    kept = remove_small_groups(MARKED, walls, DenoiseLayer(enabled=True, minimal_group_size=8))
     assert kept[4, 0]
     assert not kept[0, 0]
 
@@ -57,7 +57,7 @@ def test_a_drive_sees_the_same_with_updates_as_if_all_were_computed_anew() -> No
     rng = np.random.default_rng(5)
     world = Flatland(discs=[(x, y, 0.03) for x, y in rng.uniform(-3, 3, (12, 2)).tolist() if math.hypot(x, y) > 1])
     spec = Spec(denoise_layer=DenoiseLayer(enabled=True, minimal_group_size=4), rolling_size=8.0)
-    map_ = Costmap(spec, Surroundings(round_robot(), None, RATE))
+    map_ = LayeredCostmap(spec, Surroundings(round_robot(), None, RATE))
     for k in range(6):
         pose = Pose2(0.1 * k, 0.0)
         map_.update(pose, scan_of(world, pose, noise=0.03))

@@ -8,7 +8,7 @@ import pytest
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as Spec
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import RATE, round_robot
 
@@ -38,13 +38,13 @@ def image(*slabs: Slab, base: Pose2 = Pose2(0.0, 0.0)) -> Image:
     return Image("camera", 0, np.zeros((HEIGHT, WIDTH, 3), np.uint8), depth.astype(np.float32), MOUNT, VIEW)
 
 
-def costmap(**options: float) -> Costmap:
-    return Costmap(
+def costmap(**options: float) -> LayeredCostmap:
+    return LayeredCostmap(
         Spec(rolling_size=8.0, track_unknown_space=False, **options), Surroundings(round_robot(), None, RATE)
     )
 
 
-def lethal(map_: Costmap) -> np.ndarray:
+def lethal(map_: LayeredCostmap) -> np.ndarray:
     view = map_.view
     return (np.argwhere(view.costs == 254)[:, ::-1] + 0.5) * view.resolution + view.origin
 
@@ -69,7 +69,7 @@ def test_the_ground_is_no_obstacle_nor_is_what_hangs_higher_than_the_robot() -> 
     assert len(lethal(_seen(costmap(max_obstacle_height=1.0), LAMP)))
 
 
-def _seen(map_: Costmap, *things: Slab) -> Costmap:
+def _seen(map_: LayeredCostmap, *things: Slab) -> LayeredCostmap:
     map_.update(Pose2(0.0, 0.0), image(*things))
     return map_
 

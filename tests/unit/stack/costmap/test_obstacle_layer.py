@@ -55,4 +55,4 @@ def test_hits_are_points_in_the_map() -> None:
     [([], True), ([np.nan, -np.inf, 0.01], True), ([np.nan, np.inf], False), ([-np.inf, 3.0], False)],
 )
 def test_a_scan_without_free_space_or_hits_is_blind(ranges: list[float], is_blind: bool) -> None:
-    assert costmaps._blind(Scan("l", 0, np.array(ranges), 0.0, 0.1, 0.05, 12.0)) is is_blind
+    assert costmaps._is_blind(Scan("l", 0, np.array(ranges), 0.0, 0.1, 0.05, 12.0)) is is_blind

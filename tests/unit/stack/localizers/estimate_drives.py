@@ -15,19 +15,19 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
-from simscen.loading.files.worldfile import load_world_file
+from simscen.loading.builders import world_from_file
+from simscen.loading.files.single_files import load_world_file
 from simscen.model.localizers import Amcl
 from simscen.model.world import WorldSpec
-from simscen.run.preparation.loaders import world_from_file
 from simscen.stack.plugins.checked_components import CheckedLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
 from simscen.stack.setting import Setting
 from simscen.testing.synthetic_room import ROBOT, TICK_RATE
-from simscen.worlds.build import build
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.built_world import build_world_and_map
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
 from simscen.worlds.routes.shortest_paths import ShortestPaths
-from simscen.worlds.world_file import build_own
+from simscen.worlds.world_file import world_from_spec
 
 PERIOD, BEAMS, HEIGHT, KIDNAPPED_AT = 24, 60, 0.2, 200
 ANGLES = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
@@ -50,8 +50,8 @@ def building(name: str) -> BuiltWorld:
     if (WORLDS / f"{base}.world.yaml").exists():
         world = world_from_file(load_world_file(WORLDS / f"{base}.world.yaml", WORLDS), WORLDS)
     else:
-        world = build_own(WorldSpec.model_validate({"simscen": 1, **GENERATED[base]()}), base)
-    return build(world, HEIGHT, 0.2 if coarse else 0.05)
+        world = world_from_spec(WorldSpec.model_validate({"simscen": 1, **GENERATED[base]()}), base)
+    return build_world_and_map(world, HEIGHT, 0.2 if coarse else 0.05)
 
 
 def _hall(width: float, depth: float, boxes: list[tuple[float, float, float, float]]) -> dict[str, object]:
@@ -150,7 +150,7 @@ def moved_furniture(name: str, truth: Array, seed: int) -> RayScene:
         if np.hypot(*(truth[:, :2] - (x, y)).T).min() > 0.3 + np.hypot(a, b) / 2:
             boxes.append((float(x), float(y), float(a), float(b)))
     spec = WorldSpec.model_validate({"simscen": 1, "obstacles": _hall(1, 1, boxes)["obstacles"]})
-    return RayScene(fuse((*built.world.solids, *build_own(spec, "more").solids)))
+    return RayScene(merge_solids((*built.world.solids, *world_from_spec(spec, "more").solids)))
 
 
 def crowded(way: Way, seed: int, people: int = 6) -> Way:
@@ -206,13 +206,13 @@ class Case:
             stretched = 1 + rng.normal() * 0.01 * np.sqrt(far) / max(far, 1e-9)
             turn = step[2] + rng.normal() * np.sqrt(1e-4 * abs(step[2]) + 2.5e-5 * far)
             odometry = odometry.compose(Pose2(step[0] * stretched, step[1] * stretched, turn))
-            told = Odometry("odom", row * PERIOD, odometry, Twist())
-            yield told, Scan("lidar", row * PERIOD, ranges[row], -np.pi, 2 * np.pi / BEAMS, 0.05, self.range_max)
+            given = Odometry("odom", row * PERIOD, odometry, Twist())
+            yield given, Scan("lidar", row * PERIOD, ranges[row], -np.pi, 2 * np.pi / BEAMS, 0.05, self.range_max)
 
     def localizer(self) -> Localizer:
         """The localizer at its start."""
-        told = Surroundings(ROBOT, self.map, TICK_RATE)
-        setting = Setting(told, "localizer", Streams(self.seed), estimate=self.estimate)
+        given = Surroundings(ROBOT, self.map, TICK_RATE)
+        setting = Setting(given, "localizer", Streams(self.seed), estimate=self.estimate)
         return CheckedLocalizer(self.spec, setting)
 
 

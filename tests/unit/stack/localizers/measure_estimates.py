@@ -15,7 +15,7 @@ from estimate_drives import CIRCUMSTANCES, Case, case
 
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers import particle_filter
-from simscen.stack.localizers.clusters import clusters, errors_about, summarize
+from simscen.stack.localizers.clusters import cluster_labels, pose_errors, summarize
 from simscen.stack.localizers.kld import bins
 from simscen.stack.localizers.particles import Particles
 
@@ -26,10 +26,10 @@ Estimator = Callable[[Particles], Pose2]
 
 def near_the_best(particles: Particles) -> Pose2:
     """The mean of the particles within 0.25 m and 10° of the best one of the heaviest cluster (Rekleitis 2004)."""
-    labels = clusters(bins(particles.poses))
+    labels = cluster_labels(bins(particles.poses))
     heaviest = labels == np.bincount(labels, weights=particles.weights).argmax()
     center = particles.poses[np.where(heaviest, particles.weights, -1.0).argmax()]
-    near = errors_about(center, particles.poses)
+    near = pose_errors(center, particles.poses)
     kept = heaviest & (np.hypot(near[:, 0], near[:, 1]) <= 0.25) & (np.abs(near[:, 2]) <= np.deg2rad(10))
     return Pose2(*(center + particles.weights[kept] @ near[kept] / particles.weights[kept].sum()))
 
@@ -38,7 +38,7 @@ def heaviest_mean(power: float) -> Estimator:
     """The mean of the heaviest cluster with weights to this power; 1 is nav2_amcl's."""
 
     def estimate(particles: Particles) -> Pose2:
-        labels = clusters(bins(particles.poses))
+        labels = cluster_labels(bins(particles.poses))
         kept = labels == np.bincount(labels, weights=particles.weights).argmax()
         x, y, yaw = particles.poses[kept].T
         weights = (particles.weights[kept] / particles.weights[kept].max()) ** power
@@ -48,9 +48,9 @@ def heaviest_mean(power: float) -> Estimator:
     return estimate
 
 
-def both(peak: float) -> Estimator:
+def both(peak_power: float) -> Estimator:
     """The shipped one."""
-    return lambda particles: summarize(particles, peak)[0]
+    return lambda particles: summarize(particles, peak_power)[0]
 
 
 ESTIMATORS: Mapping[str, Estimator] = {
@@ -68,10 +68,10 @@ def beliefs(drive: Case, estimators: Mapping[str, Estimator]) -> dict[str, Array
     """What each estimator believes (k, 3) all along a drive: its last estimate, carried on by odometry."""
     subject, latest, corrected = drive.localizer(), {}, False
 
-    def summed_up(particles: Particles, peak: float) -> tuple[Pose2, Array]:
+    def summed_up(particles: Particles, peak_power: float) -> tuple[Pose2, Array]:
         nonlocal corrected, latest
         corrected, latest = True, {name: estimate(particles) for name, estimate in estimators.items()}
-        return summarize(particles, peak)
+        return summarize(particles, peak_power)
 
     found: dict[str, list[Pose2]] = {name: [] for name in estimators}
     anchors: dict[str, Pose2] = {}

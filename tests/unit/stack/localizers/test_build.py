@@ -53,5 +53,5 @@ def test_the_motion_model_is_that_of_the_drive_unless_it_is_named(
     spec = model.Amcl(alpha1=0, alpha2=0, alpha3=0, alpha4=0, alpha5=1.0, robot_model=robot_model)  # type: ignore[arg-type]
     subject = built(spec, replace(surroundings(), robot=replace(ROBOT, holonomic=holonomic)))
     assert isinstance(subject, AmclLocalizer)
-    grown = subject._motion.carry(np.zeros((3, 3)), 0.0, Pose2(0.3, 0, 0))
-    assert (grown[1, 1] > 0) == strafes
+    grow_covariance = subject._motion.propagate(np.zeros((3, 3)), 0.0, Pose2(0.3, 0, 0))
+    assert (grow_covariance[1, 1] > 0) == strafes

@@ -6,7 +6,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.clusters import clusters, spread, summarize
+from simscen.stack.localizers.clusters import cluster_labels, spread, summarize
 from simscen.stack.localizers.kld import bins, split
 from simscen.stack.localizers.particles import Particles
 
@@ -19,7 +19,7 @@ def test_groups_are_the_connected_components_of_touching_bins(seed: int, count: 
     apart = np.abs(cells[:, None] - cells)
     apart[..., 2] = np.minimum(apart[..., 2], 36 - apart[..., 2])
     expected = connected_components(coo_array((apart <= 1).all(axis=2)))[1]
-    found = clusters(keys)
+    found = cluster_labels(keys)
     assert np.array_equal(found[:, None] == found, expected[:, None] == expected)
 
 
@@ -71,22 +71,22 @@ def test_the_covariance_is_the_weighted_one_about_the_pose() -> None:
     assert np.allclose(about, np.cov(poses.T, aweights=weights, ddof=0) + np.outer(shift, shift))
 
 
-def between_two(far: float, heavier: float, peak: float, inside: tuple[float, float]) -> float:
+def between_two(far: float, heavier: float, peak_power: float, inside: tuple[float, float]) -> float:
     """Where two groups are summed up: one at 0 and `heavier` times as heavy, one at `far`; variances `inside` (m²)."""
     means, widths = [], []
-    for power in (1.0, peak):
+    for power in (1.0, peak_power):
         share = 1 / (1 + heavier**power)
         means.append(far * share)
         widths.append((1 - share) * inside[0] + share * inside[1] + far**2 * share * (1 - share))
     return (means[0] * widths[1] + means[1] * widths[0]) / sum(widths)
 
 
-@pytest.mark.parametrize("peak", [1.0, 2.0, 16.0])
-def test_a_tail_of_lighter_particles_draws_the_pose_as_far_as_the_power_of_their_weights(peak: float) -> None:
+@pytest.mark.parametrize("peak_power", [1.0, 2.0, 16.0])
+def test_a_tail_of_lighter_particles_draws_the_pose_as_far_as_the_power_of_their_weights(peak_power: float) -> None:
     poses = np.concatenate((group(Pose2(0, 0, 0), 0.03, 300, 6), group(Pose2(0.6, 0, 0), 0.1, 300, 7)))
     weights = np.repeat([1.3, 1.0], 300)
-    pose, _ = summarize(Particles(poses, weights / weights.sum()), peak)
-    assert pose.x == pytest.approx(between_two(0.6, 1.3, peak, (0.0018, 0.02)), abs=0.01)
+    pose, _ = summarize(Particles(poses, weights / weights.sum()), peak_power)
+    assert pose.x == pytest.approx(between_two(0.6, 1.3, peak_power, (0.0018, 0.02)), abs=0.01)
 
 
 def wide(count: int = 2000, width: float = 3.0) -> Array:
@@ -105,15 +105,15 @@ def test_of_a_wide_even_cloud_the_middle_is_the_answer_whichever_particle_is_bes
         assert np.sqrt(covariance[0, 0]) == pytest.approx(3 / np.sqrt(3), rel=0.05)
 
 
-@pytest.mark.parametrize("peak", [1.0, 16.0])
-def test_weights_that_change_by_a_thousandth_move_the_pose_by_that_much_of_the_clouds_width(peak: float) -> None:
+@pytest.mark.parametrize("peak_power", [1.0, 16.0])
+def test_weights_that_change_by_a_thousandth_move_the_pose_by_that_much_of_the_clouds_width(peak_power: float) -> None:
     """So there is no jump without a scan that says so."""
     poses, rng = wide(), np.random.default_rng(9)
     weights = rng.uniform(1, 3, len(poses))
-    before, _ = summarize(Particles(poses, weights / weights.sum()), peak)
+    before, _ = summarize(Particles(poses, weights / weights.sum()), peak_power)
     changed = weights * rng.choice([1, 1.001], len(poses))
-    after, _ = summarize(Particles(poses, changed / changed.sum()), peak)
-    assert before.distance(after) < 0.001 * peak * 3
+    after, _ = summarize(Particles(poses, changed / changed.sum()), peak_power)
+    assert before.distance(after) < 0.001 * peak_power * 3
 
 
 def test_of_two_groups_in_one_cluster_the_pose_goes_from_one_to_the_other_without_a_jump() -> None:
@@ -128,12 +128,12 @@ def test_of_two_groups_in_one_cluster_the_pose_goes_from_one_to_the_other_withou
     assert np.abs(np.diff(found)).max() < 0.05
 
 
-@pytest.mark.parametrize("peak", [1.0, 16.0])
-def test_of_a_narrow_cloud_the_pose_is_where_its_weights_are_highest(peak: float) -> None:
+@pytest.mark.parametrize("peak_power", [1.0, 16.0])
+def test_of_a_narrow_cloud_the_pose_is_where_its_weights_are_highest(peak_power: float) -> None:
     """Weights fall off as a normal distribution does, which any power leaves where it is."""
     poses = np.random.default_rng(12).uniform((-0.2, -0.2, -0.1), (0.2, 0.2, 0.1), (4000, 3))
     weights = np.exp(-0.5 * (np.square(poses - (0.05, -0.03, 0.02)) / 0.03**2).sum(axis=1))
-    pose, _ = summarize(Particles(poses, weights / weights.sum()), peak)
+    pose, _ = summarize(Particles(poses, weights / weights.sum()), peak_power)
     assert pose == pytest.approx((0.05, -0.03, 0.02), abs=0.005)
 
 

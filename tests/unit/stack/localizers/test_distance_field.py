@@ -39,7 +39,7 @@ def test_a_point_finds_the_cell_it_is_in_or_the_border(
     grid = some_grid(seed, Pose2(-1.3, 0.4, turned))
     field = DistanceField(grid, grid.cells == OCCUPIED, 2.0, walled=False)
     pose, points = Pose2(x, y, yaw), np.array([[0.0, 0.0], [0.51, 0.77], [-1.1, 0.3], [far, 1.0]])
-    found = field.table[field.cells_seen(np.array([pose]), points @ (1, 1j))[0]]
+    found = field.table[field.endpoint_cells(np.array([pose]), points @ (1, 1j))[0]]
     for point, distance in zip(pose.apply(points), found, strict=True):
         # Single precision may decide otherwise within 1e-4 of a cell's edge.
         corners = point + 2e-5 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from simscen.stack.localizers.kld import BIN_METERS, KldBound, bins, join, split
+from simscen.stack.localizers.kld import BIN_SIZE_M, KldBound, bins, join, split
 
 coordinates = st.integers(-2_000_000, 2_000_000)
 
@@ -34,7 +34,7 @@ def test_keys_stand_for_coordinates(x: int, y: int, yaw: int) -> None:
 @settings(max_examples=50)
 @given(st.lists(st.tuples(*[st.floats(-20, 20)] * 3), min_size=1, max_size=40))
 def test_particles_share_a_bin_exactly_when_their_whole_coordinates_are_equal(poses: list[tuple[float, ...]]) -> None:
-    whole = [(x // BIN_METERS, y // BIN_METERS, int(np.floor(yaw * 18 / np.pi)) % 36) for x, y, yaw in poses]
+    whole = [(x // BIN_SIZE_M, y // BIN_SIZE_M, int(np.floor(yaw * 18 / np.pi)) % 36) for x, y, yaw in poses]
     keys = bins(np.array(poses)).tolist()
     assert [keys.index(key) for key in keys] == [whole.index(cell) for cell in whole]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.stack.localizers.motion_models import Differential, MotionModel, Omni
+from simscen.stack.localizers.motion_models import DifferentialMotionModel, MotionModel, OmniMotionModel
 
 START = Pose2(1.5, -0.7, 2.1)
 MANY = 200_000
@@ -16,7 +16,7 @@ def moved(model: MotionModel, delta: Pose2, count: int = MANY) -> np.ndarray:
     return model.sample(np.tile(START, (count, 1)), delta, np.random.default_rng(7))
 
 
-@pytest.mark.parametrize("model", [Differential((0, 0, 0, 0)), Omni((0, 0, 0, 0, 0))])
+@pytest.mark.parametrize("model", [DifferentialMotionModel((0, 0, 0, 0)), OmniMotionModel((0, 0, 0, 0, 0))])
 @pytest.mark.parametrize("delta", [Pose2(0.3, 0.1, 0.4), Pose2(-0.2, 0.0, 0.1), Pose2(0, 0, -1.2), Pose2(0, 0, 0)])
 def test_without_noise_every_particle_moves_exactly_as_odometry_did(model: MotionModel, delta: Pose2) -> None:
     assert np.allclose(moved(model, delta, 3), START.compose(delta), atol=1e-12)
@@ -25,7 +25,7 @@ def test_without_noise_every_particle_moves_exactly_as_odometry_did(model: Motio
 @pytest.mark.parametrize(("forward", "turn_again"), [(0.3, 0.4), (-0.3, 0.4), (0.3, -2.0)])
 def test_differential_noise_has_the_variances_of_nav2(forward: float, turn_again: float) -> None:
     a1, a2, a3, a4 = 0.004, 0.003, 0.002, 0.001
-    poses = moved(Differential((a1, a2, a3, a4)), Pose2(forward, 0.0, turn_again))
+    poses = moved(DifferentialMotionModel((a1, a2, a3, a4)), Pose2(forward, 0.0, turn_again))
     local = np.array([START.between(Pose2(*pose)) for pose in poses[:20_000]])
     again = min(abs(turn_again), math.pi - abs(turn_again)) if forward > 0 else abs(turn_again)
     drive_variance = a3 * forward**2 + a4 * again**2
@@ -37,21 +37,21 @@ def test_differential_noise_has_the_variances_of_nav2(forward: float, turn_again
 
 
 def test_driving_backward_is_as_noisy_as_driving_forward() -> None:
-    model = Differential((0.01, 0.01, 0.01, 0.01))
+    model = DifferentialMotionModel((0.01, 0.01, 0.01, 0.01))
     forward, backward = moved(model, Pose2(0.4, 0, 0.2)), moved(model, Pose2(-0.4, 0, 0.2))
     assert np.allclose(forward.std(axis=0), backward.std(axis=0), rtol=0.02)
 
 
 def test_a_translation_below_a_centimeter_has_no_bearing() -> None:
     """Else odometry that rattles while the robot turns on the spot would look like two large turns."""
-    poses = moved(Differential((0.01, 0, 0, 0)), Pose2(0.0, 0.009, 0.0))
+    poses = moved(DifferentialMotionModel((0.01, 0, 0, 0)), Pose2(0.0, 0.009, 0.0))
     assert poses[:, 2].std() < 1e-12
 
 
 def test_omni_noise_has_the_variances_of_nav2() -> None:
     a1, a2, a3, a4, a5 = 0.004, 0.003, 0.002, 0.001, 0.006
     delta = Pose2(0.3, 0.4, 0.2)
-    poses = moved(Omni((a1, a2, a3, a4, a5)), delta)
+    poses = moved(OmniMotionModel((a1, a2, a3, a4, a5)), delta)
     bearing = START.yaw + math.atan2(delta.y, delta.x)
     drive, strafe = (
         np.array([[np.cos(bearing), np.sin(bearing)], [-np.sin(bearing), np.cos(bearing)]])
@@ -63,17 +63,19 @@ def test_omni_noise_has_the_variances_of_nav2() -> None:
     assert np.var(poses[:, 2]) == pytest.approx(a1 * 0.04 + a2 * 0.25, rel=0.02)
 
 
-@pytest.mark.parametrize("model", [Differential((2e-4, 3e-4, 4e-4, 1e-4)), Omni((2e-4, 3e-4, 4e-4, 1e-4, 5e-4))])
+@pytest.mark.parametrize(
+    "model", [DifferentialMotionModel((2e-4, 3e-4, 4e-4, 1e-4)), OmniMotionModel((2e-4, 3e-4, 4e-4, 1e-4, 5e-4))]
+)
 @pytest.mark.parametrize("delta", [Pose2(0.3, 0.1, 0.4), Pose2(-0.4, 0.05, -0.3), Pose2(0, 0, 0.9)])
 def test_the_carried_covariance_is_that_of_moved_particles(model: MotionModel, delta: Pose2) -> None:
     rng = np.random.default_rng(3)
     covariance = np.array([[4e-4, 1e-4, -5e-5], [1e-4, 3e-4, 2e-5], [-5e-5, 2e-5, 1e-4]])
     poses = model.sample(rng.multivariate_normal(START, covariance, MANY), delta, rng)
-    carried = model.carry(covariance, START.yaw, delta)
+    carried = model.propagate(covariance, START.yaw, delta)
     scale = np.sqrt(np.outer(np.diag(carried), np.diag(carried)))
     assert np.allclose(np.cov(poses.T) / scale, carried / scale, atol=0.015)
 
 
 def test_headings_stay_on_the_circle() -> None:
-    poses = moved(Differential((0.2, 0.2, 0.2, 0.2)), Pose2(0, 0, 3.0))
+    poses = moved(DifferentialMotionModel((0.2, 0.2, 0.2, 0.2)), Pose2(0, 0, 3.0))
     assert np.abs(poses[:, 2]).max() <= math.pi

@@ -69,8 +69,8 @@ def test_all_that_stray_are_at_most_what_a_few_scans_put_anywhere() -> None:
 
 
 def test_with_nav2s_default_of_zero_nobody_asks() -> None:
-    assert not Recovery(0.0, 0.0).wanted
-    assert Recovery(0.001, 0.1).wanted
+    assert not Recovery(0.0, 0.0).is_enabled
+    assert Recovery(0.001, 0.1).is_enabled
 
 
 @pytest.mark.parametrize(("tracked", "anywhere"), [(-np.inf, -np.inf), (-np.inf, 0.0), (0.0, -np.inf), (2000.0, 0.0)])

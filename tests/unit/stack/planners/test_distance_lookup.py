@@ -1,7 +1,7 @@
 import numpy as np
 
 from simscen.model.costmaps import Costmap as Spec
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import distances
 from simscen.stack.planners.pose_search import DistanceLookup
 from simscen.stack.protocols import Surroundings
@@ -10,7 +10,7 @@ from simscen.testing.flatland import RATE, Flatland, round_robot
 
 def test_a_point_is_as_far_from_obstacles_as_the_costmap_says_and_off_it_is_told() -> None:
     world = Flatland().room(8, 6)
-    view = Costmap(Spec(), Surroundings(round_robot(), world.grid((-0.5, -0.5, 8.5, 6.5)), RATE)).view
+    view = LayeredCostmap(Spec(), Surroundings(round_robot(), world.grid((-0.5, -0.5, 8.5, 6.5)), RATE)).view
     tested = DistanceLookup(view)
     for x, y in np.random.default_rng(1).uniform((0, 0), (8, 6), (50, 2)).tolist():
         assert tested.at(x, y) == distances(view, np.array([[x, y]]))[0]

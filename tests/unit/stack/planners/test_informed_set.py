@@ -5,7 +5,7 @@ import pytest
 
 from simscen.advanced.planners.informed_set import InformedSet
 from simscen.model.costmaps import Costmap as Spec
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot
@@ -15,7 +15,7 @@ def ground(*boxes: tuple[float, float, float, float], radius: float = 0.22) -> T
     world = Flatland(list(boxes)).room(10, 6)
     grid = world.grid((-0.5, -0.5, 10.5, 6.5))
     robot = round_robot(radius)
-    return TraversalCosts(Costmap(Spec(), Surroundings(robot, grid, RATE)).view, robot, 2.0, True)
+    return TraversalCosts(LayeredCostmap(Spec(), Surroundings(robot, grid, RATE)).view, robot, 2.0, True)
 
 
 WALL = (4.9, 0.0, 5.0, 4.0)  # the way from (1, 1) to (9, 1) leads over its end, at (4.95, 4.22)
@@ -57,10 +57,10 @@ def test_by_cost_the_set_goes_by_what_ways_cost_and_knows_the_way_itself() -> No
     shortest = InformedSet(tested, (1.0, 1.0), (9.0, 1.0))
     assert shortest.length == pytest.approx(8.0, rel=0.03)
     assert shortest.length < informed.length
-    way = informed.way(tested.costmap, 9.0)
+    way = informed.path(tested.costmap, 9.0)
     assert way[:, 1].max() > 4.2
     assert np.isfinite(tested.at(way)).all()
     informed.narrow(0.05)
     assert informed.holds(way).all()
     assert not informed.holds(np.array([(4.95, 0.9)])).any()
-    assert len(informed.way(tested.costmap, 0.0)) == math.ceil(len(way) / 3)
+    assert len(informed.path(tested.costmap, 0.0)) == math.ceil(len(way) / 3)

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial.distance import cdist
 
 from simscen.advanced.planners.path_refinement import refined, smoothed
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as PlannerSpec
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.planners.ompl_search import OmplSearch
 from simscen.stack.planners.path_postprocessing import SPACING_M, spaced
@@ -34,7 +35,7 @@ def house() -> Flatland:
 
 def view_of(world: Flatland, robot: RobotModel = ROBOT, size: tuple[float, float] = (14, 10)) -> CostmapView:
     grid = world.grid((-0.5, -0.5, size[0] + 0.5, size[1] + 0.5))
-    return Costmap(CostmapSpec(), Surroundings(robot, grid, RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, grid, RATE)).view
 
 
 def shortest(view: CostmapView, start: Pose2, goal: Pose2, radius: float) -> float:
@@ -118,7 +119,7 @@ def test_what_cannot_be_planned_fails_with_nav2s_code(
     world = house()
     world.boxes += [(16.0, 0.0, 16.1, 5.0), (16.0, 5.0, 19.0, 5.1), (18.9, 0.0, 19.0, 5.0), (16.0, 0.0, 19.0, 0.1)]
     grid = world.grid((-0.5, -0.5, 19.5, 10.5))
-    view = Costmap(CostmapSpec(), Surroundings(ROBOT, grid, RATE)).view
+    view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, grid, RATE)).view
     with pytest.raises(NavigationFailure) as failed:
         planner().plan(view, Pose2(*start), Pose2(*goal), 1)
     assert failed.value.code == code
@@ -187,3 +188,64 @@ def test_who_stands_too_near_a_wall_is_not_sent_to_the_nearest_free_place_behind
     with pytest.raises(NavigationFailure) as raised:
         planner().plan(hall(*pocket, (5.0, 7.0, 5.4, 7.05)), start, goal, 1)
     assert raised.value.code is ErrorCode.START_OCCUPIED
+
+
+# Narrow gaps
+
+
+def two_rooms(width: float, detour: bool = True) -> Flatland:
+    """A wall at x = 4 with a gap around y = 2, and, if there is a detour, a wide opening at its end."""
+    world = Flatland().room(8, 8)
+    world.boxes += [(4.0, 0.0, 4.1, 2.0 - width / 2), (4.0, 2.0 + width / 2, 4.1, 6.5 if detour else 8.0)]
+    return world
+
+
+def plan_through(world: Flatland, **parameters: float) -> float:
+    """Return the length of the plan from one room to the other."""
+    spec = PlannerSpec.model_validate(parameters)
+    view = view_of(world, size=(8, 8))
+    return OmplPlanner(spec, ROBOT).plan(view, Pose2(1.5, 2.0), Pose2(6.5, 2.0), 1).length()
+
+
+@pytest.mark.parametrize(("more_than_the_robot", "through"), [(0.1, False), (0.4, True)])
+def test_a_plan_avoids_a_gap_with_too_little_clearance(more_than_the_robot: float, through: bool) -> None:
+    length = plan_through(two_rooms(2 * ROBOT.inscribed_radius + more_than_the_robot))
+    assert (length < 6.0) == through
+    assert length > 10.0 or through
+
+
+def test_a_plan_leads_through_a_narrow_gap_if_there_is_no_other_path() -> None:
+    assert plan_through(two_rooms(2 * ROBOT.inscribed_radius + 0.1, detour=False)) < 6.0
+
+
+def test_without_gap_clearance_any_gap_will_do() -> None:
+    assert plan_through(two_rooms(2 * ROBOT.inscribed_radius + 0.1), gap_clearance=0.0) < 6.0
+
+
+def test_a_robot_in_a_narrow_gap_and_a_goal_beside_a_wall_are_planned_for() -> None:
+    view = view_of(two_rooms(2 * ROBOT.inscribed_radius + 0.1), size=(8, 8))
+    path = OmplPlanner(PlannerSpec(), ROBOT).plan(view, Pose2(4.05, 2.0), Pose2(6.5, 0.15 + ROBOT.inscribed_radius), 1)
+    assert path.length() < 4.0
+
+
+@pytest.mark.parametrize("clearance", [0.03, 0.07, 0.2])
+def test_blocked_gaps_are_those_of_a_comparison_of_all_cells(clearance: float) -> None:
+    """A cell is blocked unless it, or a cell within the clearance, is farther from obstacles than needed."""
+    rng = np.random.default_rng(3)
+    world = Flatland().room(5, 5)
+    world.boxes += [(x, y, x + 0.2, y + 0.3) for x, y in rng.uniform(0.3, 4.5, (14, 2)).tolist()]
+    view = view_of(world, size=(5, 5))
+    costs = TraversalCosts(view, ROBOT, 2.0, True)
+    start = (0.5, 0.5)
+    found = costs.without_narrow_gaps(clearance, [start])
+    cells = np.argwhere(view.distance >= 0)
+    wide = cells[(view.distance > np.float32(ROBOT.inscribed_radius + clearance)).ravel()]
+    reach = math.ceil(clearance / view.resolution)
+    narrow = (cdist(cells, wide).min(axis=1) > reach).reshape(view.distance.shape)
+    exempt = np.zeros_like(narrow)
+    row, column = costs.cell(start)
+    exempt[max(0, row - 10) : row + 11, max(0, column - 10) : column + 11] = True
+    blocked = (narrow & ~exempt) | ~np.isfinite(costs.rates)
+    assert 0 < (blocked & np.isfinite(costs.rates)).sum() < blocked.size / 2
+    np.testing.assert_array_equal(np.isfinite(found.rates), ~blocked)
+    np.testing.assert_array_equal(found.rates[~blocked], costs.rates[~blocked])

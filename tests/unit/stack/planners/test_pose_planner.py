@@ -9,9 +9,9 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as Spec
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
-from simscen.stack.planners.build import ompl_planner
+from simscen.stack.planners.ompl_planner import ompl_planner
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, setting
 
@@ -22,7 +22,7 @@ OMNI = replace(CAR, turning_radius=0.0, max_lateral=1.0, holonomic=True)
 def hall(*boxes: tuple[float, float, float, float], robot: RobotModel = CAR) -> CostmapView:
     world = Flatland().room(9, 6)
     world.boxes += boxes
-    return Costmap(CostmapSpec(), Surroundings(robot, world.grid((-0.5, -0.5, 9.5, 6.5)), RATE)).view
+    return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-0.5, -0.5, 9.5, 6.5)), RATE)).view
 
 
 def planned(view: CostmapView, start: Pose2, goal: Pose2, robot: RobotModel = CAR, **options: object) -> np.ndarray:

@@ -4,7 +4,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from simscen.advanced.planners.sampled_search import SampledSearch
+from simscen.advanced.planners.search_regions import SampledSearch
 from simscen.stack.planners.ompl_search import PLANNERS, OmplSearch, Point, Problem
 
 BOUNDS = (0.0, 0.0, 4.0, 4.0)

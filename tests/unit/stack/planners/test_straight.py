@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from simscen.advanced.planners.straight_line import BEYOND, dear_until, straight_on
+from simscen.advanced.planners.medial_axis_planner import BEYOND, dear_until, straight_on
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.planners import OmplPlanner as PlannerSpec

@@ -5,12 +5,12 @@ import pytest
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Extrusion, Solid, Sphere
-from simscen.worlds.geometry.cross_section import outlines, section
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.cross_section import cross_section, section_segments
+from simscen.worlds.geometry.triangulation import merge_solids
 
 
 def test_a_sphere_is_cut_into_a_circle_of_the_right_radius():
-    segments = outlines(fuse([Solid(Sphere(0.5), Pose3(1, 2, 0.5))]), 0.8)
+    segments = section_segments(merge_solids([Solid(Sphere(0.5), Pose3(1, 2, 0.5))]), 0.8)
     radii = np.hypot(*(segments.reshape(-1, 2) - (1, 2)).T)
     assert radii == pytest.approx(0.4, abs=0.001)
 
@@ -22,7 +22,7 @@ def test_sections_are_closed_loops_with_the_solid_on_the_left():
         Solid(Cone(1.0, 2.0), Pose3.from_rpy(-3, 0, 0.5, 0.7, 0.2, 0)),
         Solid(Capsule(0.3, 1.0), Pose3.from_rpy(0, -3, 0.4, 0, math.pi / 2, 0)),
     ]
-    cut = section(fuse(solids), 0.4)
+    cut = cross_section(merge_solids(solids), 0.4)
     for owner in range(3):
         segments = cut.segments[cut.owners == owner]
         starts = {tuple(p) for p in segments[:, 0].tolist()}
@@ -32,8 +32,8 @@ def test_sections_are_closed_loops_with_the_solid_on_the_left():
 
 
 def test_a_box_is_cut_from_above_its_underside_up_to_its_top():
-    mesh = fuse([Solid(Box((1.0, 1.0, 1.0)), Pose3(z=1.0))])
-    assert len(outlines(mesh, 0.5)) == 0
-    assert len(outlines(mesh, 0.500001)) == 8
-    assert len(outlines(mesh, 1.5)) == 4
-    assert len(outlines(mesh, 1.500001)) == 0
+    mesh = merge_solids([Solid(Box((1.0, 1.0, 1.0)), Pose3(z=1.0))])
+    assert len(section_segments(mesh, 0.5)) == 0
+    assert len(section_segments(mesh, 0.500001)) == 8
+    assert len(section_segments(mesh, 1.5)) == 4
+    assert len(section_segments(mesh, 1.500001)) == 0

@@ -7,9 +7,9 @@ import pytest
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Mesh, Solid
 from simscen.worlds.geometry.drive_obstacles import drive_obstacles
-from simscen.worlds.geometry.ramp_wedges import wedge
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.routes.shortest_paths import ShortestPaths
+from simscen.worlds.world_file import ramp_solid
 
 TURTLEBOT = 0.033, math.radians(7.9), 0.0097
 BOUNDS = (-1.0, -4.0, 8.0, 4.0)
@@ -23,9 +23,9 @@ def hall(degrees):
     """Two halves of a hall, with a platform between them that a ramp leads up to on either side."""
     high = math.tan(math.radians(degrees))
     return (
-        wedge((2, 0), (3, 0), 1.5, high, "up"),
+        ramp_solid((2, 0), (3, 0), 1.5, high, "up"),
         box("platform", 3.5, 0, 1.0, 7.8, high),
-        wedge((5, 0), (4, 0), 1.5, high, "down"),
+        ramp_solid((5, 0), (4, 0), 1.5, high, "down"),
         box("north", 3.5, 4, 9.2, 0.2, 1.0),
         box("south", 3.5, -4, 9.2, 0.2, 1.0),
         box("west", -1, 0, 0.2, 8, 1.0),
@@ -34,7 +34,7 @@ def hall(degrees):
 
 
 def way(degrees, robot=TURTLEBOT):
-    mesh = fuse(drive_obstacles(hall(degrees), *robot))
+    mesh = merge_solids(drive_obstacles(hall(degrees), *robot))
     return ShortestPaths(mesh, BOUNDS, 0.22).length(Pose2(1, 3, 0), Pose2(6, 3, 0))
 
 
@@ -62,6 +62,6 @@ def test_ramp_and_platform_join_without_a_wall_between_them():
 def test_a_concave_solid_with_a_low_part_stays_in_the_way_as_a_whole():
     """Forks 3 cm high before a mast: wheels may roll on them, but nobody plans to."""
     forks, mast = (box("jack", x, 0, length, 0.5, height) for x, length, height in ((0.5, 1.0, 0.03), (1.1, 0.2, 1.2)))
-    jack = fuse([forks, mast])
+    jack = merge_solids([forks, mast])
     solids = (Solid(Mesh(jack.vertices, jack.faces), Pose3(), "jack"),)
     assert drive_obstacles(solids, *TURTLEBOT) is solids

@@ -6,24 +6,24 @@ import shapely
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cone, Extrusion, Solid, Sphere
-from simscen.worlds.geometry.cross_section import distance_in_plan
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.cross_section import horizontal_distance
+from simscen.worlds.geometry.triangulation import merge_solids
 
 BODY = (0.05, 0.4)
 
 
 def test_a_sphere_blocks_with_what_it_has_below_the_top_of_the_robot():
-    ball = fuse([Solid(Sphere(1.0), Pose3(0, 0, 1.0))])
-    assert distance_in_plan(ball, (2.0, 0.0), (0.05, 0.4)) == pytest.approx(2 - math.sqrt(1 - 0.6**2), abs=0.001)
-    assert distance_in_plan(ball, (0.0, 0.0), (0.05, 0.4)) == 0.0
-    assert distance_in_plan(ball, (0.0, 0.0), (2.1, 3.0)) == math.inf
+    ball = merge_solids([Solid(Sphere(1.0), Pose3(0, 0, 1.0))])
+    assert horizontal_distance(ball, (2.0, 0.0), (0.05, 0.4)) == pytest.approx(2 - math.sqrt(1 - 0.6**2), abs=0.001)
+    assert horizontal_distance(ball, (0.0, 0.0), (0.05, 0.4)) == 0.0
+    assert horizontal_distance(ball, (0.0, 0.0), (2.1, 3.0)) == math.inf
 
 
 def test_a_point_under_a_slope_is_inside_where_the_slope_is_low():
-    ramp = fuse([Solid(Box((2.0, 1.0, 0.01)), Pose3.from_rpy(0, 0, 0.5, 0, -math.pi / 6, 0))])
+    ramp = merge_solids([Solid(Box((2.0, 1.0, 0.01)), Pose3.from_rpy(0, 0, 0.5, 0, -math.pi / 6, 0))])
     # The sheet rises by 1 over a length of 1.73 in plan; it is 0.4 m high 0.17 m before its middle.
-    assert distance_in_plan(ramp, (-0.4, 0.0), BODY) == 0.0
-    assert distance_in_plan(ramp, (0.5, 0.0), BODY) == pytest.approx(0.5 + 0.1 * math.sqrt(3), abs=0.02)
+    assert horizontal_distance(ramp, (-0.4, 0.0), BODY) == 0.0
+    assert horizontal_distance(ramp, (0.5, 0.0), BODY) == pytest.approx(0.5 + 0.1 * math.sqrt(3), abs=0.02)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -32,13 +32,13 @@ def test_distances_agree_with_shapely(seed):
     corners = ((0, 0), (3, 0), (3, 1), (1, 1), (1, 2), (0, 2))
     pose = Pose2(*rng.uniform(-2, 2, 2), rng.uniform(-3, 3))
     polygon = shapely.Polygon(pose.apply(np.array(corners, dtype=float)))
-    mesh = fuse([Solid(Extrusion(corners, 1.0), Pose3.planar(pose))])
+    mesh = merge_solids([Solid(Extrusion(corners, 1.0), Pose3.planar(pose))])
     for x, y in rng.uniform(-5, 5, (30, 2)):
-        assert distance_in_plan(mesh, (x, y), BODY) == pytest.approx(polygon.distance(shapely.Point(x, y)), abs=1e-9)
+        assert horizontal_distance(mesh, (x, y), BODY) == pytest.approx(polygon.distance(shapely.Point(x, y)), abs=1e-9)
 
 
 def test_a_tilted_cone_blocks_where_its_slab_is():
-    cone = fuse([Solid(Cone(0.5, 2.0), Pose3.from_rpy(0, 0, 0.5, 1.1, 0.3, 0.2))])
+    cone = merge_solids([Solid(Cone(0.5, 2.0), Pose3.from_rpy(0, 0, 0.5, 1.1, 0.3, 0.2))])
     rng = np.random.default_rng(4)
     slab = cone.vertices[cone.faces]
     for x, y in rng.uniform(-2, 2, (10, 2)):
@@ -49,6 +49,6 @@ def test_a_tilted_cone_blocks_where_its_slab_is():
         points = np.concatenate(dense)
         points = points[(points[:, 2] >= BODY[0]) & (points[:, 2] <= BODY[1])]
         brute = np.hypot(points[:, 0] - x, points[:, 1] - y).min()
-        ours = distance_in_plan(cone, (x, y), BODY)
+        ours = horizontal_distance(cone, (x, y), BODY)
         assert ours == 0.0 or ours == pytest.approx(brute, abs=0.01)
         assert ours <= brute + 1e-9

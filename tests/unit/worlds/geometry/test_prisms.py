@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cone, Cylinder, Extrusion, Solid, Sphere
-from simscen.worlds.geometry.cross_section import distance_in_plan
-from simscen.worlds.geometry.prisms import plan_extents, plan_rectangle, upright_prism
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.cross_section import horizontal_distance
+from simscen.worlds.geometry.prisms import bounding_rectangle, mesh_bounds_2d, upright_prism
+from simscen.worlds.geometry.triangulation import merge_solids
 
 L_SHAPE = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
 STAR = tuple((math.cos(4 * math.pi * k / 5), math.sin(4 * math.pi * k / 5)) for k in range(5))
@@ -37,7 +37,9 @@ def test_distances_are_those_of_the_triangle_mesh(shape, pose, point):
     solid, slab = Solid(shape, pose), (0.02, 0.4)
     prism = upright_prism(solid)
     assert prism is not None
-    assert prism.distance(point, slab) == pytest.approx(distance_in_plan(fuse([solid]), point, slab), abs=1e-9)
+    assert prism.distance(point, slab) == pytest.approx(
+        horizontal_distance(merge_solids([solid]), point, slab), abs=1e-9
+    )
 
 
 @given(shape=shapes, pose=poses, frame=poses)
@@ -45,7 +47,9 @@ def test_extents_are_those_of_the_triangle_mesh(shape, pose, frame):
     solid = Solid(shape, pose)
     for owner in (None, frame):
         assert upright_prism(solid, owner) is not None
-        assert plan_rectangle(solid, owner) == pytest.approx(plan_extents(solid, owner).ravel().tolist(), abs=1e-9)
+        assert bounding_rectangle(solid, owner) == pytest.approx(
+            mesh_bounds_2d(solid, owner).ravel().tolist(), abs=1e-9
+        )
 
 
 @pytest.mark.parametrize(
@@ -62,7 +66,7 @@ def test_extents_are_those_of_the_triangle_mesh(shape, pose, frame):
 )
 def test_what_is_no_convex_prism_is_left_to_the_mesh(solid):
     assert upright_prism(solid) is None
-    assert plan_rectangle(solid) == pytest.approx(plan_extents(solid).ravel().tolist())
+    assert bounding_rectangle(solid) == pytest.approx(mesh_bounds_2d(solid).ravel().tolist())
 
 
 def test_a_solid_in_a_tilted_frame_is_left_to_the_mesh():

@@ -8,7 +8,7 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.meshes import MAX_CONVEX_FACES, is_convex, submesh
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Solid, Sphere
 from simscen.worlds.geometry.circle_facets import facet_count
-from simscen.worlds.geometry.triangulation import fuse, triangulate
+from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
 L_SHAPE = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
 VOLUMES = [
@@ -50,7 +50,7 @@ def test_extents_of_round_shapes_are_exact():
 
 def test_fusing_places_every_solid_and_remembers_whose_face_it_is():
     turned = Pose3.from_rpy(5, 0, 0.5, 0, 0, math.pi / 2)
-    mesh = fuse([Solid(Box((2.0, 1.0, 1.0)), turned, "a"), Solid(Cylinder(0.2, 1.0), Pose3(x=-3), "b")])
+    mesh = merge_solids([Solid(Box((2.0, 1.0, 1.0)), turned, "a"), Solid(Cylinder(0.2, 1.0), Pose3(x=-3), "b")])
     box = mesh.vertices[mesh.faces[mesh.owners == 0]].reshape(-1, 3)
     assert np.allclose(box.min(axis=0), [4.5, -1, 0])
     assert np.allclose(box.max(axis=0), [5.5, 1, 1])
@@ -64,7 +64,7 @@ def test_what_is_told_to_be_convex_is_its_own_hull_and_its_vertices_are_those_to
     shapes = [*(shape for shape, _ in VOLUMES), Extrusion(quad, 1.0), Extrusion(bent, 1.0), triangulate(Box((1, 1, 1)))]
     rng = np.random.default_rng(2)
     poses = [Pose3.from_rpy(*rng.uniform(-50, 50, 3), *rng.uniform(-3, 3, 3)) for _ in shapes]
-    mesh = fuse([Solid(shape, pose) for shape, pose in zip(shapes, poses, strict=True)])
+    mesh = merge_solids([Solid(shape, pose) for shape, pose in zip(shapes, poses, strict=True)])
     told = [hull is not None for hull in mesh.hulls]
     assert told == [True, True, False, False, False, False, True, False, False, True, False, False]
     assert {len(triangulate(shape).faces) > MAX_CONVEX_FACES for shape, _ in VOLUMES[2:6]} == {True}
@@ -78,7 +78,7 @@ def test_what_is_told_to_be_convex_is_its_own_hull_and_its_vertices_are_those_to
 
 
 def test_nothing_fuses_to_an_empty_mesh():
-    mesh = fuse([])
+    mesh = merge_solids([])
     assert mesh.vertices.shape == (0, 3)
     assert mesh.faces.shape == (0, 3)
 

@@ -9,9 +9,9 @@ from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Mesh, Solid
-from simscen.worlds.geometry.triangulation import fuse, triangulate
-from simscen.worlds.geometry.wall_prisms import wall_solids
-from simscen.worlds.maps.occupancy_map import map_of
+from simscen.worlds.geometry.triangulation import merge_solids, triangulate
+from simscen.worlds.maps.occupancy_map import draw_map
+from simscen.worlds.world_file import wall_solids
 
 ROOM = (
     Solid(Box((4.2, 0.1, 1.0)), Pose3(2, -0.05, 0.5), "south"),
@@ -22,7 +22,7 @@ ROOM = (
 
 
 def grid_of(*solids, height=0.3, resolution=0.05, **world):
-    return map_of(World("w", solids, **world), fuse(solids), height, resolution)
+    return draw_map(World("w", solids, **world), merge_solids(solids), height, resolution)
 
 
 def by_shapely(grid, polygon):

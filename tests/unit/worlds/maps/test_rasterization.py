@@ -4,9 +4,9 @@ import shapely
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Extrusion, Solid
-from simscen.worlds.geometry.cross_section import Section, section
-from simscen.worlds.geometry.triangulation import fuse
-from simscen.worlds.maps.rasterization import filled, ranges, touched
+from simscen.worlds.geometry.cross_section import CrossSection, cross_section
+from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.maps.rasterization import expand_ranges, filled_cells, touched_cells
 
 STAR = tuple(
     (10 + r * np.cos(a), 10 + r * np.sin(a)) for r, a in zip([8, 3] * 5, np.arange(10) * np.pi / 5, strict=True)
@@ -14,34 +14,34 @@ STAR = tuple(
 
 
 def star_at(*offsets):
-    return section(fuse(Solid(Extrusion(STAR, 1.0), Pose3(x, y, 0)) for x, y in offsets), 0.5)
+    return cross_section(merge_solids(Solid(Extrusion(STAR, 1.0), Pose3(x, y, 0)) for x, y in offsets), 0.5)
 
 
 def test_filled_cells_are_those_whose_middle_is_inside():
     x, y = np.meshgrid(np.arange(20) + 0.5, np.arange(20) + 0.5)
     expected = shapely.contains_xy(shapely.Polygon(STAR), x, y)
-    assert np.array_equal(filled(star_at((0, 0)), (20, 20)), expected)
+    assert np.array_equal(filled_cells(star_at((0, 0)), (20, 20)), expected)
 
 
 def test_overlapping_solids_fill_their_union():
-    both = filled(star_at((0, 0), (3.3, 1.7)), (24, 24))
-    one, other = filled(star_at((0, 0)), (24, 24)), filled(star_at((3.3, 1.7)), (24, 24))
+    both = filled_cells(star_at((0, 0), (3.3, 1.7)), (24, 24))
+    one, other = filled_cells(star_at((0, 0)), (24, 24)), filled_cells(star_at((3.3, 1.7)), (24, 24))
     assert np.array_equal(both, one | other)
 
 
 def test_a_lattice_that_ends_within_a_solid_shows_the_part_that_is_on_it():
-    whole = touched(star_at((0, 0)), (20, 20))
-    assert np.array_equal(touched(star_at((0, 0)), (12, 9)), whole[:12, :9])
-    shifted = touched(star_at((-7, -6)), (14, 13))
+    whole = touched_cells(star_at((0, 0)), (20, 20))
+    assert np.array_equal(touched_cells(star_at((0, 0)), (12, 9)), whole[:12, :9])
+    shifted = touched_cells(star_at((-7, -6)), (14, 13))
     assert np.array_equal(shifted, whole[6:, 7:])
 
 
 def test_nothing_touches_nothing():
-    assert not touched(Section(np.empty((0, 2, 2)), np.empty(0, np.int32)), (4, 4)).any()
+    assert not touched_cells(CrossSection(np.empty((0, 2, 2)), np.empty(0, np.int32)), (4, 4)).any()
 
 
 def test_ranges_are_listed_one_after_the_other():
-    which, values = ranges(np.array([3, 5, 0]), np.array([5, 5, 2]))
+    which, values = expand_ranges(np.array([3, 5, 0]), np.array([5, 5, 2]))
     assert which.tolist() == [0, 0, 2, 2]
     assert values.tolist() == [3, 4, 0, 1]
 
@@ -52,7 +52,7 @@ def test_thin_slivers_touch_every_cell_they_pass(seed):
     (x0, y0), (x1, y1) = rng.uniform(1, 19, (2, 2))
     normal = np.array([y0 - y1, x1 - x0]) / np.hypot(x1 - x0, y1 - y0) * 1e-3
     corners = np.array([(x0, y0), (x1, y1), (x1 + normal[0], y1 + normal[1]), (x0 + normal[0], y0 + normal[1])])
-    cut = Section(np.stack((corners, np.roll(corners, -1, axis=0)), axis=1), np.zeros(4, np.int32))
+    cut = CrossSection(np.stack((corners, np.roll(corners, -1, axis=0)), axis=1), np.zeros(4, np.int32))
     x, y = np.meshgrid(np.arange(20), np.arange(20))
     expected = shapely.intersects(shapely.box(x, y, x + 1, y + 1), shapely.Polygon(corners))
-    assert np.array_equal(touched(cut, (20, 20)), expected)
+    assert np.array_equal(touched_cells(cut, (20, 20)), expected)

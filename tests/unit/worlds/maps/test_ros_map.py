@@ -9,7 +9,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
 from simscen.model.ros_map import RosMapSpec
-from simscen.worlds.maps.ros_map import cell_values, load_grid, save_map
+from simscen.worlds.maps.ros_map import cell_values, load_map, save_map
 
 GOLD = Path(__file__).parents[5] / "shared" / "data" / "nav2_map_loader_gold"
 needs_gold = pytest.mark.skipif(not GOLD.is_dir(), reason="the maps of others are not here: see CONTRIBUTING.md")
@@ -29,9 +29,7 @@ def pgm(path, header, body=b""):
 @pytest.mark.parametrize("image", ["testmap.png", "testmap.bmp", "testmap.pgm"])
 def test_nav2s_own_test_map_loads_as_its_loader_loads_it(image):
     expected = np.loadtxt(GOLD / "expected_grid.txt", dtype=int)
-    grid, notes = load_grid(
-        RosMapSpec.model_validate(yaml.safe_load((GOLD / "testmap.yaml").read_text())), GOLD / image
-    )
+    grid, notes = load_map(RosMapSpec.model_validate(yaml.safe_load((GOLD / "testmap.yaml").read_text())), GOLD / image)
     assert np.array_equal(grid.cells, expected)
     assert grid.resolution == 0.1
     assert grid.origin == Pose2(2.0, 3.0, 1.0)
@@ -42,7 +40,7 @@ def test_nav2s_own_test_map_loads_as_its_loader_loads_it(image):
 def test_a_missing_image_is_one_clear_error():
     bad = RosMapSpec.model_validate(yaml.safe_load((GOLD / "invalid_image.yaml").read_text()))
     with pytest.raises(InvalidInput, match="no such file") as caught:
-        load_grid(bad, GOLD / bad.image)
+        load_map(bad, GOLD / bad.image)
     assert len(caught.value.problems) == 1
 
 
@@ -79,14 +77,14 @@ def test_raw_takes_pixels_as_percentages():
 def test_pixels_that_are_not_opaque_are_unknown_except_in_raw_mode(tmp_path):
     pixels = np.array([[[0, 0, 0, 255], [0, 0, 0, 254], [255, 255, 255, 0]]], dtype=np.uint8)
     Image.fromarray(pixels).save(tmp_path / "a.png")
-    assert load_grid(spec(), tmp_path / "a.png")[0].cells.tolist() == [[100, -1, -1]]
-    assert load_grid(spec(mode="scale"), tmp_path / "a.png")[0].cells.tolist() == [[100, -1, -1]]
-    assert load_grid(spec(mode="raw"), tmp_path / "a.png")[0].cells.tolist() == [[0, 0, -1]]
+    assert load_map(spec(), tmp_path / "a.png")[0].cells.tolist() == [[100, -1, -1]]
+    assert load_map(spec(mode="scale"), tmp_path / "a.png")[0].cells.tolist() == [[100, -1, -1]]
+    assert load_map(spec(mode="raw"), tmp_path / "a.png")[0].cells.tolist() == [[0, 0, -1]]
 
 
 def test_colors_count_by_their_luma(tmp_path):
     Image.fromarray(np.array([[[255, 0, 0], [0, 255, 0], [0, 0, 255]]], np.uint8)).save(tmp_path / "c.png")
-    raw = load_grid(spec(mode="raw"), tmp_path / "c.png")[0].cells.tolist()
+    raw = load_map(spec(mode="raw"), tmp_path / "c.png")[0].cells.tolist()
     assert raw == [[76, -1, 29]]  # 0.299, 0.587 and 0.114 of 255, rounded down
 
 
@@ -102,15 +100,15 @@ def test_all_formats_and_depths_of_the_same_map_agree(tmp_path):
     pgm(tmp_path / "text.pgm", b"P2\n# made by hand\n5 7 # size\n255\n", text.encode())
     expected = cell_values(spec())[grays][::-1]
     for path in sorted(tmp_path.iterdir()):
-        assert np.array_equal(load_grid(spec(), path)[0].cells, expected), path.name
+        assert np.array_equal(load_map(spec(), path)[0].cells, expected), path.name
 
 
 def test_gray_205_that_counts_as_free_is_worth_a_warning(tmp_path):
     path = pgm(tmp_path / "m.pgm", b"P5 2 1 255\n", bytes([205, 0]))
-    assert load_grid(spec(free_thresh=0.196), path)[1] == ()
-    (note,) = load_grid(spec(free_thresh=0.25), path)[1]
+    assert load_map(spec(free_thresh=0.196), path)[1] == ()
+    (note,) = load_map(spec(free_thresh=0.25), path)[1]
     assert "1 pixels of gray 205" in note
-    assert load_grid(spec(free_thresh=0.25, mode="raw"), path)[1] == ()
+    assert load_map(spec(free_thresh=0.25, mode="raw"), path)[1] == ()
 
 
 @pytest.mark.parametrize("values", [(0, 100, -1), tuple(range(-1, 101))])
@@ -119,6 +117,6 @@ def test_a_saved_map_loads_as_exactly_the_same_map(tmp_path, values):
     grid = OccupancyGrid(cells, 0.05, Pose2(-1.2345678901234567, 1e-5, -0.1))
     save_map(grid, tmp_path / "my: map.yaml")
     read = RosMapSpec.model_validate(yaml.safe_load((tmp_path / "my: map.yaml").read_text()))
-    again, notes = load_grid(read, tmp_path / read.image)
+    again, notes = load_map(read, tmp_path / read.image)
     assert np.array_equal(again.cells, cells)
     assert (again.resolution, again.origin, notes) == (grid.resolution, grid.origin, ())

@@ -7,15 +7,15 @@ from simscen.core.environment.occupancy_grid import OCCUPIED, OccupancyGrid
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, Box, Solid
-from simscen.worlds.build import build
-from simscen.worlds.maps.map_walls import walls_of
-from simscen.worlds.maps.world_picture import BODY, FINER, FREE_GROUND, MAPPED_WALL, _view, picture
+from simscen.worlds.built_world import build_world_and_map
+from simscen.worlds.maps.map_walls import walls_from_map
+from simscen.worlds.maps.world_picture import BODY, FREE_GROUND, MAPPED_WALL, SUPERSAMPLING, _view, draw_world
 
 
 def color_at(image, built, x, y):
     view = _view(built.map)
     ((column, row),) = view.pixels(np.array([[x, y]]))
-    return image.getpixel((int(column / FINER), int(row / FINER)))
+    return image.getpixel((int(column / SUPERSAMPLING), int(row / SUPERSAMPLING)))
 
 
 def near(color, expected):
@@ -25,8 +25,8 @@ def near(color, expected):
 def test_the_picture_shows_walls_ground_and_bodies_where_they_are():
     crate = Body("", (Solid(Box((1.0, 1.0, 0.1)), Pose3(z=0.05)),), Pose3(-1, 0, 0))
     world = World("w", (Solid(Box((1.0, 1.0, 1.0)), Pose3(2, 1, 0.5)),), (crate,), bounds=(-3, -2, 3, 2))
-    built = build(world, 0.3)
-    image = picture(built, 0.3)
+    built = build_world_and_map(world, 0.3)
+    image = draw_world(built, 0.3)
     assert max(image.size) == 1200
     assert image.size[0] / image.size[1] == pytest.approx(8 / 6, rel=0.01)
     assert near(color_at(image, built, 2, 1), MAPPED_WALL)
@@ -38,12 +38,12 @@ def test_a_map_with_a_yaw_is_drawn_turned_over_its_own_walls():
     cells = np.zeros((30, 60), np.int8)
     cells[10:20, 40:50] = OCCUPIED
     grid = OccupancyGrid(cells, 0.1, Pose2(1.0, 2.0, math.pi / 5))
-    built = build(World("w", tuple(walls_of(grid, 1.0)), grid=grid), 0.3)
-    image = picture(built, 0.3)
+    built = build_world_and_map(World("w", tuple(walls_from_map(grid, 1.0)), grid=grid), 0.3)
+    image = draw_world(built, 0.3)
     middle, beside = grid.center_of(np.array([[15, 45], [5, 45]]))
     assert near(color_at(image, built, *middle), MAPPED_WALL)
     assert near(color_at(image, built, *beside), FREE_GROUND)
 
 
 def test_an_empty_world_has_a_picture_too():
-    assert picture(build(World("w", ()), 0.2), 0.2).size == (1200, 1200)
+    assert draw_world(build_world_and_map(World("w", ()), 0.2), 0.2).size == (1200, 1200)

@@ -13,7 +13,7 @@ from embreex.rtcore_scene import EmbreeScene
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.ray_fans import RayFan
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid, Sphere, TriangleMesh
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 ROOM = [
@@ -24,7 +24,7 @@ ROOM = [
     Solid(Extrusion(((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)), 1.5), Pose3(-4, -4, 0), "corner"),
 ]
 ORIGIN = Pose3()
-CART = fuse([Solid(Box((0.8, 0.5, 1.0)), Pose3(z=0.5)), Solid(Cylinder(0.2, 1.5), Pose3(0.2, 0, 0.75))])
+CART = merge_solids([Solid(Box((0.8, 0.5, 1.0)), Pose3(z=0.5)), Solid(Cylinder(0.2, 1.5), Pose3(0.2, 0, 0.75))])
 
 
 def around(count, origin):
@@ -82,7 +82,7 @@ def assert_agree(ours, theirs):
 
 
 def test_ten_thousand_random_rays_agree_with_pybullet_moving_bodies_included(bullet):
-    walls = fuse(ROOM)
+    walls = merge_solids(ROOM)
     scene = RayScene(walls)
     bullet.add(walls)
     cart = bullet.add(CART)
@@ -100,7 +100,7 @@ def test_a_world_ten_kilometers_away_is_as_exact_as_one_at_the_origin():
     shift = (9900.0, -9900.0, 0.0)
     far = [Solid(s.shape, Pose3(s.pose.x + shift[0], s.pose.y + shift[1], *s.pose[2:]), s.name) for s in ROOM]
     origins, directions = random_rays(2000, 2, (-4.5, -4.5, 0.05), (4.5, 4.5, 1.9))
-    near_scene, far_scene = RayScene(fuse(ROOM)), RayScene(fuse(far))
+    near_scene, far_scene = RayScene(merge_solids(ROOM)), RayScene(merge_solids(far))
     near = near_scene.cast(origins, directions)
     there = far_scene.cast(origins + shift, directions)
     assert (np.isfinite(near) != np.isfinite(there)).sum() <= 1
@@ -109,7 +109,7 @@ def test_a_world_ten_kilometers_away_is_as_exact_as_one_at_the_origin():
 
 
 def test_bodies_come_move_and_go():
-    scene = RayScene(fuse([]))
+    scene = RayScene(merge_solids([]))
     origins, directions = around(1, (0, 0, 0.3))
     assert scene.cast(origins, directions)[0] == math.inf
     scene.set_moving({"cart": (CART, Pose3(3, 0, 0))})
@@ -122,7 +122,7 @@ def test_bodies_come_move_and_go():
 
 def test_answers_do_not_depend_on_what_was_asked_before_or_on_the_order_of_bodies():
     origins, directions = random_rays(500, 3, (-4, -4, 0.1), (4, 4, 1.5))
-    one, other = RayScene(fuse(ROOM)), RayScene(fuse(ROOM))
+    one, other = RayScene(merge_solids(ROOM)), RayScene(merge_solids(ROOM))
     a, b = (CART, Pose3(0, -2, 0)), (CART, Pose3(0, 3, 0))
     one.set_moving({"a": a})
     one.cast(*random_rays(300, 4, (-4, -4, 0.1), (4, 4, 1.5)))
@@ -135,10 +135,10 @@ def test_many_bodies_are_seen_as_if_they_were_one_world():
     rng = np.random.default_rng(6)
     places = [Pose3.from_rpy(*rng.uniform((-9, -9, 0), (9, 9, 1)), *rng.uniform(-3, 3, 3)) for _ in range(40)]
     apart, together = (
-        RayScene(fuse(ROOM)),
-        RayScene(fuse([*ROOM, *(Solid(Box((0.7, 0.3, 0.5)), pose.compose(Pose3(z=0.2))) for pose in places)])),
+        RayScene(merge_solids(ROOM)),
+        RayScene(merge_solids([*ROOM, *(Solid(Box((0.7, 0.3, 0.5)), pose.compose(Pose3(z=0.2))) for pose in places)])),
     )
-    box = fuse([Solid(Box((0.7, 0.3, 0.5)), Pose3(z=0.2))])
+    box = merge_solids([Solid(Box((0.7, 0.3, 0.5)), Pose3(z=0.2))])
     apart.set_moving({f"box {k}": (box, pose) for k, pose in enumerate(places)})
     origins, directions = random_rays(5000, 7, (-10, -10, 0.05), (10, 10, 1.9))
     assert_agree(apart.cast(origins, directions), together.cast(origins, directions))
@@ -146,7 +146,7 @@ def test_many_bodies_are_seen_as_if_they_were_one_world():
 
 def field(count):
     places = np.random.default_rng(8).uniform((-60, -60, 0), (60, 60, 3), (count, 3)).tolist()
-    return fuse([Solid(Box((0.7, 0.3, 0.9)), Pose3.planar(Pose2(*place), 0.45)) for place in places])
+    return merge_solids([Solid(Box((0.7, 0.3, 0.9)), Pose3.planar(Pose2(*place), 0.45)) for place in places])
 
 
 @pytest.mark.parametrize("count", [1, 15, 16, 17, 361, 5000])
@@ -177,10 +177,10 @@ def test_a_scene_survives_a_fork_and_others_are_built_there():
 COLLECTED = """
 import gc
 from simscen.core.geometry.shapes import Box, Solid
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
 for _ in range(200):
-    knot = [RayScene(fuse([Solid(Box((1.0, 1.0, 1.0)))]))]
+    knot = [RayScene(merge_solids([Solid(Box((1.0, 1.0, 1.0)))]))]
     knot.append(knot)
     del knot
     gc.collect()
@@ -195,7 +195,7 @@ def test_a_scene_that_the_garbage_collector_takes_does_not_crash():
 @pytest.mark.parametrize(("first", "beams", "field"), [(-math.pi, 360, 2 * math.pi), (2.0, 91, 1.5), (0.3, 1, 0.1)])
 def test_a_fan_meets_what_its_rays_meet_one_by_one(first, beams, field):
     """Also a body that a full circle's first and last rays see, one that the lidar is in, and one out of reach."""
-    scene, fan = RayScene(fuse(ROOM)), RayFan(first, field / beams, beams)
+    scene, fan = RayScene(merge_solids(ROOM)), RayFan(first, field / beams, beams)
     places = [(-2.5, 0.1, 0.3), (1.5, -1.5, 2.0), (0.05, 0.0, 1.0), (30.0, 0.0, 0.0)]
     scene.set_moving({f"cart {k}": (CART, Pose3.planar(Pose2(*place))) for k, place in enumerate(places)})
     for lens in (Pose3(0.0, 0.0, 0.3), Pose3.from_rpy(0.8, -0.4, 0.6, 0.1, -0.2, 2.5)):
@@ -223,8 +223,8 @@ def test_the_rays_of_a_fan_within_a_cone_are_told_as_counting_all_would_tell():
 @pytest.mark.parametrize("spread", [0.0, 3.0])
 def test_a_body_farther_off_than_any_ray_reaches_is_left_out_until_it_comes_nearer(spread):
     """Also where rays begin in several places, and where a body lies far from the origin of its frame."""
-    off = fuse([Solid(Box((1.0, 1.0, 2.0)), Pose3(-6.0, 0.0, 0.0))])
-    scene, (origins, directions) = RayScene(fuse([])), around(8, (0.0, 0.0, 0.5))
+    off = merge_solids([Solid(Box((1.0, 1.0, 2.0)), Pose3(-6.0, 0.0, 0.0))])
+    scene, (origins, directions) = RayScene(merge_solids([])), around(8, (0.0, 0.0, 0.5))
     origins[4:, 0] -= spread
     for x, seen in ((18.0, math.inf), (10.0, 3.5), (30.0, math.inf)):
         scene.set_moving({"far": (CART, Pose3(50.0)), "body": (off, Pose3(x))})
@@ -238,7 +238,7 @@ def test_a_body_farther_off_than_any_ray_reaches_is_left_out_until_it_comes_near
 def test_rays_that_rounding_tilts_meet_what_level_ones_meet(turns, tilt):
     """Embree took whole packets for nothing whose rays part by the sign of next to nothing."""
     ends = [Solid(Box((0.2, 10.0, 2.0)), Pose3(x, 0, 1)) for x in (-5, 5)]
-    scene, fan = RayScene(fuse([*ROOM, *ends])), RayFan(-math.pi, math.pi / 180, 360)
+    scene, fan = RayScene(merge_solids([*ROOM, *ends])), RayFan(-math.pi, math.pi / 180, 360)
     half = turns * math.pi / 4
     for roll, pitch in ((tilt, -tilt), (-tilt, tilt), (-tilt, -tilt)):
         turned = Pose3(0.0, 0.0, 0.2, qz=math.sin(half), qw=math.cos(half))

@@ -8,13 +8,13 @@ import pytest
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.ray_fans import RayFan
 from simscen.core.geometry.shapes import Box, Cylinder, Solid
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting import mesh_scene, resting_bodies
 from simscen.worlds.raycasting.ray_scene import RayScene
 
-WALLS = fuse([Solid(Box((20.0, 0.2, 1.0)), Pose3(0.0, y, 0.5)) for y in (-10.0, 10.0)])
-STOOL = fuse([Solid(Cylinder(0.2, 0.05), Pose3(z=0.4)), Solid(Box((0.05, 0.05, 0.4)), Pose3(0.1, 0.0, 0.2))])
-CRATE = fuse([Solid(Box((0.6, 0.4, 0.5)), Pose3(z=0.25))])
+WALLS = merge_solids([Solid(Box((20.0, 0.2, 1.0)), Pose3(0.0, y, 0.5)) for y in (-10.0, 10.0)])
+STOOL = merge_solids([Solid(Cylinder(0.2, 0.05), Pose3(z=0.4)), Solid(Box((0.05, 0.05, 0.4)), Pose3(0.1, 0.0, 0.2))])
+CRATE = merge_solids([Solid(Box((0.6, 0.4, 0.5)), Pose3(z=0.25))])
 CHANCE = np.random.default_rng(21)
 HOMES = {f"thing {k:02}": Pose3.planar(Pose2(*CHANCE.uniform((-9, -9, -3), (9, 9, 3)))) for k in range(30)}
 LEVEL, NODDING = Pose3(0.5, 0.2, 0.18), Pose3.from_rpy(0.4, 0.1, 0.5, 0.05, -0.3, 1.0)
@@ -51,11 +51,13 @@ def changes():
         yield dict(poses)
 
 
-@pytest.mark.parametrize(("many", "several"), [(resting_bodies.MANY, resting_bodies.SEVERAL), (60, 3)])
+@pytest.mark.parametrize(
+    ("many", "several"), [(resting_bodies.MAX_GROUP_TRIANGLES, resting_bodies.MAX_GROUPS), (60, 3)]
+)
 def test_how_things_are_piled_up_changes_not_one_bit(monkeypatch, many, several):
     """A scene that has seen all of it says what one says that sees it for the first time, or heard of less before."""
-    monkeypatch.setattr(resting_bodies, "MANY", many)
-    monkeypatch.setattr(resting_bodies, "SEVERAL", several)
+    monkeypatch.setattr(resting_bodies, "MAX_GROUP_TRIANGLES", many)
+    monkeypatch.setattr(resting_bodies, "MAX_GROUPS", several)
     old = RayScene(WALLS)
     for number, poses in enumerate(list(changes())[::2]):
         fresh = RayScene(WALLS)

@@ -4,9 +4,9 @@ import shapely
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Solid, Sphere
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.occupancy_map import empty_grid
-from simscen.worlds.routes.clearance import MOST_LEVELS, clearance_field, standing_outlines
+from simscen.worlds.routes.clearance import MAX_LEVELS, clearance_field, sections_between
 
 BOUNDS, BODY = (-3.0, -3.0, 3.0, 3.0), (0.03, 0.4)
 
@@ -19,7 +19,7 @@ def scattered(seed):
         solids.append(Solid(Box((width, depth, 1.0)), Pose3.planar(Pose2(x, y, yaw), 0.5)))
         corners = np.array([(-width, -depth), (width, -depth), (width, depth), (-width, depth)]) / 2
         polygons.append(shapely.Polygon(Pose2(x, y, yaw).apply(corners)))
-    return fuse(solids), shapely.union_all(polygons)
+    return merge_solids(solids), shapely.union_all(polygons)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -47,7 +47,7 @@ def test_free_cells_are_those_whose_middle_keeps_the_distance(seed, distance):
 
 
 def test_points_are_pushed_off_the_nearest_solid():
-    wall = fuse([Solid(Box((0.2, 8.0, 1.0)), Pose3(0, 0, 0.5))])
+    wall = merge_solids([Solid(Box((0.2, 8.0, 1.0)), Pose3(0, 0, 0.5))])
     field = clearance_field(wall, empty_grid(BOUNDS, 0.05, "w"), BODY)
     points = np.array([[0.3, 0.0], [-0.2, 1.0], [0.05, 0.0], [0.5, 0.0], [2.0, 0.0]])
     expected = np.array([[0.1, 0], [-0.2, 0], [0.35, 0], [0, 0], [0, 0]])
@@ -55,18 +55,18 @@ def test_points_are_pushed_off_the_nearest_solid():
 
 
 def test_where_nothing_stands_everything_is_far_away():
-    field = clearance_field(fuse([]), empty_grid(BOUNDS, 0.05, "w"), BODY)
+    field = clearance_field(merge_solids([]), empty_grid(BOUNDS, 0.05, "w"), BODY)
     assert field.keeps(np.zeros((3, 2)), 100.0).all()
     assert field.free_cells(100.0).all()
 
 
 def test_upright_things_need_one_cut_and_round_ones_a_dozen():
-    upright = fuse([Solid(Box((1, 1, 1)), Pose3(z=0.5)), Solid(Cylinder(0.3, 2.0), Pose3(3, 0, 1.0))])
-    assert len(standing_outlines(upright, BODY)) == 1
-    assert len(standing_outlines(fuse([Solid(Sphere(0.5), Pose3(z=0.5))]), BODY)) == MOST_LEVELS
+    upright = merge_solids([Solid(Box((1, 1, 1)), Pose3(z=0.5)), Solid(Cylinder(0.3, 2.0), Pose3(3, 0, 1.0))])
+    assert len(sections_between(upright, BODY)) == 1
+    assert len(sections_between(merge_solids([Solid(Sphere(0.5), Pose3(z=0.5))]), BODY)) == MAX_LEVELS
 
 
 def test_a_low_shelf_is_seen_between_the_heights_of_the_robot():
-    shelf = fuse([Solid(Box((1, 1, 0.02)), Pose3(0, 0, 0.25)), Solid(Box((5, 0.1, 1.0)), Pose3(0, 2, 0.5))])
+    shelf = merge_solids([Solid(Box((1, 1, 0.02)), Pose3(0, 0, 0.25)), Solid(Box((5, 0.1, 1.0)), Pose3(0, 2, 0.5))])
     field = clearance_field(shelf, empty_grid(BOUNDS, 0.05, "w"), BODY)
     assert field.exact(np.array([[0.0, 0.0]]))[0] < 0

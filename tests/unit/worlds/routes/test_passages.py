@@ -5,7 +5,7 @@ import pytest
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Solid
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 RADIUS = 0.2
@@ -16,7 +16,7 @@ def wall(name, x, y, length, width, yaw=0.0):
 
 
 def leg(start, goal, *solids):
-    ways = ShortestPaths(fuse(solids), (-6, -6, 6, 6), RADIUS)
+    ways = ShortestPaths(merge_solids(solids), (-6, -6, 6, 6), RADIUS)
     return ways.leg(Pose2(*start), Pose2(*goal), "goal")
 
 

@@ -11,15 +11,15 @@ from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid, Sphere
 from simscen.core.messages.navigation import Goal
-from simscen.worlds.build import build
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.built_world import build_world_and_map
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.routes.shortest_paths import ShortestPaths, legs_between
 
 R = 0.25
 
 
 def ways(*solids, bounds=(-5, -5, 5, 5), radius=R, **more):
-    return ShortestPaths(fuse(solids), bounds, radius, **more)
+    return ShortestPaths(merge_solids(solids), bounds, radius, **more)
 
 
 def box(x, y, width, depth, name=""):
@@ -133,7 +133,7 @@ def test_a_point_cannot_pass_through_a_sheet():
 
 
 def test_lengths_are_given_from_stop_to_stop_also_beyond_the_bounds():
-    built = build(World("w", (Solid(Extrusion(((0, 0), (1, 0), (1, 1)), 1.0)),)), 0.2)
+    built = build_world_and_map(World("w", (Solid(Extrusion(((0, 0), (1, 0), (1, 1)), 1.0)),)), 0.2)
     stops = [Pose2(-3, 3), Pose2(-3, 8), Pose2(6, 8), Pose2(0.7, 0.3)]
     legs = legs_between(built, [(start, Goal("g", goal)) for start, goal in itertools.pairwise(stops)], R)
     assert [leg.length for leg in legs] == pytest.approx([5.0, 9.0, math.inf])

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Box, Solid
-from simscen.worlds.geometry.overlaps import first_overlapping, placed
-from simscen.worlds.geometry.triangulation import fuse
-from simscen.worlds.routes.clearance import cut_overlaps
+from simscen.worlds.geometry.overlaps import first_solid_in_footprint, place_polygon
+from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.routes.clearance import footprint_overlaps_solid
 from simscen.worlds.routes.narrow_gaps import narrowest_gap
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 from simscen.worlds.routes.simple_paths import simple_paths_between
@@ -46,7 +46,7 @@ def test_a_way_that_plain_numbers_find_is_there_and_no_shorter_than_the_shortest
     plain = simple_paths_between([*ROOM, *solids], 0.2, Z)
     assert plain is not None
     length = plain.length((0.5, 2.0), (3.5, 2.0))
-    exact = ShortestPaths(fuse([*ROOM, *solids]), BOUNDS, 0.2, Z)
+    exact = ShortestPaths(merge_solids([*ROOM, *solids]), BOUNDS, 0.2, Z)
     if math.isfinite(length):
         assert exact.may_reach(START, GOAL)
         assert exact.length(START, GOAL) <= 1.02 * length
@@ -56,20 +56,20 @@ def test_a_way_that_plain_numbers_find_is_there_and_no_shorter_than_the_shortest
 
 def test_a_sealed_room_is_proven_and_the_wall_between_is_where() -> None:
     solids = [*ROOM, wall(2.5, 0.0, 4.0, "partition")]
-    exact = ShortestPaths(fuse(solids), BOUNDS, 0.2, Z)
+    exact = ShortestPaths(merge_solids(solids), BOUNDS, 0.2, Z)
     assert not exact.may_reach(START, GOAL)
     assert not exact.may_come_to([START], lambda pose: pose.distance(GOAL) - 0.5)
-    gap = narrowest_gap(fuse(solids), BOUNDS, (START, GOAL), 0.2, Z)
+    gap = narrowest_gap(merge_solids(solids), BOUNDS, (START, GOAL), 0.2, Z)
     assert (gap.width, round(gap.x, 1)) == (0.0, 2.5)
 
 
 def test_the_width_of_a_gap_is_measured_between_its_posts() -> None:
     for width in (0.2, 0.31, 0.38):
         solids = [*ROOM, wall(2.0, 0.0, 3.0, "low"), wall(2.0, 3.0 + width, 4.0, "high")]
-        gap = narrowest_gap(fuse(solids), BOUNDS, (START, GOAL), 0.2, Z)
+        gap = narrowest_gap(merge_solids(solids), BOUNDS, (START, GOAL), 0.2, Z)
         assert abs(gap.width - width) < 0.021
         assert math.dist((gap.x, gap.y), (2.0, 3.0 + width / 2)) < 0.1
-        assert not ShortestPaths(fuse(solids), BOUNDS, 0.25, Z).may_reach(START, GOAL)
+        assert not ShortestPaths(merge_solids(solids), BOUNDS, 0.25, Z).may_reach(START, GOAL)
 
 
 OUTLINE = ((0.4, 0.2), (-0.4, 0.2), (-0.4, -0.2), (0.4, -0.2))
@@ -79,10 +79,12 @@ OUTLINE = ((0.4, 0.2), (-0.4, 0.2), (-0.4, -0.2), (0.4, -0.2))
 @given(boxes, st.floats(0.5, 3.5), spots, st.floats(-3.0, 3.0))
 def test_a_footprint_overlaps_what_its_points_are_in(box: Solid, x: float, y: float, yaw: float) -> None:
     pose = Pose2(x, y, yaw)
-    told = first_overlapping([box], OUTLINE, pose, Z) is not None
-    assert cut_overlaps(box, placed(tuple((0.999 * a, 0.999 * b) for a, b in OUTLINE), pose), Z) == told
+    told = first_solid_in_footprint([box], OUTLINE, pose, Z) is not None
+    assert (
+        footprint_overlaps_solid(box, place_polygon(tuple((0.999 * a, 0.999 * b) for a, b in OUTLINE), pose), Z) == told
+    )
     size = box.shape.size  # type: ignore[union-attr]
-    corners = placed(
+    corners = place_polygon(
         tuple((a * size[0] / 2, b * size[1] / 2) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))),
         Pose2(box.pose.x, box.pose.y, 2 * math.atan2(box.pose.qz, box.pose.qw)),
     )

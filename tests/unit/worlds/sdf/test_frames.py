@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simscen.core.geometry import Pose3
-from simscen.worlds.sdf.frames import Frame, Scope
-from simscen.worlds.sdf.markup import parse
+from simscen.worlds.sdf.elements import parse
+from simscen.worlds.sdf.frames import Frame, FrameScope
 
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
 
@@ -124,13 +124,13 @@ def test_a_chain_of_frames_is_the_product_of_their_matrices(chain):
         for k, p in enumerate(chain)
     )
     root = parse(f"<m>{text}</m>".encode(), "x", ".")
-    scope = Scope()
+    scope = FrameScope()
     for element in root.children:
         scope.add(Frame(element.name, element, element.child("pose")))
     matrix = np.eye(4)
     for pose in chain:
         matrix = matrix @ _matrix(pose)
-    placed = scope.find(f"f{len(chain) - 1}", root)
+    placed = scope.pose_of_name(f"f{len(chain) - 1}", root)
     np.testing.assert_allclose(placed.rotation(), matrix[:3, :3], atol=1e-9)
     np.testing.assert_allclose(placed.position, matrix[:3, 3], atol=1e-9)
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from simscen.worlds.geometry.drive_obstacles import drive_obstacles
-from simscen.worlds.geometry.triangulation import fuse
+from simscen.worlds.geometry.triangulation import merge_solids
 
 
 def ramp(surface):
@@ -19,20 +19,20 @@ def mu(text):
 
 
 @pytest.mark.parametrize(("surface", "friction"), [("", 1.0), (mu(0.3), 0.3), (mu("100.0"), 1.0), (mu("inf"), 1.0)])
-def test_the_lesser_of_a_surface_and_of_rubber_holds(load, surface, friction):
+def test_friction_is_that_of_the_surface_but_at_most_that_of_rubber(load, surface, friction):
     (solid,) = load(ramp(surface)).solids
     assert solid.friction == friction
-    assert fuse([solid]).frictions == (() if friction == 1.0 else (friction,))
+    assert merge_solids([solid]).frictions == (() if friction == 1.0 else (friction,))
 
 
 @pytest.mark.parametrize("text", ["-1", "dry", ""])
-def test_what_is_no_coefficient_is_told_and_taken_for_1(load, text):
+def test_an_invalid_coefficient_of_friction_becomes_1_with_a_note(load, text):
     world = load(ramp(mu(text)))
     assert world.solids[0].friction == 1.0
-    assert any("no coefficient of friction" in note for note in world.notes)
+    assert any("not a coefficient of friction" in note for note in world.notes)
 
 
-def test_a_tilted_box_is_a_ramp_to_a_robot_that_climbs_it_and_a_wall_to_one_that_does_not(load):
+def test_a_tilted_box_is_a_ramp_for_a_robot_that_climbs_it_and_a_wall_for_others(load):
     solids = load(ramp("")).solids
     climbed = drive_obstacles(solids, 0.033, math.radians(7.9), 0.0097)
     assert climbed is not solids

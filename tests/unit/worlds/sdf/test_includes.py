@@ -4,7 +4,7 @@ import pytest
 
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry.shapes import Box, Sphere
-from simscen.worlds.sdf import load_sdf, tree
+from simscen.worlds.sdf import load_sdf, model_tree
 
 CRATE = (
     "<sdf version='{version}'><model name='crate'>{extra}<link name='a'><collision name='c'><geometry>{shape}"
@@ -185,7 +185,7 @@ def test_a_circle_of_includes_is_refused_with_its_chain(tmp_path, load, refuse):
 
 
 def test_includes_that_unfold_without_end_are_refused_in_time(tmp_path, refuse, monkeypatch):
-    monkeypatch.setattr(tree, "MOST_MODELS", 1000)
+    monkeypatch.setattr(model_tree, "MAX_MODELS", 1000)
     for level in range(8):
         inner = "".join(include(f"../l{level + 1}", f"<name>n{k}</name>") for k in range(10))
         write(tmp_path, f"l{level}", extra=inner if level < 7 else "")

@@ -141,7 +141,7 @@ class TestCollada:
         library = f'<library_nodes><node id="l20"/>{levels}</library_nodes><library_visual_scenes>'
         text = dae(nodes='<node><instance_node url="#l0"/></node>').replace("<library_visual_scenes>", library)
         with pytest.raises(UnusableMesh):
-            read_parts(text.encode(), ".dae", "x.dae")
+            read_parts(text.encode(), ".dae")
 
 
 def stl(count, triangles):
@@ -172,7 +172,7 @@ class TestStl:
 
     def test_more_than_a_million_triangles_are_refused(self):
         with pytest.raises(UnusableMesh, match="more than 1000000 triangles"):
-            read_parts(stl(1_000_001, 1)[:84] + bytes(50 * 1_000_001), ".stl", "x.stl")
+            read_parts(stl(1_000_001, 1)[:84] + bytes(50 * 1_000_001), ".stl")
 
     def test_values_that_are_no_numbers_are_refused(self, broken):
         content = stl(1, 1).replace(struct.pack("<f", 1.0), struct.pack("<f", float("nan")))

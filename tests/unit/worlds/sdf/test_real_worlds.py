@@ -12,8 +12,8 @@ from scipy.ndimage import distance_transform_edt
 
 from simscen.core.environment.world_model import World
 from simscen.core.geometry.shapes import Cylinder, Mesh
-from simscen.worlds.geometry.triangulation import fuse
-from simscen.worlds.maps.occupancy_map import map_of
+from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.maps.occupancy_map import draw_map
 from simscen.worlds.raycasting.ray_scene import RayScene
 from simscen.worlds.sdf import load_sdf
 
@@ -67,7 +67,7 @@ def test_concave_walls_are_not_filled(data: Path) -> None:
     folder = data / "aws_small_warehouse"
     world = load_sdf(folder / "worlds/no_roof_small_warehouse.world", root=folder, search=[folder / "models"])
     walls = [solid for solid in world.solids if "Wall" in solid.name]
-    scene = RayScene(fuse(walls))
+    scene = RayScene(merge_solids(walls))
     ways = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
     distances = scene.cast(np.tile([[0.0, 0.0, 1.0]], (4, 1)), ways)
     # The inner faces, in centimeters, as they stand in the DAE: 685.14, 686.14, 1032.08, 1032.08.
@@ -78,7 +78,7 @@ def test_the_warehouse_map_lies_on_the_warehouse(data: Path) -> None:
     """Occupied cells of the map within 15 cm of the solids at lidar height, but for a shift of the whole map."""
     folder = data / "aws_small_warehouse"
     world = load_sdf(folder / "worlds/no_roof_small_warehouse.world", root=folder, search=[folder / "models"])
-    ours = map_of(world, fuse(world.solids), 0.2)
+    ours = draw_map(world, merge_solids(world.solids), 0.2)
     occupied, _ = _map(folder / "maps/005/map_rotated.png")
     rows, columns = np.nonzero(occupied)
     shift = (0.1, 0.15)  # best of a search over whole cells and quarter turns
@@ -105,7 +105,7 @@ def test_rays_in_the_sandbox_agree_with_its_map(data: Path) -> None:
     occupied, free = _map(data / "nav2_tb3_sandbox" / "tb3_sandbox.pgm")
     rows, columns = np.nonzero(free & (distance_transform_edt(~occupied) * CELL > 0.2))
     chosen = np.random.default_rng(0).choice(len(rows), 60, replace=False)
-    scene = RayScene(fuse(_sandbox(data).solids))
+    scene = RayScene(merge_solids(_sandbox(data).solids))
     angles = np.arange(90) * 2 * math.pi / 90
     directions = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(90)])
     agreeing = 0

@@ -11,7 +11,7 @@ from PIL import Image
 
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Sphere
 from simscen.worlds.geometry.triangulation import triangulate
-from simscen.worlds.sdf.polyline import trapezoids
+from simscen.worlds.sdf.shapes import trapezoids
 
 OFF_GRID = 8.28713
 """No corner, crossing or border of a piece lies on a half number less this."""

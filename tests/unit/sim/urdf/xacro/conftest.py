@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.assets.folders import Folders
+from simscen.assets.folders import AllowedFolders
 from simscen.core.errors import InvalidInput
 from simscen.sim.urdf.xacro.expand import expand as expand_xacro
 from simscen.sim.urdf.xml_source import read_xml
@@ -16,7 +16,7 @@ def expand(tmp_path):
             path = tmp_path / f"{name.replace('__', '/')}.xacro"
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(f'<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">{content}</robot>')
-        folders = Folders.of([tmp_path])
+        folders = AllowedFolders.of([tmp_path])
         path = tmp_path / "main.xacro"
         return expand_xacro(read_xml(path, folders), path, folders, lambda included: read_xml(included, folders))
 

@@ -1,1 +1,0 @@
-"""Recovery behaviors beyond Nav2."""

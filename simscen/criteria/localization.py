@@ -1,0 +1,258 @@
+"""Criteria for the localizer: its error, its recovery after a kidnapping, and the consistency of its covariance."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from simscen.core.geometry import Array
+from simscen.core.records.verdict import POSITION, Evidence, Finding
+from simscen.core.statistics import chi2_quantile, nees_mean_bounds
+from simscen.criteria.base import Criterion
+from simscen.criteria.findings import at_least, at_most, missed, undecided
+from simscen.criteria.timeline import Span, end_reason, has_ended, never_started, spans
+from simscen.criteria.trace_signals.ground_truth import DIMENSIONS, first_sustained, nees_samples, pose_error
+from simscen.spec.base import Spec
+from simscen.spec.places import HappeningName
+from simscen.spec.quantities import Duration, PositiveAngle, PositiveDuration, PositiveLength, Quantity
+
+if TYPE_CHECKING:
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
+
+if TYPE_CHECKING:
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Samples, Trace
+
+
+class LocalizationError(Spec, Criterion):
+    """The robot was where it believed to be.
+
+    What is measured: the distance between believed and true position (and the heading error) whenever the robot
+        publishes its belief, and all the time while its newest belief is over 1 s old; without any alignment.
+    When it fails: the largest, the root mean square or the last error exceeds its bound.
+    Why this: goals can be reached by luck with a belief half a meter off, until a shelf stands in that half meter.
+    Source: evo's APE (metrics.py) and Beluga's benchmarks; alignment would forgive the very error we look for.
+
+    Example: `localization_error: {max: 0.3 m, rmse: 0.1 m, after: 5 s}`
+    """
+
+    max: PositiveLength | None = None
+    """Never further off than this."""
+    rmse: PositiveLength | None = None
+    """Root mean square of the distance."""
+    final: PositiveLength | None = None
+    """At the end of the run."""
+    max_yaw: PositiveAngle | None = None
+    """Heading never further off than this."""
+    after: Duration = 0.0
+    """Only from this simulated time on: time to settle in."""
+
+    @model_validator(mode="after")
+    def _some_bound(self) -> LocalizationError:
+        if self.max is None and self.rmse is None and self.final is None and self.max_yaw is None:
+            raise ValueError("expected at least one of: max, rmse, final, max_yaw")
+        return self
+
+    @property
+    def horizon(self) -> float:
+        """When judging begins."""
+        return self.after
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return POSITION | {Evidence.BELIEF}
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """One finding for each bound that is given."""
+        error = pose_error(trace)
+        if not len(error):
+            return [undecided("localization_error", "the robot never said where it believes to be")]
+        counts = error.ticks >= self.after * trace.tick_rate
+        if not counts.any():
+            last = trace.seconds(int(error.ticks[-1]))
+            because = f"the last belief is from t = {last:.2f} s, but judging begins at {self.after:.2f} s"
+            return [undecided("localization_error", because)]
+        return self._bounds(trace, type(error)(error.ticks[counts], error.values[counts]))
+
+    def _bounds(self, trace: Trace, error: Samples) -> list[Finding]:
+        off, turned = error.values.T
+        findings = []
+        if self.max is not None:
+            findings.append(_worst(trace, error, off, "localization_error", self.max, "m"))
+        if self.rmse is not None:
+            rmse = float(np.sqrt(np.mean(off**2)))
+            bound = at_most("localization_error rmse", rmse, self.rmse, "m", context="(not aligned)")
+            findings.append(_of_a_whole_run(trace, bound))
+        if self.final is not None:
+            at = (trace, int(error.ticks[-1]))
+            bound = at_most("localization_error final", float(off[-1]), self.final, "m", at=at)
+            findings.append(_of_a_whole_run(trace, bound))
+        if self.max_yaw is not None:
+            findings.append(_worst(trace, error, turned, "localization_error yaw", self.max_yaw, "rad"))
+        return findings
+
+
+def _of_a_whole_run(trace: Trace, finding: Finding) -> Finding:
+    """Return an inconclusive finding if the log is truncated, because the final error is unknown."""
+    if has_ended(trace):
+        return finding
+    return undecided(finding.what, f"{finding.measured} so far", finding.limit)
+
+
+def _worst(trace: Trace, error: Samples, values: Array, what: str, limit: float, unit: str) -> Finding:
+    k = int(np.argmax(values))
+    return at_most(what, float(values[k]), limit, unit, at=(trace, int(error.ticks[k])))
+
+
+class RelocalizedWithin(Spec, Criterion):
+    """The robot found itself again in time.
+
+    What is measured: time from the start of `after` (or of the run) until the belief, once lost, is within the
+        tolerances of the true pose again and stays there for `hold`; each time that it happens.
+    When it fails: that took longer than `time`.
+    Why this: a wrong start or a kidnapping must be mended while driving, not merely survived; and a belief that
+        crosses the truth by chance has not found it.
+    Source: the kidnapped robot problem, Thrun, Burgard, Fox: Probabilistic Robotics, chapters 7 and 8.
+
+    Inconclusive when the robot was never lost, or when the run was over before the time was.
+
+    Example: `relocalized_within: {time: 20 s, after: kidnapped, tolerance: 0.3 m}`
+    """
+
+    time: PositiveDuration
+    """Seconds."""
+    after: HappeningName | None = None
+    """The event or fault that made it lose itself; default: the start of the run."""
+    tolerance: PositiveLength = 0.25
+    """How far the believed position may be off."""
+    yaw_tolerance: PositiveAngle = 0.25
+    """How far the believed heading may be off."""
+    hold: PositiveDuration = 1.0
+    """It must stay right so long to count."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        started = {Evidence.DISTURBANCES} if self.after is not None else set()
+        return POSITION | {Evidence.BELIEF, *started}
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """One finding each time it happened."""
+        error = pose_error(trace)
+        if not len(error):
+            return [undecided("relocalized_within", "the robot never said where it believes to be")]
+        happened = [Span(0, trace.end, False)] if self.after is None else spans(trace, self.after)
+        if not happened:
+            because, detail = never_started(trace, str(self.after))
+            return [undecided("relocalized_within", because, self._limit, detail)]
+        return [self._once(trace, span.start, error) for span in happened]
+
+    @property
+    def _limit(self) -> str:
+        return f"≤ {self.time:.2f} s {self._context}"
+
+    @property
+    def _context(self) -> str:
+        return f"after {self.after}" if self.after is not None else "after the start"
+
+    def _once(self, trace: Trace, start: int, error: Samples) -> Finding:
+        later = error.ticks >= start
+        ticks, off = error.ticks[later], error.values[later]
+        right = (off[:, 0] <= self.tolerance) & (off[:, 1] <= self.yaw_tolerance)
+        if right[ticks <= start + self.time * trace.tick_rate].all():
+            return undecided("relocalized_within", f"the robot was never lost {self._context}", self._limit)
+        # What held before it lost itself is no finding again.
+        lost = int(np.argmin(right))
+        found, lasted = first_sustained(ticks[lost:], right[lost:], round(self.hold * trace.tick_rate), trace.end)
+        tick = trace.end if found is None else found
+        elapsed = trace.seconds(tick - start)
+        if not lasted and elapsed <= self.time:
+            state = "still lost" if found is None else f"right for only {trace.seconds(trace.end - tick):.2f} s"
+            because = (
+                f"the run was over at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)}), the belief {state}"
+            )
+            return undecided("relocalized_within", because, self._limit)
+        detail = [f"its belief was off by {off[:, 0].max():.2f} m at worst and {off[-1, 0]:.2f} m at the end"]
+        if found is None:
+            detail.append("it never found itself again")
+        return at_most(
+            "relocalized_within", elapsed, self.time, "s", at=(trace, tick), context=self._context, detail=detail
+        )
+
+
+class LocalizationConsistency(Spec, Criterion):
+    """The robot's doubt about its pose fitted its error.
+
+    What is measured: the normalized estimation error squared e' P⁻¹ e of the believed pose (x, y, wrapped heading) with
+        its covariance P, every so often, averaged over the run; 3 when the covariance tells the truth.
+    When it fails: the average is above what a consistent belief keeps with this probability (the robot is
+        overconfident), or with `both_sides` below it; or a covariance is singular, as that of a particle set that has
+        collapsed: it claims to know a direction exactly.
+    Why this: a planner that trusts a covariance drives by it; a filter that is wrong and sure of it never recovers.
+    Source: Bar-Shalom, Li, Kirubarajan 2001, section 5.4; filterpy's stats.NEES.
+
+    The bounds are those of a mean of independent samples. Errors of one run are correlated, so `every` should be longer
+    than they last; the strict test is over runs at fixed times, as `simscen bench nav` takes it.
+
+    Example: `localization_consistency: {every: 5 s, after: 10 s}`
+    """
+
+    probability: Annotated[float, Field(ge=0.5, le=0.9999), Quantity("ratio")] = 0.95
+    """With which a consistent belief passes."""
+    every: PositiveDuration = 5.0
+    """Seconds between two samples."""
+    after: Duration = 0.0
+    """Only from this simulated time on: time to settle in."""
+    both_sides: bool = False
+    """Is a belief that is less sure than it may be a failure, too?"""
+
+    @property
+    def horizon(self) -> float:
+        """When judging begins."""
+        return self.after
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return POSITION | {Evidence.BELIEF, Evidence.COVARIANCE}
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """Return findings for the average and its upper bound, and with `both_sides` also for its lower bound."""
+        samples = self._sampled(trace)
+        if samples is None:
+            return [undecided("localization_consistency", "the belief has no covariance")]
+        if not len(samples):
+            return [undecided("localization_consistency", f"there is no belief after t = {self.after:.2f} s")]
+        values = samples.values[:, 0]
+        worst = int(np.argmax(values))
+        at = (trace, int(samples.ticks[worst]))
+        if math.isinf(values[worst]):
+            return [missed("localization_consistency", "overconfident", "a covariance that is not singular", at)]
+        low, high = self._bounds(len(values))
+        mean, context = float(values.mean()), f"(mean of {len(values)} NEES, {DIMENSIONS} when consistent)"
+        findings = [at_most("localization_consistency", mean, high, "", at=at, context=context)]
+        if low is not None:
+            findings.append(at_least("localization_consistency doubt", mean, low, "", context=context))
+        return findings
+
+    def _bounds(self, count: int) -> tuple[float | None, float]:
+        if self.both_sides:
+            return nees_mean_bounds(count, DIMENSIONS, self.probability)
+        return None, chi2_quantile(self.probability, DIMENSIONS * count) / count
+
+    def _sampled(self, trace: Trace) -> Samples | None:
+        """Return the NEES sampled at regular times from `after` to the last belief."""
+        from simscen.core.records.trace import Samples
+
+        every = nees_samples(trace)
+        if not len(every):
+            return None
+        first, last = max(self.after * trace.tick_rate, int(every.ticks[0])), int(every.ticks[-1])
+        times = np.arange(first, last + 1, self.every * trace.tick_rate).astype(np.int64)
+        chosen = np.searchsorted(every.ticks, times, side="right") - 1
+        return Samples(every.ticks[chosen], every.values[chosen])

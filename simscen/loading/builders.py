@@ -1,0 +1,170 @@
+"""Build the world, the maps, the filter masks, and the robot that a loaded scenario names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks, mask_blocks
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import World
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.geometry.shapes import Mesh
+from simscen.loading.loaded import JudgedMask, LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.yaml.tree import Key, MappingNode, key_position, value_position
+from simscen.model.robot import RobotSpec
+from simscen.model.world import WorldSpec
+from simscen.worlds.world_file import world_from_spec
+
+if TYPE_CHECKING:
+    from simscen.sim.body.robot_body import RobotBody
+
+
+def load_world(loaded: LoadedScenario) -> World:
+    """Build the world of a scenario. Raises InvalidInput for an unusable map image or SDF file."""
+    return world_from_file(loaded.world, loaded.root, loaded.world_path, loaded.lenient)
+
+
+def world_from_file(source: LoadedWorld, root: Path, world_path: Sequence[Path] = (), lenient: bool = False) -> World:
+    """Build the world of a world file. Files that SDF refers to must lie in `root` or `world_path`.
+
+    Raises InvalidInput for an unusable map image or SDF file; with `lenient`, unsupported SDF elements become notes.
+    """
+    base: World | None = None
+    if source.sdf is not None:
+        from simscen.worlds.sdf import load_sdf
+
+        base = load_sdf(source.sdf, search=world_path, root=root, lenient=lenient)
+    spec = source.spec or WorldSpec(simscen=1)
+    grid, notes = _map_and_notes(source.map) if source.map else (None, ())
+    return world_from_spec(spec, source.name, grid, base, notes)
+
+
+def load_map(source: LoadedMap) -> OccupancyGrid:
+    """Load the grid of a ROS map."""
+    return _map_and_notes(source)[0]
+
+
+def _map_and_notes(source: LoadedMap) -> tuple[OccupancyGrid, tuple[str, ...]]:
+    from simscen.worlds.maps.ros_map import load_map
+
+    return load_map(source.spec, source.image)
+
+
+def read_mesh(path: Path) -> Mesh:
+    """Read a mesh for a URDF. Raises ValueError, which the URDF reader reports at the line that names the mesh."""
+    from simscen.worlds.sdf.meshes import read_mesh as read
+
+    try:
+        return read(path)
+    except InvalidInput as error:
+        raise ValueError("; ".join(problem.message for problem in error.problems)) from error
+
+
+def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
+    """Load the specification of the robot (inferred for a bare URDF) and its body, including the payload.
+
+    Raises InvalidInput for unusable files and for a payload that would tip the robot over.
+    """
+    try:
+        spec, body = robot_from_file(loaded.robot, (loaded.root, *loaded.world_path))
+        return spec, _as_entered(loaded, body)
+    except InvalidInput as error:
+        raise InvalidInput([p if p.source else loaded.sourced(p) for p in error.problems]) from error
+
+
+def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
+    entry = loaded.spec.only_robot
+    if entry.payload is None and entry.motor_torque == 1.0:
+        return body
+    from simscen.sim.body.robot_body import add_payload, center_of_mass, hull_height, is_stable, scale_motor_torque
+
+    body = scale_motor_torque(body, entry.motor_torque)
+    if entry.payload is not None:
+        x, y, z = entry.payload.at or (0.0, 0.0, hull_height(body))
+        body = add_payload(body, entry.payload.mass, (x, y, z))
+        if not is_stable(body):
+            x, y, _ = center_of_mass(body)
+            what = f"the robot falls over: with its payload its center of mass is at ({x:.2f}, {y:.2f}), off its wheels"
+            raise InvalidInput([loaded.problem(("robot", "payload"), "SC406", what, "put it nearer to the middle")])
+    return body
+
+
+def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, RobotBody]:
+    """Load the specification and body of a robot. Files that it refers to must lie in `roots`."""
+    from simscen.sim.body.from_spec import build_robot_body
+    from simscen.sim.urdf.xacro.expand import UnknownArgument
+    from simscen.sim.urdf.xml_source import RobotFiles
+
+    spec = robot.spec or _inferred(robot.path, roots)
+    found = RobotFiles(robot.urdf, robot.packages) if robot.urdf else None
+    try:
+        return spec, build_robot_body(spec, robot.path, roots, read_mesh, found)
+    except UnknownArgument as error:
+        raise InvalidInput([_unknown(robot, error.name, error.declared)]) from error
+
+
+def _unknown(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Problem:
+    assert robot.tree is not None and robot.urdf is not None  # who else would give arguments
+    message = f"{quoted(robot.urdf.name)} declares no argument {quoted(argument)}"
+    hint = suggestion(argument, declared) or "it has no <xacro:arg>"
+    return Problem(*key_position(robot.tree, ("arguments", argument)), "SC403", message, hint)
+
+
+def _inferred(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:
+    from simscen.sim.urdf.infer_spec import infer_robot_spec
+
+    return infer_robot_spec(urdf, roots, read_mesh)
+
+
+KEEPOUT_KEYS: tuple[Key, ...] = ("stack", "keepout_mask")
+SPEED_KEYS: tuple[Key, ...] = ("stack", "speed_mask", "file")
+
+MAX_BLOCKS = 100_000
+"""Largest number of rectangles of equal cells in a mask of a criterion. Each log contains them."""
+
+AddSource = Callable[[Problem], Problem]
+"""Adds the source line to a problem."""
+
+
+def load_masks(loaded: LoadedScenario) -> FilterMasks:
+    """Load the masks of the stack. Raises InvalidInput at the line that names an unreadable mask."""
+    keepout = _of_stack(loaded, KEEPOUT_KEYS, loaded.keepout_mask)
+    grid, spec = _of_stack(loaded, SPEED_KEYS, loaded.speed_mask), loaded.spec.stack.speed_mask
+    if grid is None or spec is None:
+        return FilterMasks(keepout)
+    return FilterMasks(keepout, spec.over(grid))
+
+
+def load_criterion_masks(
+    masks: Mapping[str, JudgedMask], tree: MappingNode, sourced: AddSource
+) -> dict[str, MaskBlocks]:
+    """Load the masks of criteria. Raises InvalidInput at the line that names an unusable mask."""
+    return {name: _judged(mask, tree, sourced) for name, mask in masks.items()}
+
+
+def _judged(mask: JudgedMask, tree: MappingNode, sourced: AddSource) -> MaskBlocks:
+    cells = mask_blocks(_grid(mask.map, mask.keys, tree, sourced))
+    if len(cells.blocks) > MAX_BLOCKS:
+        message = f"mask image {mask.map.image.name} falls into {len(cells.blocks)} rectangles of equal cells"
+        hint = f"criteria judge by masks of {MAX_BLOCKS} at most; is it a photograph, or a map with noise?"
+        raise InvalidInput([sourced(Problem(*value_position(tree, mask.keys), "SC320", message, hint))])
+    return cells
+
+
+def _of_stack(loaded: LoadedScenario, keys: tuple[Key, ...], source: LoadedMap | None) -> OccupancyGrid | None:
+    return None if source is None else _grid(source, keys, loaded.tree, loaded.sourced)
+
+
+def _grid(source: LoadedMap, keys: tuple[Key, ...], tree: MappingNode, sourced: AddSource) -> OccupancyGrid:
+    try:
+        return load_map(source)
+    except InvalidInput as error:
+        place, image = value_position(tree, keys), source.image.name
+        told = [replace(problem, path=place.path, line=place.line, col=place.col) for problem in error.problems]
+        raise InvalidInput(
+            [sourced(replace(problem, message=f"mask image {image}: {problem.message}")) for problem in told]
+        ) from error

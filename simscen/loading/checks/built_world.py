@@ -1,0 +1,83 @@
+"""Checks of a world file in the built world: places, regions, and motions."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+from simscen.core.environment.world_model import World
+from simscen.core.errors import Problem
+from simscen.loading.checks.placement import motion_stops
+from simscen.loading.checks.registry import Finding, Stage
+from simscen.loading.checks.scene import TOUCH_M
+from simscen.loading.loaded import LoadedWorld
+from simscen.loading.schema.messages import quoted
+from simscen.loading.yaml.tree import MappingNode
+from simscen.worlds.geometry.overlaps import blocking_solid
+
+HEIGHTS_M = 0.02, 0.4
+"""Heights between which an obstacle blocks most robots."""
+RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M = 0.1, 0.35, 0.03
+"""What a robot that climbs typical ramps can climb."""
+
+
+class BuiltWorld(NamedTuple):
+    """A world and the file that it was built from."""
+
+    world: World
+    source: LoadedWorld
+
+    @property
+    def tree(self) -> MappingNode | None:
+        """The tree of the world file; None for worlds in other formats."""
+        return self.source.tree
+
+
+BUILT_WORLD: Stage[BuiltWorld] = Stage("built world")
+
+
+def check_built_world(world: World, source: LoadedWorld) -> list[Problem]:
+    """Return the problems of a world file in its built world, without the text of their lines; all are warnings."""
+    return [] if source.spec is None else BUILT_WORLD.problems(BuiltWorld(world, source))
+
+
+@BUILT_WORLD.check("SC314", severity="warning")
+def places_in_obstacles(built: BuiltWorld) -> Iterator[Finding]:
+    """Find places inside obstacles."""
+    assert built.source.spec is not None
+    world = _without_platforms(built.world) if built.source.spec.ramps else built.world
+    for name, place in built.source.spec.places.items():
+        solid = blocking_solid(world, (place.x, place.y), TOUCH_M, HEIGHTS_M)
+        if solid is not None:
+            message = f'place {quoted(name)} is inside obstacle "{solid}"'
+            yield Finding(("places", name), message, at_key=True)
+
+
+@BUILT_WORLD.check("SC304", severity="warning")
+def motions_into_obstacles(built: BuiltWorld) -> Iterator[Finding]:
+    """Find keyframes and waypoints of objects inside obstacles."""
+    assert built.source.spec is not None
+    for index, thing in enumerate(built.source.spec.objects):
+        for keys, what, (x, y) in motion_stops(thing.move) if thing.move is not None else ():
+            if solid := blocking_solid(built.world, (x, y), TOUCH_M, HEIGHTS_M):
+                message = f'{what} of {quoted(thing.name)} ({x:g}, {y:g}) is inside obstacle "{solid}"'
+                yield Finding(("objects", index, "move", *keys), message)
+
+
+@BUILT_WORLD.check("SC315", severity="warning")
+def regions_outside_the_world(built: BuiltWorld) -> Iterator[Finding]:
+    """Find regions outside the bounds of the world."""
+    assert built.source.spec is not None
+    left, low, right, high = built.world.bounds
+    for name, corners in built.source.spec.regions.items():
+        xs, ys = [x for x, _ in corners], [y for _, y in corners]
+        if max(xs) < left or min(xs) > right or max(ys) < low or min(ys) > high:
+            message = f"region {quoted(name)} is outside the world ({left:g} … {right:g}, {low:g} … {high:g})"
+            yield Finding(("regions", name), message, at_key=True)
+
+
+def _without_platforms(world: World) -> World:
+    """Return the world as it blocks a robot that climbs ramps: places may be on top of platforms."""
+    from simscen.worlds.geometry.drive_obstacles import drive_obstacles
+
+    solids = drive_obstacles(world.solids, RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M)
+    return replace(world, solids=solids)

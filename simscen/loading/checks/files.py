@@ -1,0 +1,119 @@
+"""Recognize the kind of a file, and check files of any kind."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from simscen.core.errors import Problem
+from simscen.loading.checks.runner import check_world_file
+from simscen.loading.files.assets import GAZEBO, URDF, Assets, is_ros_map
+from simscen.loading.files.discovery import BASE, ROBOT, SCENARIO, STACK, WORLD
+from simscen.loading.files.paths import PathSandbox
+from simscen.loading.scenario import try_variations
+from simscen.loading.schema.validate import check_partial
+from simscen.loading.stacks.stackfile import NAV2_FILE_KIND, STACK_FILE_KIND, recognize_stack_file
+from simscen.loading.variations.naming import VariationProblems, merge_problems
+from simscen.loading.yaml.library import APPEND_SUFFIX, DEFAULTS_FILE, Library
+from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, node_at, value_position
+from simscen.model.scenario import ScenarioSpec
+
+STACKS = ("stack", NAV2_FILE_KIND)
+"""Kinds of files with the parameters of a stack."""
+_ONLY_ROBOTS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
+_ONLY_WORLDS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
+_ONLY_SCENARIOS = frozenset({"world", "robot", "goals", "pass", "events", "faults", "stack"})
+_SUFFIXES = (
+    ("scenario", SCENARIO),
+    ("base", BASE),
+    ("world", (*WORLD, *GAZEBO)),
+    ("robot", (*ROBOT, *URDF)),
+    ("stack", STACK),
+)
+
+
+def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:
+    """Return the problems of a file, and of the files it names; `kind` is what file_kind returns.
+
+    Some problems are warnings.
+    """
+    if kind == "scenario":
+        loaded = try_variations(file, root, world_path)
+        if isinstance(loaded, list):
+            return loaded
+        return merge_problems([VariationProblems(one.variation, one.set_by, one.notes) for one in loaded])
+    library = Library(PathSandbox.around(root, world_path))
+    if isinstance(path := library.fence.entered(file), Problem):
+        return [path]
+    if kind in STACKS:
+        from simscen.loading.stacks.stackfile import read_stack_file
+
+        return found if isinstance(found := read_stack_file(path, library), list) else found[1]
+    if kind == "base":
+        return check_base_file(path, library)
+    assets = Assets(library)
+    senses: list[Problem] = []
+    if kind == "world":
+        world = assets.world_file(path)
+        senses = check_world_file(world) if world is not None else []
+    elif kind == "robot":
+        assets.robot_file(path)
+    else:
+        assets.map_file(path)
+    return library.with_source(sorted([*assets.problems, *senses]))
+
+
+def file_kind(file: Path, root: Path) -> str:
+    """Return the kind of a file by its suffix, else by keys that only one kind has.
+
+    The kinds are "scenario", "world", "robot", "stack", "base", "map" and NAV2_FILE_KIND.
+    """
+    if file.name == DEFAULTS_FILE:
+        return "base"
+    for kind, suffixes in _SUFFIXES:
+        if file.name.endswith(suffixes):
+            return kind
+    library = Library(PathSandbox.around(root))
+    tree, _ = library.read(file.absolute())
+    if is_ros_map(tree):
+        return "map"
+    if strange := recognize_stack_file(tree, "".join(library.texts.values()), library.fence.shown(file.absolute())):
+        return "stack" if strange == STACK_FILE_KIND else strange
+    keys = set(tree.entries) if isinstance(tree, MappingNode) else set()
+    if keys & _ONLY_SCENARIOS:
+        return "scenario"
+    return "robot" if keys & _ONLY_ROBOTS else "world" if keys & _ONLY_WORLDS else "scenario"
+
+
+def check_base_file(file: Path, library: Library) -> list[Problem]:
+    """Return the problems of a base file (`*.base.yaml`, `defaults.yaml`) and of the files it names.
+
+    Missing keys are not problems: the scenarios that extend it may have them.
+    """
+    tree, problems = library.read(file)
+    if problems or tree is None:
+        return library.with_source(problems)
+    problems = check_partial(ScenarioSpec, _with_lists(tree))
+    return library.with_source(
+        sorted([*problems, *(_of_files(tree, library) if isinstance(tree, MappingNode) else [])])
+    )
+
+
+def _with_lists(tree: Node) -> Node:
+    """Return the tree with `pass+` as `pass`, so that the items to be added are checked."""
+    if not isinstance(tree, MappingNode):
+        return tree
+    entries = {
+        key.removesuffix(APPEND_SUFFIX): entry for key, entry in tree.entries.items() if key.endswith(APPEND_SUFFIX)
+    }
+    return MappingNode(
+        tree.place, {**entries, **{key: entry for key, entry in tree.entries.items() if key[-1:] != APPEND_SUFFIX}}
+    )
+
+
+def _of_files(tree: MappingNode, library: Library) -> list[Problem]:
+    assets = Assets(library)
+    world, model = child(tree, "world"), node_at(tree, ("robot", "model"))
+    if isinstance(world, ScalarNode) and isinstance(world.value, str):
+        assets.world(world)
+    if isinstance(model, ScalarNode) and isinstance(model.value, str):
+        assets.robot(model.value, value_position(tree, ("robot", "model")))
+    return assets.problems

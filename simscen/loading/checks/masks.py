@@ -1,0 +1,130 @@
+"""Checks of keepout zones and filter masks: do they forbid the start or a goal, do they have any effect?"""
+
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks, in_keepout_mask
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
+from simscen.core.environment.world_model import Polygon
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.polygons import depth_inside_polygon, separation_from_boxes
+from simscen.criteria.keepout import Keepout
+from simscen.criteria.speed import Speed
+from simscen.loading.builders import KEEPOUT_KEYS, SPEED_KEYS, load_criterion_masks, load_masks
+from simscen.loading.checks.registry import Finding, Keys
+from simscen.loading.checks.scene import WORLD, Scene, expects_start_failure
+from simscen.loading.schema.messages import quoted
+
+Forbids = Callable[[Pose2, float], bool]
+"""Whether a zone contains a pose and everything around it within a distance in m."""
+
+CELL_M = 0.1
+"""Depth inside a zone at which a goal is forbidden however the zone is rounded to cells."""
+ESTIMATE_ERROR_M = 0.5
+"""Possible error of the initial estimate."""
+NO_LIMIT = "no cell of the mask limits the speed with this `base` and `multiplier`"
+
+
+def stack_masks(scene: Scene) -> FilterMasks:
+    """Return the filter masks of the stack. Raises InvalidInput for a mask that cannot be read."""
+    return load_masks(scene.loaded)
+
+
+def judged_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
+    """Return the masks of criteria, by file. Raises InvalidInput for a mask that cannot be read."""
+    return load_criterion_masks(scene.loaded.judged_masks, scene.loaded.tree, scene.loaded.sourced)
+
+
+@WORLD.check("SC302")
+def check_stack_zones(scene: Scene) -> Iterator[Finding]:
+    """Find goals, and starts (a warning), in zones that the stack keeps out of."""
+    regions = scene.world.regions
+    zones: list[tuple[Keys, str, Forbids]] = [
+        (("stack", "keepout", index), f"in `{region}`", _inside_region(regions[region]))
+        for index, region in enumerate(scene.loaded.spec.stack.keepout)
+    ]
+    keepout = scene.once(stack_masks).keepout
+    if keepout is not None:
+        zones.append((KEEPOUT_KEYS, "in a cell that the keepout mask forbids", forbidden_test(keepout)))
+    for keys, where, forbids in zones:
+        hint = "move one of them, or expect the failure with `result: {status: FAILED, error_code: %s}`"
+        for name in [goal.name for _, goal in scene.targets if forbids(goal.pose, CELL_M)]:
+            message = f"goal `{name}` cannot be reached: it is {where}, which the stack keeps out of"
+            yield Finding(keys, message, hint % "GOAL_OCCUPIED")
+        if forbids(scene.start, ESTIMATE_ERROR_M) and not expects_start_failure(scene.loaded.spec):
+            message = f"the robot starts {where}, which the stack keeps out of"
+            yield Finding(keys, message, hint % "START_OCCUPIED", warning=True)
+
+
+def _inside_region(corners: Polygon) -> Forbids:
+    return lambda pose, within: depth_inside_polygon(pose, corners) > within
+
+
+def forbidden_test(mask: OccupancyGrid) -> Forbids:
+    """Return the test whether a keepout mask forbids a position."""
+
+    def forbids(pose: Pose2, within: float) -> bool:
+        steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, CELL_M))) + 1)
+        around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        return bool(in_keepout_mask(mask, around + np.array((pose.x, pose.y))).all())
+
+    return forbids
+
+
+@WORLD.check("SC055", severity="warning")
+def masks_without_effect(scene: Scene) -> Iterator[Finding]:
+    """Find masks of the stack that forbid or limit nothing."""
+    masks = scene.once(stack_masks)
+    if masks.keepout is not None and not (masks.keepout.cells == OCCUPIED).any():
+        yield Finding(KEEPOUT_KEYS, "the keepout mask forbids nothing: none of its cells is occupied")
+    if masks.speed is not None and not masks.speed.limiting:
+        yield Finding(SPEED_KEYS, f"the speed mask has no effect: {NO_LIMIT}")
+
+
+@WORLD.check("SC311", severity="warning")
+def shades_in_keepout_mask(scene: Scene) -> Iterator[Finding]:
+    """Find keepout masks with cells that are neither free nor occupied."""
+    keepout = scene.once(stack_masks).keepout
+    if keepout is not None and (keepout.cells == OCCUPIED).any():
+        count = np.count_nonzero((keepout.cells > FREE) & (keepout.cells < OCCUPIED))
+        if count:
+            message = f"{count} cells of the keepout mask are neither free nor occupied: they forbid nothing"
+            yield Finding(KEEPOUT_KEYS, message)
+
+
+@WORLD.check("SC055", severity="warning")
+def judged_masks_without_effect(scene: Scene) -> Iterator[Finding]:
+    """Find masks of criteria that forbid or limit nothing."""
+    masks = scene.once(judged_masks)
+    for index, entry in enumerate(scene.loaded.spec.pass_):
+        match entry.chosen:
+            case Keepout(mask=str(name)) if not len(masks[name].forbidden):
+                message = "the criterion judges nothing: no cell of the mask is occupied"
+                yield Finding(("pass", index, "keepout", "mask"), message)
+            case Speed(mask=spec) if spec is not None and not spec.over(masks[spec.file].grid).limiting:
+                yield Finding(("pass", index, "speed", "mask", "file"), f"the criterion judges nothing: {NO_LIMIT}")
+            case _:
+                pass
+
+
+@WORLD.check("SC051")
+def keepout_masks_on_goals(scene: Scene) -> Iterator[Finding]:
+    """Find keepout criteria whose mask forbids the start or a goal."""
+    masks = scene.once(judged_masks)
+    for index, entry in enumerate(scene.loaded.spec.pass_):
+        if not isinstance(entry.chosen, Keepout) or entry.chosen.mask is None:
+            continue
+        name, keys = entry.chosen.mask, ("pass", index, "keepout", "mask")
+        mask = masks[name]
+        if not len(mask.forbidden):
+            continue
+        start = mask.to_mask_frame(np.array([scene.start]))
+        if separation_from_boxes(start, scene.outline, mask.forbidden)[0] < 0:
+            yield Finding(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
+            continue
+        forbids = forbidden_test(mask.grid)
+        inside = [goal.name for _, goal in scene.targets if forbids(goal.pose, goal.xy_tolerance)]
+        if inside:
+            message = f"keepout cannot hold if goal `{inside[0]}` is reached: {quoted(name)} forbids its position"
+            yield Finding(keys, message)

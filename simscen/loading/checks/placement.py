@@ -1,0 +1,220 @@
+"""Checks of poses: is the robot, a goal, or what an event adds inside an obstacle or outside the map?"""
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import combinations, product
+
+from simscen.actions.doors import CloseDoor, OpenDoor, panel_path
+from simscen.actions.objects import Move, Spawn, Teleport
+from simscen.actions.pedestrian import Pedestrian
+from simscen.actions.robot import Kidnap
+from simscen.core.environment.world_model import Polygon
+from simscen.core.errors import Problem
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast
+from simscen.core.geometry.shapes import MotionPath, Solid
+from simscen.core.messages.navigation import Goal
+from simscen.loading.checks.registry import Finding, Keys
+from simscen.loading.checks.scene import SILL_M, START, TOUCH_M, WORLD, Scene, expects_start_failure
+from simscen.loading.yaml.tree import MappingNode
+from simscen.sim.body.outline import radius_and_height
+from simscen.spec.moving_objects import Motion
+from simscen.triggers.base import Trigger
+from simscen.triggers.timing import Time
+from simscen.worlds.geometry.overlaps import first_solid_in_disc, place_polygon, polygons_overlap
+from simscen.worlds.geometry.prisms import upright_prism
+
+START_HINT = "move it to free space"
+GOAL_HINT = "move it, or expect the failure with `result: {status: FAILED, error_code: GOAL_OCCUPIED}`"
+OUTSIDE_HINT = GOAL_HINT.replace("GOAL_OCCUPIED", "GOAL_OUTSIDE_MAP")
+TOLERANCE_SHARES = (-0.9, 0.0, 0.9)
+"""Shares of a goal's tolerances at which the robot may stop instead of at the exact pose."""
+
+MotionStop = tuple[Keys, str, tuple[float, float]]
+"""Keys below the motion, name and position of a keyframe or waypoint."""
+
+
+def blocked_poses(scene: Scene) -> dict[Keys, Finding]:
+    """Return the findings for the start, goals and kidnap poses that the robot cannot have, by their keys."""
+    found = [*_start(scene), *_goals(scene), *_kidnaps(scene)]
+    return {finding.keys: finding for finding in found}
+
+
+@WORLD.check("SC301")
+def check_robot_poses(scene: Scene) -> Iterator[Finding]:
+    """Find start, goal and kidnap poses inside an obstacle or outside the map."""
+    yield from scene.once(blocked_poses).values()
+
+
+def _start(scene: Scene) -> Iterator[Finding]:
+    if not expects_start_failure(scene.loaded.spec):
+        solids = (*scene.world.solids, *scene.bodies)
+        yield from _blocked(scene, START, "the robot's start", scene.start, solids, START_HINT)
+
+
+def _goals(scene: Scene) -> Iterator[Finding]:
+    for keys, goal in scene.targets:
+        hint = OUTSIDE_HINT if scene.area.outside(goal.pose) else GOAL_HINT
+        found = list(_blocked(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))
+        if found and not _fits_nearby(scene, goal):
+            yield from found
+        position = goal.pose.x, goal.pose.y
+        if not found and (thing := first_solid_in_disc(scene.unmoved_bodies, position, TOUCH_M, scene.z_range)):
+            message = f"goal `{goal.name}` is inside `{thing}`, and no event moves or removes `{thing}`"
+            yield Finding(keys, message, GOAL_HINT, warning=True)
+
+
+def _fits_nearby(scene: Scene, goal: Goal) -> bool:
+    """Return whether only the exact pose is blocked and a footprint that is not round fits within the tolerances."""
+    outside = scene.area.outside(goal.pose)
+    if outside or scene.size.radius is not None or scene.circle_conflict(goal.pose, scene.world.solids):
+        return False
+    x, y, yaw = goal.pose
+    near = (
+        Pose2(x + a * goal.xy_tolerance, y + b * goal.xy_tolerance, yaw + c * goal.yaw_tolerance)
+        for a, b, c in product(TOLERANCE_SHARES, repeat=3)
+        if math.hypot(a, b) <= 1
+    )
+    return any(scene.footprint_conflict(pose, scene.world.solids) is None for pose in near)
+
+
+def _kidnaps(scene: Scene) -> Iterator[Finding]:
+    for keys, _, action in scene.actions:
+        if isinstance(action, Kidnap):
+            what = "the pose to which the robot is kidnapped"
+            yield from _blocked(scene, (*keys, "pose"), what, action.pose.pose, scene.world.solids, START_HINT)
+
+
+def _blocked(
+    scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
+) -> Iterator[Finding]:
+    conflict = scene.area.outside(pose) or scene.footprint_conflict(pose, solids)
+    if conflict:
+        yield Finding(keys, f"{what} ({pose.x:g}, {pose.y:g}) is {conflict}", hint)
+
+
+@WORLD.check("SC304")
+def check_spawns(scene: Scene) -> Iterator[Finding]:
+    """Find things that are spawned inside an obstacle or on the robot."""
+    for keys, _, action in scene.actions:
+        if isinstance(action, Spawn):
+            is_event = keys[2] == "do"  # the time of a later step counts from the step before it
+            when = scene.loaded.spec.events[int(keys[1])].when if is_event else None
+            where = _inside_obstacle(scene, action) or _on_robot(scene, action, when)
+            if where:
+                yield Finding((*keys, "name"), f"`{action.name}` would appear {where}", "choose another pose")
+
+
+def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
+    """Return the obstacle that contains the whole outline of a spawned thing, which nothing could ever meet."""
+    if spawn.pose is None:
+        return None
+    corners = place_polygon(_outline(spawn), spawn.pose.pose)
+    for solid in scene.world.solids:
+        prism = upright_prism(solid)
+        if prism is None or prism.bottom > spawn.z or prism.top < spawn.z + spawn.tall:
+            continue
+        if all(prism.distance(corner, (prism.bottom, prism.top)) == 0 for corner in corners):
+            return f'inside obstacle "{solid.name}"'
+    return None
+
+
+def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
+    """Return "on the robot" if a thing overlaps the robot when it appears: relative to the robot, or at t = 0."""
+    if spawn.z >= scene.size.height:
+        return None
+    if spawn.ahead is not None:
+        corners = place_polygon(_outline(spawn), Pose2(spawn.ahead[0], spawn.ahead[1], spawn.yaw))
+    elif spawn.pose is not None and when and isinstance(when.time, Time) and when.time.root + when.delay == 0:
+        corners = place_polygon(_outline(spawn), scene.start.inverse().compose(spawn.pose.pose))
+    else:
+        return None
+    return "on the robot" if polygons_overlap(scene.outline, corners) else None
+
+
+def _outline(spawn: Spawn) -> Polygon:
+    """Return the outline of a thing in its own frame."""
+    solid = spawn.solid(spawn.name)
+    prism = upright_prism(Solid(solid.shape, Pose3(z=solid.pose.z), spawn.name))
+    return prism.base if prism is not None else tuple((x, y) for x, y in spawn.polygon or ())
+
+
+@WORLD.check("SC304")
+def check_pedestrians(scene: Scene) -> Iterator[Finding]:
+    """Find pedestrians that appear, or want to go, where they have no room."""
+    solids = (*scene.world.solids, *scene.immovable_bodies)
+    for keys, _, action in scene.actions:
+        if not isinstance(action, Pedestrian):
+            continue
+        stops: list[MotionStop] = [(("pose",), f"the start of `{action.name}`", (action.pose.x, action.pose.y))]
+        stops += [(("goals", k), f"goal {k + 1} of `{action.name}`", (x, y)) for k, (x, y) in enumerate(action.goals)]
+        for below, what, (x, y) in stops:
+            if solid := first_solid_in_disc(solids, (x, y), action.radius, (SILL_M, action.height)):
+                message = f'{what} ({x:g}, {y:g}) is closer to obstacle "{solid}" than {action.radius:g} m'
+                yield Finding((*keys, *below), message, "choose a position with enough room")
+
+
+@WORLD.check("SC304", severity="warning")
+def check_motions(scene: Scene) -> Iterator[Finding]:
+    """Find keyframes, waypoints and teleport targets inside the fixed world."""
+    for keys, _, action in scene.actions:
+        stops: list[MotionStop] = []
+        if isinstance(action, Move):
+            stops = [(below, f"{what} of `{action.name}`", position) for below, what, position in motion_stops(action)]
+        elif isinstance(action, Teleport):
+            stops = [(("pose",), f"the new pose of `{action.name}`", (action.pose.x, action.pose.y))]
+        for below, what, (x, y) in stops:
+            if solid := first_solid_in_disc(scene.world.solids, (x, y), TOUCH_M, scene.z_range):
+                message = f'{what} ({x:g}, {y:g}) is inside obstacle "{solid}"'
+                yield Finding((*keys, *below), message, "move it to free space: walls do not stop scripted motions")
+
+
+@WORLD.check("SC305")
+def check_motion_speeds(scene: Scene) -> Iterator[Finding]:
+    """Find scripted motions so fast that contact with the robot could be missed between two ticks."""
+    tick = 1 / scene.loaded.spec.physics.tick_rate
+    for keys, tree, name, path, solids in _motions(scene):
+        step = largest_step(path, tick, radius_and_height(solids)[0] if solids else 0.0)
+        if step > MAX_STEP_M:
+            hint = f"make it {math.ceil(10 * step / MAX_STEP_M) / 10:g} times slower, or raise `physics.tick_rate`"
+            yield Finding(keys, too_fast(name, step), hint, tree=tree)
+
+
+def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, MotionPath, Sequence[Solid]]]:
+    """Yield keys, their tree, name, path and solids of all scripted motions, as far as they are known before a run."""
+    bodies = {body.name: body for body in scene.world.bodies}
+    file = scene.loaded.world
+    own = [thing.name for thing in file.spec.objects] if file.spec is not None else []
+    for body in scene.world.bodies:
+        if body.path is not None and body.name in own:
+            yield ("objects", own.index(body.name), "move"), file.tree, body.name, body.path, body.solids
+        elif body.path is not None:  # an actor of a Gazebo world
+            yield ("world",), None, body.name, body.path, body.solids
+    spawned = {action.name: action for _, _, action in scene.actions if isinstance(action, Spawn)}
+    for keys, _, action in scene.actions:
+        if isinstance(action, OpenDoor | CloseDoor) and action.name in scene.world.doors:
+            path = panel_path(*scene.world.doors[action.name], action.duration)
+            key = "duration" if "duration" in action.model_fields_set else "name"
+            yield (*keys, key), None, action.name, path, bodies[action.name].solids
+        elif isinstance(action, Move) and action.name in bodies:
+            body = bodies[action.name]
+            yield (*keys, "name"), None, action.name, action.path(body.pose.plane), body.solids
+        elif isinstance(action, Move) and (spawn := spawned.get(action.name)) is not None and spawn.pose is not None:
+            yield (*keys, "name"), None, action.name, action.path(spawn.pose.pose), (spawn.solid(action.name),)
+
+
+def motion_stops(motion: Motion) -> list[MotionStop]:
+    """Return the keyframes or waypoints of a motion."""
+    if motion.keyframes is not None:
+        return [(("keyframes", k), f"keyframe {k + 1}", (x, y)) for k, (_, x, y, _) in enumerate(motion.keyframes)]
+    return [(("through", k), f"waypoint {k + 1}", (x, y)) for k, (x, y) in enumerate(motion.through or [])]
+
+
+def check_robots_apart(scenes: Sequence[Scene]) -> Iterator[Problem]:
+    """Find robots whose footprints overlap at their starts (SC044); `scenes` are the views of one scenario."""
+    for one, other in combinations(scenes, 2):
+        if polygons_overlap(place_polygon(one.outline, one.start), place_polygon(other.outline, other.start)):
+            first, second = one.loaded.robot_name, other.loaded.robot_name
+            where = f"({other.start.x:g}, {other.start.y:g}) and ({one.start.x:g}, {one.start.y:g})"
+            message = f"robot `{second}` overlaps robot `{first}` at the start: {where}"
+            yield other.loaded.problem(START, "SC044", message, "move one of them farther away")

@@ -1,0 +1,211 @@
+"""Checks of triggers, criteria and goals by position: positions that the robot cannot reach, or has from the start."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+from simscen.core.environment.world_model import Polygon
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry.polygons import depth_inside_polygon, distance_to_polygon
+from simscen.core.geometry.shapes import Solid
+from simscen.criteria.keepout import Keepout
+from simscen.criteria.localization import LocalizationError
+from simscen.loading.checks.events import MAX_OVERSHOOT
+from simscen.loading.checks.placement import blocked_poses
+from simscen.loading.checks.registry import Finding, Keys
+from simscen.loading.checks.scene import START, WORLD, Scene
+from simscen.loading.world_cache import bounds_with
+from simscen.triggers.base import AnyCondition
+from simscen.triggers.robot_state import RobotIn, RobotWithin
+from simscen.worlds.geometry.overlaps import place_polygon, polygons_overlap
+from simscen.worlds.routes.simple_paths import SimplePaths, simple_paths_between
+
+if TYPE_CHECKING:
+    from simscen.worlds.routes.shortest_paths import ShortestPaths
+
+
+SILL_M = 0.03
+"""Height of obstacles that a route may cross, although no robot could stop there."""
+
+
+@dataclass(frozen=True)
+class RobotRoutes:
+    """Routes of a disc that fits into the footprint: if the disc has no route, neither has the robot."""
+
+    scene: Scene
+    stops: tuple[Pose2, ...]
+
+    def is_reachable(self, starts: Sequence[Pose2], goal: Pose2, solids: tuple[Solid, ...]) -> bool:
+        """Return whether a route may lead from a start to the goal; False proves that there is none."""
+        plain = self._plain(solids)
+        if plain is not None and any(plain.length(start[:2], goal[:2]) < float("inf") for start in starts):
+            return True
+        exact = self._exact(solids)
+        return any(exact.may_reach(start, goal) for start in starts)
+
+    def can_come_to(self, starts: Sequence[Pose2], towards: Pose2, distance: Callable[[Pose2], float]) -> bool:
+        """Return whether the center of the robot can get from a start to where `distance` is at most 0."""
+        plain = self._plain(self.scene.world.solids)
+
+        def arrived(point: tuple[float, float]) -> bool:
+            return distance(Pose2(*point)) <= 0
+
+        if plain is not None and any(plain.comes_to(start[:2], towards[:2], arrived) for start in starts):
+            return True
+        return self._exact(self.scene.world.solids).may_come_to(starts, distance)
+
+    def length_upper_bound(self, start: Pose2, goal: Pose2) -> float:
+        """Return an upper bound of the shortest route in m; inf if the approximation finds none."""
+        plain = self._fixed
+        return float("inf") if plain is None else plain.length(start[:2], goal[:2])
+
+    def length(self, start: Pose2, goal: Pose2) -> float:
+        """Return the length of the shortest route around the fixed solids in m; inf if there is none."""
+        return self._exact(self.scene.world.solids).length(start, goal)
+
+    @property
+    def z_range(self) -> tuple[float, float]:
+        """Heights in m between which an obstacle blocks a route."""
+        return SILL_M, max(2 * SILL_M, self.scene.size.height)
+
+    @cached_property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Bounds of the world and of all stops, with room to drive around them."""
+        return bounds_with(self.scene.world.bounds, list(self.stops))
+
+    @cached_property
+    def _fixed(self) -> SimplePaths | None:
+        return self.scene.cache.plain_ways(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
+
+    def _plain(self, solids: tuple[Solid, ...]) -> SimplePaths | None:
+        if solids is self.scene.world.solids:
+            return self._fixed
+        return simple_paths_between(solids, self.scene.size.inscribed, self.z_range)
+
+    def _exact(self, solids: tuple[Solid, ...]) -> "ShortestPaths":
+        return self.scene.cache.ways(solids, self.bounds, self.scene.size.inscribed, self.z_range)
+
+
+class TriggerArea(NamedTuple):
+    """An area that a trigger waits for the robot to enter; `distance` is how far a pose is from it, in m."""
+
+    keys: Keys
+    event: str
+    description: str
+    corners: Polygon
+    distance: Callable[[Pose2], float]
+
+
+def trigger_areas(scene: Scene) -> list[TriggerArea]:
+    """Return the areas that the robot must enter for events and faults to happen."""
+    spec = scene.loaded.spec
+    tests: list[tuple[Keys, str, AnyCondition | None]] = [
+        ((*step.keys, "when"), step.name, step.when) for step in spec.steps
+    ]
+    tests += [(("faults", k, "when"), fault.label, fault.when) for k, fault in enumerate(spec.faults)]
+    return [area for keys, name, test in tests if test is not None for area in _areas(scene, test, keys, name)]
+
+
+def _areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> Iterator[TriggerArea]:
+    """Return the areas of all conditions that must be true for a test to be true."""
+    if not scene.loaded.concerns(test.robot) or test.any is not None or test.not_ is not None:
+        return
+    if test.all is not None:
+        for k, part in enumerate(test.all):
+            yield from _areas(scene, part, (*keys, "all", k), name)
+        return
+    keys = (*keys, test.kind)
+    match test.chosen if test.kind in ("robot_in", "robot_within") else None:
+        case RobotIn(region=region):
+            corners = scene.world.regions[region]
+            yield TriggerArea(keys, name, f"region `{region}`", corners, _distance_to_region(corners, 0.0))
+        case RobotWithin(region=str(region), distance=reach):
+            corners = scene.world.regions[region]
+            what = f"a position within {reach:g} m of region `{region}`"
+            yield TriggerArea(keys, name, what, corners, _distance_to_region(corners, reach))
+        case RobotWithin(of=[x, y], distance=reach):
+            what = f"a position within {reach:g} m of ({x:g}, {y:g})"
+            yield TriggerArea(keys, name, what, ((x, y),), lambda pose: pose.distance(Pose2(x, y)) - reach)
+        case _:
+            pass
+
+
+def _distance_to_region(corners: Polygon, reach: float) -> Callable[[Pose2], float]:
+    return lambda pose: distance_to_polygon(pose, corners) - reach
+
+
+def robot_routes(scene: Scene) -> RobotRoutes:
+    """Return the routes between the start, all goals and all trigger areas."""
+    corners = [Pose2(x, y) for area in scene.once(trigger_areas) for x, y in area.corners]
+    return RobotRoutes(scene, (*scene.start_poses, *(goal.pose for _, goal in scene.targets), *corners))
+
+
+def _start_is_blocked(scene: Scene) -> bool:
+    return START in scene.once(blocked_poses)
+
+
+@WORLD.check("SC050")
+def unreachable_triggers(scene: Scene) -> Iterator[Finding]:
+    """Find events and faults that wait for the robot to be where it cannot get."""
+    if _start_is_blocked(scene) or scene.does():  # an action of an installed package may take the robot anywhere
+        return
+    starts, robot, limit = scene.start_poses, scene.loaded.robot.spec, scene.loaded.spec.time_limit
+    for keys, name, what, corners, distance in scene.once(trigger_areas):
+        center = Pose2(*(sum(values) / len(corners) for values in zip(*corners, strict=True)))
+        if not scene.once(robot_routes).can_come_to(starts, center, distance):
+            yield Finding(keys, f"`{name}` can never happen: no route leads the robot to {what}")
+        elif robot is not None and min(map(distance, starts)) > MAX_OVERSHOOT * robot.top_speed * limit:
+            reason = f"at {robot.top_speed:g} m/s, its top speed, the robot does not reach {what} within the time limit"
+            yield Finding(keys, f"`{name}` can never happen: {reason}")
+
+
+@WORLD.check("SC051")
+def keepout_regions_on_goals(scene: Scene) -> Iterator[Finding]:
+    """Find keepout criteria whose region contains the start or a goal."""
+    if _start_is_blocked(scene):
+        return
+    for index, entry in enumerate(scene.loaded.spec.pass_):
+        if not isinstance(entry.chosen, Keepout) or entry.chosen.region is None:
+            continue
+        region, keys = entry.chosen.region, ("pass", index, "keepout", "region")
+        corners = scene.world.regions[region]
+        if polygons_overlap(corners, place_polygon(scene.outline, scene.start)):
+            yield Finding(keys, f"keepout can never hold: the robot starts in `{region}`")
+            continue
+        inside = [
+            goal.name for _, goal in scene.targets if depth_inside_polygon(goal.pose, corners) > goal.xy_tolerance
+        ]
+        if inside:
+            yield Finding(keys, f"keepout cannot hold if goal `{inside[0]}` is reached: it is in `{region}`")
+
+
+@WORLD.check("SC055", severity="warning")
+def goals_reached_at_once(scene: Scene) -> Iterator[Finding]:
+    """Find goals that the robot has already reached when it is sent to them."""
+    if _start_is_blocked(scene):
+        return
+    own = [(keys, goal) for keys, goal in scene.targets if keys[0] == "goals"]
+    poses = [scene.start, *(goal.pose for _, goal in own)]
+    for (before, _), (keys, goal) in zip(pairwise(poses), own, strict=True):
+        turned = abs(wrap(before.yaw - goal.pose.yaw))
+        if before.distance(goal.pose) <= goal.xy_tolerance and turned <= goal.yaw_tolerance:
+            message = f"the robot is already within the tolerances of goal `{goal.name}` when it is sent there"
+            yield Finding(keys, message)
+
+
+@WORLD.check("SC052", severity="warning")
+def loose_localization_bounds(scene: Scene) -> Iterator[Finding]:
+    """Find bounds on the localization error that are larger than the world."""
+    if _start_is_blocked(scene):
+        return
+    left, low, right, high = scene.world.bounds
+    diagonal = math.hypot(right - left, high - low)
+    for index, entry in enumerate(scene.loaded.spec.pass_):
+        for key in ("max", "rmse", "final") if isinstance(entry.chosen, LocalizationError) else ():
+            bound = getattr(entry.chosen, key)
+            if bound is not None and 0 < diagonal < bound:
+                message = f"localization_error can hardly fail: the diagonal of the world is {diagonal:.1f} m"
+                yield Finding(("pass", index, "localization_error", key), message)

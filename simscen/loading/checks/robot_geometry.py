@@ -1,0 +1,76 @@
+"""Check the geometry of a robot's file against its URDF."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.errors import InvalidInput, Problem
+from simscen.loading.builders import read_mesh, robot_from_file
+from simscen.loading.files.single_files import RobotFile
+from simscen.loading.loaded import LoadedRobot
+from simscen.loading.yaml.tree import value_position
+from simscen.model.robot import RobotSpec
+from simscen.sim.body.robot_body import RobotBody, check_ground_clearance
+from simscen.sim.body.undercarriage import Wheel
+
+DIMENSION_TOLERANCE = 0.01
+"""Relative difference from the URDF that a dimension of the drive may have."""
+
+
+def geometry_warnings(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, roots: tuple[Path, ...]) -> list[Problem]:
+    """Return warnings about a robot with a URDF: different dimensions, or wheels and casters off the ground."""
+    if robot.urdf is None:
+        return []
+    from simscen.sim.urdf.body import read_spec_tree
+    from simscen.sim.urdf.wheels import alignment_warnings
+    from simscen.sim.urdf.xml_source import RobotFiles
+
+    tree = read_spec_tree(spec, robot.path, roots, read_mesh, RobotFiles(robot.urdf, robot.packages))
+    return [*dimension_warnings(robot, body), *alignment_warnings(tree, spec.drive)]
+
+
+def dimension_warnings(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]:
+    """Yield warnings about dimensions of the drive that differ from the URDF."""
+    if robot.tree is None or robot.urdf is None:
+        return
+    drawn = _drawn(body.wheels)
+    for name in ("wheel_radius", "wheel_separation", "wheel_base"):
+        said = getattr(body.drive, name, None)
+        if said is None or name not in body.drive.model_fields_set or name not in drawn:
+            continue
+        if abs(said - drawn[name]) > DIMENSION_TOLERANCE * drawn[name]:
+            message = f"{name} is {said:g} m here, but {drawn[name]:.4g} m in {robot.urdf.name}"
+            hint = "the wheels stand where the URDF has them; commands and odometry reckon with what is written here"
+            yield Problem(*value_position(robot.tree, ("drive", name)), "SC404", message, hint, "warning")
+
+
+def _drawn(wheels: tuple[Wheel, ...]) -> dict[str, float]:
+    """Return the dimensions of the drive according to the wheels of the body."""
+    driven = [wheel for wheel in wheels if wheel.driven]
+    if not driven:
+        return {}
+    left, right = ([wheel.y for wheel in driven if wheel.left is side] for side in (True, False))
+    axles, steered = [wheel.x for wheel in driven], [wheel.x for wheel in wheels if wheel.steered]
+    base = np.mean(steered) - np.mean(axles) if steered else max(axles) - min(axles)
+    return {
+        "wheel_radius": float(np.mean([wheel.radius for wheel in driven])),
+        "wheel_separation": float(np.mean(left) - np.mean(right)),
+        **({"wheel_base": float(base)} if base > 0 else {}),
+    }
+
+
+def robot_problems(file: RobotFile) -> list[Problem]:
+    """Return errors and warnings about a robot that only building it reveals."""
+    robot = file.robot
+    try:
+        if robot.urdf is not None:
+            spec, body = robot_from_file(robot, file.roots)
+            found = geometry_warnings(robot, spec, body, file.roots)
+        else:
+            assert robot.spec is not None  # a robot has one or the other
+            check_ground_clearance(robot.spec, robot.path)
+            found = []
+    except InvalidInput as error:
+        found = error.problems
+    return file.library.with_source_where_missing(found)

@@ -1,0 +1,235 @@
+"""Scenario in its built world: the subject of the checks of the stages WORLD and TIMING."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+from pydantic import BaseModel
+
+from simscen.actions.robot import Kidnap
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import Polygon, World
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.shapes import Body, Solid
+from simscen.core.messages.navigation import ErrorCode, Goal, matches_goal_name
+from simscen.criteria.result import ErrorCodeIs, Result
+from simscen.loading.builders import load_map
+from simscen.loading.checks.registry import Keys, Stage
+from simscen.loading.goals import event_goals, scenario_goals
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.robot_size import RobotSize
+from simscen.loading.world_cache import WorldCache
+from simscen.loading.yaml.tree import MappingNode
+from simscen.model.navigation import expected_failure_name
+from simscen.model.scenario import ScenarioSpec
+from simscen.worlds.geometry.overlaps import first_solid_in_disc, first_solid_in_footprint
+from simscen.worlds.geometry.prisms import upright_prism
+
+SILL_M = 0.02
+"""Height below which an obstacle does not block a robot."""
+TOUCH_M = 1e-6
+"""Distance below which a point counts as inside a solid."""
+START = ("robot", "pose")
+MOVING_ACTIONS = frozenset({"open", "close", "move", "remove", "teleport", "push"})
+"""Actions after which a body is no longer where it was."""
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class DrivableArea:
+    """The area that the robot can be in: its map, or else the bounds of the world; unlimited without either."""
+
+    bounds: tuple[float, float, float, float] | None = None
+    grid: OccupancyGrid | None = None
+
+    def outside(self, pose: Pose2) -> str | None:
+        """Return what a pose is outside of, as words after "is"; None for a pose inside."""
+        if self.grid is not None and not self.grid.inside(self.grid.cell_of(np.array([[pose.x, pose.y]])))[0]:
+            rows, columns = self.grid.shape
+            size = f"{columns * self.grid.resolution:g} m x {rows * self.grid.resolution:g} m"
+            return f"outside the map ({size} from ({self.grid.origin.x:g}, {self.grid.origin.y:g}))"
+        if self.bounds is None:
+            return None
+        left, bottom, right, top = self.bounds
+        if left <= pose.x <= right and bottom <= pose.y <= top:
+            return None
+        return f"outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
+
+
+def drivable_area(loaded: LoadedScenario, world: World) -> DrivableArea:
+    """Return the area of the map that the robot gets; for a world without a map, the bounds of the world.
+
+    With `map: none` it is unlimited: goals may lie beyond all obstacles.
+    """
+    if loaded.map == "none":
+        return DrivableArea()
+    grid = world.grid if loaded.map is None else load_map(loaded.map)
+    return DrivableArea(world.bounds if grid is None else None, grid)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scenario of one robot, its world, and the size of the robot."""
+
+    loaded: LoadedScenario
+    world: World
+    size: RobotSize
+    cache: WorldCache = field(default_factory=WorldCache, repr=False)
+    _results: dict[Callable[..., Any], Any] = field(default_factory=dict, repr=False, compare=False)
+
+    def once(self, compute: "Callable[[Scene], T]") -> T:
+        """Return `compute(self)`, computed once: checks share results this way."""
+        if compute not in self._results:
+            self._results[compute] = compute(self)
+        result: T = self._results[compute]
+        return result
+
+    @property
+    def tree(self) -> MappingNode:
+        """The tree of the scenario."""
+        return self.loaded.tree
+
+    @property
+    def z_range(self) -> tuple[float, float]:
+        """Heights in m between which something blocks the robot."""
+        return SILL_M, max(2 * SILL_M, self.size.height)
+
+    @cached_property
+    def start(self) -> Pose2:
+        """The true start pose of the robot."""
+        return self.loaded.spec.only_robot.pose.pose
+
+    @property
+    def start_poses(self) -> list[Pose2]:
+        """The start pose, and the poses to which events kidnap the robot."""
+        return [self.start, *(action.pose.pose for _, _, action in self.actions if isinstance(action, Kidnap))]
+
+    @cached_property
+    def area(self) -> DrivableArea:
+        """The area that the robot can be in."""
+        return drivable_area(self.loaded, self.world)
+
+    @cached_property
+    def bodies(self) -> tuple[Solid, ...]:
+        """All bodies that can move, at their initial poses."""
+        return tuple(_at_initial_pose(self.world.bodies))
+
+    @cached_property
+    def unmoved_bodies(self) -> tuple[Solid, ...]:
+        """Bodies that have no motion of their own, and that no event opens, moves or removes."""
+        return tuple(_at_initial_pose(b for b in self.world.bodies if b.path is None and b.name not in self._moved))
+
+    @cached_property
+    def immovable_bodies(self) -> tuple[Solid, ...]:
+        """Unmoved bodies that the robot cannot push either."""
+        return tuple(
+            _at_initial_pose(
+                b for b in self.world.bodies if b.mass == 0 and b.path is None and b.name not in self._moved
+            )
+        )
+
+    @cached_property
+    def _moved(self) -> set[str]:
+        if self.does():
+            return {body.name for body in self.world.bodies}
+        return {getattr(action, "name", "") for _, kind, action in self.actions if kind in MOVING_ACTIONS}
+
+    @cached_property
+    def certain_walls(self) -> tuple[Solid, ...]:
+        """The fixed solids that surely block a robot: upright ones, and the walls made from a map.
+
+        A mesh or a tilted box may be a ramp.
+        """
+        mapped = self.world.grid is not None
+        return tuple(s for s in self.world.solids if upright_prism(s) is not None or (mapped and s.name == "map"))
+
+    @cached_property
+    def targets(self) -> list[tuple[Keys, Goal]]:
+        """The goals that the robot is expected to reach, also those sent by events, with the keys of their poses."""
+        spec = self.loaded.spec
+        first = scenario_goals(spec)[: len(spec.goals)]  # further loops lead to the same poses
+        own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first)}
+        every = {**own, **event_goals(spec, self.loaded.concerns)}
+        return [((*keys, "pose"), goal) for keys, goal in every.items() if not expects_failure(spec, goal.name)]
+
+    @cached_property
+    def actions(self) -> list[tuple[Keys, str, BaseModel]]:
+        """Keys, kind and specification of every action of every event."""
+        placed = [found for step in self.loaded.spec.steps for found in step.located_actions()]
+        mine = [(keys, action) for keys, action in placed if self.loaded.concerns(action.robot)]
+        return [((*keys, action.kind), action.kind, action.chosen) for keys, action in mine]
+
+    def does(self, *kinds: str) -> bool:
+        """Return whether an event does, or may do, one of these actions; without kinds: may do anything."""
+        return any(action.may(*kinds) for step in self.loaded.spec.steps for action in step.actions)
+
+    def footprint_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
+        """Return how the footprint of the robot conflicts with a solid, as words after "is"; None if it is free."""
+        if solid := first_solid_in_disc(solids, (pose.x, pose.y), TOUCH_M, self.z_range):
+            return f'inside obstacle "{solid}"'
+        if solid := self.circle_conflict(pose, solids):
+            radius = "radius" if self.size.radius is not None else "inscribed radius"
+            return f'closer to obstacle "{solid}" than the robot\'s {radius} of {self.size.inscribed:.2f} m'
+        if self.size.radius is None and (solid := first_solid_in_footprint(solids, self.outline, pose, self.z_range)):
+            return f'so close to obstacle "{solid}" that the robot\'s footprint overlaps it at this heading'
+        return None
+
+    def circle_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
+        """Return the solid that the inscribed circle of the robot overlaps, at any heading."""
+        return first_solid_in_disc(solids, (pose.x, pose.y), self.size.inscribed, self.z_range)
+
+    @property
+    def outline(self) -> Polygon:
+        """The footprint in the base frame of the robot."""
+        return self.size.footprint
+
+
+def _at_initial_pose(bodies: Iterable[Body]) -> Iterator[Solid]:
+    for body in bodies:
+        for solid in body.solids:
+            yield Solid(solid.shape, body.pose.compose(solid.pose), body.name)
+
+
+WORLD: Stage[Scene] = Stage("world")
+TIMING: Stage[Scene] = Stage("timing")
+"""Checks of time bounds, which need routes to all goals: they run only if all other checks pass."""
+
+
+START_FAILURES = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
+
+
+def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
+    """Return whether the scenario passes if the robot fails at this goal.
+
+    The scenario says so with `expect` at the goal, with the result or the error code of the whole navigation, or with
+    the error code of this goal.
+    """
+    through = spec.navigation.mode == "navigate_through_poses"
+    entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
+    if any(matches_goal_name(goal, name) and expected_failure_name(entry.expect) for name, entry in entries):
+        return True
+    results = [entry.chosen for entry in spec.pass_ if entry.severity == "fail"]
+    failing = any(isinstance(result, Result) and result.status == "FAILED" for result in results)
+    return failing or any(code != ErrorCode.NONE and of in (None, goal) for code, of in _codes(spec))
+
+
+def expects_start_failure(spec: ScenarioSpec) -> bool:
+    """Return whether the scenario passes if the robot cannot start."""
+    return any(code in START_FAILURES for code, _ in _codes(spec))
+
+
+def _codes(spec: ScenarioSpec) -> Iterator[tuple[ErrorCode, str | None]]:
+    """Return each error code that a criterion asks for, and its goal; None: the whole navigation."""
+    for entry in spec.pass_:
+        if entry.severity != "fail":
+            continue
+        match entry.chosen:
+            case ErrorCodeIs(code=code, goal=goal):
+                yield code, goal
+            case Result(error_code=ErrorCode() as code):
+                yield code, None
+            case _:
+                pass

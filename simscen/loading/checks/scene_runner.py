@@ -1,0 +1,133 @@
+"""Run the checks that need the built world: is the start free, can every goal be reached in time?
+
+They need no physics engine.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from simscen.core.environment.world_model import World
+from simscen.core.errors import Problem, UsageError
+from simscen.core.files import require_regular_file
+from simscen.loading.builders import load_robot
+from simscen.loading.checks import masks, placement, reachability, regions, timing
+from simscen.loading.checks.built_world import check_built_world
+from simscen.loading.checks.runner import check_scenario
+from simscen.loading.checks.scene import TIMING, WORLD, Scene
+from simscen.loading.loaded import LoadedScenario, LoadedWorld
+from simscen.loading.robot_size import blocking_world, robot_size
+from simscen.loading.world_cache import WorldCache
+from simscen.worlds.geometry.overlaps import place_polygon
+from simscen.worlds.maps.map_size import map_size_error
+
+MODULES = (masks, placement, reachability, regions, timing)
+"""Modules that register checks when they are imported."""
+
+
+def check_in_world(
+    loaded: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None
+) -> list[Problem]:
+    """Return the problems of a scenario in its world; some are warnings.
+
+    `cache` keeps worlds for further scenarios. With `pictures`, a picture of each scenario with problems is written
+    to that folder. Raises InvalidInput for unusable files, and UsageError for a picture that cannot be written.
+    """
+    cache = cache or WorldCache()
+    if not loaded.robots:
+        return _check_robot(loaded, cache, pictures)
+    found = [problem for view in loaded.robots.values() for problem in _check_robot(view, cache, pictures)]
+    problems = list(dict.fromkeys(found))  # the robots share most problems
+    if not _has_errors(problems):
+        world, views = cache.world(loaded), [_with_robot_spec(view) for view in loaded.robots.values()]
+        problems += placement.check_robots_apart([Scene(view, world, robot_size(view), cache) for view in views])
+    return problems
+
+
+def _check_robot(loaded: LoadedScenario, cache: WorldCache, pictures: Path | None) -> list[Problem]:
+    """Return the problems of a scenario of one robot, or as one of several robots sees it."""
+    world = cache.world(loaded)
+    loaded = _with_robot_spec(loaded)
+    blocking = blocking_world(loaded, world)
+    problems = [*_check_names_again(loaded, world), *_too_large(loaded, world)]
+    problems += [loaded.sourced(problem) for problem in check_built_world(blocking, loaded.world)]
+    problems += _robot_file_mismatches(loaded)
+    if not _has_errors(problems):
+        problems += _check_scene(Scene(loaded, blocking, robot_size(loaded), cache), pictures)
+    return [*problems, *world_reader_notes(world, loaded.world, loaded.root)]
+
+
+def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
+    problems = WORLD.problems(scene)
+    if not _has_errors(problems):
+        problems += TIMING.problems(scene)
+    problems = [scene.loaded.sourced(problem) for problem in sorted(problems)]
+    if problems and pictures is not None:
+        gaps = [gap.position for _, gap in scene.once(reachability.closed_gaps)]
+        file = draw_picture(scene, gaps, pictures)
+        problems = [replace(problem, hint=f"{problem.hint}; picture: {file}".lstrip("; ")) for problem in problems]
+    return problems
+
+
+def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path) -> Path:
+    """Draw the world, the robot at its start and its goals, and gaps that are too narrow; return the image file.
+
+    Raises UsageError if it cannot be written.
+    """
+    from simscen.worlds.built_world import build_world_and_map
+    from simscen.worlds.maps.world_picture import draw_world
+
+    low, high = scene.z_range
+    height = (low + high) / 2
+    poses = [scene.start, *(goal.pose for _, goal in scene.targets)]
+    image = draw_world(
+        build_world_and_map(scene.world, height), height, [place_polygon(scene.outline, pose) for pose in poses], gaps
+    )
+    file = folder / f"{scene.loaded.title}.png"
+    try:
+        require_regular_file(file)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        image.save(file)
+    except OSError as error:
+        raise UsageError(f"cannot write the picture {file}: {error.strerror}") from error
+    return file
+
+
+def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Problem]:
+    """Return the notes of the reader of a world, as warnings about its file."""
+    shown = source.path.relative_to(root).as_posix() if source.path.is_relative_to(root) else str(source.path)
+    return [Problem(shown, 0, 0, "SC311", note.removeprefix(f"{shown}: "), severity="warning") for note in world.notes]
+
+
+def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:
+    """Check names that are only known now: those of an imported world, and the sensors of a bare URDF."""
+    is_urdf = loaded.robot.path == loaded.robot.urdf
+    if is_urdf or loaded.world.map is not None or loaded.world.sdf is not None:
+        return sorted(check_scenario(loaded, world))
+    return []
+
+
+def _too_large(loaded: LoadedScenario, world: World) -> Iterator[Problem]:
+    message = map_size_error(world.bounds) if world.grid is None else None
+    if message:
+        yield loaded.problem(("world",), "SC330", message, "is something far away from everything else?")
+
+
+def _robot_file_mismatches(loaded: LoadedScenario) -> Iterator[Problem]:
+    """Find contradictions between a robot file and its URDF."""
+    if loaded.robot.urdf is None:
+        return
+    from simscen.loading.checks.robot_geometry import dimension_warnings
+
+    yield from map(loaded.sourced, dimension_warnings(loaded.robot, load_robot(loaded)[1]))
+
+
+def _with_robot_spec(loaded: LoadedScenario) -> LoadedScenario:
+    """Return the scenario with the specification that follows from a bare URDF."""
+    if loaded.robot.spec is not None:
+        return loaded
+    return replace(loaded, robot=replace(loaded.robot, spec=load_robot(loaded)[0]))
+
+
+def _has_errors(problems: Iterable[Problem]) -> bool:
+    return any(problem.severity == "error" for problem in problems)

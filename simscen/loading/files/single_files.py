@@ -1,0 +1,102 @@
+"""Load a robot file or a world file by itself, and write worlds as `*.world.yaml`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from simscen.core.errors import InvalidInput, Problem
+from simscen.loading.files.assets import Assets, shipped_robots
+from simscen.loading.files.paths import PathSandbox
+from simscen.loading.loaded import LoadedRobot, LoadedWorld
+from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.yaml.library import Library
+from simscen.loading.yaml.scalars import Dumper, to_yaml
+from simscen.model.world import WorldSpec
+
+
+@dataclass(frozen=True)
+class RobotFile:
+    """Robot and the reader of its files."""
+
+    robot: LoadedRobot
+    library: Library
+
+    @property
+    def roots(self) -> tuple[Path, ...]:
+        """The root and the folders of `--world-path`."""
+        return (self.library.fence.root, *self.library.fence.world_path)
+
+
+def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -> RobotFile:
+    """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file, or one that ships with simscen, by name.
+
+    Raises InvalidInput with all problems.
+    """
+    shipped = shipped_robots()
+    library = Library(PathSandbox.around(root, world_path))
+    bundled = written in shipped and not Path(written).exists()
+    path = shipped[written] if bundled else library.fence.entered(Path(written))
+    if isinstance(path, Problem):
+        raise InvalidInput([path])
+    if not path.is_file():
+        message = "not a regular file" if path.exists() else f"no such file or shipped robot: {quoted(written)}"
+        raise InvalidInput([Problem(written, 0, 0, "SC001", message, suggestion(written, shipped))])
+    assets = Assets(library)
+    robot = assets.robot_file(path, bundled)
+    if robot is None or assets.problems:
+        raise InvalidInput(library.with_source(sorted(assets.problems)))
+    return RobotFile(robot, library)
+
+
+def load_world_file(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedWorld:
+    """Load the world in a `*.world.yaml`, a ROS map or an SDF file. Raises InvalidInput with all problems."""
+    library = Library(PathSandbox.around(root, world_path))
+    file = library.fence.entered(path)
+    if isinstance(file, Problem):
+        raise InvalidInput([file])
+    if not file.exists():
+        raise InvalidInput([Problem(str(path), 0, 0, "SC001", "no such file or directory")])
+    if file.is_dir():
+        raise InvalidInput([Problem(str(path), 0, 0, "SC001", "not a regular file")])
+    assets = Assets(library)
+    world = assets.world_file(file)
+    if world is None or assets.problems:
+        raise InvalidInput(library.with_source(sorted(assets.problems)))
+    return world
+
+
+def world_text(spec: WorldSpec) -> str:
+    """Return a world as the text of a `*.world.yaml`, without default values."""
+    data = spec.model_dump(mode="json", exclude_defaults=True)
+    return to_yaml(_in_order(data), _Compact)
+
+
+def _in_order(value: Any) -> Any:
+    """Return data with the version and names first."""
+    if isinstance(value, list):
+        return [_in_order(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    first = [key for key in ("simscen", "name") if key in value]
+    return {key: _in_order(value[key]) for key in dict.fromkeys((*first, *value))}
+
+
+class _Compact(Dumper):
+    """YAML writer that puts each item of a list on one line."""
+
+
+def _list(dumper: yaml.SafeDumper, value: list[Any]) -> yaml.Node:
+    flat = not any(isinstance(item, dict) for item in value)
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", value, flow_style=flat)
+
+
+def _mapping(dumper: yaml.SafeDumper, value: dict[str, Any]) -> yaml.Node:
+    flat = any(not isinstance(item, dict | list) for item in value.values()) and "simscen" not in value
+    return dumper.represent_mapping("tag:yaml.org,2002:map", value, flow_style=flat)
+
+
+_Compact.add_representer(list, _list)
+_Compact.add_representer(dict, _mapping)

@@ -1,0 +1,91 @@
+"""Size of a robot, and the parts of a world that block it."""
+
+import math
+from dataclasses import dataclass, replace
+
+from simscen.core.environment.world_model import Polygon, World
+from simscen.core.geometry.polygons import distance_to_segment
+from simscen.core.geometry.shapes import Solid
+from simscen.loading.builders import load_robot
+from simscen.loading.loaded import LoadedScenario
+from simscen.model.robot import RobotSpec
+from simscen.sim.body.robot_body import RobotBody, check_ground_clearance
+from simscen.worlds.geometry.prisms import is_surely_flat
+
+CIRCLE_CORNERS = 24
+"""Corners of the polygon that approximates a round footprint."""
+
+
+@dataclass(frozen=True)
+class RobotSize:
+    """Size of a robot: `footprint` (base frame, m), `radius` of a round one (m), and `height` of the hull (m)."""
+
+    footprint: Polygon
+    radius: float | None
+    height: float
+
+    @property
+    def inscribed(self) -> float:
+        """The inscribed radius in m."""
+        return inscribed_radius(self.radius, self.footprint)
+
+
+def inscribed_radius(radius: float | None, footprint: Polygon) -> float:
+    """Return the radius in m of the largest circle around the base's origin inside the footprint."""
+    if radius is not None:
+        return radius
+    ends = (*footprint[1:], footprint[0])
+    return min(distance_to_segment(0.0, 0.0, a, b) for a, b in zip(footprint, ends, strict=True))
+
+
+def robot_size(loaded: LoadedScenario) -> RobotSize:
+    """Return the size of a scenario's robot. Raises InvalidInput for an unusable robot.
+
+    A robot of simple shapes with a footprint or radius in its file need not be built for this.
+    """
+    spec = loaded.robot.spec
+    if spec is not None and spec.body is not None and (spec.radius is not None or spec.footprint is not None):
+        check_ground_clearance(spec, loaded.robot.path)
+        corners = tuple((x, y) for x, y in spec.footprint) if spec.footprint is not None else _round(spec.radius or 0.0)
+        return RobotSize(corners, spec.radius, _height_of_shapes(spec))
+    body = load_robot(loaded)[1]
+    return RobotSize(body.footprint, body.radius, _height_of_hull(body))
+
+
+def _round(radius: float) -> Polygon:
+    turns = [2 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
+    return tuple((radius * math.cos(turn), radius * math.sin(turn)) for turn in turns)
+
+
+def _height_of_shapes(spec: RobotSpec) -> float:
+    return max(part.z + part.tall for part in spec.body or ())
+
+
+def _height_of_hull(body: RobotBody) -> float:
+    from simscen.sim.body.outline import hull_points
+
+    return max(float(solid.pose.apply(hull_points(solid.shape))[:, 2].max()) for solid in body.hull)
+
+
+def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, ...]:
+    """Return the solids that block a robot: all except the ramps that it can climb."""
+    reach = max((wheel.radius for wheel in body.wheels), default=0.0)
+    if is_surely_flat(solids, reach):
+        return solids
+    from simscen.sim.body.climb import compute_climb_limits
+    from simscen.worlds.geometry.drive_obstacles import drive_obstacles
+
+    return drive_obstacles(solids, reach, *compute_climb_limits(body))
+
+
+def blocking_world(loaded: LoadedScenario, world: World) -> World:
+    """Return the world with only the solids that block the scenario's robot.
+
+    The robot is built only if the world is not flat. Raises InvalidInput for an unusable robot.
+    """
+    spec = loaded.robot.spec
+    radius = None if spec is None else getattr(spec.drive, "wheel_radius", 0.0)
+    if radius is not None and is_surely_flat(world.solids, 2 * radius):
+        return world
+    solids = blocking_solids(world.solids, load_robot(loaded)[1])
+    return world if solids is world.solids else replace(world, solids=solids)

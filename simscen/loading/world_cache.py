@@ -1,0 +1,76 @@
+"""Cache of the worlds that one command uses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from simscen.core.environment.world_model import World
+from simscen.core.files import collect_read_files, record_read_file
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.shapes import Solid
+from simscen.loading.builders import load_world
+from simscen.loading.loaded import LoadedScenario, LoadedWorld
+from simscen.worlds.routes.simple_paths import SimplePaths, simple_paths_between
+
+if TYPE_CHECKING:
+    from simscen.worlds.routes.shortest_paths import ShortestPaths
+
+Bounds = tuple[float, float, float, float]
+
+
+@dataclass
+class WorldCache:
+    """Caches worlds by the content of their files, and the shortest paths of discs in them."""
+
+    _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
+    _plain: list[tuple[tuple[Solid, ...], float, tuple[float, float], SimplePaths | None]] = field(default_factory=list)
+    _ways: list[tuple[tuple[Solid, ...], Bounds, float, tuple[float, float], ShortestPaths]] = field(
+        default_factory=list
+    )
+
+    def world(self, loaded: LoadedScenario) -> World:
+        """Return the world of a scenario and record its files as read. Raises InvalidInput."""
+        known = next((entry for entry in self._worlds if entry[0] == loaded.world), None)
+        if known is None:
+            with collect_read_files() as read:
+                world = load_world(loaded)
+            known = loaded.world, world, read
+            self._worlds.append(known)
+        for file in sorted(known[2]):
+            record_read_file(file)
+        return known[1]
+
+    def plain_ways(self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]) -> SimplePaths | None:
+        """Return the paths of a disc between simple solids without numpy; None if a solid is not simple."""
+        for known in self._plain:
+            if known[0] is solids and known[1:3] == (radius, z_range):
+                return known[3]
+        ways = simple_paths_between(solids, radius, z_range)
+        self._plain = [*self._plain[-7:], (solids, radius, z_range, ways)]
+        return ways
+
+    def ways(
+        self, solids: tuple[Solid, ...], bounds: Bounds, radius: float, z_range: tuple[float, float]
+    ) -> ShortestPaths:
+        """Return the shortest paths of a disc between solids."""
+        for known in self._ways:
+            if known[0] is solids and known[1:4] == (bounds, radius, z_range):
+                return known[4]
+        from simscen.worlds.geometry.triangulation import merge_solids
+        from simscen.worlds.routes.shortest_paths import ShortestPaths
+
+        ways = ShortestPaths(merge_solids(solids), bounds, radius, z_range)
+        self._ways = [
+            *self._ways[-3:],
+            (solids, bounds, radius, z_range, ways),
+        ]  # large objects: keep only the last four
+        return ways
+
+
+def bounds_with(bounds: Bounds, places: list[Pose2]) -> Bounds:
+    """Return the bounds, enlarged to contain the places."""
+    left, low, right, high = bounds
+    xs, ys = [place.x for place in places], [place.y for place in places]
+    return min([left, *xs]), min([low, *ys]), max([right, *xs]), max([high, *ys])

@@ -1,1 +1,0 @@
-"""Caches of worlds and prepared scenarios, in memory and on disk."""

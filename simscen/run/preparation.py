@@ -1,0 +1,241 @@
+"""Prepare a scenario: build everything that all of its runs share, such as world, map, goals, and shortest paths.
+
+The result holds only plain data and numpy arrays, so that the fork server can build it once for all workers.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import BuiltWorld
+from simscen.core.errors import Problem
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.shapes import TriangleMesh
+from simscen.core.messages.navigation import Estimate, Goal
+from simscen.core.records.case import CLEARANCE_RANGE, Case
+from simscen.criteria.base import Criterion
+from simscen.loading.builders import (
+    load_criterion_masks,
+    load_map,
+    load_masks,
+    load_robot,
+    load_world,
+    robot_from_file,
+    world_from_file,
+)
+from simscen.loading.files.criteriafile import LoadedCriteria
+from simscen.loading.goals import event_goals, expected_failures, scenario_goals
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.plugins import plugins_of
+from simscen.loading.robot_size import blocking_solids, inscribed_radius
+from simscen.loading.scenario_text import disturbances_of
+from simscen.model.localizers import OdometryOnly
+from simscen.model.robot import RobotSpec
+from simscen.model.scenario import ScenarioSpec, initial_estimate
+from simscen.model.stack import StackSpec
+from simscen.model.stack_files import AnyStack
+from simscen.model.world import WorldSpec
+from simscen.sim.body.robot_body import RobotBody
+from simscen.sim.single_robot import ROBOT_NAME
+from simscen.spec.registry import Entry
+from simscen.triggers.robot_state import ClearanceBelow
+from simscen.worlds.built_world import build_world_and_map
+from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.routes.shortest_paths import Leg, legs_between
+from simscen.worlds.world_file import world_from_spec
+
+DEFAULT_LIDAR_HEIGHT = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedScenario:
+    """A scenario with its world, map, and robots built: everything about a run except the seed.
+
+    With several robots, `robots` holds a PreparedScenario for each by name, and the fields about a robot are those of
+    the first.
+    """
+
+    loaded: LoadedScenario
+    built: BuiltWorld
+    map: OccupancyGrid | None
+    masks: FilterMasks
+    robot: RobotSpec
+    body: RobotBody
+    stack: AnyStack
+    start: Pose2
+    estimate: Estimate
+    case: Case
+    obstacles: TriangleMesh
+    """The part of the world's mesh that blocks the robot."""
+    mapped: tuple[int, ...] = ()
+    """The indices of the faults that changed the map."""
+    plugins: tuple[Entry, ...] = ()
+    """The plug-ins that the scenario uses."""
+    robots: Mapping[str, "PreparedScenario"] = field(default_factory=dict)
+
+    @property
+    def each(self) -> Mapping[str, "PreparedScenario"]:
+        """The prepared scenario of each robot by name; a single robot has no name."""
+        return self.robots or {ROBOT_NAME: self}
+
+    @property
+    def spec(self) -> ScenarioSpec:
+        """The specification of the scenario."""
+        return self.loaded.spec
+
+
+BuildWorld = Callable[[LoadedScenario, float], BuiltWorld]
+"""Returns the built world of a scenario, mapped by a lidar at a height in m."""
+
+
+FindLegs = Callable[[BuiltWorld, Sequence[tuple[Pose2, Goal]], float], list[Leg]]
+"""Returns the shortest path of a disc with a radius from each pose to its goal."""
+
+
+def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
+    """Build the world of a scenario without a cache."""
+    return build_world_and_map(load_world(loaded), height)
+
+
+def prepare(
+    loaded: LoadedScenario, world_of: BuildWorld = build_world, legs: FindLegs = legs_between
+) -> PreparedScenario:
+    """Build what the runs of this scenario share. Raises InvalidInput for unusable files."""
+    if not loaded.robots:
+        return _prepared(loaded, world_of, legs)
+    parts: dict[str, PreparedScenario] = {}
+    heights: dict[float, BuiltWorld] = {}
+
+    def known(view: LoadedScenario, height: float) -> BuiltWorld:
+        if height not in heights:
+            heights[height] = world_of(view, height)
+        return heights[height]
+
+    for name, view in loaded.robots.items():
+        parts[name] = _prepared(view, known, legs)
+    reach = max(part.case.clearance_range for part in parts.values())
+    parts = {name: replace(part, case=replace(part.case, clearance_range=reach)) for name, part in parts.items()}
+    return replace(next(iter(parts.values())), loaded=loaded, robots=parts, plugins=plugins_of(loaded))
+
+
+def _prepared(loaded: LoadedScenario, world_of: BuildWorld, legs: FindLegs) -> PreparedScenario:
+    """Prepare the scenario of one robot."""
+    spec = loaded.spec
+    robot, body = load_robot(loaded)
+    built = world_of(loaded, lidar_height(robot))
+    world = built.world
+    standing = blocking_solids(world.solids, body)
+    obstacles = built.mesh if standing is world.solids else merge_solids(standing)
+    start = spec.only_robot.pose.pose
+    goals = scenario_goals(spec)
+    case = Case(
+        start=start,
+        goals=goals,
+        expected=expected_failures(spec, goals),
+        sent=tuple(event_goals(spec, loaded.concerns).values()),
+        regions=world.regions,
+        footprint=body.footprint,
+        inscribed_radius=inscribed_radius(body.radius, body.footprint),
+        time_limit=spec.time_limit,
+        clearance_range=_clearance_range(spec),
+        disturbances=disturbances_of(loaded),
+        masks=load_criterion_masks(loaded.judged_masks, loaded.tree, loaded.sourced),
+    )
+    return PreparedScenario(
+        loaded=loaded,
+        built=built,
+        map=_robot_map(loaded, built),
+        masks=load_masks(loaded),
+        robot=robot,
+        body=body,
+        stack=effective_stack(spec),
+        start=start,
+        estimate=initial_estimate(spec.only_robot, start),
+        case=with_shortest_paths(case, built, obstacles, legs),
+        obstacles=obstacles,
+        plugins=plugins_of(loaded),
+    )
+
+
+def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, find_legs: FindLegs) -> Case:
+    """Return the case with the shortest paths to its goals and the passages along them.
+
+    If the robot is expected to fail at a goal, the path to the next goal starts where the path to this one did.
+    """
+    ends, at = [], case.start
+    for goal in case.goals:
+        ends.append((at, goal))
+        at = at if goal.name in case.expected else goal.pose
+    legs = find_legs(replace(built, mesh=obstacles), ends, case.inscribed_radius)
+    return replace(
+        case,
+        shortest={goal.name: leg.length for goal, leg in zip(case.goals, legs, strict=True)},
+        passages=tuple(passage for leg in legs for passage in leg.passages),
+    )
+
+
+def _clearance_range(spec: ScenarioSpec) -> float:
+    """Return the largest clearance range in m that a criterion or trigger needs."""
+    asked = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
+    near = (test.clearance_below for trigger in spec.triggers for test in trigger.parts())
+    asked += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]
+    return max([CLEARANCE_RANGE, *asked])
+
+
+def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | None:
+    if loaded.map == "none":
+        return None
+    return load_map(loaded.map) if loaded.map is not None else built.map
+
+
+def lidar_height(robot: RobotSpec) -> float:
+    """Return the height in m at which the world is mapped: that of the first lidar."""
+    heights = [sensor.lidar.mount.z for sensor in robot.sensors.values() if sensor.lidar]
+    return heights[0] if heights else DEFAULT_LIDAR_HEIGHT
+
+
+def effective_stack(spec: ScenarioSpec) -> AnyStack:
+    """Return the stack of a scenario; without a map, the default localizer is dead reckoning instead of AMCL."""
+    stack = spec.stack
+    if not isinstance(stack, StackSpec):
+        return stack
+    unwritten = "localizer" not in stack.model_fields_set
+    if spec.map == "none" and unwritten and stack.localizer.needs_map:
+        return stack.model_copy(update={"localizer": OdometryOnly(type="odometry")})
+    return stack
+
+
+def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
+    """Return the case of a criteria file; without a robot it has no footprint. Raises InvalidInput."""
+    loaded_world, loaded_robot = criteria.surroundings()
+    root = criteria.library.fence.root
+    world = (
+        world_from_spec(WorldSpec(simscen=1), "")
+        if loaded_world is None
+        else world_from_file(loaded_world, root, world_path)
+    )
+    body = (
+        None if loaded_robot is None else robot_from_file(loaded_robot, (root, *criteria.library.fence.world_path))[1]
+    )
+    goals = scenario_goals(criteria.spec)
+    return Case(
+        start=Pose2(0.0, 0.0, 0.0),
+        goals=goals,
+        expected=expected_failures(criteria.spec, goals),
+        regions=world.regions,
+        footprint=() if body is None else body.footprint,
+        inscribed_radius=0.0 if body is None else inscribed_radius(body.radius, body.footprint),
+        time_limit=criteria.spec.time_limit,
+        masks=masks_from_criteria(criteria),
+    )
+
+
+def masks_from_criteria(criteria: LoadedCriteria) -> dict[str, MaskBlocks]:
+    """Load the filter masks of the file's criteria. Raises InvalidInput."""
+
+    def sourced(problem: Problem) -> Problem:
+        return criteria.library.with_source([problem])[0]
+
+    return load_criterion_masks(criteria.masks, criteria.tree, sourced)

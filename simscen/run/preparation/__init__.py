@@ -1,1 +1,0 @@
-"""Everything that the runs of a scenario share: world, map, robot, goals, and shortest paths."""

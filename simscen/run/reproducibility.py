@@ -1,0 +1,239 @@
+"""Digest of everything that the result of a run depends on: files, software, plug-ins, and processor features."""
+
+import hashlib
+import importlib
+import importlib.util
+import json
+import math
+import platform
+from collections.abc import Iterable, Iterator
+from functools import cache, lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from simscen.core.geometry import Array
+from simscen.core.version import PACKAGE
+from simscen.loading.loaded import LoadedMap, LoadedScenario
+from simscen.loading.plugins import plugins_of
+from simscen.loading.yaml.library import DEFAULTS_FILE
+from simscen.spec.registry import Entry
+
+PACKAGES = (
+    *("simscen", "pybullet", "ompl", "filterpy", "numpy", "scipy", "embreex", "trimesh", "mapbox-earcut", "pycollada"),
+    *("pillow", "mcap", "zstandard", "pydantic", "pyyaml"),
+)
+"""Packages that affect results or the bytes of a log."""
+_LAST_BITS = frozenset({"fma", "avx", "avx2", "avx512f", "sse4_2"})
+"""Instruction sets that affect the last bits of a result."""
+
+
+def software_versions() -> dict[str, str]:
+    """Return the versions of Python and all packages that affect results; "" for a missing package."""
+    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
+
+
+def cpu_flags() -> list[str]:
+    """Return the relevant instruction sets of this machine; empty if /proc/cpuinfo cannot be read."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []
+    flags = next((line.split(":", 1)[1].split() for line in lines if line.startswith("flags")), [])
+    return sorted(_LAST_BITS.intersection(flags))
+
+
+@cache
+def arithmetic_fingerprints() -> dict[str, str]:
+    """Return fingerprints of results of OpenBLAS, the C math library and NumPy; equal ones mean equal last bits.
+
+    These libraries choose instructions at run time, so the processor flags alone are not sufficient.
+    """
+    import numpy as np
+
+    numbers = [(0.37 + 1.618 * k) * 1.7 ** (k % 23) for k in range(400)]
+    functions = (math.sin, math.cos, math.tan, math.atan, math.sqrt, lambda x: math.exp(-x / 1e5), math.log)
+    libm = [function(number) for function in functions for number in numbers]
+    array = np.array(numbers)
+    told = [np.sin(array), np.exp(-array / 1e5), np.arctan2(array, array[::-1]), np.outer(array, array) @ array]
+    square = np.sin(np.arange(8100.0)).reshape(90, 90) + 90 * np.eye(90)
+    blas = [function(square[:k, :k]) for k in (3, 16, 90) for function in (_squared, np.linalg.inv, np.linalg.cholesky)]
+    return {
+        "blas": hashlib.sha256(b"".join(part.tobytes() for part in blas)).hexdigest()[:16],
+        "libm": hashlib.sha256(repr(libm).encode()).hexdigest()[:16],
+        "numpy": hashlib.sha256(b"".join(part.tobytes() for part in told)).hexdigest()[:16],
+        "numpy_dispatch": " ".join(sorted(name for name, used in _numpy_features().items() if used)),
+    }
+
+
+def _squared(matrix: Array) -> Array:
+    product: Array = matrix @ matrix.T
+    return product
+
+
+def _numpy_features() -> dict[str, bool]:
+    import numpy as np
+
+    core = "numpy._core" if np.lib.NumpyVersion(np.__version__) >= "2.0.0" else "numpy.core"
+    return dict(importlib.import_module(f"{core}._multiarray_umath").__cpu_features__)
+
+
+@cache
+def source_digest(*parts: str) -> str:
+    """Return the SHA-256 of simscen's source files, because a working copy changes without a new version.
+
+    If `parts` are given, only these subpackages and modules (`name.py`) count.
+    """
+    sha, folder = hashlib.sha256(), PACKAGE
+    roots = [folder / part for part in parts or (".",)]
+    files = [path for root in roots for path in ([root] if root.is_file() else root.rglob("*"))]
+    for file in sorted(path for path in files if path.suffix in (".py", ".yaml", ".json")):
+        sha.update(f"{file.relative_to(folder).as_posix()}\0".encode() + file.read_bytes())
+    return sha.hexdigest()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+def plugin_packages(plugins: Iterable[Entry]) -> dict[str, dict[str, object]]:
+    """Return version and used entry points by package, for run.json."""
+    found: dict[str, dict[str, object]] = {}
+    for entry in plugins:
+        package = found.setdefault(entry.distribution, {"version": entry.version, "used": []})
+        used = package["used"]
+        assert isinstance(used, list)
+        used.append(f"{entry.group} {entry.name}")
+    return found
+
+
+def plugin_fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
+    """Return version, class, and digest of all files by plug-in."""
+    return {
+        f"{entry.group} {entry.name}": [entry.distribution, entry.version, entry.value, _files_digest(entry.value)]
+        for entry in plugins
+    }
+
+
+def _files_digest(value: str) -> str:
+    """Return the SHA-256 of the top-level package that contains the class, or of its module."""
+    stats = ((name, file, file.stat()) for name, file in _files(value))
+    return _digest_of_files(tuple((name, file, stat.st_mtime_ns, stat.st_size) for name, file, stat in stats))
+
+
+@lru_cache(maxsize=64)
+def _digest_of_files(files: tuple[tuple[str, Path, int, int], ...]) -> str:
+    """Return the SHA-256 of files; time of change and size are only there to read changed files again."""
+    sha = hashlib.sha256()
+    for name, file, _, _ in files:
+        data = file.read_bytes()
+        sha.update(f"{name}\0{len(data)}\0".encode() + data)
+    return sha.hexdigest()
+
+
+def plugin_files(plugins: Iterable[Entry]) -> list[Path]:
+    """Return the files of the top-level packages that contain the plug-ins."""
+    return [file for entry in plugins for _, file in _files(entry.value)]
+
+
+def _files(value: str) -> Iterator[tuple[str, Path]]:
+    found = importlib.util.find_spec(value.partition(":")[0])
+    if found is None or found.origin is None:
+        return
+    file = Path(found.origin)
+    folder = file.parent
+    if not (folder / "__init__.py").is_file():
+        yield file.name, file
+        return
+    while (folder.parent / "__init__.py").is_file():
+        folder = folder.parent
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            yield path.relative_to(folder).as_posix(), path
+
+
+def scenario_digest(loaded: LoadedScenario) -> str:
+    """Return the SHA-256 of all files, options, versions, and processor features that affect a run.
+
+    The files are the scenario with `extends`, `defaults.yaml`, world, map, and robot, and all files that these refer
+    to, such as map images, SDF and URDF files, meshes, heightmaps, and xacro includes. Moving a file changes the
+    digest, and so does a change of an installed package that the scenario uses. Raises OSError.
+    """
+    sha = hashlib.sha256(json.dumps(_circumstances(loaded), sort_keys=True).encode())
+    for name, text in sorted(loaded.sources.items()):
+        _take(sha, name, text.encode())
+    for file in sorted({*referenced_files(loaded), *loaded.read}):
+        _take(sha, _name(file, loaded), file.read_bytes())
+    return sha.hexdigest()
+
+
+def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
+    """Return everything besides files that affects a run. The seed is not included: it is part of the run's key."""
+    return {
+        "versions": software_versions(),
+        "code": source_digest(),
+        "machine": platform.machine(),
+        "cpu_flags": cpu_flags(),
+        "arithmetic": arithmetic_fingerprints(),
+        "lenient": loaded.lenient,
+        "plugins": plugin_fingerprints(plugins_of(loaded)),
+        **({"scenario": loaded.tree.plain} if loaded.variation else {}),
+        **_stacks(loaded),
+    }
+
+
+def _stacks(loaded: LoadedScenario) -> dict[str, object]:
+    """Return stacks that were chosen on the command line or in the user's configuration."""
+    return {
+        **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
+        **({} if loaded.runs is None else {"runs": loaded.runs.digest}),
+        **({"robots": {name: _stacks(view) for name, view in loaded.robots.items()}} if loaded.robots else {}),
+    }
+
+
+def referenced_files(loaded: LoadedScenario) -> list[Path]:
+    """Return the map images, SDF files, and URDF files of a scenario."""
+    views = list(loaded.each.values())
+    maps = [loaded.world.map, *(view.map for view in views if view.map != "none")]
+    return [
+        *(found.image for found in maps if isinstance(found, LoadedMap)),
+        *(file for file in (loaded.world.sdf, *(view.robot.urdf for view in views)) if file),
+    ]
+
+
+def _name(file: Path, loaded: LoadedScenario) -> str:
+    """Return the path relative to the root, so that moving a whole project does not change the digest."""
+    return file.relative_to(loaded.root).as_posix() if file.is_relative_to(loaded.root) else str(file)
+
+
+def _take(sha: "hashlib._Hash", name: str, data: bytes) -> None:
+    sha.update(f"{name}\0{len(data)}\0".encode())
+    sha.update(data)
+
+
+def scenario_files(loaded: LoadedScenario) -> set[Path]:
+    """Return all files that a scenario depends on, including programs of external stacks and plug-ins.
+
+    A `defaults.yaml` next to the scenario is included even if it does not exist yet.
+    """
+    choice = loaded.choice
+    programs = [part for view in loaded.each.values() if view.runs is not None for part in _program(view)]
+    return {
+        loaded.file,
+        loaded.file.with_name(DEFAULTS_FILE),
+        *loaded.files.values(),
+        *loaded.read,
+        *referenced_files(loaded),
+        *plugin_files(plugins_of(loaded)),
+        *(() if choice is None else choice.files.values()),
+        *programs,
+    }
+
+
+def _program(loaded: LoadedScenario) -> list[Path]:
+    """Return the files among the arguments of an external stack's command."""
+    assert loaded.runs is not None
+    words = [Path(loaded.runs.cwd, word) for word in loaded.runs.argv]
+    return [word for word in words if word.is_file()]

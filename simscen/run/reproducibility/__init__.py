@@ -1,1 +1,0 @@
-"""What a result depends on, and whether two runs agree."""

@@ -1,1 +1,0 @@
-"""Checks of a robot's file: its geometry, and a trial drive in an empty world."""

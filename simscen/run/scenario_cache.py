@@ -1,0 +1,156 @@
+"""Cache prepared scenarios in memory, and maps and shortest paths of worlds on disk.
+
+Maps and shortest paths take most of the time to prepare a scenario. Fusing solids and reading meshes is faster than
+looking them up, so these are not cached.
+"""
+
+import hashlib
+import pickle
+import struct
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import to_json
+
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import BuiltWorld, World
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.shapes import TriangleMesh
+from simscen.core.messages.navigation import Goal
+from simscen.loading.builders import load_world
+from simscen.loading.loaded import LoadedScenario
+from simscen.run.disk_cache import DiskCache
+from simscen.run.preparation import PreparedScenario, prepare
+from simscen.run.reproducibility import arithmetic_fingerprints, software_versions, source_digest
+from simscen.worlds.built_world import build_world_and_map
+from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.maps.map_size import MAP_RESOLUTION_M
+from simscen.worlds.maps.occupancy_map import draw_map
+from simscen.worlds.routes.shortest_paths import Leg, legs_between
+
+_LEGS = TypeAdapter(list[Leg])
+_MAP = struct.Struct("<II4d")
+_PACKAGES = ("core", "grid_graph.py", "worlds")
+"""Packages whose code affects the cached results."""
+
+
+class CachedWorldBuilder:
+    """Builds maps and shortest paths, or reads them from the disk cache. Results are identical to the last bit."""
+
+    def __init__(self, files: DiskCache) -> None:
+        self._files = files
+
+    def build(self, world: World, lidar_height: float) -> BuiltWorld:
+        """See built_world.build_world_and_map."""
+        if not self._files.on:
+            return build_world_and_map(world, lidar_height)
+        mesh = merge_solids(world.solids)
+        places = [tuple(pose) for pose in world.places.values()]
+        grid = world.grid and (world.grid.cells, world.grid.resolution, world.grid.origin)
+        key = cache_key("map", _surface(mesh), world.bounds, places, grid, lidar_height, MAP_RESOLUTION_M)
+        known = _map_of_bytes(self._files.get(key))
+        if known is None:
+            known = draw_map(world, mesh, lidar_height)
+            self._files.put(key, _map_to_bytes(known))
+        return BuiltWorld(world, mesh, known)
+
+    def legs(self, built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float) -> list[Leg]:
+        """See worlds.shortest.legs_between."""
+        if not self._files.on or not ends:
+            return legs_between(built, ends, radius)
+        told = [(start, goal.name, goal.pose) for start, goal in ends]
+        around = built.world.bounds, built.map.shape, built.map.resolution, built.map.origin
+        key = cache_key("legs", _surface(built.mesh), built.mesh.owners, built.mesh.names, around, told, radius)
+        known = _legs_of_bytes(self._files.get(key), len(ends))
+        if known is None:
+            known = legs_between(built, ends, radius)
+            self._files.put(key, to_json(known, inf_nan_mode="strings"))
+        return known
+
+
+def cache_key(*parts: object) -> str:
+    """Return the cache key of a result that depends on these numbers, strings, arrays, and sequences of them."""
+    sha = hashlib.sha256(_circumstances())
+    _take(sha, parts)
+    return sha.hexdigest()
+
+
+@cache
+def _circumstances() -> bytes:
+    """Return the versions, code, and arithmetic that affect the last bit of a result."""
+    return repr((software_versions(), source_digest(*_PACKAGES), arithmetic_fingerprints())).encode()
+
+
+def _take(sha: "hashlib._Hash", part: object) -> None:
+    if isinstance(part, np.ndarray):
+        sha.update(f"{part.dtype.str}{part.shape}".encode())
+        sha.update(np.ascontiguousarray(part).data)
+    elif isinstance(part, list | tuple):
+        sha.update(f"({len(part)}".encode())
+        for one in part:
+            _take(sha, one)
+    else:
+        sha.update(f"{part!r}\0".encode())
+
+
+def _surface(mesh: TriangleMesh) -> tuple[object, object]:
+    return mesh.vertices, mesh.faces
+
+
+def _legs_of_bytes(data: bytes | None, count: int) -> list[Leg] | None:
+    try:
+        legs = None if data is None else _LEGS.validate_json(data)
+    except ValidationError:
+        return None
+    return legs if legs is not None and len(legs) == count else None
+
+
+def _map_to_bytes(grid: OccupancyGrid) -> bytes:
+    return _MAP.pack(*grid.shape, grid.resolution, *grid.origin) + grid.cells.astype(np.int8).tobytes()
+
+
+def _map_of_bytes(data: bytes | None) -> OccupancyGrid | None:
+    if data is None or len(data) < _MAP.size:
+        return None
+    rows, columns, resolution, x, y, yaw = _MAP.unpack_from(data)
+    if not rows * columns or len(data) != _MAP.size + rows * columns:
+        return None
+    cells = np.frombuffer(data, np.int8, offset=_MAP.size).reshape(rows, columns).copy()
+    return OccupancyGrid(cells, resolution, Pose2(x, y, yaw))
+
+
+MAX_SCENARIOS = 100
+"""Number of scenarios in the cache; a file can have a thousand variations."""
+
+
+class ScenarioCache:
+    """Prepares each scenario and builds each world once. Workers inherit its content from the fork server."""
+
+    def __init__(self, kept: CachedWorldBuilder) -> None:
+        """`kept` uses the disk cache of earlier sessions."""
+        self._kept = kept
+        self._worlds: dict[str, BuiltWorld] = {}
+        self._scenarios: dict[tuple[str, str, str], PreparedScenario] = {}
+
+    def prepared(self, loaded: LoadedScenario) -> PreparedScenario:
+        """Return the prepared scenario. Raises InvalidInput."""
+        name = loaded.id, loaded.variation, loaded.stack_name
+        if name not in self._scenarios:
+            if len(self._scenarios) == MAX_SCENARIOS:
+                del self._scenarios[next(iter(self._scenarios))]
+            self._scenarios[name] = prepare(loaded, self._world, self._kept.legs)
+        return self._scenarios[name]
+
+    def clear(self) -> None:
+        """Remove all entries."""
+        self._worlds.clear()
+        self._scenarios.clear()
+
+    def _world(self, loaded: LoadedScenario, height: float) -> BuiltWorld:
+        key = hashlib.sha256(pickle.dumps((replace(loaded.world, tree=None), height))).hexdigest()
+        if key not in self._worlds:
+            self._worlds[key] = self._kept.build(load_world(loaded), height)
+        return self._worlds[key]

@@ -1,1 +1,0 @@
-"""Semantic checks of a scenario in its built world."""

@@ -1,0 +1,109 @@
+"""A world made ready: once for each world and lidar height, shared by all its runs."""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.environment.occupancy_grid import OCCUPIED, UNKNOWN
+from simscen.core.environment.world_model import BuiltWorld, World
+from simscen.core.geometry.shapes import Solid, TriangleMesh
+from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.maps.map_size import MAP_RESOLUTION_M
+from simscen.worlds.maps.occupancy_map import draw_map
+
+
+def build_world_and_map(world: World, lidar_height: float, resolution: float = MAP_RESOLUTION_M) -> BuiltWorld:
+    """Fuse the static solids and draw the map a robot with a lidar at `lidar_height` meters would have.
+
+    Numpy arrays only, so that the result can be made before forking and shared by every run. Takes some 10 ms for
+    a house of 20 x 20 m, 0.1 s for thousands of solids. Raises InvalidInput for a map beyond 16 million cells.
+    """
+    mesh = merge_solids(world.solids)
+    return BuiltWorld(world, mesh, draw_map(world, mesh, lidar_height, resolution))
+
+
+Extent = tuple[float, float, float, float, float, float]
+"""(min x, min y, min z, max x, max y, max z) in m."""
+
+
+@dataclass(frozen=True)
+class WorldItem:
+    """Solid or body; `extent` is in the world frame."""
+
+    name: str
+    shape: str
+    triangles: int
+    extent: Extent
+    mass: float | None = None
+    """In kg; None for a static solid."""
+
+
+@dataclass(frozen=True)
+class WorldSummary:
+    """Summary of a world: solids, bodies, map, and notes of the importer."""
+
+    name: str
+    bounds: tuple[float, float, float, float]
+    solids: tuple[WorldItem, ...]
+    bodies: tuple[WorldItem, ...]
+    map_size: tuple[int, int]
+    """Rows and columns."""
+    map_resolution: float
+    map_shares: tuple[float, float, float]
+    """Shares of occupied, free and unknown cells."""
+    places: tuple[str, ...]
+    regions: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def triangles(self) -> int:
+        """Number of triangles of all solids and bodies."""
+        return sum(item.triangles for item in (*self.solids, *self.bodies))
+
+    @property
+    def shapes(self) -> tuple[tuple[str, int], ...]:
+        """Kinds of shapes of the solids with their counts, the most frequent first."""
+        counts = Counter(item.shape for item in self.solids)
+        return tuple(sorted(counts.items(), key=lambda entry: (-entry[1], entry[0])))
+
+
+def inspect_world(built: BuiltWorld) -> WorldSummary:
+    """Return the summary of a world."""
+    world, cells = built.world, built.map.cells
+    occupied = float(np.mean(cells == OCCUPIED)) if cells.size else 0.0
+    unknown = float(np.mean(cells == UNKNOWN)) if cells.size else 0.0
+    bodies = []
+    for body in world.bodies:
+        placed = tuple(Solid(s.shape, body.pose.compose(s.pose), s.name) for s in body.solids)
+        kinds = "+".join(dict.fromkeys(_kind(solid) for solid in placed))
+        bodies.append(_item(body.name, kinds, placed, body.mass))
+    return WorldSummary(
+        name=world.name,
+        bounds=world.bounds,
+        solids=tuple(_item(solid.name, _kind(solid), (solid,)) for solid in world.solids),
+        bodies=tuple(bodies),
+        map_size=built.map.shape,
+        map_resolution=built.map.resolution,
+        map_shares=(occupied, 1.0 - occupied - unknown, unknown),
+        places=tuple(sorted(world.places)),
+        regions=tuple(sorted(world.regions)),
+        notes=world.notes,
+    )
+
+
+def _kind(solid: Solid) -> str:
+    return type(solid.shape).__name__.lower()
+
+
+def _item(name: str, kind: str, solids: tuple[Solid, ...], mass: float | None = None) -> WorldItem:
+    mesh = merge_solids(solids)
+    return WorldItem(name, kind, len(mesh.faces), _extent(mesh), mass)
+
+
+def _extent(mesh: TriangleMesh) -> Extent:
+    if not len(mesh.vertices):
+        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    x0, y0, z0 = mesh.vertices.min(axis=0).tolist()
+    x1, y1, z1 = mesh.vertices.max(axis=0).tolist()
+    return x0, y0, z0, x1, y1, z1

@@ -1,1 +1,0 @@
-"""Conversion of imported worlds to simscen's own world files."""

@@ -1,0 +1,182 @@
+"""XML elements of SDF files with their positions, and the numbers, booleans, names and poses in them."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from typing_extensions import Self
+
+from simscen.assets import markup
+from simscen.core.geometry import Pose3
+from simscen.worlds.sdf.report import OutOfReach, SourcePlace, UnusableElement
+
+MAX_SHOWN_NAME_LENGTH = 120
+MAX_NAME_LENGTH = 120
+MAX_COORDINATE_M = 1e4
+"""Maximum absolute value of coordinates and sizes."""
+
+
+@dataclass(eq=False, slots=True)
+class Element(markup.Element):
+    """An element of an SDF file or of a file that it includes."""
+
+    @property
+    def text(self) -> str:
+        """Text of the element, without the text of its children."""
+        return "".join(self.pieces).strip()
+
+    @property
+    def path(self) -> str:
+        """Path from the root, for example world[default]/model[shelf]/link[link]."""
+        own = f"{_printable(self.tag)}[{_printable(self.name)}]" if self.name else _printable(self.tag)
+        return f"{self.parent.path}/{own}" if self.parent and self.parent.parent else own
+
+    @property
+    def place(self) -> SourcePlace:
+        """Position in the file, for messages."""
+        return SourcePlace(self.source.name, self.line, self.col, self.path, self.source.line(self.line))
+
+    def descendants(self) -> Iterator[Self]:
+        """Yield all elements below this one, in document order."""
+        for child in self.children:
+            yield child
+            yield from child.descendants()
+
+    def unusable(self, message: str, hint: str = "") -> UnusableElement:
+        """Return an error about this element."""
+        return UnusableElement(self.place, message, hint)
+
+
+def parse(data: bytes, file: str, folder: str) -> Element:
+    """Return the root element of an XML text; raises UnusableElement if the text is not well-formed."""
+    try:
+        return markup.parse(data, markup.Source.of(data, file, folder), Element)
+    except markup.MalformedXml as error:
+        place = SourcePlace(file, error.line, error.col, source=error.source)
+        raise UnusableElement(place, error.message, error.hint) from error
+
+
+def _printable(name: str) -> str:
+    """Return a name with control characters escaped and at most MAX_SHOWN_NAME_LENGTH characters."""
+    shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
+    return shown if len(shown) <= MAX_SHOWN_NAME_LENGTH else f"{shown[:MAX_SHOWN_NAME_LENGTH]}…"
+
+
+# Values: each function raises UnusableElement at the element that holds an invalid value.
+
+
+def read_numbers(element: Element, *counts: int) -> tuple[float, ...]:
+    """Return the finite numbers in an element's text; their number must be one of `counts`."""
+    words = element.text.split()
+    if len(words) not in counts:
+        raise element.unusable(f"expected {' or '.join(map(str, counts))} numbers, got {len(words)}")
+    try:
+        return tuple(_number(word) for word in words)
+    except ValueError as error:
+        hint = "xacro expressions are not expanded: run xacro first" if "$" in element.text else ""
+        raise element.unusable(str(error), hint) from error
+
+
+def _number(word: str) -> float:
+    try:
+        value = math.nan if "_" in word else float(word)
+    except ValueError as error:
+        raise ValueError(f"expected a number, got {word[:40]!r}") from error
+    if not math.isfinite(value):
+        raise ValueError(f"must be a finite number, got {word[:40]!r}")
+    return value
+
+
+def read_sizes(parent: Element, tag: str, count: int, default: Sequence[float] | None = None) -> tuple[float, ...]:
+    """Return `count` positive lengths in meters from the child `tag`."""
+    element = parent.child(tag)
+    if element is None:
+        if default is None:
+            raise parent.unusable(f"<{tag}> is missing")
+        return tuple(default)
+    sizes = read_numbers(element, count)
+    if any(size <= 0 for size in sizes):
+        raise element.unusable(f"must be positive, got {element.text}")
+    if any(size > MAX_COORDINATE_M for size in sizes):
+        raise element.unusable(f"larger than {MAX_COORDINATE_M:g} m")
+    return sizes
+
+
+def read_size(parent: Element, tag: str) -> float:
+    """Return one positive length in meters from the child `tag`."""
+    return read_sizes(parent, tag, 1)[0]
+
+
+def read_positive(parent: Element, tag: str) -> float:
+    """Return one positive number of any unit from the child `tag`."""
+    element = parent.child(tag)
+    if element is None:
+        raise parent.unusable(f"<{tag}> is missing")
+    value = read_numbers(element, 1)[0]
+    if value <= 0:
+        raise element.unusable(f"must be positive, got {element.text}")
+    return value
+
+
+def read_bool(element: Element | None, default: bool = False) -> bool:
+    """Return the boolean in an element's text: 1, true, True, TRUE, or 0, false, …"""
+    return default if element is None else parse_bool(element.text, element)
+
+
+def parse_bool(word: str, element: Element) -> bool:
+    """Return the boolean that `word` means; errors name `element`."""
+    word = word.strip().lower()
+    if word not in ("0", "1", "true", "false"):
+        raise element.unusable(f"expected true or false, got {word[:40]!r}")
+    return word in ("1", "true")
+
+
+def checked_name(element: Element, name: str | None = None) -> str:
+    """Return the `name` attribute of an element, or `name` if given; raises UnusableElement if the name is invalid."""
+    name = element.name if name is None else name
+    if not name:
+        raise element.unusable(f"<{element.tag}> has no name")
+    if len(name) > MAX_NAME_LENGTH:
+        raise element.unusable(f"the name is longer than {MAX_NAME_LENGTH} characters")
+    if not name.isprintable():
+        raise element.unusable("control character in the name")
+    return name
+
+
+def reference_frame(pose: Element | None) -> str:
+    """Return the name of the frame that a `<pose>` is relative to; SDF before 1.7 called the attribute `frame`."""
+    if pose is None:
+        return ""
+    return pose.attributes.get("relative_to", pose.attributes.get("frame", ""))
+
+
+def read_pose(element: Element | None) -> Pose3:
+    """Return the pose in an element: x y z and either roll pitch yaw or a quaternion x y z w.
+
+    Source: SDF specification, "Specifying pose in SDFormat"; `rotation_format` and `degrees` were added in 1.9.
+    """
+    if element is None or not element.text:
+        return Pose3()
+    rotation_format = element.attributes.get("rotation_format", "euler_rpy")
+    in_degrees = parse_bool(element.attributes.get("degrees", "false"), element)
+    if rotation_format == "quat_xyzw":
+        pose = _quaternion_pose(element, in_degrees)
+    elif rotation_format == "euler_rpy":
+        x, y, z, *angles = read_numbers(element, 6)
+        roll, pitch, yaw = (math.radians(angle) if in_degrees else angle for angle in angles)
+        pose = Pose3.from_rpy(x, y, z, roll, pitch, yaw)
+    else:
+        raise element.unusable(f"unknown rotation_format {rotation_format[:40]!r}: expected euler_rpy or quat_xyzw")
+    if any(abs(coordinate) > MAX_COORDINATE_M for coordinate in pose.position):
+        raise OutOfReach(element.place, f"farther than {MAX_COORDINATE_M:g} m from its frame")
+    return pose
+
+
+def _quaternion_pose(element: Element, in_degrees: bool) -> Pose3:
+    if in_degrees:
+        raise element.unusable("degrees and quat_xyzw exclude each other")
+    x, y, z, *quaternion = read_numbers(element, 7)
+    norm = math.hypot(*quaternion)
+    if norm < 1e-9:
+        raise element.unusable("zero quaternion")
+    return Pose3(x, y, z, *(part / norm for part in quaternion))

@@ -1,0 +1,125 @@
+"""Poses of links in the world, from the poses of models and from the `<state>` that Gazebo Classic saved.
+
+Gazebo Classic applies the first `<state>` of a world after it loads the world: the poses of models, nested models and
+links in it are world poses and override those in the models (World::Load, Model::SetState). The new Gazebo ignores
+`<state>`, but worlds that have one were made with Classic.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from simscen.core.geometry import Pose3
+from simscen.worlds.sdf.elements import MAX_COORDINATE_M, Element, read_numbers, read_pose
+from simscen.worlds.sdf.frames import Frame
+from simscen.worlds.sdf.model_tree import ModelNode
+from simscen.worlds.sdf.report import ImportReport
+
+Scale = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ModelState:
+    """Saved world poses of a model (None if not saved), of its links, and of its nested models, by name.
+
+    The shapes of its links are enlarged by `scale`; their poses are not.
+    """
+
+    pose: Pose3 | None = None
+    links: dict[str, Pose3] = field(default_factory=dict)
+    models: "dict[str, ModelState]" = field(default_factory=dict)
+    scale: Scale = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class WorldState:
+    """Saved states of models by name, names of deleted models, and inserted `<model>` elements."""
+
+    models: dict[str, ModelState] = field(default_factory=dict)
+    deleted: frozenset[str] = frozenset()
+    inserted: tuple[Element, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedLink:
+    """A link with its pose in the world, its name as in Gazebo (model::nested::link), and the scale of its shapes."""
+
+    name: str
+    frame: Frame
+    model: ModelNode
+    pose: Pose3
+    scale: Scale = (1.0, 1.0, 1.0)
+
+
+def read_state(world: Element, report: ImportReport) -> WorldState:
+    """Return the state of a `<world>`; empty if the world has none."""
+    states = list(world.all("state"))
+    if not states:
+        return WorldState()
+    first = states[0]
+    if len(states) > 1:
+        report.note(states[1].place, "only the first <state> of a world is applied")
+    deletions, insertions = first.child("deletions"), first.child("insertions")
+    return WorldState(
+        {model.name: _read_model_state(model, report) for model in first.all("model")},
+        frozenset(name.text for name in deletions.all("name")) if deletions else frozenset(),
+        tuple(insertions.all("model")) if insertions else (),
+    )
+
+
+def _read_model_state(element: Element, report: ImportReport) -> ModelState:
+    links: dict[str, Pose3] = {}
+    models: dict[str, ModelState] = {}
+    pose, scale = None, (1.0, 1.0, 1.0)
+    for child in element.children:
+        with report.skip_unusable():
+            match child.tag:
+                case "pose":
+                    pose = read_pose(child)
+                case "link":
+                    if child.child("pose"):
+                        links[child.name] = read_pose(child.child("pose"))
+                case "model":
+                    models[child.name] = _read_model_state(child, report)
+                case "scale":
+                    scale = _read_scale(child)
+    return ModelState(pose, links, models, scale)
+
+
+def _read_scale(element: Element) -> Scale:
+    """Return the factor for the sizes of collisions: Classic saves the sizes divided by this scale."""
+    x, y, z = read_numbers(element, 3)
+    if min(x, y, z) <= 0:
+        raise element.unusable(f"a scale must be positive, got {element.text}")
+    if max(x, y, z) > MAX_COORDINATE_M:
+        raise element.unusable(f"a scale must be at most {MAX_COORDINATE_M:g}, got {element.text}")
+    return x, y, z
+
+
+def place_links(
+    model: ModelNode, pose: Pose3, report: ImportReport, state: ModelState | None = None
+) -> Iterator[PlacedLink]:
+    """Yield all links of a model at `pose` in the world; poses in `state` override those in the model."""
+    yield from _place_links_below(model, pose, model.name, report, state or ModelState())
+
+
+def _place_links_below(
+    model: ModelNode, pose: Pose3, scoped_name: str, report: ImportReport, state: ModelState
+) -> Iterator[PlacedLink]:
+    model_pose = state.pose if state.pose is not None else pose
+    for part in model.parts:
+        with report.skip_unusable():
+            frame = part.frame if isinstance(part, ModelNode) else part
+            part_pose = model_pose.compose(model.scope.pose_of(frame))
+            name = f"{scoped_name}::{part.name}"
+            if isinstance(part, ModelNode):
+                nested_state = state.models.get(part.name, _state_of_included_model(state, part))
+                yield from _place_links_below(part, part_pose, name, report, nested_state)
+            else:
+                yield PlacedLink(name, part, model, state.links.get(part.name, part_pose), state.scale)
+
+
+def _state_of_included_model(state: ModelState, model: ModelNode) -> ModelState:
+    """Return the state of a nested model whose links an older Classic saved as `model::link` in the outer model."""
+    prefix = f"{model.name}::"
+    links = {name.removeprefix(prefix): pose for name, pose in state.links.items() if name.startswith(prefix)}
+    return ModelState(scale=state.scale, links=links)

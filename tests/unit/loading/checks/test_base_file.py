@@ -1,0 +1,58 @@
+"""Files that are there to be extended are checked for what they say, not for what they leave out."""
+
+import pytest
+
+from simscen.loading.checks.files import check_file, file_kind
+
+BASE = """\
+simscen: 1
+world: room.world.yaml
+robot: {model: cube.robot.yaml}
+stack: {controller: {desired_linear_vel: 0.3}}
+"""
+
+
+def told(write, text: str, name: str = "a.base.yaml") -> list[str]:
+    file = write(name, text)
+    assert file_kind(file, file.parent) == "base"
+    return [f"{found.line}:{found.col} {found.message}" for found in check_file("base", file, file.parent)]
+
+
+@pytest.mark.parametrize("name", ["a.base.yaml", "a.base.yml", "defaults.yaml", "deep/defaults.yaml"])
+def test_a_base_may_leave_out_whatever_its_scenarios_say(write, name: str) -> None:
+    assert told(write, "tags: [smoke]\n", name) == []
+
+
+def test_a_base_may_say_a_part_of_a_mapping(write) -> None:
+    assert told(write, BASE) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        (BASE + "gaols: []\n", "5:1 unknown key `gaols`"),
+        (BASE.replace("0.3", "fast"), "4:42 expected a speed, got the text `fast`"),
+        (BASE.replace("room.world", "rom.world"), "2:8 no such file or directory"),
+        (BASE.replace("cube.", "cub."), "3:16 no such file or directory"),
+        (BASE + "goals: [{timeout: 3 s}]\n", "5:9 missing key `pose` in `goals[0]`"),
+        (BASE + "pass:\n", "5:1 `pass` has no value"),
+        ("simscen: 2\n", "1:10 needs schema 2"),
+        ("- a\n", "1:1 expected a mapping at top level"),
+        ("extends: b.base.yaml\n", "1:10 no such file or directory"),
+    ],
+)
+def test_what_a_base_says_is_checked(write, text: str, problem: str) -> None:
+    found = told(write, text)
+    assert [one for one in found if problem in one], found
+
+
+def test_what_a_base_adds_to_a_list_is_checked(write) -> None:
+    assert told(write, "pass+: [{collisions: {max: 0}}]\n") == []
+    assert told(write, "pass+: [{colisions: {max: 0}}]\n")[0].startswith("1:10 unknown key `colisions`")
+
+
+def test_a_base_may_extend_another(write) -> None:
+    write("b.base.yaml", "linger: 1\n")
+    assert told(write, "extends: b.base.yaml\n") == []
+    write("b.base.yaml", "linger: no\n")
+    assert told(write, "extends: b.base.yaml\n") == ["1:9 expected a duration, got the text `no`"]

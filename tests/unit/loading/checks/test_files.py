@@ -1,0 +1,88 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from simscen.core.errors import Problem
+from simscen.loading.checks.files import check_file, file_kind
+
+Write = Callable[[str, str], Path]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "kind"),
+    [
+        ("a.scenario.yaml", "x: 1", "scenario"),
+        ("a.world.yaml", "x: 1", "world"),
+        ("a.robot.yaml", "x: 1", "robot"),
+        ("a.sdf", "<sdf/>", "world"),
+        ("a.urdf", "<robot/>", "robot"),
+        ("a.yaml", "image: a\nresolution: 1", "map"),
+        ("a.yaml", "simscen: 1\npass: []", "scenario"),
+        ("a.yaml", "simscen: 1\ndrive: {}", "robot"),
+        ("a.yaml", "simscen: 1\nwalls: []", "world"),
+        ("a.yaml", "not even [yaml", "scenario"),
+        ("a.yaml", "simscen: 1\nname: mine\nstack: {}", "stack"),
+        ("a.yaml", "simscen: 1\nworld: a\nstack: {}", "scenario"),
+        ("a.yaml", "amcl: {ros__parameters: {alpha1: 0.1}}", "parameter file of Nav2"),
+        ("a.yaml", "robot1:\n  /**: {ros__parameters: {a: 1, a: 2}}", "parameter file of Nav2"),
+        ("a.scenario.yaml", "amcl: {ros__parameters: {alpha1: 0.1}}", "scenario"),
+    ],
+)
+def test_a_file_tells_its_kind_by_name_or_keys(write: Write, tmp_path: Path, name: str, text: str, kind: str) -> None:
+    assert file_kind(write(name, text), tmp_path) == kind
+
+
+def _problems(file: Path, root: Path) -> list[Problem]:
+    return check_file(file_kind(file, root), file, root)
+
+
+def test_every_kind_is_checked(write: Write, scenario: str, tmp_path: Path) -> None:
+    write("a.scenario.yaml", scenario)
+    for name in ("a.scenario.yaml", "room.world.yaml", "cube.robot.yaml"):
+        assert _problems(tmp_path / name, tmp_path) == []
+    write("map.yaml", "image: no.pgm\nresolution: 1\norigin: [0, 0, 0]\n")
+    assert [p.place for p in _problems(tmp_path / "map.yaml", tmp_path)] == ["map.yaml:1:8"]
+
+
+def test_a_robot_is_checked_down_to_its_urdf(write: Write, tmp_path: Path) -> None:
+    robot = (tmp_path / "cube.robot.yaml").read_text().replace("body: [{box: [0.3, 0.3, 0.3]}]", "urdf: cube.urdf")
+    write("cube.robot.yaml", robot)
+    assert [p.code for p in _problems(tmp_path / "cube.robot.yaml", tmp_path)] == ["SC023"]
+
+
+def test_paths_may_be_relative_to_the_working_folder(
+    write: Write, scenario: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write("a.scenario.yaml", scenario)
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.scenario.yaml", "room.world.yaml"):
+        assert _problems(Path(name), Path()) == []
+
+
+PARAMETERS = "amcl:\n  ros__parameters: {alpha1: 0.1, beta: 2}\ndocking_server:\n  ros__parameters: {a: 1}\n"
+
+
+def test_of_a_parameter_file_of_nav2_is_told_what_means_nothing_and_what_is_wrong(write: Write, tmp_path: Path) -> None:
+    told = _problems(write("nav2.yaml", PARAMETERS), tmp_path)
+    assert [(p.place, p.code, p.severity) for p in told] == [
+        ("nav2.yaml:2:40", "SC341", "warning"),
+        ("nav2.yaml:4:24", "SC341", "warning"),
+    ]
+    wrong = _problems(write("nav2.yaml", PARAMETERS.replace("alpha1: 0.1", "alpha1: -1.0")), tmp_path)
+    assert [(p.place, p.code, p.severity) for p in wrong] == [("nav2.yaml:2:29", "SC013", "error")]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (PARAMETERS, "this is a parameter file of Nav2, not a scenario"),
+        ("simscen: 1\nstack: {}", "this is a stack file, not a scenario"),
+    ],
+)
+def test_parameters_of_a_stack_are_no_scenario_and_what_they_are_for_is_told(
+    write: Write, tmp_path: Path, text: str, told: str
+) -> None:
+    (problem,) = check_file("scenario", write("mine.yaml", text), tmp_path)
+    assert (problem.place, problem.code, problem.message) == ("mine.yaml", "SC025", told)
+    assert "--stack NAME=mine.yaml" in problem.hint

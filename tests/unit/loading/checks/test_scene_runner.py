@@ -1,0 +1,90 @@
+"""What a scenario asks to fail need not be possible, and nothing else is let through."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.loading.checks.scene_runner import check_in_world
+from simscen.loading.scenario import load_scenario
+
+SCENARIO = """
+simscen: 1
+world:
+  simscen: 1
+  walls: [{{points: [[0, 0], [6, 0], [6, 6], [0, 6], [0, 0]]}}]
+  obstacles: [{{name: crate, box: [2, 2, 1], pose: {{x: 4, y: 4}}}}]
+robot: {{pose: {{x: {start}, y: {start}}}}}
+goals:
+  - {{name: crate, pose: {{x: 4, y: 4}}}}
+  - {{name: free, pose: {{x: 2, y: 1}}}}
+{events}
+pass: [{criteria}]
+"""
+IN_THE_CRATE = ['goal `crate` (4, 4) is inside obstacle "crate"']
+AT_START = 'the robot\'s start (4, 4) is inside obstacle "crate"'
+
+
+def told(tmp_path: Path, criteria: str, start: float = 1, events: str = "") -> list[str]:
+    file = tmp_path / "a.scenario.yaml"
+    file.write_text(SCENARIO.format(criteria=criteria, start=start, events=events))
+    return [problem.message for problem in check_in_world(load_scenario(file, tmp_path))]
+
+
+@pytest.mark.parametrize(
+    "criterion",
+    [
+        "result: {status: FAILED}",
+        "result: {status: FAILED, error_code: GOAL_OCCUPIED}",
+        "error_code: {code: GOAL_OCCUPIED}",
+        "error_code: {code: 206, goal: crate}",
+        "error_code: {code: NO_VALID_PATH}",
+        "error_code: {code: NO_VALID_PATH, goal: crate}",
+        "error_code: {code: GOAL_OUTSIDE_MAP}",
+        "error_code: {code: FAILED_TO_MAKE_PROGRESS, goal: crate}",
+    ],
+)
+def test_a_goal_whose_failure_is_asked_for_may_be_in_the_way(tmp_path, criterion):
+    assert told(tmp_path, f"{{{criterion}}}") == []
+
+
+@pytest.mark.parametrize(
+    "criterion",
+    [
+        "goals_reached: {}",
+        "result: {status: SUCCEEDED}",
+        "result: {status: CANCELED}",
+        "error_code: {code: NONE}",
+        "error_code: {code: NONE, goal: crate}",
+        "error_code: {code: GOAL_OCCUPIED, goal: free}",
+        "error_code: {code: GOAL_OCCUPIED}, severity: warn}, {collisions: {}",
+    ],
+)
+def test_a_goal_whose_failure_is_not_asked_for_may_not(tmp_path, criterion):
+    canceled = "events: [{when: {time: 1}, do: {cancel_goal: {}}}]" if "CANCELED" in criterion else ""
+    assert told(tmp_path, f"{{{criterion}}}", events=canceled) == IN_THE_CRATE
+
+
+@pytest.mark.parametrize("code", ["START_OCCUPIED", "START_OUTSIDE_MAP"])
+def test_a_bad_start_may_be_asked_for_by_its_code_alone(tmp_path, code):
+    assert told(tmp_path, f"{{error_code: {{code: {code}}}}}", start=4) == []
+    assert told(tmp_path, f"{{result: {{status: FAILED, error_code: {code}}}}}", start=4) == []
+    assert told(tmp_path, "{error_code: {code: GOAL_OCCUPIED}}", start=4) == [AT_START]
+
+
+@pytest.mark.parametrize("do", ["{{new_goal: {}}}", "[{{cancel_goal: {{}}}}, {{new_goal: {}}}]"])
+def test_a_goal_that_an_event_sends_is_looked_at_too(tmp_path, do):
+    sent = do.format("{name: detour, pose: {x: 4, y: 4}}")
+    events = f"events: [{{when: {{time: 1}}, do: {sent}}}]"
+    assert told(tmp_path, "{error_code: {code: NO_VALID_PATH, goal: crate}}", events=events) == [
+        'goal `detour` (4, 4) is inside obstacle "crate"'
+    ]
+    assert told(tmp_path, "{error_code: {code: NO_VALID_PATH}}", events=events) == []
+
+
+@pytest.mark.parametrize(("x", "code"), [(4, "GOAL_OCCUPIED"), (40, "GOAL_OUTSIDE_MAP")])
+def test_the_failure_that_may_be_expected_is_told_by_its_code(tmp_path, x, code):
+    file = tmp_path / "a.scenario.yaml"
+    text = SCENARIO.replace("{{name: crate, pose: {{x: 4,", f"{{{{name: crate, pose: {{{{x: {x},")
+    file.write_text(text.format(criteria="{goals_reached: {}}", start=1, events=""))
+    (problem,) = check_in_world(load_scenario(file, tmp_path))
+    assert f"error_code: {code}}}" in (problem.hint or "")

@@ -1,0 +1,201 @@
+"""Imported worlds in our own language: the same triangles where it can say them, the same cut where it cannot."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+from shapely import Polygon, union_all
+
+from simscen.core.environment.world_model import World
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry.motion_paths import pose_at
+from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, Mesh, MotionPath, Solid, Sphere
+from simscen.model.world import WorldSpec
+from simscen.spec.moving_objects import path_through_waypoints
+from simscen.worlds.conversion import convert_world
+from simscen.worlds.geometry.cross_section import section_segments
+from simscen.worlds.geometry.section_polygons import rings_from_segments
+from simscen.worlds.geometry.triangulation import merge_solids, triangulate
+from simscen.worlds.world_file import world_from_spec
+
+EMPTY = WorldSpec(simscen=1)
+NEAR = st.floats(-20, 20)
+
+
+def converted(*solids, bodies=(), height=0.2):
+    done = convert_world(World("w", solids, bodies), height)
+    return world_from_spec(done.merged_into(EMPTY), "w"), done.changes
+
+
+def assert_same_corners(solids, others, tolerance=1e-5):
+    """Each vertex of one has its own vertex of the other within the tolerance in m along each axis."""
+    distances = cdist(merge_solids(solids).vertices, merge_solids(others).vertices, "chebyshev")
+    assert distances.shape[0] == distances.shape[1]
+    assert distances[linear_sum_assignment(distances)].max() <= tolerance
+
+
+def covered(solids, height):
+    rings = [
+        Polygon(ring)
+        for solid in solids
+        for ring in rings_from_segments(section_segments(merge_solids([solid]), height))
+    ]
+    return union_all(rings)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.tuples(*[st.floats(0.05, 3)] * 3), NEAR, NEAR, st.sampled_from(range(6)), st.floats(-math.pi, math.pi))
+def test_a_box_on_any_of_its_sides_is_the_same_box(size, x, y, side, yaw):
+    roll, pitch = [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (0, 3)][side]
+    turned = Pose3.from_rpy(0, 0, 0, roll * math.pi / 2, pitch * math.pi / 2, yaw)
+    low = merge_solids([Solid(Box(size), turned)]).vertices[:, 2].min()
+    solid = Solid(Box(size), turned._replace(x=x, y=y, z=0.01 - float(low)), "crate")
+    world, changes = converted(solid)
+    assert changes == []
+    assert isinstance(world.solids[0].shape, Box)
+    assert_same_corners(world.solids, [solid], 1e-4)
+
+
+def test_cylinders_and_prisms_are_the_same_and_need_no_word():
+    solids = (
+        Solid(Cylinder(0.3, 1.2), Pose3(1.0, 2.0, 0.6), "pillar"),
+        Solid(Extrusion(((0, 0), (2, 0), (0, 1)), 0.8), Pose3.planar(Pose2(3, 1, 0.7), 0.5), "wedge"),
+    )
+    world, changes = converted(*solids)
+    assert changes == []
+    assert_same_corners(world.solids, solids)
+    assert [solid.name for solid in world.solids] == ["pillar", "wedge"]
+
+
+def test_what_is_below_the_ground_is_cut_off():
+    world, changes = converted(
+        Solid(Box((1, 1, 1)), Pose3(z=0.25), "sunk"), Solid(Box((9, 9, 1)), Pose3(z=-0.5), "floor")
+    )
+    assert changes == ["floor: it lies below the ground; it is left out"]
+    vertices = merge_solids(world.solids).vertices
+    assert (vertices[:, 2].min(), vertices[:, 2].max()) == (0.0, 0.75)
+
+
+@pytest.mark.parametrize(
+    ("shape", "pose", "kind"),
+    [
+        (Sphere(0.5), Pose3(z=0.4), "a sphere"),
+        (Cone(0.5, 1.0), Pose3(z=0.5), "a cone"),
+        (Capsule(0.3, 1.0), Pose3(z=0.5), "a capsule"),
+        (Box((1.0, 0.4, 0.6)), Pose3.from_rpy(1.0, 0.0, 0.3, 0.4, 0.1, 0.9), "a box"),
+        (Cylinder(0.2, 2.0), Pose3.from_rpy(0, 0, 0.2, math.pi / 2, 0, 0.3), "a cylinder"),
+    ],
+)
+def test_what_leans_or_bulges_keeps_its_cut_and_is_told(shape, pose, kind):
+    solid = Solid(shape, pose, "thing")
+    world, changes = converted(solid, height=0.25)
+    assert changes == [f"thing: {kind}; it became an upright prism over its cut at 0.25 m"]
+    before, after = covered([solid], 0.25), covered(world.solids, 0.25)
+    assert before.symmetric_difference(after).area < 1e-4
+
+
+def test_a_mesh_of_upright_walls_is_the_same_without_a_word():
+    ring = triangulate(Extrusion(((0, 0), (5, 0), (5, 4), (3, 4), (3, 1), (0, 1)), 2.0))
+    solid = Solid(Mesh(ring.vertices, ring.faces), Pose3.planar(Pose2(1, 2, 0.3)), "wall")
+    world, changes = converted(solid)
+    assert changes == []
+    assert_same_corners(world.solids, [solid])
+
+
+def test_a_mesh_that_is_open_is_left_out_and_told():
+    box = triangulate(Box((1, 1, 1)))
+    solid = Solid(Mesh(box.vertices, box.faces[2:][:-1]), Pose3(z=0.5), "torn")
+    world, changes = converted(solid)
+    assert world.solids == ()
+    assert changes == ["torn: a mesh whose cut at 0.2 m is not closed; it is left out"]
+
+
+def test_bodies_keep_mass_and_motion():
+    start = Pose2(1.0, 1.0, 0.0)
+    path = path_through_waypoints(start, [[4.0, 1.0], [4.0, 3.0]], 0.8, "back_and_forth")
+    box = (Solid(Box((0.6, 0.4, 1.0)), Pose3(z=0.5)),)
+    bodies = (Body("cart", box, Pose3.planar(start), 0.0, path), Body("bin", box, Pose3(x=3.0), 4.0))
+    world, changes = converted(bodies=bodies)
+    assert changes == []
+    cart, bin_ = world.bodies
+    assert bin_.mass == 4.0
+    assert cart.path is not None
+    assert cart.path.mode == "back_and_forth"
+    np.testing.assert_allclose(cart.path.times, path.times)
+    np.testing.assert_allclose(cart.path.poses, path.poses, atol=1e-9)
+
+
+def test_motion_and_shape_that_cannot_be_said_are_told():
+    disc = (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),)
+    poses = (Pose2(0, 0), Pose2(1, 0), Pose2(2, 0))
+    off = (Solid(Cylinder(0.3, 1.0), Pose3(x=1.0, z=0.5)),)
+    hasty = Body("beside", off, Pose3(), 0.0, MotionPath((0.0, 1.0, 9.0), poses))
+    table = Body("table", (*disc, Solid(Box((1, 1, 0.1)), Pose3(z=1.0))), Pose3(x=5.0), 3.0)
+    world, changes = converted(bodies=(hasty, table))
+    assert changes == [
+        "beside: it moves, and its shape is beside its own origin; it stands still",
+        "table: it could be pushed and has 2 shapes, an object has one; it stands still",
+    ]
+    assert world.bodies[0].path is None
+    assert [solid.name for solid in world.solids] == ["table", "table"]
+
+
+@pytest.mark.parametrize("mode", ["once", "back_and_forth"])
+def test_a_motion_at_changing_speed_is_said_in_keyframes(mode):
+    disc = (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),)
+    poses = (Pose2(0, 0), Pose2(1, 0), Pose2(2, 0.5, 1.0))
+    path = MotionPath((0.0, 1.0, 9.0), poses, mode, ease="spline", phase=0.5)
+    world, changes = converted(bodies=(Body("hasty", disc, Pose3.planar(pose_at(path, 0.0)), 0.0, path),))
+    assert changes == []
+    assert world.bodies[0].path == path
+
+
+def test_what_the_file_adds_itself_comes_after():
+    spec = WorldSpec.model_validate(
+        {"simscen": 1, "sdf": "x.sdf", "obstacles": [{"name": "mine", "box": [1, 1, 1], "pose": {"x": 0, "y": 0}}]}
+    )
+    done = convert_world(World("w", (Solid(Box((1, 1, 1)), Pose3(z=0.5), "theirs"),)), 0.2).merged_into(spec)
+    assert done.sdf is None
+    assert [obstacle.name for obstacle in done.obstacles] == ["theirs", "mine"]
+
+
+def test_a_slippery_plate_stays_slippery():
+    world, changes = converted(Solid(Box((1.0, 1.0, 0.02)), Pose3(z=0.01), "plate", 0.3))
+    assert (world.solids[0].friction, changes) == (0.3, [])
+
+
+TINY = 4e-7
+"""Length in m that is 0 when it is rounded to the micrometer."""
+LINE = ((0.0, 0.0), (1.0, 0.0), (2.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("shape", "reason"),
+    [
+        (Box((TINY, 1.0, 1.0)), "its `box` is not valid: input should be greater than 0"),
+        (Cylinder(TINY, 1.0), "its `cylinder` is not valid: input should be greater than 0"),
+        (Extrusion(LINE, 1.0), "its `polygon` is not valid: the polygon encloses no area"),
+        (Box((20_000.0, 1.0, 1.0)), "its `box` is not valid: input should be less than or equal to 10000"),
+    ],
+)
+def test_a_shape_that_a_world_file_cannot_hold_is_left_out_with_its_reason(shape, reason):
+    pose = Pose3(z=0.5) if not isinstance(shape, Extrusion) else Pose3()
+    solids = (Solid(shape, pose, "plate"), Solid(Box((1, 1, 1)), Pose3(x=5.0, z=0.5), "crate"))
+    bodies = (
+        Body("thin", (Solid(shape, pose),), Pose3(x=3.0), 2.0),
+        Body("both", (Solid(shape, pose), Solid(Box((1, 1, 1)), Pose3(z=0.5))), Pose3(x=8.0), 2.0),
+    )
+    world, changes = converted(*solids, bodies=bodies)
+    assert changes == [f"{name}: {reason}; it is left out" for name in ("plate", "thin", "both")]
+    assert [solid.name for solid in world.solids] == ["crate"]
+    assert [(body.name, body.mass) for body in world.bodies] == [("both", 2.0)]
+
+
+def test_a_mass_that_a_world_file_cannot_hold_is_told():
+    world, changes = converted(bodies=(Body("heavy", (Solid(Box((1, 1, 1)), Pose3(z=0.5)),), Pose3(), 1e6),))
+    assert changes == ["heavy: its `mass` is not valid: input should be less than or equal to 100000; it is left out"]
+    assert world.bodies == ()
