@@ -1,7 +1,8 @@
 """Extended Kalman filter of wheel odometry and gyroscope for the odom frame, as robot_localization's ekf_node.
 
 Moore and Stouch, A Generalized Extended Kalman Filter Implementation for the Robot Operating System (IAS 2014), in its
-planar mode (`two_d_mode`). Prediction and update are those of filterpy's ExtendedKalmanFilter (Labbe).
+planar mode (`two_d_mode`). The velocity is predicted and updated by filterpy's KalmanFilter (Labbe).
+The pose follows from it as in the prediction of an extended Kalman filter.
 
 Import this module only where there is a filter: filterpy imports scipy.stats, which takes half a second.
 """
@@ -193,7 +194,3 @@ def mean_velocity(step: Pose2, seconds: float) -> Twist:
     x, y, turn = step
     c, s = math.cos(turn / 2), math.sin(turn / 2)
     return Twist((c * x + s * y) / seconds, (c * y - s * x) / seconds, turn / seconds)
-
-
-def _keep_state(_: object = 0) -> None:
-    """Predict that the state stays as it is, without the product that filterpy would compute."""
