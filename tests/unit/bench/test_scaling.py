@@ -1,9 +1,9 @@
-"""The scenarios of `simscen bench growth` have more of what they say, and the suite's is spread."""
+"""Scenarios of `simscen bench growth` and the sample of `simscen bench suite`."""
 
 import pytest
 
 from simscen.bench.speed.scaling import AXES, write_more
-from simscen.bench.speed.session_speed import SHORT, Suite, evenly_spaced, short_patrol
+from simscen.bench.speed.session_speed import SHORT_RUN_S, Suite, evenly_spaced, short_patrol
 from simscen.loading.builders import load_robot, load_world
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
@@ -27,21 +27,21 @@ def count(axis: str, loaded: LoadedScenario) -> int:
 
 
 @pytest.mark.parametrize(("axis", "many"), [(axis, many) for axis, counts in AXES.items() for many in counts[::2]])
-def test_there_is_as_much_as_the_line_says(tmp_path, axis, many):
+def test_growth_scenario_has_the_stated_amount(tmp_path, axis, many):
     assert count(axis, load_scenario(write_more(tmp_path, axis, many), tmp_path)) == many
 
 
-def test_the_short_patrol_is_over_at_once(tmp_path):
-    assert load_scenario(short_patrol(tmp_path), tmp_path).spec.time_limit == SHORT
+def test_short_patrol_has_the_stated_time_limit(tmp_path):
+    assert load_scenario(short_patrol(tmp_path), tmp_path).spec.time_limit == SHORT_RUN_S
 
 
-def test_of_a_large_suite_every_so_manieth_is_run():
+def test_sample_of_a_large_suite_is_evenly_spaced():
     assert evenly_spaced(list(range(89)), 60)[:4] == [0, 1, 2, 4]
     assert len(set(evenly_spaced(list(range(89)), 60))) == 60
     assert evenly_spaced([1, 2], 60) == [1, 2]
 
 
-def test_a_suite_is_held_against_pybullet_alone_for_as_long():
+def test_suite_time_is_compared_with_pybullet_for_the_same_simulated_time():
     suite = Suite(60, (), 2, simulated=1200.0, wall=20.0, cpu=36.0, memory=(100.0, 120.0, 300.0), bare=0.0075)
     figures = {name: figure.value for name, figure in suite.figures.items()}
     assert figures["suite: runs a minute"] == 180.0

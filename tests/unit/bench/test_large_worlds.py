@@ -1,14 +1,14 @@
-"""The worlds of `simscen bench worlds` are what its table says, and can be driven."""
+"""Worlds of `simscen bench worlds`."""
 
 import pytest
 
-from simscen.bench.speed.large_worlds import MOVABLE, MOVING, STANDING, write_arena, write_hall, write_warehouse
+from simscen.bench.speed.large_worlds import MOVABLE, MOVING, STATIC, write_arena, write_hall, write_warehouse
 from simscen.loading.builders import load_world
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
 
 
-def test_the_hall_holds_its_movable_meshes_and_a_way_past_them(tmp_path):
+def test_hall_has_movable_meshes_and_reachable_goals(tmp_path):
     file = write_hall(tmp_path / "hall")
     prepared = prepare(load_scenario(file, file.parent))
     bodies = prepared.built.world.bodies
@@ -17,7 +17,7 @@ def test_the_hall_holds_its_movable_meshes_and_a_way_past_them(tmp_path):
     assert None not in prepared.case.shortest.values()
 
 
-def test_the_arena_is_a_hundred_meters_wide_and_its_goals_can_be_reached(tmp_path):
+def test_arena_is_100_m_wide_and_its_goals_are_reachable(tmp_path):
     file = write_arena(tmp_path / "arena")
     prepared = prepare(load_scenario(file, file.parent))
     cells = prepared.built.map
@@ -26,8 +26,8 @@ def test_the_arena_is_a_hundred_meters_wide_and_its_goals_can_be_reached(tmp_pat
 
 
 @pytest.mark.slow
-def test_the_warehouse_holds_five_thousand_objects_of_which_twenty_move(tmp_path):
+def test_warehouse_has_5000_objects_and_20_move(tmp_path):
     file = write_warehouse(tmp_path / "warehouse")
     world = load_world(load_scenario(file, file.parent))
-    assert (len(world.solids), len(world.bodies)) == (STANDING + 4, MOVING)  # and four walls
+    assert (len(world.solids), len(world.bodies)) == (STATIC + 4, MOVING)  # and four walls
     assert all(body.path is not None for body in world.bodies)
