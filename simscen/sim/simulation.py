@@ -18,6 +18,7 @@ from simscen.sim.bullet import engine
 from simscen.sim.bullet.client_pool import CLIENT_POOL
 from simscen.sim.contact.collisions import PreStepMotion
 from simscen.sim.objects.actors import Actors
+from simscen.sim.objects.proximity import ACTIVATION_PERIOD_S, EARLY_QUERY_DISTANCE_M
 from simscen.sim.objects.rest import SAMPLE_COUNT, SAMPLE_PERIOD_TICKS
 from simscen.sim.robots.robot import Robot, Scene
 from simscen.sim.scene.camera import RenderScene
@@ -69,11 +70,12 @@ class Simulation:
         walls = Walls(client, terrain.obstacles)
         visual_shape = engine.DEFAULT_VISUAL if has_images else engine.invisible_shape(client)
         render_scene = RenderScene(client, static, triangulate) if has_images else None
-        actors = Actors(client, tick_rate, triangulate, visual_shape, is_complete=has_images)
+        actors = Actors(client, tick_rate, triangulate, visual_shape, is_rendered=has_images)
         self._scene = Scene(client, tick_rate, walls, terrain, actors, render_scene)
         self._periodic_call: tuple[int, Callable[[], None]] | None = None
         self._firmware_period = max(1, round(tick_rate / FIRMWARE_RATE_HZ))
         self._rest_update_period = math.ceil(REST_UPDATE_PERIOD_S * tick_rate)
+        self._activation_period = math.ceil(ACTIVATION_PERIOD_S * tick_rate)
         self.robots: dict[str, Robot] = self._scene.robots
         self._robots: tuple[Robot, ...] = ()
         for name, (body, pose, own_obstacles) in sorted(robots.items()):
@@ -114,11 +116,15 @@ class Simulation:
     def step(self, ticks: int) -> None:
         """Simulate `ticks` ticks."""
         scene, until = self._scene, self._scene.tick + ticks
-        if scene.actors.has_pushable:
-            period = self._rest_update_period
+        has_pushable = scene.actors.has_pushable
+        if has_pushable or not scene.actors.is_engine_complete:
+            period = self._rest_update_period if has_pushable else self._activation_period
             for due in range(scene.tick - scene.tick % period + period, until + 1, period):
                 self._step(due - scene.tick)
-                scene.actors.update_rest_poses(due)
+                if has_pushable:
+                    scene.actors.update_rest_poses(due)
+                else:
+                    scene.activate_actors(EARLY_QUERY_DISTANCE_M)
         if scene.tick < until:
             self._step(until - scene.tick)
         scene.activate_actors()

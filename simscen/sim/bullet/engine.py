@@ -245,6 +245,20 @@ def put_to_sleep(client: int, number: int) -> None:
     )
 
 
+STATIC_FILTER = 2
+"""Bullet's collision group of bodies without mass; they collide with all other groups."""
+
+
+def disable_collisions(client: int, number: int) -> None:
+    """Keep a body without mass from colliding. Its distances can still be measured."""
+    pybullet.setCollisionFilterGroupMask(number, -1, 0, 0, physicsClientId=client)
+
+
+def enable_collisions(client: int, number: int) -> None:
+    """Let a body without mass collide again, as if it had been created now."""
+    pybullet.setCollisionFilterGroupMask(number, -1, STATIC_FILTER, ~STATIC_FILTER, physicsClientId=client)
+
+
 def create_static_body(
     client: int, shape: int, look: int = DEFAULT_VISUAL, pose: Pose3 = ORIGIN, friction: float = 1.0
 ) -> int:

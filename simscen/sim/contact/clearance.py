@@ -69,7 +69,9 @@ class Clearance:
         self._extent = math.hypot(self._radius, self._height)
         self.size = SHAPE_MARGIN_M + self._extent
         """Radius in m of the robot's bounding sphere around its base frame."""
-        self.query_radius = self.size + max(max_range, CLEARANCE_RANGE)
+        self.contact_radius = self.size + CLEARANCE_RANGE
+        """Radius in m around its base frame within which actors collide, regardless of what is measured."""
+        self.query_radius = max(self.contact_radius, self.size + max_range)
         """Radius in m around its base frame within which actors affect the clearance or the sensors."""
         # Wheels can also hit the solids that they roll on.
         touching = replace(robot, casters=(*robot.casters, *robot.tires)) if is_uneven else robot

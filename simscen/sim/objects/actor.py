@@ -44,7 +44,9 @@ class Actor:
     is_steered: bool = False
     """Whether the path can be replaced at any time, as for pedestrians."""
     body_id: int | None = None
-    """Body id in the engine; None while the actor is deferred."""
+    """Body id in the engine; None if the engine does not have it."""
+    is_tangible: bool = False
+    """Whether the engine has it and it collides. Otherwise it can only be measured and rendered."""
     engine_pose: Pose3 | None = None
     """Pose at which the engine currently has it."""
     center_from_base: Pose3 = Pose3()

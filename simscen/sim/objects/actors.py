@@ -39,7 +39,9 @@ class Actors:
 
     Scripted bodies are moved in the engine only where contact is possible: `begin_step` and `end_step` give them their
     pose and velocity, so that they push others with the correct speed. Pushable objects sleep until something comes
-    near (see BroadPhase). If there are none, the engine only has the actors near robots (see DeferredActors).
+    near (see BroadPhase). If there are none, actors collide only after a robot has come near (see DeferredActors).
+    Bullet solves contacts in the order in which bodies begin to collide. Actors that are only measured or rendered are
+    therefore in the engine without collisions, so that no observation changes a run.
     """
 
     def __init__(
@@ -48,17 +50,17 @@ class Actors:
         tick_rate: int,
         triangulate: engine.Triangulate,
         visual_shape: int = engine.DEFAULT_VISUAL,
-        is_complete: bool = True,
+        is_rendered: bool = True,
     ) -> None:
-        """Begin without actors; `visual_shape` is what the renderer shows, `is_complete` disables deferred actors."""
+        """Begin without actors; `visual_shape` is what the renderer shows of all of them if `is_rendered`."""
         self._client, self._tick_rate = client, tick_rate
         self._triangulate, self._visual_shape = triangulate, visual_shape
-        self._is_complete = is_complete
+        self._is_rendered = is_rendered
         self._actors: dict[str, Actor] = {}
         self._deferred: DeferredActors | None = None
         self._deferred_count = 0
         self._scripted: list[Actor] = []
-        self._scripted_in_engine: list[Actor] = []
+        self._scripted_tangible: list[Actor] = []
         self._scripted_speed = 0.0
         """Upper bound of the speed of all scripted actors in m/s."""
         self._pushable: list[Actor] = []
@@ -103,14 +105,34 @@ class Actors:
         return Actor(body, body.path, tick, segments, speed, size, radius, shell, is_steered)
 
     def _update_engine(self, tick: int) -> None:
-        """Create all actors in the engine that cannot be deferred."""
+        """Let all actors collide that cannot be deferred, and create the others if they are rendered."""
         self._actors = dict(sorted(self._actors.items()))
         actors = self._actors.values()
-        none_deferred = self._is_complete or any(actor.is_pushable for actor in actors)
+        none_deferred = any(actor.is_pushable for actor in actors)
         for actor in actors:
-            if actor.body_id is None and (none_deferred or actor.is_steered):
-                self._create_in_engine(actor, tick)
+            if none_deferred or actor.is_steered:
+                self._make_tangible(actor, tick)
+            elif self._is_rendered:
+                self._make_measurable(actor, tick)
         self._update_lists()
+
+    def _make_tangible(self, actor: Actor, tick: int) -> None:
+        """Let an actor collide; Bullet then sorts its contacts after those of all that already collide."""
+        if actor.is_tangible:
+            return
+        if actor.body_id is None:
+            self._create_in_engine(actor, tick)
+        else:
+            engine.enable_collisions(self._client, actor.id)
+            if actor.path is not None:
+                actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
+        actor.is_tangible = True
+
+    def _make_measurable(self, actor: Actor, tick: int) -> None:
+        """Create an actor in the engine without collisions."""
+        if actor.body_id is None:
+            self._create_in_engine(actor, tick)
+            engine.disable_collisions(self._client, actor.id)
 
     def _create_in_engine(self, actor: Actor, tick: int) -> None:
         client, body, visual = self._client, actor.body, self._visual_shape
@@ -133,20 +155,25 @@ class Actors:
 
     @property
     def is_engine_complete(self) -> bool:
-        """Whether no actor is deferred."""
+        """Whether all actors collide."""
         return not self._deferred_count
 
     def activate_near(self, queries: Iterable[ProximityQuery], tick: int) -> dict[int, str | None]:
-        """Create the deferred actors that any robot could reach; return their names by body id."""
+        """Let the deferred actors collide that any robot could reach, and create those that it could measure.
+
+        Return the names of both by body id.
+        """
         if self._deferred is None:
-            self._deferred = DeferredActors([actor for actor in self._actors.values() if actor.body_id is None])
-        activated = self._deferred.activate_near(queries)
+            self._deferred = DeferredActors([actor for actor in self._actors.values() if not actor.is_tangible])
+        activated, measured = self._deferred.activate_near(queries)
         for actor in activated:
-            self._create_in_engine(actor, tick)
+            self._make_tangible(actor, tick)
+        for actor in measured:
+            self._make_measurable(actor, tick)
         if activated:
             self._deferred_count -= len(activated)
-            self._scripted_in_engine = [actor for actor in self._scripted if actor.body_id is not None]
-        return {actor.id: actor.body.name for actor in activated}
+            self._scripted_tangible = [actor for actor in self._scripted if actor.is_tangible]
+        return {actor.id: actor.body.name for actor in (*activated, *measured)}
 
     def remove(self, name: str) -> None:
         """Remove a body; unknown names are ignored."""
@@ -179,9 +206,9 @@ class Actors:
     def _update_lists(self) -> None:
         self._poses_tick = self._resting_since = None
         actors = self._actors.values()
-        self._deferred, self._deferred_count = None, sum(actor.body_id is None for actor in actors)
+        self._deferred, self._deferred_count = None, sum(not actor.is_tangible for actor in actors)
         self._scripted = [actor for actor in actors if actor.path is not None]
-        self._scripted_in_engine = [actor for actor in self._scripted if actor.body_id is not None]
+        self._scripted_tangible = [actor for actor in self._scripted if actor.is_tangible]
         self._scripted_speed = max((actor.max_speed for actor in self._scripted), default=0.0)
         self._pushable = [actor for actor in actors if actor.is_pushable]
         self._broad_phase = BroadPhase(self._client, self._tick_rate, self._scripted, self._pushable)
@@ -280,7 +307,7 @@ class Actors:
 
     def begin_step(self, tick: int, everything: bool = True) -> None:
         """Give scripted bodies, or only those near contact, their pose and velocity before the step from `tick`."""
-        for actor in self._scripted_in_engine if everything else self._broad_phase.near_contact:
+        for actor in self._scripted_tangible if everything else self._broad_phase.near_contact:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
             velocity, turn_rate = actor.path_velocity(tick, self._tick_rate)
             if turn_rate or any(velocity):
@@ -288,12 +315,17 @@ class Actors:
 
     def end_step(self, tick: int, everything: bool = True) -> None:
         """Move scripted bodies, or only those near contact, to their pose at `tick`."""
-        for actor in self._scripted_in_engine if everything else self._broad_phase.near_contact:
+        for actor in self._scripted_tangible if everything else self._broad_phase.near_contact:
+            actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
+
+    def move_rendered(self, tick: int) -> None:
+        """Move all scripted bodies in the engine to their pose at `tick`, also those that do not collide."""
+        for actor in self._scripted:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
 
     def velocities(self, tick: int) -> dict[int, Vector]:
-        """Return the velocities in m/s of all actors in the engine by body id."""
-        scripted = {actor.id: actor.path_velocity(tick, self._tick_rate)[0] for actor in self._scripted_in_engine}
+        """Return the velocities in m/s of all actors that collide, by body id."""
+        scripted = {actor.id: actor.path_velocity(tick, self._tick_rate)[0] for actor in self._scripted_tangible}
         pushed = {actor.id: pybullet.getBaseVelocity(actor.id, self._client)[0] for actor in self._pushable}
         return {**scripted, **pushed}
 

@@ -13,6 +13,10 @@ EXTRA_RADIUS_M = 2.0
 """Additional search radius, so that the next queries can use the same list of nearby actors."""
 REQUERY_DISTANCE_M = 1.0
 """Distance that a robot can move before it queries deferred actors again."""
+EARLY_QUERY_DISTANCE_M = 0.5
+"""The same at ticks that are a multiple of ACTIVATION_PERIOD_S, however often the robot is observed."""
+ACTIVATION_PERIOD_S = 0.05
+"""Time between two of these ticks: robots are slower than 10 m/s, so that the other distance is not reached."""
 ROUNDING_MARGIN_M = 1e-3
 """Upper bound of rounding errors in the distances of deferred actors."""
 
@@ -86,14 +90,18 @@ def find_nearby(
 
 
 class ProximityQuery(NamedTuple):
-    """Position of a robot and the radius in m around it in which actors must be simulated."""
+    """Position of a robot and two radii in m around it.
+
+    Actors within `radius` must be simulated, those within `observed_radius` must be in the engine to be measured.
+    """
 
     point: Vector
     radius: float
+    observed_radius: float
 
 
 class DeferredActors:
-    """Actors that are not in the engine yet, because no robot has come near their path.
+    """Actors that do not collide in the engine yet, because no robot has come near their path.
 
     They stand still or follow a fixed path. An actor is activated, for good, before a robot can reach any point of its
     path, regardless of time and speed, so that no collision can be missed. docs/design/speed.md has the measurements.
@@ -108,18 +116,24 @@ class DeferredActors:
         sizes = np.array([actor.size for actor in actors])[self._owners]
         self._radii = segments[:, 4] + sizes + ROUNDING_MARGIN_M
         self._is_deferred = np.ones(len(actors), dtype=np.bool_)
+        self._is_measured = np.zeros(len(actors), dtype=np.bool_)
 
-    def activate_near(self, queries: Iterable[ProximityQuery]) -> list[Actor]:
-        """Return the deferred actors that any robot could reach, in order, and mark them as active.
+    def activate_near(self, queries: Iterable[ProximityQuery]) -> tuple[list[Actor], list[Actor]]:
+        """Return the deferred actors that any robot could reach, and the others that it could measure, in order.
 
-        The result holds until a robot has moved by REQUERY_DISTANCE_M.
+        Both are returned once. The result holds until a robot has moved by REQUERY_DISTANCE_M.
         """
-        is_near = np.zeros(len(self._actors), dtype=np.bool_)
-        for point, radius in queries:
-            is_near[self._owners[self._distances(point) <= radius + REQUERY_DISTANCE_M]] = True
+        is_near, is_measured = np.zeros((2, len(self._actors)), dtype=np.bool_)
+        for point, radius, observed_radius in queries:
+            distances = self._distances(point) - REQUERY_DISTANCE_M
+            is_near[self._owners[distances <= radius]] = True
+            is_measured[self._owners[distances <= observed_radius]] = True
         is_near &= self._is_deferred
         self._is_deferred &= ~is_near
-        return [self._actors[index] for index in np.flatnonzero(is_near).tolist()]
+        is_measured &= self._is_deferred & ~self._is_measured
+        self._is_measured |= is_measured
+        near, measured = (np.flatnonzero(chosen).tolist() for chosen in (is_near, is_measured))
+        return [self._actors[index] for index in near], [self._actors[index] for index in measured]
 
     def _distances(self, point: Vector) -> Array:
         """Return lower bounds of the distance in m from a point to the area that each segment sweeps."""

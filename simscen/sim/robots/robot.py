@@ -86,21 +86,21 @@ class Scene:
         for robot in self.robots.values():
             robot.sampler.compute_deferred()
 
-    def activate_actors(self, all_robots: bool = False) -> None:
-        """Create the deferred actors near robots in the engine; called at every tick at which a robot is observed.
+    def activate_actors(self, moved: float = REQUERY_DISTANCE_M) -> None:
+        """Let the deferred actors near robots collide in the engine; called at every tick at which a robot is observed.
 
-        Only robots that have moved since their last query are considered, or `all_robots`, after objects changed.
+        Only robots that have moved at least `moved` m since their last query are considered.
         """
         if self.actors.is_engine_complete:
             return
-        queries = [robot.make_query() for robot in self.robots.values() if all_robots or robot.needs_query]
+        queries = [robot.make_query() for robot in self.robots.values() if robot.distance_since_query >= moved]
         if queries and (activated := self.actors.activate_near(queries, self.tick)):
             for robot in self.robots.values():
                 robot.add_bodies(activated)
 
     def after_change(self) -> None:
         """Update everything that depends on the objects of the world."""
-        self.activate_actors(all_robots=True)
+        self.activate_actors(moved=0.0)
         for robot in self.robots.values():
             robot.on_change()
 
@@ -251,7 +251,7 @@ class Robot:
         """Return the image of a camera at `mount` in the base frame; see `render_image`."""
         render_scene = self._scene.render_scene
         assert render_scene is not None, "the simulation was built without images"
-        self._scene.actors.end_step(self._scene.tick)
+        self._scene.actors.move_rendered(self._scene.tick)
         render_scene.update(self.bodies_and_poses())
         return render_image(self._scene.client, self.base_pose().compose(mount), width, height, field_of_view, far)
 
@@ -299,14 +299,14 @@ class Robot:
         self.clearance.invalidate()
 
     @property
-    def needs_query(self) -> bool:
-        """Whether it has moved too far since its last query of deferred actors."""
-        return math.dist(self._query_point, self._state().pose[:3]) > REQUERY_DISTANCE_M
+    def distance_since_query(self) -> float:
+        """Distance in m from where it last queried deferred actors."""
+        return math.dist(self._query_point, self._state().pose[:3])
 
     def make_query(self) -> ProximityQuery:
         """Return its query of deferred actors."""
         self._query_point = self._state().pose.position
-        return ProximityQuery(self._query_point, self.clearance.query_radius)
+        return ProximityQuery(self._query_point, self.clearance.contact_radius, self.clearance.query_radius)
 
     def add_bodies(self, names: Mapping[int, str | None]) -> None:
         """Add new bodies of the engine that it can touch: names by body id, None for walls."""

@@ -1,4 +1,4 @@
-"""What nobody pushes is in the engine once a robot comes near to its ways, which nobody notices."""
+"""Deferred actors: those that cannot be pushed collide in the engine once a robot comes near their path."""
 
 import math
 import random
@@ -43,14 +43,14 @@ def thing(rng, name, start):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_all_whose_ways_lead_a_robot_within_its_reach_are_met_and_few_others(simulate, seed):
+def test_actors_whose_paths_come_within_reach_are_activated(simulate, seed):
     """Held against where paths are at many moments."""
     rng = random.Random(seed)
     bodies = [thing(rng, f"{k}", (rng.uniform(-20, 20), rng.uniform(-20, 20))) for k in range(60)]
     simulation = simulate(bodies=bodies, pose=Pose2(100.0, 100.0), has_images=False)
     actors = list(simulation._scene.actors._actors.values())
-    absent, place = DeferredActors(actors), (rng.uniform(-5, 5), rng.uniform(-5, 5), 0.0)
-    met = absent.activate_near([ProximityQuery(place, 3.0)])
+    deferred, place = DeferredActors(actors), (rng.uniform(-5, 5), rng.uniform(-5, 5), 0.0)
+    near, measured = deferred.activate_near([ProximityQuery(place, 3.0, 6.0)])
 
     def nearest(actor: Actor) -> float:
         if actor.path is None:
@@ -60,13 +60,16 @@ def test_all_whose_ways_lead_a_robot_within_its_reach_are_met_and_few_others(sim
 
     away = {actor.body.name: nearest(actor) for actor in actors}
     strays = {actor.body.name: max(way.deviation for way in actor.segments) for actor in actors}
-    names = {actor.body.name for actor in met}
+    names = {actor.body.name for actor in near}
     assert 0 < len(names) < 50
     assert {name for name, distance in away.items() if distance <= 3.0 + REQUERY_DISTANCE_M} <= names
     assert {name for name in names if away[name] > 3.2 + REQUERY_DISTANCE_M + strays[name]} == set()
-    assert (
-        absent.activate_near([ProximityQuery((place[0] + REQUERY_DISTANCE_M, *place[1:]), 3.0 - REQUERY_DISTANCE_M)])
-        == []
+    assert {actor.body.name for actor in measured} >= {n for n, d in away.items() if 4.0 + strays[n] < d <= 6.0}
+    assert not names & {actor.body.name for actor in measured}
+    moved = (place[0] + REQUERY_DISTANCE_M, *place[1:])
+    assert deferred.activate_near([ProximityQuery(moved, 3.0 - REQUERY_DISTANCE_M, 6.0 - REQUERY_DISTANCE_M)]) == (
+        [],
+        [],
     )
 
 
@@ -108,8 +111,42 @@ def course(seed, present):
     return beats, count
 
 
+def squeeze(seed, every=6, **observation):
+    """Return the poses, every so many ticks, of a robot between a crate and two carts that meet it 8 m from its start."""
+    rng = random.Random(seed)
+
+    def cart(name, side, offset):
+        poses = (
+            Pose2(8.0 + offset, side * 2.0, rng.uniform(-0.3, 0.3)),
+            Pose2(8.0 + rng.uniform(-0.1, 0.1), side * rng.uniform(0.25, 0.35), rng.uniform(-0.3, 0.3)),
+        )
+        path = MotionPath((0.0, rng.uniform(1.5, 4.0)), poses, "once", 12.0, "linear")
+        return Body(name, CRATE, Pose3(*poses[0][:2]), path=path)
+
+    crate = Body("m", CRATE, Pose3(8.55 + rng.uniform(0.0, 0.05), rng.uniform(-0.1, 0.1)))
+    bodies = [cart("a", 1, rng.uniform(2, 4)), cart("z", -1, -rng.uniform(3, 5)), crate]
+    placed = {"": RobotPlacement(build_robot_body(shipped("turtlebot")), Pose2(0.0, 0.0))}
+    simulation = Simulation(merge_solids([box("post", 3, -2, 0.3, 0.3)]), bodies, placed, triangulate, **observation)
+    robot = simulation.robots[""]
+    robot.drive(Twist(0.65, 0.0, 0.0))
+    poses = []
+    for _ in range(4800 // every):
+        simulation.step(every)
+        poses.append(robot.truth().pose)
+    simulation.close()
+    return poses
+
+
+@pytest.mark.parametrize("seed", [1, 6, 10])
+def test_observations_do_not_change_the_contacts_of_a_jammed_robot(seed):
+    poses = squeeze(seed, has_images=False)
+    assert squeeze(seed, has_images=True) == poses
+    assert squeeze(seed, has_images=False, clearance_range=6.0) == poses
+    assert squeeze(seed, every=24, has_images=False) == poses[3::4]
+
+
 @pytest.mark.parametrize("seed", [4, 6])
-def test_robots_meet_what_they_would_if_all_were_in_the_engine_from_the_start(seed):
+def test_robots_collide_as_if_all_actors_were_in_the_engine_from_the_start(seed):
     """To the last bit."""
     everybody, (all_there, all_known) = course(seed, present=True)
     absence, (there, known) = course(seed, present=False)
@@ -127,7 +164,7 @@ FAR = Body("far", CRATE, Pose3(7.5))
 COMES = Body("comes", CRATE, Pose3(0, 30), path=MotionPath((0.0, 60.0), (Pose2(0, 30), Pose2(0, 1.0))))
 
 
-def test_the_engine_has_what_comes_near_some_time_and_what_a_robot_comes_near_to(simulate):
+def test_engine_has_actors_whose_path_comes_near_the_robot(simulate):
     simulation = simulate(bodies=[FAR, COMES], has_images=False)
     assert there(simulation) == {"comes"}
     simulation.place_robot(Pose2(4.0, 0.0))
@@ -138,7 +175,7 @@ def test_the_engine_has_what_comes_near_some_time_and_what_a_robot_comes_near_to
 
 
 @pytest.mark.parametrize("every", [12, 18 * 240], ids=["asked", "not asked"])
-def test_what_a_robot_drives_into_from_afar_is_touched(simulate, every):
+def test_robot_collides_with_an_actor_that_was_deferred(simulate, every):
     simulation = simulate(bodies=[FAR], drive=(0.5, 0.0, 0.0), has_images=False)
     for _ in range(18 * 240 // every):
         simulation.step(every)
@@ -147,20 +184,20 @@ def test_what_a_robot_drives_into_from_afar_is_touched(simulate, every):
     assert [event.name for event in simulation.collisions()] == ["far"]
 
 
-def test_where_anything_can_be_pushed_the_engine_has_everything(simulate):
+def test_no_actor_is_deferred_if_one_can_be_pushed(simulate):
     simulation = simulate(bodies=[FAR], has_images=False)
     assert there(simulation) == set()
     simulation.spawn(Body("light", CRATE, Pose3(-3.0), mass=1.0))
     assert there(simulation) == {"far", "light"}
 
 
-def test_who_is_led_is_in_the_engine_for_it_may_go_anywhere(simulate):
+def test_steered_actor_is_not_deferred(simulate):
     simulation = simulate(has_images=False)
     simulation.add_steered(FAR, 1.0)
     assert there(simulation) == {"far"}
 
 
-def test_nobody_is_measured_against_what_is_missing(simulate):
+def test_distance_to_a_deferred_actor_is_an_error(simulate):
     """Rather than that a collision with it is not seen."""
     simulation = simulate(bodies=[FAR], has_images=False)
     with pytest.raises(LookupError, match='"far" is not in the engine'):
