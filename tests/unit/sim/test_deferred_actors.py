@@ -112,7 +112,7 @@ def course(seed, present):
 
 
 def squeeze(seed, every=6, **observation):
-    """Return the poses, every so many ticks, of a robot between a crate and two carts that meet it 8 m from its start."""
+    """Return the poses of a robot between a crate and two carts that meet it 8 m from its start."""
     rng = random.Random(seed)
 
     def cart(name, side, offset):
