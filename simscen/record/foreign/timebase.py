@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,10 @@ from simscen.record.simtime import NS_PER_SECOND
 
 MAX_BACKWARD_JUMP_NS = NS_PER_SECOND
 """Maximum difference to an earlier but newer stamp of the topic. A larger one means that the clock was reset."""
+MIN_CLOCK_STEP_NS = NS_PER_SECOND // 10
+"""Change of a clock that is reported. Smaller ones are within the delays of logging."""
+MIN_MESSAGES_AROUND_STEP = 20
+"""Messages before and after a change of a clock that are needed to tell it from delayed messages."""
 MAX_LOGGING_DELAY_NS = 10 * NS_PER_SECOND
 """Maximum difference between the stamps of two topics at the same time. A larger one means different clocks."""
 
@@ -21,7 +25,7 @@ MAX_LOGGING_DELAY_NS = 10 * NS_PER_SECOND
 class StampedMessages:
     """Times of the messages of a topic in ns, in the order of logging: times of logging, and stamps of the headers.
 
-    Raises UnusableLog if the stamps jump back.
+    Raises UnusableLog if the stamps jump back, or if their clock was set while they were recorded.
     """
 
     topic: str
@@ -36,6 +40,11 @@ class StampedMessages:
             seconds = jumps[index] / NS_PER_SECOND
             text = f"the time of {self.topic} jumps back by {seconds:.1f} s at its message {index + 1}"
             raise UnusableLog(text, "a clock was reset or a bag looped: cut the log there, or judge it with --time log")
+        if (step := find_clock_step(self.logged, self.stamps)) is not None:
+            index, seconds = step[0], step[1] / NS_PER_SECOND
+            direction = "back" if seconds < 0 else "forward"
+            text = f"the clock of {self.topic} was set {direction} by {abs(seconds):.1f} s at its message {index + 1}"
+            raise UnusableLog(text, "cut the log there, or judge it with --time log")
 
     @property
     def disorder(self) -> str:
@@ -47,6 +56,49 @@ class StampedMessages:
             f"{repeated} repeated stamps, of which the last message is used" if repeated else "",
         ]
         return ", ".join(text for text in texts if text)
+
+
+def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
+    """Return the first message after the clock of the stamps was set, and by how many ns; None if it was not.
+
+    Both times are those of one topic, in ns, in the order of logging. No message is logged before its stamp, so the
+    largest difference of stamp and time of logging is that of the clocks. It changes for good only if a clock is set. A
+    delayed or repeated message, a slow recorder, and a paused simulation do not change it for good, or they change the
+    interval of logging rather than that of the stamps.
+    """
+    count = MIN_MESSAGES_AROUND_STEP
+    if len(stamps) < 2 * count:
+        return None
+    offsets, stamp_gaps, logged_gaps = stamps - logged, np.diff(stamps), np.diff(logged)
+    changes = np.diff(offsets)
+    lasting = np.maximum.accumulate(offsets[::-1])[::-1][1:] - np.maximum.accumulate(offsets)[:-1]
+    is_step = (np.abs(changes) > MIN_CLOCK_STEP_NS) & (2 * lasting * np.sign(changes) > np.abs(changes))
+    is_step &= np.abs(stamp_gaps - np.median(stamp_gaps)) > np.abs(logged_gaps - np.median(logged_gaps))
+    found = np.flatnonzero(is_step[count - 1 : -count + 1])
+    if not len(found):
+        return None
+    index = int(found[0]) + count - 1
+    return index + 1, int(changes[index])
+
+
+def check_recorder_clock(topic: str, logged: Sequence[int], stamps: Sequence[int]) -> None:
+    """Raise UnusableLog if the clock of the recorder was set back, and that of the stamps with it, unless unset.
+
+    Both times are in ns, in the order of the file. A file whose messages are sorted in another way has many steps back,
+    or parts that do not overlap in time.
+    """
+    times = np.array(logged, dtype=np.int64)
+    backward = np.flatnonzero(np.diff(times) < 0)
+    if len(backward) != 1:
+        return
+    index = int(backward[0]) + 1
+    step = int(times[index - 1] - times[index])
+    overlaps = times[index] > times[0] and times[-1] > times[index - 1]
+    if step > MIN_CLOCK_STEP_NS and overlaps and (stamps[index] < stamps[index - 1] or not any(stamps)):
+        text = (
+            f"the clock of the recorder was set back by {step / NS_PER_SECOND:.1f} s at message {index + 1} of {topic}"
+        )
+        raise UnusableLog(text, "cut the log there")
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from simscen.core.geometry import Array, wrap_array
 from simscen.core.records.trace import Ticks
 from simscen.record.foreign.options import TOPICS, ForeignLogOptions
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog
-from simscen.record.foreign.timebase import StampedMessages
+from simscen.record.foreign.timebase import StampedMessages, check_recorder_clock
 from simscen.record.foreign.transforms import TransformTree
 from simscen.record.messages import decode
 from simscen.record.messages.decode import NO_COVARIANCE, CheckedReader, StampedPose, decode_checked
@@ -121,6 +121,7 @@ def track_from_topic(topic: str, messages: Sequence[tuple[int, StampedPose]], op
     frames = sorted({pose.frame for _, pose in messages})
     if len(frames) > 1:
         raise UnusableLog(f"{topic} has messages in several frames: {', '.join(frames)}")
+    check_recorder_clock(topic, [time for time, _ in messages], [pose.stamp for _, pose in messages])
     messages = sorted(messages, key=lambda message: message[0])
     logged, poses = [time for time, _ in messages], [pose for _, pose in messages]
     twists = [pose.twist for pose in poses if pose.twist is not None]

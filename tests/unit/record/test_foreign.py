@@ -1,5 +1,6 @@
-"""Logs of real robots become traces, as far as they go and no further."""
+"""Reading the logs of real robots."""
 
+import random
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,6 +12,7 @@ import pytest
 from foreign_logs import (
     BEGIN,
     CHUNKED,
+    LATENCY,
     SECOND,
     SPEED,
     STORE,
@@ -18,6 +20,7 @@ from foreign_logs import (
     Said,
     believed,
     drive,
+    header,
     link,
     odometry,
     stamped_pose,
@@ -92,7 +95,7 @@ def test_every_container_gives_the_same_trace(tmp_path: Path, writer: str) -> No
     }  # fmt: skip
 
 
-def test_stamps_count_not_when_the_log_got_the_message(read: Callable[..., ForeignLog]) -> None:
+def test_times_are_those_of_the_headers(read: Callable[..., ForeignLog]) -> None:
     """AMCL's pose is logged 80 ms after the truth of the same moment; at 0.5 m/s that would be 4 cm of error."""
     log = read(drive(off=0.0))
     error = log.trace.belief.values[:, 0] - np.interp(
@@ -106,7 +109,7 @@ def test_stamps_count_not_when_the_log_got_the_message(read: Callable[..., Forei
     assert np.abs(late[:-1]).max() == pytest.approx(0.04, abs=0.002)
 
 
-def test_what_has_no_stamp_is_placed_by_the_clock_of_what_has(read: Callable[..., ForeignLog]) -> None:
+def test_times_without_header_are_converted_to_the_clock_of_the_headers(read: Callable[..., ForeignLog]) -> None:
     """Twist has no header; with simulated time the log's own clock is another one, and runs at another rate."""
     said = [replace(one, time=BEGIN + 2 * (one.time - 5 * SECOND)) for one in drive(begin=5 * SECOND)]
     trace = read(said).trace
@@ -152,7 +155,7 @@ def test_a_truth_in_a_frame_of_its_own_is_not_compared_with_the_map(read: Callab
     assert Evidence.ALIGNMENT not in same.coverage.missing
 
 
-def test_repeated_and_late_stamps_are_put_in_order_and_told(read: Callable[..., ForeignLog]) -> None:
+def test_repeated_and_late_stamps_are_sorted_and_noted(read: Callable[..., ForeignLog]) -> None:
     said = [one for one in drive() if one.topic == "/mocap"]
     said[10], said[11] = replace(said[10], message=said[11].message), replace(said[11], message=said[10].message)
     said.insert(51, replace(said[50], time=said[50].time + 1))
@@ -168,6 +171,62 @@ def test_a_clock_that_jumps_back_is_refused(refused: Callable[..., str]) -> None
     assert refused(said).startswith("SC804 the time of /mocap jumps back by 4.0 s at its message 82 (")
 
 
+def with_clock_step(seconds: float, also_recorder: bool = False) -> list[Said]:
+    """A drive during which the clock of the stamps, and perhaps that of the recorder, is set after 5 s."""
+    step, said = round(seconds * SECOND), []
+    for one in drive():
+        if one.time > BEGIN + 5 * SECOND + LATENCY and hasattr(one.message, "header"):
+            stamp = one.message.header.stamp
+            moved = header(stamp.sec * SECOND + stamp.nanosec + step, one.message.header.frame_id)
+            time = one.time + step if also_recorder else one.time
+            said.append(Said(one.topic, time, replace(one.message, header=moved)))
+        else:
+            said.append(one)
+    return said
+
+
+@pytest.mark.parametrize("seconds", [-0.9, -0.3, 0.3, 0.9, 3.0])
+def test_clock_that_is_set_while_recording_is_refused(
+    refused: Callable[..., str], read: Callable[..., ForeignLog], seconds: float
+) -> None:
+    direction = "back" if seconds < 0 else "forward"
+    text = f"SC804 the clock of /mocap was set {direction} by {abs(seconds):.1f} s at its message 102 ("
+    assert refused(with_clock_step(seconds)).startswith(text)
+    by_log = read(with_clock_step(seconds), ForeignLogOptions(truth="/mocap", clock="log"))
+    assert by_log.trace.velocity.values[:, 0] == pytest.approx(SPEED, abs=1e-6)
+
+
+def test_clock_of_the_recorder_that_is_set_back_is_refused(refused: Callable[..., str]) -> None:
+    text = "SC804 the clock of the recorder was set back by 0.5 s at message 102 of /mocap ("
+    assert refused(with_clock_step(-0.55, also_recorder=True)).startswith(text)
+
+
+def delayed(said: list[Said], begin: float, end: float, seconds: float) -> list[Said]:
+    """Messages of one topic, of which those between two times (s) are logged late, and none before an earlier one."""
+    late, last = [], 0
+    for one in said:
+        is_late = begin * SECOND <= one.time - BEGIN < end * SECOND
+        last = max(last, one.time + (round(seconds * SECOND) if is_late else 0))
+        late.append(replace(one, time=last))
+    return late
+
+
+@pytest.mark.parametrize(
+    "change", ["shuffled", "reversed", "stalled", "slow at the start", "slow at the end", "jitter"]
+)
+def test_order_and_delay_of_logging_do_not_change_stamped_poses(read: Callable[..., ForeignLog], change: str) -> None:
+    said, rng = [one for one in drive() if one.topic == "/mocap"], random.Random(4)
+    changed = {
+        "shuffled": lambda: rng.sample(said, len(said)),
+        "reversed": lambda: said[::-1],
+        "stalled": lambda: delayed(said, 4.0, 5.0, 1.5),
+        "slow start": lambda: delayed(said, 0.0, 3.0, 0.5),
+        "slow end": lambda: delayed(said, 5.0, 99.0, 0.5),
+        "jitter": lambda: [replace(one, time=one.time + rng.randrange(SECOND // 3)) for one in said],
+    }[change]()
+    assert (read(changed).trace.truth.values == read(said).trace.truth.values).all()
+
+
 def test_topics_of_different_clocks_are_refused(refused: Callable[..., str], read: Callable[..., ForeignLog]) -> None:
     said = [one for one in drive() if one.topic == "/mocap"]
     said += [Said("/amcl_pose", BEGIN + k * SECOND, believed(k * SECOND, SPEED * k)) for k in range(10)]
@@ -175,7 +234,7 @@ def test_topics_of_different_clocks_are_refused(refused: Callable[..., str], rea
     assert len(read(said, ForeignLogOptions(truth="/mocap", clock="log")).trace.belief) == 10
 
 
-def test_stamps_that_nobody_set_are_not_used(read: Callable[..., ForeignLog]) -> None:
+def test_stamps_that_were_never_set_are_not_used(read: Callable[..., ForeignLog]) -> None:
     said = [one for one in drive() if one.topic != "/mocap"]
     said += [Said("/mocap", BEGIN + k * SECOND // 20, stamped_pose(0, "map", SPEED * k / 20)) for k in range(201)]
     log = read(said)
@@ -196,7 +255,7 @@ def test_a_belief_that_begins_after_a_meter_of_driving_leaves_room_for_doubt(rea
     assert log.coverage.partial[Evidence.BELIEF].startswith("/amcl_pose starts at t = 2.0")
 
 
-def test_a_twist_that_nobody_filled_in_is_no_standstill(read: Callable[..., ForeignLog]) -> None:
+def test_twists_that_were_never_set_are_not_a_standstill(read: Callable[..., ForeignLog]) -> None:
     said = [Said("/gps", BEGIN + k * SECOND // 20, odometry(BEGIN + k * SECOND // 20, "map", SPEED * k / 20, 0.0))
             for k in range(201)]  # fmt: skip
     log = read(said, ForeignLogOptions(truth="/gps"))
