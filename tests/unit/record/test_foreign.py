@@ -211,9 +211,7 @@ def delayed(said: list[Said], begin: float, end: float, seconds: float) -> list[
     return late
 
 
-@pytest.mark.parametrize(
-    "change", ["shuffled", "reversed", "stalled", "slow at the start", "slow at the end", "jitter"]
-)
+@pytest.mark.parametrize("change", ["shuffled", "reversed", "stalled", "slow start", "slow end", "jitter"])
 def test_order_and_delay_of_logging_do_not_change_stamped_poses(read: Callable[..., ForeignLog], change: str) -> None:
     said, rng = [one for one in drive() if one.topic == "/mocap"], random.Random(4)
     changed = {
