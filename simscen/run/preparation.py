@@ -14,7 +14,7 @@ from simscen.core.errors import Problem
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.navigation import Estimate, Goal
-from simscen.core.records.case import CLEARANCE_RANGE, Case
+from simscen.core.records.case import CLEARANCE_RANGE, ROBOT_NAME, Case
 from simscen.criteria.base import Criterion
 from simscen.loading.builders import (
     load_criterion_masks,
@@ -38,7 +38,6 @@ from simscen.model.stack import StackSpec
 from simscen.model.stack_files import AnyStack
 from simscen.model.world import WorldSpec
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.single_robot import ROBOT_NAME
 from simscen.spec.registry import Entry
 from simscen.triggers.robot_state import ClearanceBelow
 from simscen.worlds.built_world import build_world_and_map

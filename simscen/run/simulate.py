@@ -12,7 +12,7 @@ from typing import Any
 
 from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput, RunError
-from simscen.core.records.case import Run
+from simscen.core.records.case import ROBOT_NAME, Run
 from simscen.core.records.trace import Trace
 from simscen.judge.result_json import to_json
 from simscen.judge.run_result import combine_robots, judge_run
@@ -27,7 +27,6 @@ from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
 from simscen.run.log_header import log_header
 from simscen.run.preparation import PreparedScenario, prepare
-from simscen.sim.single_robot import ROBOT_NAME
 from simscen.spec.registry import Entry
 
 Attach = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]

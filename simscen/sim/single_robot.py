@@ -9,14 +9,12 @@ import numpy.typing as npt
 from simscen.core.geometry import Pose2, Pose3, Vector
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, TriangleMesh
+from simscen.core.records.case import ROBOT_NAME
 from simscen.core.records.events import Event
 from simscen.core.records.trace import Truth
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import engine
 from simscen.sim.simulation import RobotPlacement, Simulation
-
-ROBOT_NAME = ""
-"""Name of a robot that is the only one."""
 
 
 class SingleRobotSimulation(Simulation):

@@ -49,6 +49,8 @@ class Passage:
         return f"the passage of {self.width:.2f} m{between} at ({self.middle[0]:.2f}, {self.middle[1]:.2f})"
 
 
+ROBOT_NAME = ""
+"""Name of a robot that is the only one."""
 CLEARANCE_RANGE = 2.0
 """Distance in m around the robot within which clearance is always measured."""
 

@@ -2,6 +2,8 @@
 
 import inspect
 import re
+import subprocess
+import sys
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -117,6 +119,20 @@ def test_a_log_is_judged_by_a_file_of_criteria(simscen, limits, tmp_path: Path) 
     assert strict.code == 1
     assert "speed: 0.50 m/s > 0.40 m/s, at t = " in strict.out
     assert "limits.yaml:2" in strict.out
+
+
+def test_judging_a_log_imports_no_engine(limits, tmp_path: Path) -> None:
+    write_mcap(tmp_path / "drive.mcap", drive())
+    arguments = ["judge", "drive.mcap", "--scenario", limits("speed: {max: 0.6 m/s}"), "--truth", "/mocap"]
+    code = (
+        "import sys; from simscen.cli.main import main\n"
+        f"sys.argv = ['simscen', *{arguments}]\n"
+        "try: main()\n"
+        "except SystemExit as end: assert not end.code, end.code\n"
+        "print({'pybullet', 'ompl', 'filterpy'} & set(sys.modules))"
+    )
+    run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert run.stdout.splitlines()[-1] == "set()"
 
 
 def test_a_log_is_judged_by_the_filter_masks_of_a_file_of_criteria(simscen, limits, tmp_path: Path) -> None:
