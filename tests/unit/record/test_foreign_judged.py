@@ -4,7 +4,6 @@ import inspect
 import re
 import subprocess
 import sys
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
