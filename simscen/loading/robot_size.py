@@ -18,11 +18,16 @@ CIRCLE_CORNERS = 24
 
 @dataclass(frozen=True)
 class RobotSize:
-    """Size of a robot: `footprint` (base frame, m), `radius` of a round one (m), and `height` of the hull (m)."""
+    """Size of a robot: `footprint` (base frame, m), `radius` of a round one (m), and `height` of the hull (m).
+
+    `underside` is the lowest height (m) of a base that stays at z = 0, because its drive is omnidirectional or mecanum;
+    None for a base on wheels, which climbs low obstacles.
+    """
 
     footprint: Polygon
     radius: float | None
     height: float
+    underside: float | None = None
 
     @property
     def inscribed(self) -> float:
@@ -44,12 +49,21 @@ def robot_size(loaded: LoadedScenario) -> RobotSize:
     A robot of simple shapes with a footprint or radius in its file need not be built for this.
     """
     spec = loaded.robot.spec
-    if spec is not None and spec.body is not None and (spec.radius is not None or spec.footprint is not None):
+    if (
+        spec is not None
+        and spec.body is not None
+        and (spec.radius is not None or spec.footprint is not None)
+        and spec.drive.type != "mecanum"
+    ):
         check_ground_clearance(spec, loaded.robot.path)
         corners = tuple((x, y) for x, y in spec.footprint) if spec.footprint is not None else _round(spec.radius or 0.0)
-        return RobotSize(corners, spec.radius, _height_of_shapes(spec))
+        is_planar = spec.drive.type == "omnidirectional"
+        underside = min(part.z for part in spec.body) if is_planar else None
+        return RobotSize(corners, spec.radius, _height_of_shapes(spec), underside)
     body = load_robot(loaded)[1]
-    return RobotSize(body.footprint, body.radius, _height_of_hull(body))
+    low, high = _hull_heights(body)
+    is_planar = body.drive.type in ("omnidirectional", "mecanum")
+    return RobotSize(body.footprint, body.radius, high, low if is_planar else None)
 
 
 def _round(radius: float) -> Polygon:
@@ -61,10 +75,12 @@ def _height_of_shapes(spec: RobotSpec) -> float:
     return max(part.z + part.tall for part in spec.body or ())
 
 
-def _height_of_hull(body: RobotBody) -> float:
+def _hull_heights(body: RobotBody) -> tuple[float, float]:
+    """Return the lowest and the highest z of the hull in m."""
     from simscen.sim.body.outline import hull_points
 
-    return max(float(solid.pose.apply(hull_points(solid.shape))[:, 2].max()) for solid in body.hull)
+    heights = [solid.pose.apply(hull_points(solid.shape))[:, 2] for solid in body.hull]
+    return min(float(z.min()) for z in heights), max(float(z.max()) for z in heights)
 
 
 def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, ...]:

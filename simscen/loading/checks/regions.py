@@ -69,7 +69,7 @@ class RobotRoutes:
     @property
     def z_range(self) -> tuple[float, float]:
         """Heights in m between which an obstacle blocks a route."""
-        return SILL_M, max(2 * SILL_M, self.scene.size.height)
+        return self.scene.heights_above(SILL_M)
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:

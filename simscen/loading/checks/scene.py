@@ -29,6 +29,8 @@ from simscen.worlds.geometry.prisms import upright_prism
 
 SILL_M = 0.02
 """Height below which an obstacle does not block a robot."""
+TOUCHING_M = 0.002
+"""Height that an obstacle must reach above the underside of a hull to surely touch it."""
 TOUCH_M = 1e-6
 """Distance below which a point counts as inside a solid."""
 START = ("robot", "pose")
@@ -95,7 +97,13 @@ class Scene:
     @property
     def z_range(self) -> tuple[float, float]:
         """Heights in m between which something blocks the robot."""
-        return SILL_M, max(2 * SILL_M, self.size.height)
+        return self.heights_above(SILL_M)
+
+    def heights_above(self, sill: float) -> tuple[float, float]:
+        """Return the heights in m between which something blocks the robot, if a base on wheels climbs `sill` m."""
+        underside = self.size.underside
+        lowest = sill if underside is None else underside + TOUCHING_M
+        return lowest, max(lowest + sill, self.size.height)
 
     @cached_property
     def start(self) -> Pose2:
