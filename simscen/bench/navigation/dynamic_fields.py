@@ -31,7 +31,7 @@ LEAST_WAY = 8.0
 """Meters: a polynomial that leaves the arena sooner is drawn again."""
 START, GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14159)
 """Where DynaBARN's robot sets out, a meter outside the arena, and where it goes."""
-MOST_TRIES = 1000
+MAX_ATTEMPTS = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +75,9 @@ def _mover(rng: np.random.Generator, speed: float) -> Mover:
 def _way(rng: np.random.Generator) -> Array:
     """Points (n, 2) about PIECE apart along a polynomial within the arena; every other one leads along y, or back.
 
-    Raises RuntimeError after MOST_TRIES (never seen).
+    Raises RuntimeError after MAX_ATTEMPTS (never seen).
     """
-    for _ in range(MOST_TRIES):
+    for _ in range(MAX_ATTEMPTS):
         way = _inside(rng)
         along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
         if along[-1] < LEAST_WAY:
@@ -86,7 +86,7 @@ def _way(rng: np.random.Generator) -> Array:
         points = np.column_stack((np.interp(at, along, way[:, 0]), np.interp(at, along, way[:, 1])))
         points = points[:, ::-1] if rng.integers(2) else points
         return points[::-1] if rng.integers(2) else points
-    raise RuntimeError(f"none of {MOST_TRIES} polynomials stays within the arena for {LEAST_WAY:g} m")
+    raise RuntimeError(f"none of {MAX_ATTEMPTS} polynomials stays within the arena for {LEAST_WAY:g} m")
 
 
 def _inside(rng: np.random.Generator) -> Array:

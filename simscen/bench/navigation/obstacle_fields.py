@@ -25,7 +25,7 @@ FILL_AT, CLEAR_AT = 5, 1
 START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
 GAP = 0.37
 """Radius in meters of the disc that has a way through every field, as through every world of BARN."""
-MOST_TRIES = 1000
+MAX_ATTEMPTS = 1000
 
 Cells = npt.NDArray[np.bool_]
 
@@ -51,14 +51,14 @@ def obstacle_field(number: int, gap: float = GAP, too_wide: float | None = None)
     """The field of this number (from 1): always the same, and one that can be crossed.
 
     Density is drawn anew until a disc of radius `gap` has a way, and one of `too_wide`, where that is given, has none.
-    Raises RuntimeError after MOST_TRIES (never seen).
+    Raises RuntimeError after MAX_ATTEMPTS (never seen).
     """
     rng = Streams(number).generator("obstacle field" if gap == GAP else f"obstacle field {gap:g}")
-    for _ in range(MOST_TRIES):
+    for _ in range(MAX_ATTEMPTS):
         centers = _centers(_smoothed(rng))
         if _crossable(centers, gap, too_wide) and np.isfinite(length := _shortest(centers, gap)):
             return ObstacleField(number, centers, length)
-    raise RuntimeError(f"no way through any of {MOST_TRIES} fields of number {number}")
+    raise RuntimeError(f"no way through any of {MAX_ATTEMPTS} fields of number {number}")
 
 
 def _smoothed(rng: np.random.Generator) -> Cells:

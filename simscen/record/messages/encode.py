@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.clock import Stamp
 from simscen.record.messages.cdr import Template
-from simscen.record.simtime import Stamp
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 _TWIST = "2d24xd"

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from simscen.core.clock import SimTime
 from simscen.core.environment.scenery import Scenery
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.scripted_poses import PosesAtTick, PredictedPoses
@@ -24,7 +25,6 @@ from simscen.record.messages.encode_arrays import (
 from simscen.record.publishers.channels import BatchWriter, LogPublisher, MessageSink, NamespacedPublisher
 from simscen.record.publishers.scene import ScenePublisher
 from simscen.record.publishers.sensors import SensorPublisher
-from simscen.record.simtime import SimTime
 from simscen.record.trace_thinning import Thinning, Throttle
 
 

@@ -25,7 +25,7 @@ from simscen.core.geometry.shapes import (
     Sphere,
     TriangleMesh,
 )
-from simscen.worlds.geometry.circle_facets import MAX_SAGITTA_M, facet_count
+from simscen.worlds.geometry.prisms import MAX_SAGITTA_M, facet_count
 
 Faces = npt.NDArray[np.int32]
 Profile = list[tuple[float, float]]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from simscen.bench.navigation import corridors
+from simscen.bench.navigation import office_maps
 from simscen.bench.navigation.experiments import with_stack_parameters
 from simscen.bench.navigation.office_maps import FREE, building, write_building
 from simscen.bench.navigation.random_goals import FAULTS, MOVABLE, ROOM, degraded, random_drives, random_goals
@@ -79,13 +79,13 @@ def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
 
 
 def test_corridors_and_ramps_load_and_are_not_all_alike(tmp_path: Path) -> None:
-    for made in (corridors.two_robots(tmp_path / "c", (1, 2, 3)), corridors.ramps(tmp_path / "r", (1, 2, 3))):
+    for made in (office_maps.two_robots(tmp_path / "c", (1, 2, 3)), office_maps.ramps(tmp_path / "r", (1, 2, 3))):
         names = {load_scenario(drive.file, made.root).spec.name for drive in made.drives}
         assert len(names) == 3
 
 
 def test_no_ramp_is_a_wall_on_the_map_that_the_robots_lidar_would_make(tmp_path: Path) -> None:
-    for drive in corridors.ramps(tmp_path, range(1, 21)).drives:
+    for drive in office_maps.ramps(tmp_path, range(1, 21)).drives:
         loaded = load_scenario(drive.file, tmp_path)
         (lidar,) = (sensor.lidar for sensor in loaded.robot.spec.sensors.values() if sensor.lidar)
         (platform,) = loaded.world.spec.obstacles
@@ -96,7 +96,7 @@ OTHER = {"controller": {"desired_linear_vel": 0.3}, "localizer": {"type": "odome
 
 
 def test_a_variant_has_the_same_drives_with_other_parameters(tmp_path: Path) -> None:
-    made = corridors.ramps(tmp_path / "r", (1, 2))
+    made = office_maps.ramps(tmp_path / "r", (1, 2))
     other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
     for before, after in zip(made.drives, other.drives, strict=True):
         one = load_scenario(before.file, made.root).spec
@@ -106,7 +106,7 @@ def test_a_variant_has_the_same_drives_with_other_parameters(tmp_path: Path) -> 
 
 
 def test_a_variant_of_drives_without_a_map_keeps_the_localizer_that_needs_none(tmp_path: Path) -> None:
-    made = replace(corridors.ramps(tmp_path / "r", (1,)), mapless=True)
+    made = replace(office_maps.ramps(tmp_path / "r", (1,)), mapless=True)
     other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
     spec = load_scenario(other.drives[0].file, other.root, other.world_path).spec
     assert (spec.stack.controller.desired_linear_vel, spec.stack.localizer.type) == (0.3, "amcl")

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from schemas_from_rosbags import humble
 
+from simscen.core.clock import Stamp
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Scan
 from simscen.record.messages import encode, encode_arrays
-from simscen.record.simtime import Stamp
 
 STORE = humble()
 names = st.text(max_size=20)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.record.simtime import SimTime
+from simscen.core.clock import SimTime
 
 rates = st.integers(1, 999_999_999)
 ticks = st.integers(0, 10**12)

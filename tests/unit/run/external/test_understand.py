@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from simscen.core.clock import SimTime
 from simscen.core.geometry import Pose2
 from simscen.peer import messages, wire
 from simscen.peer.cdr import HEADER
-from simscen.record.simtime import SimTime
 from simscen.run.external.answer_decoder import Answer, decode_answer
 from simscen.run.external.goal_tracker import GoalTracker
 from simscen.run.external.handshake import Welcome

@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from shapely import Polygon, union_all
 
-from simscen.worlds.geometry.section_polygons import OpenCrossSection, rings_from_segments, signed_area, simple_polygons
+from simscen.worlds.geometry.cross_section import OpenCrossSection, rings_from_segments, signed_area, simple_polygons
 
 
 def segments(*rings, shuffle=0):
