@@ -83,9 +83,9 @@ def _parts(name: str, scenarios: Path) -> list[str]:
         case "BARN":
             return [f"BARN, {variant}" for variant in ("default parameters", *barn.CONTROLLERS)]
         case "narrow fields":
-            return [experiments.narrow_name(room) for room in experiments.NARROW]
+            return [experiments.narrow_name(room) for room in experiments.NARROW_MARGINS_M]
         case "dynamic fields":
-            return [experiments.dynamic_name(speed) for speed in dynamic_fields.SPEEDS]
+            return [experiments.dynamic_name(speed) for speed in dynamic_fields.SPEEDS_M_S]
         case "random goals":
             return ["random goals, ROS maps"]
         case "degraded sensing":

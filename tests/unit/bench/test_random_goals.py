@@ -10,7 +10,14 @@ from scipy import ndimage
 from simscen.bench.navigation import office_maps
 from simscen.bench.navigation.experiments import with_stack_parameters
 from simscen.bench.navigation.office_maps import FREE, building, write_building
-from simscen.bench.navigation.random_goals import FAULTS, MOVABLE, ROOM, degraded, random_drives, random_goals
+from simscen.bench.navigation.random_goals import (
+    FAULTS,
+    MOVABLE_MARGIN_M,
+    WALL_MARGIN_M,
+    degraded,
+    random_drives,
+    random_goals,
+)
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Body, Box, Solid
@@ -37,8 +44,8 @@ def test_every_errand_can_be_driven_and_has_room_at_both_ends() -> None:
         assert one.length >= max(2.0, one.start.distance(one.goal) - 1e-6)
         for end in (one.start, one.goal):
             to_walls = min(abs(end.x - x) for x in (0.0, 5.0, 10.0)), min(end.y, 6.0 - end.y)
-            assert min(to_walls) >= 0.05 + 0.22 + ROOM - 0.01
-            assert math.hypot(end.x - 2.0, end.y - 3.0) >= MOVABLE
+            assert min(to_walls) >= 0.05 + 0.22 + WALL_MARGIN_M - 0.01
+            assert math.hypot(end.x - 2.0, end.y - 3.0) >= MOVABLE_MARGIN_M
 
 
 def test_a_drive_is_that_of_its_number_whichever_others_are_drawn() -> None:
