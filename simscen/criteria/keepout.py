@@ -64,7 +64,7 @@ class Keepout(Spec, Criterion):
     """Time for leaving the zone after it was enabled; only with `while_on`."""
 
     @model_validator(mode="after")
-    def _one_place(self) -> Keepout:
+    def _check_region_or_mask(self) -> Keepout:
         if (self.region is None) == (self.mask is None):
             raise ValueError("expected either region or mask")
         if self.grace and not self.while_on:

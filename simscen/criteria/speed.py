@@ -66,13 +66,13 @@ class Speed(Spec, Criterion):
         return self
 
     @model_validator(mode="after")
-    def _on_where(self) -> Speed:
+    def _check_zone(self) -> Speed:
         if self.while_on and (self.in_ is None or self.mask is not None):
             raise ValueError("while_on is for the zone of a region: `in`, and no mask")
         return self
 
     @model_validator(mode="after")
-    def _of_what(self) -> Speed:
+    def _check_reference_speed(self) -> Speed:
         percent = self.mask is not None and self.mask.type == "percent"
         if percent and self.full_speed is None:
             raise ValueError("expected full_speed, which the percents of the mask are of (or `type: absolute`)")

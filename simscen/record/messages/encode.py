@@ -128,28 +128,10 @@ def _stamped(frame: str) -> Template:
     return message
 
 
-def string(text: str) -> bytes:
-    """Return a std_msgs/msg/String."""
-    message = Template()
-    message.string(text)
-    return bytes(message.buffer)
-
-
 def boolean(value: bool) -> bytes:
     """Return a std_msgs/msg/Bool."""
     message = Template()
     message.put("B", value)
-    return bytes(message.buffer)
-
-
-def log(stamp: Stamp, level: int, name: str, text: str) -> bytes:
-    """Return a rcl_interfaces/msg/Log without a source location."""
-    message = Template()
-    message.put("iI", *stamp)
-    message.put("B", level)
-    for field in (name, text, "", ""):
-        message.string(field)
-    message.put("I", 0)
     return bytes(message.buffer)
 
 

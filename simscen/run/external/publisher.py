@@ -50,7 +50,7 @@ class StepPublisher:
 
     def latch_robot(self, description: str, estimate: Estimate) -> None:
         """Publish robot description and initial pose with the first step."""
-        self._latched.append((topics.ROBOT_DESCRIPTION, encode.string(description)))
+        self._latched.append((topics.ROBOT_DESCRIPTION, messages.string(description)))
         if estimate.pose is not None:
             told = encode.pose_with_covariance(frame_names.MAP).packer()
             covariance = np.diag(np.square(estimate.std)).ravel().tolist()

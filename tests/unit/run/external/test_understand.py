@@ -117,7 +117,7 @@ events = st.fixed_dictionaries(
 
 @given(events)
 def test_an_event_of_any_kind_is_heard_or_refused_and_can_be_logged(said) -> None:
-    from simscen.record.messages.encode import log, string
+    from simscen.peer.messages import log, string
     from simscen.record.messages.event_text import sentence, to_json
 
     goals = GoalTracker(True, 240)
