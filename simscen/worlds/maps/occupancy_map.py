@@ -104,11 +104,10 @@ def _cells_in_convex_hull(occupied: Cells) -> Cells:
     return filled_cells(CrossSection(segments, np.zeros(len(segments), np.int32)), occupied.shape)
 
 
-OccupiedCells = npt.NDArray[np.bool_]
 Runs = npt.NDArray[np.int64]
 
 MIN_OCCUPIED_VALUE = 65
-"""OccupiedCells with values from this to 100 are walls: Nav2's occupied_thresh, for maps in mode scale or raw."""
+"""Cells with values from this to 100 are walls: Nav2's occupied_thresh, for maps in mode scale or raw."""
 MAX_EDGES = 500_000
 """Maximum number of straight edges. A building of 16 million cells has about 10 000, noise has one per cell."""
 
@@ -129,7 +128,7 @@ def walls_from_map(grid: OccupancyGrid, height: float, name: str = "map") -> lis
     return [Solid(Mesh(vertices, faces), Pose3.planar(grid.origin), name)]
 
 
-def _sides(occupied: OccupiedCells, name: str) -> Array:
+def _sides(occupied: Cells, name: str) -> Array:
     """Return the upright faces (n, 4, 3) in cells, with height 1: one for each straight edge of the outline."""
     sides = []
     for swapped, cells in ((False, occupied), (True, occupied.T)):
@@ -145,7 +144,7 @@ def _sides(occupied: OccupiedCells, name: str) -> Array:
     return np.concatenate(sides).astype(np.float64)
 
 
-def _caps(occupied: OccupiedCells, name: str) -> Array:
+def _caps(occupied: Cells, name: str) -> Array:
     """Return the faces (n, 4, 3) of bottom and top, one for equal runs of cells in consecutive rows."""
     row, start, stop = _runs(occupied, name).T
     order = np.lexsort((row, stop, start))
@@ -162,7 +161,7 @@ def _caps(occupied: OccupiedCells, name: str) -> Array:
     return np.concatenate((top, under)).astype(np.float64)
 
 
-def _runs(lines: OccupiedCells, name: str) -> Runs:
+def _runs(lines: Cells, name: str) -> Runs:
     """Return the runs of True along the rows (n, 3): row, first column, column after the last."""
     steps = np.diff(np.pad(lines.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     count = int(np.count_nonzero(steps == 1))
