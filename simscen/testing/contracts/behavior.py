@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from simscen.core.geometry import Pose2
@@ -19,7 +17,7 @@ from simscen.testing.contracts.base import (
     require,
     view_of,
 )
-from simscen.testing.contracts.controller import PERIOD, SLACK, moved
+from simscen.testing.contracts.controller import PERIOD, checked_command, moved
 from simscen.testing.flatland import Flatland
 
 LONGEST = 120.0
@@ -55,17 +53,7 @@ class BehaviorContract(ComponentContract):
     def command(self, behavior: Behavior, pose: Pose2, view: CostmapView, seconds: float) -> Twist | None:
         """Return the checked command, or None if the behavior is done."""
         command = call_component("is asked for a command", lambda: behavior.step(pose, view, seconds))
-        if command is None:
-            return None
-        require(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
-        require(all(map(math.isfinite, command)), f"commands {tuple(command)}")
-        robot = self.robot
-        within = -robot.max_reverse - SLACK <= command.vx <= robot.max_linear + SLACK
-        within = (
-            within and abs(command.vy) <= robot.max_lateral + SLACK and abs(command.wz) <= robot.max_angular + SLACK
-        )
-        require(within, f"commands {tuple(command)}, more than the base can do")
-        return command
+        return None if command is None else checked_command(command, self.robot)
 
     @promise
     def it_ends(self) -> None:

@@ -11,7 +11,7 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.stack.footprint import Footprint
 from simscen.stack.path_geometry import poses_along
-from simscen.stack.protocols import Controller, CostmapView, GoalChecker, NavigationFailure
+from simscen.stack.protocols import Controller, CostmapView, GoalChecker, NavigationFailure, RobotModel
 from simscen.testing.contracts.base import (
     ComponentContract,
     call_component,
@@ -50,16 +50,7 @@ class ControllerContract(ComponentContract):
     def command(self, controller: Controller, pose: Pose2, twist: Twist, view: CostmapView) -> Twist:
         """Return the command, checked for type, finiteness and limits."""
         command = call_component("is asked for a command", lambda: controller.command(pose, twist, view, GOAL))
-        require(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
-        require(all(map(math.isfinite, command)), f"commands {tuple(command)}")
-        robot = self.robot
-        within = -robot.max_reverse - SLACK <= command.vx <= robot.max_linear + SLACK
-        within = (
-            within and abs(command.vy) <= robot.max_lateral + SLACK and abs(command.wz) <= robot.max_angular + SLACK
-        )
-        require(within, f"commands {tuple(command)}, more than the base can do: {robot.max_linear:g} m/s ahead, "
-               f"{robot.max_reverse:g} back, {robot.max_lateral:g} sideways, {robot.max_angular:g} rad/s")  # fmt: skip
-        return command
+        return checked_command(command, self.robot)
 
     def drive(self, controller: Controller, view: CostmapView, pose: Pose2, seconds: float) -> list[Pose2]:
         """Return the track of an ideal base until it has been at the goal for REST seconds."""
@@ -180,6 +171,17 @@ class ControllerContract(ComponentContract):
             isinstance(plan, Path) and plan.points.shape[1:] == (3,) and np.isfinite(plan.points).all()
         )
         require(fine, "the local plan is no path of finite poses (n, 3)")
+
+
+def checked_command(command: Twist, robot: RobotModel) -> Twist:
+    """Return a command, checked for type, finiteness and the limits of the robot."""
+    require(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
+    require(all(map(math.isfinite, command)), f"commands {tuple(command)}")
+    within = -robot.max_reverse - SLACK <= command.vx <= robot.max_linear + SLACK
+    within = within and abs(command.vy) <= robot.max_lateral + SLACK and abs(command.wz) <= robot.max_angular + SLACK
+    require(within, f"commands {tuple(command)}, more than the base can do: {robot.max_linear:g} m/s ahead, "
+           f"{robot.max_reverse:g} back, {robot.max_lateral:g} sideways, {robot.max_angular:g} rad/s")  # fmt: skip
+    return command
 
 
 def at_goal(pose: Pose2) -> bool:
