@@ -1,1 +1,1 @@
-"""What passes: one file for each criterion, its specification and its meaning together."""
+"""Pass criteria: one file for each, with its specification and its evaluation."""

@@ -15,25 +15,25 @@ if TYPE_CHECKING:
 
 
 class Criterion(ABC):
-    """A requirement on a run that its trace either meets or not.
+    """Requirement on the trace of a run.
 
-    *Given* the same trace and case *then* the findings are the same: a criterion looks at nothing else. Every bound
-    that it checks yields a finding, so a criterion without findings has checked nothing.
+    *Given* the same trace and case *then* the findings are the same. Every checked bound yields a finding, so a
+    criterion without findings has checked nothing.
     """
 
     @property
     def clearance_range(self) -> float:
-        """Distance around the robot, in meters, in which it needs the clearance; 0 if it does not use it."""
+        """Distance in m up to which the criterion needs the clearance; 0 if it does not use the clearance."""
         return 0.0
 
     @property
     def horizon(self) -> float:
-        """Seconds of simulated time before which it cannot be known to hold."""
+        """Minimum simulated time in s for a decision."""
         return 0.0
 
     @property
     def evidence(self) -> frozenset[Evidence] | None:
-        """What a log must hold for it to be decided; None for everything that a log of simscen holds."""
+        """Evidence in the log that the criterion needs; None for everything in a log of simscen."""
         return None
 
     @abstractmethod
@@ -42,17 +42,17 @@ class Criterion(ABC):
 
 
 class Measure(ABC):
-    """A number of a run that a scenario asks for. Unlike a criterion it has no bound: no run fails by it.
+    """Number that a scenario requests for a run. Unlike a criterion, it has no bound and fails no run.
 
-    *Given* the same trace and case *then* the same number. It looks at nothing else.
+    *Given* the same trace and case *then* the same number.
     """
 
     unit: ClassVar[str] = ""
-    """Of the number, SI; "" = none."""
+    """SI unit of the number; "" for none."""
 
     @property
     def evidence(self) -> frozenset[Evidence] | None:
-        """What a log must hold for it to be defined; None = everything that a log of simscen holds."""
+        """Evidence in the log that the metric needs; None for everything in a log of simscen."""
         return None
 
     @abstractmethod
@@ -61,13 +61,13 @@ class Measure(ABC):
 
 
 class AnyMeasure(Choice):
-    """A metric of an installed package; those that simscen ships are reported for every run."""
+    """Metric of an installed package. The shipped metrics are reported for every run."""
 
     group: ClassVar[str] = "metric"
 
     @property
     def measure(self) -> Measure:
-        """The metric that was chosen."""
+        """Selected metric."""
         measure = self.chosen
         assert isinstance(measure, Measure)
         return measure

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 SEARCH_MARGIN_M = 0.5
-"""Meters beyond its bound."""
+"""Distance in m beyond the bound that is measured."""
 
 
 class Clearance(Spec, Criterion):
@@ -30,23 +30,23 @@ class Clearance(Spec, Criterion):
     What is measured: the smallest true distance between the robot's hull and the surface of anything solid, over the
         whole run. It is searched 2 m around the robot, and further where a bound asks for it.
     When it fails: it is below `min`.
-    Why this: a near miss is a collision with better luck; the margin shows it long before the first contact.
+    Why this: a near miss can become a collision; the margin shows the risk before the first contact.
     Source: bench-mr's ClearingMetric, but from the true geometry, not from a map or a scan.
 
     Example: `clearance: {min: 0.1 m}`
     """
 
     min: NonNegativeLength
-    """Meters."""
+    """Smallest allowed distance in meters."""
 
     @property
     def clearance_range(self) -> float:
-        """Its bound and a little more, so that a margin is left to be seen."""
+        """Bound plus a small distance, so that margins are visible."""
         return self.min + SEARCH_MARGIN_M
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return frozenset({Evidence.CLEARANCE})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
@@ -63,7 +63,7 @@ class Clearance(Spec, Criterion):
 
 
 DRIVING_SPEED_M_S = 0.1
-"""m/s; a slower robot stands, and people come up to it as they like."""
+"""Speed in m/s of a standing robot, which people may approach."""
 
 
 class PersonalSpace(Spec, Criterion):
@@ -76,19 +76,19 @@ class PersonalSpace(Spec, Criterion):
         intimate space begins.
     Source: Hall 1966; the space intrusions of HuNavSim and of Francis et al. 2023, by the gap between surfaces.
 
-    Inconclusive when nobody was ever there: then nothing was tested.
+    Inconclusive if the run had no pedestrians.
 
     Example: `personal_space: {min: 0.3 m, while_driving: true}`
     """
 
     min: NonNegativeLength = INTIMATE_SPACE_M
-    """Of the gap."""
+    """Smallest allowed gap."""
     while_driving: bool = False
-    """Only moments at which the robot drives, faster than 0.1 m/s: people come up to one that stands as they like."""
+    """Ignore moments at which the robot is slower than 0.1 m/s, because people may approach a standing robot."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:

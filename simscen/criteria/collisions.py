@@ -1,4 +1,4 @@
-"""`collisions`: what the robot touched, and how hard."""
+"""The criterion `collisions`: number and impulse of contacts."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 MOVING_SPEED_M_S = 0.1
-"""m/s; a slower robot was run into (CARLA's CollisionTest draws the line here)."""
+"""Speed in m/s below which the robot did not cause the contact, as in the CollisionTest of CARLA."""
 
 LOOKBACK_S = 0.1
-"""Seconds before the contact in which the robot's speed counts: at the contact itself it may be stopped already."""
+"""Time in s before the contact in which the speed counts, because the contact itself stops the robot."""
 
 MAX_DETAILS = 5
 
@@ -57,7 +57,7 @@ class Collisions(Spec, Criterion):
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         speed_needed = {Evidence.TRUTH, Evidence.VELOCITY} if self.caused_by_robot else set()
         people_needed = {Evidence.OBJECTS} if self.people else set()
         return frozenset({Evidence.CONTACTS, *speed_needed, *people_needed})
@@ -105,7 +105,7 @@ def _impulse(hit: Event) -> float:
 
 
 def _moving(trace: Trace, hit: Event, case: Case) -> bool:
-    """Whether any point of the robot's hull moved faster than OWN_FAULT just before."""
+    """Return whether any point of the robot's hull moved faster than OWN_FAULT before the contact."""
     reach = max((math.hypot(x, y) for x, y in case.footprint), default=case.inscribed_radius)
     linear, turning = speed(trace), turn_rate(trace)
     if not len(linear):

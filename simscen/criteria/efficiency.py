@@ -32,24 +32,24 @@ class TimeToGoal(Spec, Criterion):
         `goal`, from that goal's acceptance to the report that it is reached. Goals that events send count too; those
         that they preempt, and goals that are expected to fail, need not be reached.
     When it fails: it took longer, or the goal was never reached.
-    Why this: a robot that dithers arrives, too. That it truly arrived is what goals_reached asks.
+    Why this: a robot that hesitates arrives, too. Use goals_reached to check the true arrival.
     Source: the time of the BARN challenge and of Nav2's own benchmarks (nav2#3239).
 
     Example: `time_to_goal: {max: 45 s}`
     """
 
     max: PositiveDuration
-    """Seconds of simulated time."""
+    """Maximum simulated time in seconds."""
     goal: GoalName | None = None
-    """Of this goal alone; default: of the whole tour."""
+    """Measure only this goal; default: all goals."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return frozenset({Evidence.NAVIGATION})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding; one for each goal if several share the name."""
+        """Return one finding, or one for each goal with the same name."""
         told = goal_outcomes(trace, case)
         if self.goal is not None:
             own = [outcome for outcome in told if matches_goal_name(outcome.goal.name, self.goal)]
@@ -94,7 +94,7 @@ class TimeToGoal(Spec, Criterion):
         return missed(what, "never reached", expected, (trace, tick), [fate])
 
     def _never_begun(self, trace: Trace, what: str, outcome: GoalOutcome) -> Finding:
-        """Without an acceptance no clock runs; a log that begins later may still hold the arrival."""
+        """Return the finding for a goal without an acceptance. A log that starts later can contain the arrival."""
         expected = f"to be there within {self.max:.2f} s"
         if outcome.end is None and has_ended(trace):
             return missed(
@@ -106,11 +106,11 @@ class TimeToGoal(Spec, Criterion):
 class PathLength(Spec, Criterion):
     """The robot drove no further than it should.
 
-    What is measured: the length of the true way in the plane, in moves of at least 1 cm, over the whole run; its ratio
-        to the shortest way from the start through all goals that a disc of the robot's inscribed radius has; goals at
-        which the robot is to fail are left out of that way.
-    When it fails: it is longer than `max`, or than `max_ratio` times the shortest way.
-    Why this: detours, swerving and search patterns cost battery and nerves while every goal is still reached.
+    What is measured: the length of the true path in the plane, in moves of at least 1 cm, over the whole run; its ratio
+        to the shortest path of a disc with the robot's inscribed radius from the start through all goals, except
+        those at which the robot is expected to fail.
+    When it fails: it is longer than `max`, or than `max_ratio` times the shortest path.
+    Why this: detours and search patterns cost energy and time although every goal is reached.
     Source: HuNavSim and bench-mr for the length; SEAN's "path efficiency" is this ratio. SPL (Anderson 2018) is its
         inverse over many runs.
 
@@ -118,9 +118,9 @@ class PathLength(Spec, Criterion):
     """
 
     max: PositiveLength | None = None
-    """Meters."""
+    """Maximum length in meters."""
     max_ratio: Ratio | None = None
-    """Times the shortest way; 1 is a perfect drive."""
+    """Maximum multiple of the shortest path; 1 is a perfect drive."""
 
     @model_validator(mode="after")
     def _some_bound(self) -> PathLength:
@@ -130,7 +130,7 @@ class PathLength(Spec, Criterion):
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return frozenset({Evidence.TRUTH})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:

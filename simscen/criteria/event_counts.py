@@ -30,12 +30,12 @@ Count = Annotated[int, Field(ge=0, le=100_000)]
 
 
 class CountBounds(Spec):
-    """At least `min`, at most `max`."""
+    """Bounds on a number of events."""
 
     min: Count | None = None
-    """At least so often."""
+    """Minimum number."""
     max: Count | None = None
-    """At most so often."""
+    """Maximum number."""
 
     @model_validator(mode="after")
     def _some_bound(self) -> CountBounds:
@@ -48,7 +48,7 @@ class CountBounds(Spec):
         return self
 
     def bound(self, trace: Trace, what: str, noun: str, hits: Sequence[Event], detail: Sequence[str]) -> list[Finding]:
-        """One finding for each bound; in a log that was cut off, too few so far may have become enough."""
+        """Return one finding for each bound. In a truncated log, a number below `min` is inconclusive."""
         at = (trace, hits[-1].tick) if hits else None
         findings = counted(what, len(hits), noun, self.min, self.max, at=at, detail=detail)
         if self.min is not None and findings[0].status is Status.FAIL and not has_ended(trace):
@@ -75,11 +75,11 @@ class Replans(CountBounds, Criterion):
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return frozenset({Evidence.PLANNING})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding for each bound."""
+        """Return one finding for each bound."""
         plans = trace.of_kind(EventKind.PLAN_MADE)
         again = [plan for plan in plans if plan.data.get("reason", "goal") != "goal"]
         if self.reason is not None:
@@ -105,11 +105,11 @@ class Recoveries(CountBounds, Criterion):
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return frozenset({Evidence.RECOVERIES})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding for each bound."""
+        """Return one finding for each bound."""
         every = trace.of_kind(EventKind.RECOVERY_STARTED)
         counting = [start for start in every if self.name in (None, start.name)]
         told = [f"t = {trace.seconds(start.tick):.2f} s: {start.name}" for start in every[:8]]

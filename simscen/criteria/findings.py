@@ -1,4 +1,4 @@
-"""How a measured number becomes a finding: the margin is the distance to the limit, and the sign decides."""
+"""Findings from measured numbers: the margin is the distance to the limit, and its sign decides."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 
 class InvalidTrace(ValueError):
-    """A signal that has to be a number is not; nothing can be judged from it."""
+    """A signal is not a finite number, so that nothing can be judged."""
 
 
 class MissingEvidence(ValueError):
-    """What a criterion has to look at is not in the trace: neither a pass nor a failure."""
+    """The trace lacks evidence for a criterion, which is then inconclusive."""
 
 
 def at_most(
@@ -62,7 +62,7 @@ def counted(
     at: tuple[Trace, int] | None = None,
     detail: Sequence[str] = (),
 ) -> list[Finding]:
-    """One finding for each bound on a number of events; the margin is in events."""
+    """Return one finding for each bound on a number of events, with margins in events."""
     measured = f"{count} {noun}" if count == 1 else f"{count} {_plural(noun)}"
     bounds = [] if low is None else [(count - low, f"≥ {low}")]
     bounds += [] if high is None else [(high - count, f"≤ {high}")]
@@ -83,7 +83,7 @@ def counted(
 
 
 def undecided(what: str, because: str, limit: str = "", detail: Sequence[str] = ()) -> Finding:
-    """There was nothing to check, or the trace is too short to decide: never a pass."""
+    """Return an inconclusive finding: nothing to check, or the trace is too short."""
     return Finding(Status.INCONCLUSIVE, what, because, limit, detail=tuple(detail))
 
 
@@ -148,7 +148,7 @@ def _spot(at: tuple[Trace, int] | None) -> tuple[int | None, tuple[float, float]
 
 
 def decimals(value: float, limit: float) -> int:
-    """As many decimals as tell the two apart: "0.50 s > 0.50 s" would explain nothing."""
+    """Return enough decimals to distinguish both numbers, unlike "0.50 s > 0.50 s"."""
     if value == limit or not math.isfinite(value) or not math.isfinite(limit):
         return 2
     return next((digits for digits in range(2, 9) if f"{value:.{digits}f}" != f"{limit:.{digits}f}"), 9)

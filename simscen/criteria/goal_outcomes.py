@@ -1,4 +1,4 @@
-"""What became of each goal of a run, as the robot reported it."""
+"""Outcome of each goal of a run, as the robot reported it."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def _nth(reports: list[_Report], k: int) -> _Report:
 
 
 def parse(value: Any) -> ErrorCode:
-    """GOAL_OCCUPIED or 206. Raises a validation error that lists the names."""
+    """Parse an error code such as GOAL_OCCUPIED or 206. Raises a validation error that lists the names."""
     if isinstance(value, ErrorCode):
         return value
     if isinstance(value, str) and value in ErrorCode.__members__:
@@ -178,7 +178,7 @@ def parse(value: Any) -> ErrorCode:
 
 
 class _Documented:
-    """The JSON Schema of a code: one of the names or one of the numbers."""
+    """Return the JSON schema of a code: one of the names or numbers."""
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         return {"enum": [*ErrorCode.__members__, *(int(code) for code in ErrorCode)]}

@@ -1,4 +1,4 @@
-"""`goals_reached`: the robot truly was where it was sent."""
+"""The criterion `goals_reached`: the true pose of the robot at its goals."""
 
 from __future__ import annotations
 
@@ -28,12 +28,11 @@ if TYPE_CHECKING:
 class GoalsReached(Spec, Criterion):
     """Every goal was reached: the robot says so, and at that moment it truly was there.
 
-    A goal with `expect` is judged by that: one at which the robot is to fail has to fail, with the code that is asked
-    for. Poses that navigate_through_poses passes have to be come near to, at whatever heading. Where a goal has
-    `on_reached: {wait: …}`, the robot has to stay so long before it goes on.
+    A goal with `expect` must fail with the expected error code. Poses that navigate_through_poses passes must be
+    passed closely enough with any heading. At a goal with `on_reached: {wait: …}`, the robot must stay for that time.
 
-    Goals that events send count from when they are sent. A goal that such a goal preempted is dropped, as in Nav2: it
-    is told as preempted and need not be reached, but those that remain must be. Named in `goals`, it is inconclusive.
+    Goals of events count from the moment they are sent. A preempted goal is dropped, as in Nav2: it is reported as
+    preempted and need not be reached, unlike the remaining goals. If `goals` names it, the result is inconclusive.
 
     The stack decides with its estimated pose. The true pose may therefore be beyond the goal's tolerance by a margin
     for localization. To require accuracy, give a `tolerance`, or set the margin to 0.
@@ -42,35 +41,35 @@ class GoalsReached(Spec, Criterion):
         robot's report, for each goal.
     When it fails: a goal was not reported reached, or was reported while the true pose was out of tolerance, or later
         than `within`.
-    Why this: the robot's own word is worth as much as its localization. Arena's metrics count the word alone, BARN's
-        the distance alone, so that neither sees a robot that is lost and content.
+    Why this: the report of a robot is only as good as its localization. The metrics of Arena use the report alone,
+        those of BARN the distance alone, so that neither detects a lost robot that reports success.
     Source: Nav2's SimpleGoalChecker for the tolerances; BARN challenge, run.py, for judging by the truth.
 
     Example: `goals_reached: {goals: [shelf], tolerance: 0.3 m, within: 60 s}`
     """
 
     goals: Annotated[list[GoalName], Field(min_length=1, max_length=1000)] | None = None
-    """Only these, by name, in every loop (`shelf#2`: in the second one); default: all of the scenario, and all that
-    events have sent."""
+    """Names of the goals to check, in every loop (`shelf#2`: in the second one); default: all goals, including those of
+    events."""
     tolerance: PositiveLength | None = None
-    """How far the true position may be off; default: the goal's own tolerance plus `localization_margin`."""
+    """Maximum distance of the true position; default: the goal's own tolerance plus `localization_margin`."""
     yaw_tolerance: PositiveAngle | None = None
-    """How far the true heading may be off; default: the goal's own tolerance plus `localization_yaw_margin`."""
+    """Maximum error of the true heading; default: the goal's own tolerance plus `localization_yaw_margin`."""
     localization_margin: NonNegativeLength = 0.15
-    """Added to the goal's own tolerance, because a robot stops where its estimated position is within the tolerance.
-    With 0 the true position has to be."""
+    """Added to the goal's own tolerance, because a robot stops when its estimated position is within the tolerance.
+    With 0, the true position must be within the tolerance."""
     localization_yaw_margin: NonNegativeAngle = 0.1
     """Added to the goal's own tolerance of the heading."""
     within: PositiveDuration | None = None
-    """Each goal at most this long after the robot accepted it."""
+    """Maximum time from the acceptance of each goal to its arrival."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return POSITION | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Distance, heading and, if asked for, time of each goal; one finding for a goal that was not reached."""
+        """Return findings on distance, heading and time of each goal, or one finding for a missed goal."""
         told = goal_outcomes(trace, case)
         chosen = [
             outcome
@@ -143,7 +142,7 @@ class GoalsReached(Spec, Criterion):
         return findings
 
     def _passed(self, trace: Trace, outcome: GoalOutcome, told: list[GoalOutcome]) -> list[Finding]:
-        """Of a pose that is passed on the way the heading is free, and how near the robot came to it at all counts."""
+        """Return the finding for a via pose: the smallest distance counts, and the heading is free."""
         tick, apart = closest_approach(trace, outcome, told)
         limit, context = self._limit(outcome), "from the pose where it came nearest to it"
         findings = [at_most(f"goal {outcome.goal.name}", apart, limit, "m", at=(trace, tick), context=context)]
@@ -164,7 +163,7 @@ class GoalsReached(Spec, Criterion):
 
 
 def _failed(trace: Trace, outcome: GoalOutcome) -> Finding:
-    """Of a goal at which the robot is to fail: whether it did, and with the code that is asked for."""
+    """Return the finding for a goal at which the robot must fail with the expected code."""
     what, expected = f"goal {outcome.goal.name}", _expected(outcome)
     if outcome.end is None and not has_ended(trace):
         return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}", expected)
@@ -178,7 +177,7 @@ def _expected(outcome: GoalOutcome) -> str:
 
 
 def _waited(trace: Trace, case: Case, outcome: GoalOutcome, told: list[GoalOutcome]) -> list[Finding]:
-    """Whether the robot stayed as long as it was to, before it went on to another goal of the list."""
+    """Return the finding on the required waiting time at a goal before the next goal."""
     later = next(
         (each for each in told if outcome_start(each) > outcome_start(outcome) and each.goal in case.goals), None
     )

@@ -1,4 +1,4 @@
-"""`keepout`: where the robot must not be."""
+"""The criterion `keepout`: regions and masks that the robot must not enter."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     Away = Callable[[Array], Array]
 
 RESOLUTION_M = 0.005
-"""Meters to which the nearest moment between two samples is searched."""
+"""Resolution in m of the search for the smallest distance between two samples."""
 POINT = ((0.0, 0.0),)
-"""The hull of a robot without a footprint; its inscribed radius is around it."""
+"""Footprint of a robot that has only an inscribed radius."""
 
 
 class Keepout(Spec, Criterion):
@@ -42,29 +42,29 @@ class Keepout(Spec, Criterion):
         it would have to be moved to be out again (out of the deepest convex piece, where one of the two is not convex;
         out of the deepest of the rectangles that equal cells of a mask make).
     When it fails: it is below `distance`.
-    Why this: a keepout filter in a costmap is advice to a planner; recoveries and controllers leave the plan.
+    Why this: a keepout filter affects the costmap of the planner, but recoveries and controllers can leave the plan.
     Source: Nav2's keepout filter tutorial.
 
-    Inconclusive when no cell of the mask is occupied, or with `while_on` when it never was on: then nothing was tested.
+    Inconclusive if no cell of the mask is occupied, or if the zone was never enabled with `while_on`.
 
     Example: `keepout: {region: wet floor, distance: 10 cm}`
     """
 
     region: RegionName | None = None
-    """By name."""
+    """Name of the region."""
     mask: MaskFile | None = None
     """Instead of a region: map yaml of a filter mask, relative to this file; lighter cells than occupied ones are free.
 
-    The stack is told of it only if `stack.keepout_mask` names it, too."""
+    The stack only gets the mask if `stack.keepout_mask` names it, too."""
     distance: NonNegativeLength = 0.0
-    """How far to stay away from it."""
+    """Minimum distance from the region."""
     while_on: bool = False
-    """Only while events have it switched on (`keepout` among the actions); else over the whole run."""
+    """Check only while the zone is enabled by the action `keepout`; default: the whole run."""
     grace: Duration = 0.0
-    """How long the robot may take to leave it after it was switched on; with `while_on` only."""
+    """Time for leaving the zone after it was enabled; only with `while_on`."""
 
     @model_validator(mode="after")
-    def _one_place(self) -> Keepout:
+    def _check_region_or_mask(self) -> Keepout:
         if (self.region is None) == (self.mask is None):
             raise ValueError("expected either region or mask")
         if self.grace and not self.while_on:
@@ -73,7 +73,7 @@ class Keepout(Spec, Criterion):
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         switched = {Evidence.DISTURBANCES} if self.while_on else set()
         return POSITION | {Evidence.FOOTPRINT, *switched}
 
@@ -97,7 +97,7 @@ class Keepout(Spec, Criterion):
         return [at_least(what, distance, self.distance, "m", at=(trace, tick), context="while it was on")]
 
     def _away(self, case: Case) -> Away | str:
-        """How far the hull is away at poses, or why nobody can say."""
+        """Return a function for the distance of the footprint at poses, or the reason why there is none."""
         hull = case.footprint or POINT
         if self.region is None:
             mask = case.masks.get(self.mask or "")
@@ -140,7 +140,7 @@ def _nearest(trace: Trace, poses: Samples, case: Case, away: Away) -> tuple[floa
 
 
 def _carried(trace: Trace, poses: Samples) -> Flags:
-    """Of each stretch between two samples, whether the robot was set down elsewhere in it."""
+    """Return, for each interval between two samples, whether the robot was teleported in it."""
     placed = [event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)]
     carried = np.zeros(len(poses) + 1, dtype=bool)
     carried[np.searchsorted(poses.ticks, placed, side="right")] = True

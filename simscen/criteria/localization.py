@@ -29,27 +29,27 @@ if TYPE_CHECKING:
 
 
 class LocalizationError(Spec, Criterion):
-    """The robot was where it believed to be.
+    """The localization error of the robot stayed small.
 
     What is measured: the distance between believed and true position (and the heading error) whenever the robot
         publishes its belief, and all the time while its newest belief is over 1 s old; without any alignment.
     When it fails: the largest, the root mean square or the last error exceeds its bound.
-    Why this: goals can be reached by luck with a belief half a meter off, until a shelf stands in that half meter.
-    Source: evo's APE (metrics.py) and Beluga's benchmarks; alignment would forgive the very error we look for.
+    Why this: with an error of half a meter, a robot reaches goals only by chance, until an obstacle is near.
+    Source: evo's APE (metrics.py) and Beluga's benchmarks; alignment would hide the measured error.
 
     Example: `localization_error: {max: 0.3 m, rmse: 0.1 m, after: 5 s}`
     """
 
     max: PositiveLength | None = None
-    """Never further off than this."""
+    """Maximum distance."""
     rmse: PositiveLength | None = None
-    """Root mean square of the distance."""
+    """Maximum root mean square of the distance."""
     final: PositiveLength | None = None
-    """At the end of the run."""
+    """Maximum distance at the end of the run."""
     max_yaw: PositiveAngle | None = None
-    """Heading never further off than this."""
+    """Maximum heading error."""
     after: Duration = 0.0
-    """Only from this simulated time on: time to settle in."""
+    """Start of the evaluation in simulated time, after the filter has converged."""
 
     @model_validator(mode="after")
     def _some_bound(self) -> LocalizationError:
@@ -59,16 +59,16 @@ class LocalizationError(Spec, Criterion):
 
     @property
     def horizon(self) -> float:
-        """When judging begins."""
+        """Minimum simulated time in s for a decision."""
         return self.after
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return POSITION | {Evidence.BELIEF}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding for each bound that is given."""
+        """Return one finding for each given bound."""
         error = pose_error(trace)
         if not len(error):
             return [undecided("localization_error", "the robot never said where it believes to be")]
@@ -110,39 +110,39 @@ def _worst(trace: Trace, error: Samples, values: Array, what: str, limit: float,
 
 
 class RelocalizedWithin(Spec, Criterion):
-    """The robot found itself again in time.
+    """The robot relocalized in time.
 
     What is measured: time from the start of `after` (or of the run) until the belief, once lost, is within the
         tolerances of the true pose again and stays there for `hold`; each time that it happens.
     When it fails: that took longer than `time`.
-    Why this: a wrong start or a kidnapping must be mended while driving, not merely survived; and a belief that
-        crosses the truth by chance has not found it.
+    Why this: after a wrong initial pose or a kidnapping, the robot must correct its belief. A belief that crosses
+        the truth by chance is not correct.
     Source: the kidnapped robot problem, Thrun, Burgard, Fox: Probabilistic Robotics, chapters 7 and 8.
 
-    Inconclusive when the robot was never lost, or when the run was over before the time was.
+    Inconclusive if the robot was never lost, or if the run ended before the time.
 
     Example: `relocalized_within: {time: 20 s, after: kidnapped, tolerance: 0.3 m}`
     """
 
     time: PositiveDuration
-    """Seconds."""
+    """Maximum time in seconds."""
     after: HappeningName | None = None
-    """The event or fault that made it lose itself; default: the start of the run."""
+    """Event or fault after which the robot is lost; default: the start of the run."""
     tolerance: PositiveLength = 0.25
-    """How far the believed position may be off."""
+    """Maximum position error."""
     yaw_tolerance: PositiveAngle = 0.25
-    """How far the believed heading may be off."""
+    """Maximum heading error."""
     hold: PositiveDuration = 1.0
-    """It must stay right so long to count."""
+    """Time for which the belief must stay within the tolerances."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         started = {Evidence.DISTURBANCES} if self.after is not None else set()
         return POSITION | {Evidence.BELIEF, *started}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding each time it happened."""
+        """Return one finding for each start of `after`."""
         error = pose_error(trace)
         if not len(error):
             return [undecided("relocalized_within", "the robot never said where it believes to be")]
@@ -186,14 +186,14 @@ class RelocalizedWithin(Spec, Criterion):
 
 
 class LocalizationConsistency(Spec, Criterion):
-    """The robot's doubt about its pose fitted its error.
+    """The covariance of the believed pose matched its error.
 
     What is measured: the normalized estimation error squared e' P⁻¹ e of the believed pose (x, y, wrapped heading) with
-        its covariance P, every so often, averaged over the run; 3 when the covariance tells the truth.
+        its covariance P, every so often, averaged over the run; 3 for a correct covariance.
     When it fails: the average is above what a consistent belief keeps with this probability (the robot is
-        overconfident), or with `both_sides` below it; or a covariance is singular, as that of a particle set that has
-        collapsed: it claims to know a direction exactly.
-    Why this: a planner that trusts a covariance drives by it; a filter that is wrong and sure of it never recovers.
+        overconfident), or with `both_sides` below it; or a covariance is singular, like that of a
+        collapsed particle set.
+    Why this: a filter that is wrong but has a small covariance does not recover.
     Source: Bar-Shalom, Li, Kirubarajan 2001, section 5.4; filterpy's stats.NEES.
 
     The bounds are those of a mean of independent samples. Errors of one run are correlated, so `every` should be longer
@@ -203,22 +203,22 @@ class LocalizationConsistency(Spec, Criterion):
     """
 
     probability: Annotated[float, Field(ge=0.5, le=0.9999), Quantity("ratio")] = 0.95
-    """With which a consistent belief passes."""
+    """Probability with which a consistent belief passes."""
     every: PositiveDuration = 5.0
     """Seconds between two samples."""
     after: Duration = 0.0
-    """Only from this simulated time on: time to settle in."""
+    """Start of the evaluation in simulated time, after the filter has converged."""
     both_sides: bool = False
-    """Is a belief that is less sure than it may be a failure, too?"""
+    """Also fail if the covariance is too large."""
 
     @property
     def horizon(self) -> float:
-        """When judging begins."""
+        """Minimum simulated time in s for a decision."""
         return self.after
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return POSITION | {Evidence.BELIEF, Evidence.COVARIANCE}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:

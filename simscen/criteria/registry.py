@@ -1,4 +1,4 @@
-"""The list of criteria: a new one is one file and one line here."""
+"""Registry of criteria. A new criterion needs one line here."""
 
 from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal
@@ -18,11 +18,11 @@ class AnyCriterion(Choice):
     modifiers: ClassVar[frozenset[str]] = frozenset({"id", "severity", "then"})
 
     id: Name | None = None
-    """What the verdict is called in reports; default: the criterion's key."""
+    """Name of the verdict in reports; default: the key of the criterion."""
     severity: Literal["fail", "warn"] = "fail"
     """Whether a violation fails the run or is only reported."""
     then: Annotated[BaseModel | None, LazySpec("simscen.criteria.stl.condition", "Condition")] = None
-    """Beside `whenever` alone: the condition that must hold then."""
+    """Condition that must hold when the condition of `whenever` holds."""
 
     goals_reached: Annotated[Criterion | None, LazySpec("simscen.criteria.goals_reached", "GoalsReached")] = None
     result: Annotated[Criterion | None, LazySpec("simscen.criteria.result", "Result")] = None
@@ -55,14 +55,14 @@ class AnyCriterion(Choice):
     whenever: Annotated[BaseModel | None, LazySpec("simscen.criteria.temporal", "Whenever")] = None
 
     @model_validator(mode="after")
-    def _whenever_then(self) -> "AnyCriterion":
+    def _combine_whenever_and_then(self) -> "AnyCriterion":
         if (self.whenever is None) != (self.then is None):
             raise ValueError("`whenever` and `then` belong together")
         return self
 
     @property
     def chosen(self) -> BaseModel:
-        """The criterion; of `whenever` the two halves in one."""
+        """Criterion; `whenever` and `then` are combined."""
         if self.whenever is None:
             return super().chosen
         from simscen.criteria.temporal import Response

@@ -23,29 +23,29 @@ if TYPE_CHECKING:
 
 
 class Result(Spec, Criterion):
-    """Navigation ended the way it should: an expected failure is a pass.
+    """Navigation ended with the required result, which can be a failure.
 
     What is measured: the result the robot reports at the end, and its error code.
     When it fails: another result, another code, or none at all when the run ended.
-    Why this: that a robot refuses a goal inside an obstacle, and says why, is a thing to test like any other.
+    Why this: a robot must reject a goal inside an obstacle with the correct error code.
     Source: nav2_simple_commander's TaskResult; the error codes of nav2_msgs' actions.
 
     Example: `result: {status: FAILED, error_code: GOAL_OCCUPIED}`
     """
 
     status: Literal["SUCCEEDED", "FAILED", "CANCELED"]
-    """What it must report."""
+    """Required result."""
     error_code: Code | None = None
-    """Nav2's error code that it must give, by name or number."""
+    """Required error code of Nav2, by name or number."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         codes = set() if self.error_code is None else {Evidence.ERROR_CODES}
         return frozenset({Evidence.NAVIGATION, *codes})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding for the result, one for the code if it is asked for."""
+        """Return one finding for the result, and one for the code if it is given."""
         end = _last(trace, EventKind.NAVIGATION_ENDED)
         if end is None:
             return [_no_answer(trace, "result", self.status)]
@@ -60,7 +60,7 @@ class ErrorCodeIs(Spec, Criterion):
 
     What is measured: the error code of the last report about the goal, or of the end of navigation.
     When it fails: another code, or no report when the run ended.
-    Why this: with several goals the end of navigation tells only one of their codes.
+    Why this: with several goals, the end of navigation has only one of their codes.
     Source: the error codes of nav2_msgs' actions.
 
     Example: `error_code: {code: NO_VALID_PATH, goal: shelf}`
@@ -69,15 +69,15 @@ class ErrorCodeIs(Spec, Criterion):
     code: Code
     """By name or number; NONE = no error."""
     goal: GoalName | None = None
-    """Of this goal; default: of the navigation as a whole."""
+    """Name of the goal; default: the navigation as a whole."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return frozenset({Evidence.NAVIGATION, Evidence.ERROR_CODES})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding."""
+        """Return one finding."""
         kinds = (
             [EventKind.NAVIGATION_ENDED]
             if self.goal is None
@@ -113,12 +113,12 @@ def _no_answer(trace: Trace, what: str, expected: str) -> Finding:
 
 
 class NoFalseSuccess(Spec, Criterion):
-    """The robot never says that it is at a goal when it is not; that it fails honestly is fine.
+    """The robot never reports success at a wrong place. Reported failures pass.
 
     What is measured: the true distance to the goal whenever the robot reports it reached; and whether navigation was
         reported SUCCEEDED with every goal reached that was not preempted by another.
     When it fails: a goal was reported reached from further away than `tolerance`, or SUCCEEDED with a goal missing.
-    Why this: a failed delivery is retried; one that was reported done is not even noticed. Arena's result says
+    Why this: a failed delivery is retried, but a false success is not noticed. Arena's result says
         GOAL_REACHED without ever checking the goal.
     Source: BARN challenge, run.py, for the meter.
 
@@ -126,15 +126,15 @@ class NoFalseSuccess(Spec, Criterion):
     """
 
     tolerance: PositiveLength = 1.0
-    """From here on a success is false; larger than the goal's own tolerance, which goals_reached judges."""
+    """Distance beyond which a reported success is false. Larger than the goal tolerance, which goals_reached checks."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return POSITION | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding for each goal reported reached, one for the end of navigation."""
+        """Return one finding for each goal reported as reached, and one for the end of navigation."""
         told = goal_outcomes(trace, case)
         ended = trace.of_kind(EventKind.NAVIGATION_ENDED)
         strange = [
@@ -191,6 +191,6 @@ def _success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Find
 
 
 def _task(outcome: GoalOutcome, ended: tuple[Event, ...]) -> int | None:
-    """Which end of navigation answers for a goal: the first after it began, or at which it is over, too."""
+    """Return the end of navigation that belongs to a goal: the first one after the goal was accepted."""
     over = math.inf if outcome.end is None else outcome.end.tick
     return next((k for k, end in enumerate(ended) if outcome_start(outcome) < end.tick or over <= end.tick), None)

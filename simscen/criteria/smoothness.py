@@ -1,4 +1,4 @@
-"""`smoothness`: how gently the robot drove."""
+"""The criterion `smoothness`: acceleration, jerk, SPARC and LDLJ."""
 
 from __future__ import annotations
 
@@ -31,27 +31,26 @@ class Smoothness(Spec, Criterion):
         (acceleration), its second difference by time squared (jerk), and two measures of smoothness without a unit,
         spectral arc length (SPARC, 0 = smooth) and log dimensionless jerk (LDLJ, greater = smoother).
     When it fails: the largest acceleration or jerk or the mean jerk is above its bound, or SPARC or LDLJ below.
-    Why this: cargo tips and passengers feel jerk; a controller that chatters wears its gears and still arrives.
+    Why this: jerk tips cargo over and is uncomfortable; an oscillating controller wears out gears although it arrives.
     Source: Balasubramanian et al. 2015 and the authors' code for SPARC and LDLJ; HuNavSim and Arena report jerk, the
         one as a first difference, the other without the time step.
 
-    SPARC hardly notices a stop on the way but sees a slow wobble, LDLJ sees the stop, and both drift with the
-    duration: bound them only in a scenario whose drive is always the same. A robot that never moved has neither, which
-    is inconclusive.
+    SPARC is sensitive to slow oscillation, LDLJ to stops, and both depend on the duration: use them only in scenarios
+    with a fixed drive. They are inconclusive for a robot that never moved.
 
     Example: `smoothness: {max_acceleration: 1 m/s^2, max_jerk: 60 m/s^3}`
     """
 
     max_acceleration: PositiveAcceleration | None = None
-    """m/s² over ground, speeding up or braking."""
+    """Maximum acceleration or deceleration over ground in m/s²."""
     max_jerk: PositiveJerk | None = None
-    """m/s³, either way."""
+    """Maximum jerk in m/s³."""
     max_mean_jerk: PositiveJerk | None = None
-    """m/s³, its mean without sign."""
+    """Maximum mean of the absolute jerk in m/s³."""
     min_sparc: Annotated[float, Field(lt=0, ge=-1000)] | None = None
-    """Spectral arc length; a straight drive at one speed has about -2."""
+    """Minimum spectral arc length; a straight drive at one speed has about -2."""
     min_ldlj: Annotated[float, Field(ge=-1000, le=1000)] | None = None
-    """Log dimensionless jerk."""
+    """Minimum log dimensionless jerk."""
 
     @model_validator(mode="after")
     def _some_bound(self) -> Smoothness:
@@ -61,11 +60,11 @@ class Smoothness(Spec, Criterion):
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return frozenset({Evidence.TRUTH, Evidence.VELOCITY})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding for each bound that is given."""
+        """Return one finding for each given bound."""
         findings = []
         if self.max_acceleration is not None:
             findings.append(_largest(trace, case, "acceleration", self.max_acceleration, "m/s^2"))

@@ -1,4 +1,4 @@
-"""`speed`: how fast the robot went."""
+"""The criterion `speed`: speed and turn rate of the robot."""
 
 from __future__ import annotations
 
@@ -31,35 +31,33 @@ class Speed(Spec, Criterion):
         cell that the robot's center truly was in, where it was furthest above it.
     When it fails: one is above its bound; the speed is more than `tolerance` above a limit of the mask, for which the
         highest limit within `grace` before and after counts.
-    Why this: limits in a controller's parameters are wishes; slopes, slip and overshoot decide.
+    Why this: slopes, slip and overshoot can exceed the limits in the parameters of the controller.
     Source: ScenarioRunner's MaxVelocityTest.
 
-    Inconclusive when the robot never was in the region, or where the mask limits it for longer than twice the grace:
-    then nothing was tested.
+    Inconclusive if the robot never was in the region, or in a limited part of the mask for longer than twice the grace.
 
     Example: `speed: {max: 0.5 m/s}`
     """
 
     max: PositiveSpeed | None = None
-    """m/s over ground."""
+    """Maximum speed over ground in m/s."""
     max_turn_rate: PositiveAngularSpeed | None = None
-    """rad/s, either way."""
+    """Maximum absolute turn rate in rad/s."""
     in_: RegionName | None = Field(default=None, alias="in")
-    """Only while the robot's center is in this region, by name."""
+    """Check only while the robot's center is in the region with this name."""
     while_on: bool = False
-    """Only while events have the limit in that region switched on (`speed_zone` among the actions), and from `grace`
-    after that; else over the whole run."""
+    """Check only while the limit in the region is enabled by the action `speed_zone`, from `grace` after that; default:
+    the whole run."""
     mask: SpeedMask | None = None
     """A filter mask of speed limits: file, type, base and multiplier, as `stack.speed_mask` has them.
 
-    The stack is told of it only if it is written there, too."""
+    The stack only gets the mask if it is also given there."""
     full_speed: PositiveSpeed | None = None
-    """What the percents of a mask are of; the criterion does not ask the stack how fast it thinks it may go."""
+    """Speed that corresponds to 100 % in the mask."""
     tolerance: NonNegativeSpeed = 0.05
-    """How far above a limit of the mask the robot may be."""
+    """Maximum speed above a limit of the mask."""
     grace: Duration = 1.0
-    """How long the robot may take to slow down for a lower limit, or for a zone that was switched on, and how early it
-    may believe to have left it."""
+    """Time for slowing down at a lower limit or after a zone was enabled, and tolerance for leaving it early."""
 
     @model_validator(mode="after")
     def _some_bound(self) -> Speed:
@@ -68,13 +66,13 @@ class Speed(Spec, Criterion):
         return self
 
     @model_validator(mode="after")
-    def _on_where(self) -> Speed:
+    def _check_zone(self) -> Speed:
         if self.while_on and (self.in_ is None or self.mask is not None):
             raise ValueError("while_on is for the zone of a region: `in`, and no mask")
         return self
 
     @model_validator(mode="after")
-    def _of_what(self) -> Speed:
+    def _check_reference_speed(self) -> Speed:
         percent = self.mask is not None and self.mask.type == "percent"
         if percent and self.full_speed is None:
             raise ValueError("expected full_speed, which the percents of the mask are of (or `type: absolute`)")
@@ -84,13 +82,13 @@ class Speed(Spec, Criterion):
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         place = POSITION if self.in_ is not None or self.mask is not None else set()
         switched = {Evidence.DISTURBANCES} if self.while_on else set()
         return frozenset({Evidence.TRUTH, Evidence.VELOCITY, *place, *switched})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding for each bound."""
+        """Return one finding for each bound."""
         wanted = [("speed", self.max, "m/s"), ("turn_rate", self.max_turn_rate, "rad/s")]
         found = [self._fastest(trace, case, name, limit, unit) for name, limit, unit in wanted if limit is not None]
         return found if self.mask is None else [*found, self._by_mask(trace, case, self.mask)]
@@ -137,7 +135,7 @@ class Speed(Spec, Criterion):
         return at_most("speed", value, limit, "m/s", at=(trace, int(signal.ticks[k])), context=context)
 
     def _inside(self, trace: Trace, case: Case, signal: Samples) -> ground_truth.Flags | None:
-        """When the robot's center was in the region, everywhere being one, too; None for one that does not exist."""
+        """Return whether the robot's center was in the region; always without a region, None for an unknown one."""
         from simscen.criteria.trace_signals.readers import points_in_polygon
 
         if self.in_ is None:
@@ -149,7 +147,7 @@ class Speed(Spec, Criterion):
 
 
 def _highest_around(values: Array, ticks: Ticks, reach: int) -> Array:
-    """Of each sample, the greatest value no more than `reach` ticks away."""
+    """Return, for each sample, the largest value within `reach` ticks."""
     first = np.searchsorted(ticks, ticks - reach, side="left")
     behind = np.searchsorted(ticks, ticks + reach, side="right")
     padded = np.append(values, -np.inf)

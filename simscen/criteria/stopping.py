@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 STALE_SCAN_S = 0.2
-"""Seconds; a scan older than two periods of a 10 Hz lidar is worth a line."""
+"""Age in s above which a scan is mentioned: two periods of a 10 Hz lidar."""
 
 
 class StoppedWithin(Spec, Criterion):
@@ -32,36 +32,35 @@ class StoppedWithin(Spec, Criterion):
     What is measured: time from the start of `after` until the robot's true speed and turn rate fall to rest and stay
         there for `hold`; each time that it happens.
     When it fails: that took longer than `time`; or, with `stay`, the robot moved again before the fault ended.
-    Why this: a robot that no longer sees must not drive. The command may be zero while the wheels still roll, so the
-        truth decides.
-    Source: Nav2's collision monitor, whose source_timeout stops a robot that is no longer told what is around it.
+    Why this: a robot without sensor data must not drive. The true speed counts, because wheels can roll after the
+        command is zero.
+    Source: Nav2's collision monitor, whose source_timeout stops a robot without sensor data.
 
-    Inconclusive when it never happened, when the fault or the run was over before `time` was, or when the robot stood
-    already each time: then nothing was tested.
+    Inconclusive if `after` never started, if the fault or the run ended before `time`, or if the robot already stood.
 
     Example: `stopped_within: {time: 0.5 s, after: lidar.off}`
     """
 
     time: PositiveDuration
-    """Seconds after its start."""
+    """Maximum time in s after its start."""
     after: HappeningName
-    """The fault, e.g. `lidar.off`, or the event of the scenario, by name."""
+    """Name of the fault, e.g. `lidar.off`, or of the event."""
     speed: PositiveSpeed = 0.02
-    """What counts as standing, in m/s over ground."""
+    """Maximum speed over ground of a standing robot in m/s."""
     turn_rate: PositiveAngularSpeed = 0.05
-    """What counts as standing, in rad/s."""
+    """Maximum turn rate of a standing robot in rad/s."""
     hold: PositiveDuration = 0.2
-    """It must stand so long to count: changing direction is not stopping."""
+    """Minimum duration of standing, because a change of direction is not a stop."""
     stay: bool = False
-    """Must it also stand until the fault or event ends?"""
+    """Require that the robot stands until the fault or event ends."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return frozenset({Evidence.TRUTH, Evidence.VELOCITY, Evidence.DISTURBANCES})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """One finding each time it happened, and one more with `stay`."""
+        """Return one finding for each start of `after`, and a second one with `stay`."""
         if not len(trace.velocity):
             raise MissingEvidence("the robot's true velocity was not recorded")
         happened = spans(trace, self.after)
@@ -79,7 +78,7 @@ class StoppedWithin(Spec, Criterion):
         return f"≤ {self.time:.2f} s after {self.after}"
 
     def _rest(self, trace: Trace) -> Flags:
-        """Whether the robot stands, at each truth tick."""
+        """Return, for each sample of the truth, whether the robot stands."""
         slow = speed(trace).values[:, 0] <= self.speed
         steady = turn_rate(trace).values[:, 0] <= self.turn_rate
         return slow & steady
@@ -114,7 +113,7 @@ class StoppedWithin(Spec, Criterion):
 
 
 def _stood(trace: Trace, rest: Flags, tick: int) -> bool:
-    """Whether the robot stood just before `tick`."""
+    """Return whether the robot stood just before `tick`."""
     return bool(rest[max(int(np.searchsorted(trace.velocity.ticks, tick, side="left")) - 1, 0)])
 
 
@@ -132,25 +131,24 @@ def _explained(trace: Trace, start: int, end: int) -> list[str]:
 
 
 class Stuck(Spec, Criterion):
-    """The robot got on while it had a goal.
+    """The robot made progress while it had a goal.
 
     What is measured: the longest time in which it stayed within `radius` of where it was, while a goal was under way.
     When it fails: that is longer than `max`.
-    Why this: a robot that spins and backs up in front of a cart for a minute and then arrives has passed every other
-        criterion.
+    Why this: a robot that spins and backs up for a minute before it arrives passes all other criteria.
     Source: Nav2's SimpleProgressChecker, whose defaults these are; ScenarioRunner's ActorBlockedTest.
 
     Example: `stuck: {max: 10 s}`
     """
 
     max: PositiveDuration = 10.0
-    """Seconds."""
+    """Maximum time in seconds."""
     radius: PositiveLength = 0.5
-    """Meters that count as getting on."""
+    """Distance in meters that counts as progress."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold for it to be decided."""
+        """Evidence in the log that the criterion needs."""
         return frozenset({Evidence.TRUTH, Evidence.NAVIGATION})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
@@ -170,7 +168,7 @@ class Stuck(Spec, Criterion):
 
 
 def _stays(poses: Samples, start: int, end: int, radius: float) -> list[tuple[int, int]]:
-    """(ticks it lasted, tick it ended) of each stay between `start` and `end`, as a progress checker sees them."""
+    """Yield the duration and end in ticks of each stay between `start` and `end`, as measured by a progress checker."""
     first, last = np.searchsorted(poses.ticks, (start, end + 1), side="left").tolist()
     if first == last:
         return []

@@ -1,7 +1,7 @@
-"""What did not happen is not green: each event and fault of a scenario has to change something, or the run fails.
+"""Verdicts on events and faults that did not take effect: a run does not pass without its disturbances.
 
-That a trigger fired is not enough. An action may find nothing to act on, a fault may be over before a message of its
-sensor comes, and what comes with the last beat of a run has nobody left to disturb.
+A trigger that fires is not enough. An action can find no object to act on, a fault can end before its sensor sends a
+message, and a disturbance in the last step of a run disturbs nothing.
 """
 
 from collections import Counter
@@ -46,7 +46,7 @@ def missing_disturbances(
 
 
 def _excused(one: DisturbanceOutcome, happened: Sequence[DisturbanceOutcome]) -> bool:
-    """Whether it never had its turn in its story, and the step that it waited for has a verdict of its own."""
+    """Return whether the step waited for an earlier step of its sequence that already has a verdict."""
     after = one.ordered.after
     if after is None or one.fired:
         return False
@@ -55,7 +55,7 @@ def _excused(one: DisturbanceOutcome, happened: Sequence[DisturbanceOutcome]) ->
 
 
 def _numbered(ordered: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance]]:
-    """Each with its number among those of its kind, by which events of the log name the entry."""
+    """Return the disturbances with their numbers among those of the same kind, which events of the log refer to."""
     counts = {"event": 0, "fault": 0}
     for one in ordered:
         yield counts[one.kind], one
@@ -75,7 +75,7 @@ def _of_entry(trace: Trace, kind: EventKind, entry: int) -> list[Event]:
 
 
 def _event(trace: Trace, case: Case, ordered: Disturbance, entry: int) -> DisturbanceOutcome:
-    """Each of its actions has to have changed something at least once, and the run to have gone on after that."""
+    """Return the outcome of an event. Each action must take effect once, and the run must continue after that."""
     started = _of_entry(trace, EventKind.EVENT_STARTED, entry)
     fired = tuple(event.tick for event in started)
     ended = _of_entry(trace, EventKind.EVENT_ENDED, entry)
@@ -96,7 +96,7 @@ def _event(trace: Trace, case: Case, ordered: Disturbance, entry: int) -> Distur
 
 
 def _waited(trace: Trace, case: Case, ordered: Disturbance) -> str:
-    """Of a step of a story that never came: since when it was waited for, or which one was waited for instead."""
+    """Return since when a missing step of a sequence was due, or which earlier step was missing."""
     if ordered.after is None:
         return ""
     events = [one for one in case.disturbances if one.kind == "event"]
@@ -110,7 +110,7 @@ def _waited(trace: Trace, case: Case, ordered: Disturbance) -> str:
 
 
 def _effects(ended: Event) -> list[tuple[bool, str]]:
-    """Whether each action of an event took effect, and what came of it."""
+    """Return, for each action of an event, whether it took effect, and a description."""
     effects = ended.data.get("effects")
     assert isinstance(effects, list)
     return [(bool(one["happened"]), str(one["what"])) for one in effects if isinstance(one, dict)]

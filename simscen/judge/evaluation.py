@@ -150,7 +150,7 @@ def _defect(finding: object) -> str:
 
 
 EXPECTED = "expected"
-"""What the verdict on an expectation is called."""
+"""Name of the verdict on an expected failure."""
 
 
 def apply_expectation(

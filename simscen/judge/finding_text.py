@@ -1,4 +1,4 @@
-"""How findings are told: one way for the console, JUnit, JSON and pictures."""
+"""Text of findings for the console, JUnit, JSON and pictures."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -7,11 +7,11 @@ from simscen.core.records.events import DisturbanceOutcome
 from simscen.core.records.verdict import Finding, Status, Verdict
 
 DISTURBANCE = "disturbance"
-"""What the verdicts on events and faults are called that did not happen; the id is the name of the event or fault."""
+"""Criterion names of the verdicts on missing events and faults; the ID is the name of the event or fault."""
 ARRIVAL = "goals_reached"
-"""The criterion that looks at how near to a goal the robot stopped."""
+"""Name of the criterion on the distance from a goal."""
 MAX_TIMES_SHOWN = 5
-"""So many times of a disturbance that came again and again are told."""
+"""Number of times that are listed for a repeated disturbance."""
 _RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< "), "< ": ("< ", "≥ "), "> ": ("> ", "≤ ")}
 
 
@@ -28,7 +28,7 @@ def comparison(finding: Finding) -> str:
 
 
 def time_and_place(finding: Finding, tick_rate: int) -> str:
-    """When and where, e.g. "at t = 10.84 s, (2.10, 3.41)"; "" when unknown."""
+    """Return time and place, e.g. "at t = 10.84 s, (2.10, 3.41)", or "" if unknown."""
     if finding.tick is None:
         return ""
     disturbance_times = f"at t = {finding.tick / tick_rate:.2f} s"
@@ -54,7 +54,7 @@ def sentence(verdict: Verdict, finding: Finding, tick_rate: int) -> str:
 
 
 def disturbance_times(one: DisturbanceOutcome, tick_rate: int) -> str:
-    """When an event or fault began, e.g. "t = 10.00 s, 12.50 s and 3 more"; "never"."""
+    """Return when an event or fault began, e.g. "t = 10.00 s, 12.50 s and 3 more", or "never"."""
     times = [f"{tick / tick_rate:.2f} s" for tick in one.fired[:MAX_TIMES_SHOWN]]
     more = f" and {len(one.fired) - MAX_TIMES_SHOWN} more" if len(one.fired) > MAX_TIMES_SHOWN else ""
     return f"t = {', '.join(times)}{more}" if times else "never"
@@ -91,7 +91,7 @@ def tightest_margin(verdicts: Sequence[Verdict]) -> str:
 
 
 def _stopping(verdict: Verdict, finding: Finding) -> bool:
-    """Whether it is about where a robot stopped and stayed, rather than about how long it took."""
+    """Return whether the finding is about the place where the robot stopped."""
     return verdict.criterion == ARRIVAL and not (finding.unit == "s" and finding.limit.startswith("≤"))
 
 

@@ -15,7 +15,7 @@ FORMAT = 2
 
 
 def to_json(result: RunResult) -> str:
-    """Sorted, indented, with a newline at the end: the same result gives the same bytes."""
+    """Return sorted, indented JSON with a final newline. The same result gives the same bytes."""
     return json.dumps(result_data(result), sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
@@ -123,7 +123,7 @@ def read_verdict(data: dict[str, Any]) -> Verdict:
 
 
 def number(value: float | None) -> float | None:
-    """JSON knows neither nan nor infinity."""
+    """Return the number, or a text for nan and infinity, which JSON lacks."""
     return value if value is not None and math.isfinite(value) else None
 
 

@@ -83,16 +83,16 @@ def _reason(verdicts: tuple[Verdict, ...]) -> RunFailure:
 T = TypeVar("T")
 SUCCESS = "success"
 OF_ALL = ("object.", "pedestrian.", "event.", "mark", "run.")
-"""Kinds of events that happen to the world, and are in the log of each robot."""
+"""Kinds of events of the world, which the log of each robot contains."""
 
 
 def combine_robots(
     results: Mapping[str, RunResult], traces: Mapping[str, Trace], expected: ExpectedFailure | None = None
 ) -> RunResult:
-    """One result: all passes where each does; verdicts, metrics and faults are called `robot/name`.
+    """Return the combined result of several robots, which passes if all robots pass.
 
-    What happens to the world has no robot and is told once. The metric `success` is there for the run as well. The run
-    may be `expected` to fail.
+    Verdicts, metrics and faults get the name `robot/name`. Events of the world have no robot and are listed once. The
+    metric `success` also exists for the run. `expected` says that the run is expected to fail.
     """
     first = next(iter(results.values()))
     shared = {one.ordered.name for one in first.disturbances if one.ordered.kind == "event"}
@@ -134,7 +134,7 @@ def _called(verdict: Verdict, robot: str) -> Verdict:
 
 
 def _of_the_world(verdict: Verdict, events: set[str]) -> bool:
-    """Whether it says that an event of the scenario did not happen."""
+    """Return whether the verdict is about a missing event of the scenario."""
     return verdict.criterion == DISTURBANCE and not events.isdisjoint((verdict.id, verdict.id.rpartition("#")[0]))
 
 
@@ -148,7 +148,7 @@ def _named(parts: Mapping[str, Mapping[str, T]]) -> dict[str, T]:
 
 
 def _events(traces: Mapping[str, Trace]) -> dict[str, int]:
-    """How often what happened, each thing once; that the robots are there is nothing that happens."""
+    """Return the number of events by kind. Events of the world count once, and spawned robots do not count."""
     first = next(iter(traces.values()))
     counts = Counter(str(event.kind) for event in first.events if _shared(event) and event.name not in traces)
     for trace in traces.values():

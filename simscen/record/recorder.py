@@ -6,7 +6,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol
 
-from simscen.core.clock import Clock
+from simscen.core.clock import Clock, SimTime
 from simscen.core.errors import RunError
 from simscen.core.records.trace import Moment
 from simscen.record import log_header
@@ -15,7 +15,6 @@ from simscen.record.log_header import LogHeader, scenery_from_header
 from simscen.record.mcap_writer import McapWriter, Sink
 from simscen.record.publishers.channels import LogPublisher, NamespacedPublisher
 from simscen.record.publishers.robot import RobotPublisher
-from simscen.record.simtime import SimTime
 
 
 class Recorder:

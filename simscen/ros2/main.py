@@ -11,9 +11,8 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tu
 from simscen.peer import messages, wire
 from simscen.peer.goals import Goal, Goals
 from simscen.peer.wire import Connection, Gone
-from simscen.ros2.domain import Domain, claim, ros_environment
 from simscen.ros2.launch import LaunchedCommand
-from simscen.ros2.options import AdapterError, Options
+from simscen.ros2.options import AdapterError, Domain, Options, claim, ros_environment
 
 EVENTS = "/simscen/events"
 DEFAULT_MODE = "navigate_to_pose"

@@ -1,6 +1,15 @@
-"""Options of `simscen ros2`, the error that ends a run, and the names of topics in the user's graph."""
+"""Options of `simscen ros2`, the error that ends a run, topic names of the user's graph, and ROS domains.
 
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional
+Each run gets a ROS_DOMAIN_ID that no other run of this user on this machine uses at the same time. Every domain has a
+file that its holder locks; the kernel releases the lock when the process ends.
+"""
+
+import fcntl
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import IO, Any, Dict, Iterable, List, Mapping, NamedTuple, Optional
 
 
 class AdapterError(Exception):
@@ -57,3 +66,71 @@ class TopicNames:
         if target is None:
             return topic if topic in GLOBAL_TOPICS else self.namespace + topic
         return target if target.startswith("/") else f"{self.namespace}/{target}"
+
+
+ROBOT_VARIABLE = "SIMSCEN_ROBOT"
+"""Environment variable with the robot's name, if a scenario has several."""
+DOMAINS = range(1, 102)
+"""Above 101, ports of a domain may be ephemeral ports of Linux; 0 is the default domain of all ROS users."""
+
+
+class Domain:
+    """A claimed domain, held until `release` or the end of the process."""
+
+    def __init__(self, number: int, lock: IO[str]) -> None:
+        self.number = number
+        self._lock = lock
+
+    def release(self) -> None:
+        """Allow other runs to use the domain."""
+        self._lock.close()
+
+
+def claim(wanted: Optional[int], environment: Mapping[str, str]) -> Domain:
+    """Claim the domain `wanted`, or the first free one. Raises AdapterError if there is none."""
+    folder = _lock_folder(environment)
+    for number in DOMAINS if wanted is None else (wanted,):
+        lock = (folder / f"{number}.lock").open("a+")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.close()
+            continue
+        return Domain(number, lock)
+    if wanted is None:
+        raise AdapterError(f"all ROS domains from {DOMAINS[0]} to {DOMAINS[-1]} are in use by other runs")
+    if environment.get(ROBOT_VARIABLE):
+        raise AdapterError(
+            f"another robot or run is using ROS domain {wanted}: with several robots, each has a ROS graph of its own; "
+            "with --launch each has nodes and a domain of its own"
+        )
+    raise AdapterError(
+        f"another run is using ROS domain {wanted}: nodes that you start yourself serve one run at a time "
+        "(simscen run --jobs 1); with --launch each run has nodes and a domain of its own"
+    )
+
+
+def _lock_folder(environment: Mapping[str, str]) -> Path:
+    """Return the folder of the lock files, which all sessions of a user share."""
+    runtime = environment.get("XDG_RUNTIME_DIR")
+    if not runtime or not os.access(runtime, os.W_OK):
+        runtime = str(Path(tempfile.gettempdir(), f"simscen-{os.getuid()}"))
+    folder = Path(runtime, "simscen-ros2")
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if folder.stat().st_uid != os.getuid():
+        raise AdapterError(f"{folder} belongs to another user")
+    return folder
+
+
+def ros_environment(domain: int, log_folder: str, environment: Mapping[str, str]) -> Mapping[str, str]:
+    """Return the environment of the adapter and its nodes: one domain, restricted to this machine."""
+    env = dict(environment, ROS_DOMAIN_ID=str(domain), ROS_LOG_DIR=log_folder)
+    # simscen's virtual environment would hide the Python that has rclpy from the user's commands.
+    env["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), environment.get("PATH", os.defpath)])
+    env["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    # Deprecated since Iron; older distributions know nothing else.
+    if environment.get("ROS_DISTRO") in ("foxy", "galactic", "humble"):
+        env["ROS_LOCALHOST_ONLY"] = "1"
+    else:
+        env.pop("ROS_LOCALHOST_ONLY", None)
+    return env

@@ -1,4 +1,4 @@
-"""Contract tests for everybody's own planners, controllers, localizers, behaviors, stacks, criteria, faults and so on.
+"""Contract tests for planners, controllers, localizers, behaviors, stacks, criteria, faults and other plug-ins.
 
     @pytest.mark.parametrize("promise", promises_of(MyPlannerSpec()), ids=str)
     def test_my_planner(promise):
@@ -27,7 +27,7 @@ _WHERE = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is asked for, and no sooner: pytest imports this package whenever it starts."""
+    """Import a name on first use, because every start of pytest imports this package."""
     if name not in _WHERE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module

@@ -1,4 +1,4 @@
-"""A run as triggers and actions see it, without a run: everything is as it is set, and what is done is written down."""
+"""Fakes for triggers, actions and sensors: a stage that records all calls, and a room with four walls."""
 
 import math
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ from simscen.model.robot import Differential
 
 @dataclass
 class FakeStage:
-    """A core.stage.Stage. `regions` and `objects` that nobody has set are squares and places near the origin."""
+    """Fake of core.stage.Stage. Unknown regions are squares around the origin, and unknown objects are near it."""
 
     tick: int = 0
     clock: Clock = field(default_factory=Clock)
@@ -41,119 +41,119 @@ class FakeStage:
     done: list[Any] = field(default_factory=list)
 
     def scanned(self, sensor: str | None) -> int | None:
-        """The tick of the newest scan of this lidar, or of any."""
+        """Return the tick of the newest scan of this lidar, or of any lidar."""
         return max(self.scans.values(), default=None) if sensor is None else self.scans.get(sensor)
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """There is one only."""
+        """Return no names, because there is a single robot."""
         return ()
 
     def of(self, robot: str) -> "FakeStage":
-        """All robots are the same."""
+        """Return the same stage for all robots."""
         return self
 
     def region(self, name: str) -> Polygon:
-        """A named region of the world."""
+        """Return a region."""
         return self.regions.get(name, ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
 
     def object(self, name: str) -> Pose2 | None:
-        """Where a named object is now."""
+        """Return the pose of an object."""
         return self.objects.get(name, Pose2(0.5, 0.5, 0.0))
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """The path that moves an object."""
+        """Return the motion of an object."""
         return self.motions.get(name)
 
     def mass(self, name: str) -> float:
-        """Everything weighs a kilogram."""
+        """Return 1 kg for all objects."""
         return 1.0
 
     def door(self, name: str) -> tuple[Pose2, Pose2]:
-        """A door that slides by a meter."""
+        """Return the closed and open pose of a door that slides by 1 m."""
         return Pose2(0.0, 0.0, 0.0), Pose2(1.0, 0.0, 0.0)
 
     def spawn(self, body: Body) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("spawn", body))
 
     def walk(self, walker: WalkingPedestrian) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("walk", walker))
 
     def room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Everywhere."""
+        """Return True: there is space everywhere."""
         return True
 
     def rng(self, name: str) -> np.random.Generator:
-        """The stream of seed 1."""
+        """Return the random stream of seed 1."""
         return Streams(1).generator(name)
 
     def remove(self, name: str) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("remove", name))
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("move", name, path))
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("place", name, pose))
 
     def place_robot(self, pose: Pose2) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("place_robot", pose))
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("push", impulse, name, seconds))
 
     def lay(self, name: str, patch: Patch) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("lay", name, patch))
 
     def send_goal(self, name: str) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("send_goal", name))
 
     def cancel_goal(self) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("cancel_goal",))
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("switch_zone", order))
         return ""
 
     def tell(self, event: Event) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("tell", event))
 
     def note(self, event: Event) -> None:
-        """Write it down."""
+        """Record the call."""
         self.done.append(("note", event))
 
 
 LINEAR_SPEED, ANGULAR_SPEED = 0.3, 0.2
-"""m/s and rad/s."""
+"""Speeds of the robot in m/s and rad/s."""
 ROOM_HALF_WIDTH_M = 4.0
-"""Meters from the middle of the room to its walls."""
+"""Half of the side length of the room."""
 DRIVE = Differential(type="differential", wheel_separation=0.3, wheel_radius=0.05)
 
 
 class FakeSensorView:
-    """A sensors.sensor.SensorView: where the robot is `seconds` after its start; that is set by hand."""
+    """Fake of sensors.sensor.SensorView at the time `seconds`, which tests set."""
 
     seconds = 0.0
 
     def base_pose(self) -> Pose3:
-        """On a circle around (0, 1.5)."""
+        """Return a pose on a circle around (0, 1.5)."""
         yaw, radius = ANGULAR_SPEED * self.seconds, LINEAR_SPEED / ANGULAR_SPEED
         return Pose3.planar(Pose2(radius * math.sin(yaw), radius * (1 - math.cos(yaw)), yaw))
 
     def base_velocity(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Along the world's axes."""
+        """Return the velocity in the world frame."""
         yaw = ANGULAR_SPEED * self.seconds
         return (LINEAR_SPEED * math.cos(yaw), LINEAR_SPEED * math.sin(yaw), 0.0), (0.0, 0.0, ANGULAR_SPEED)
 
@@ -162,27 +162,27 @@ class FakeSensorView:
         return 0
 
     def encoders(self) -> tuple[float, ...]:
-        """Radians of the left and the right wheel."""
+        """Return the angles of the left and the right wheel in rad."""
         half = DRIVE.wheel_separation / 2
         left, right = (LINEAR_SPEED - ANGULAR_SPEED * half), (LINEAR_SPEED + ANGULAR_SPEED * half)
         return tuple(speed * self.seconds / DRIVE.wheel_radius for speed in (left, right))
 
     def touching(self) -> bool:
-        """Every other second."""
+        """Return True in every other second."""
         return int(self.seconds) % 2 == 1
 
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """Gray, two meters away."""
+        """Return a gray image with a depth of 2 m."""
         return np.full((height, width, 3), 128, np.uint8), np.full((height, width), min(2.0, far), np.float32)
 
 
 class SquareRoomRays(RayCaster):
-    """Rays to the four walls."""
+    """Ray caster for the four walls."""
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """See core.geometry.ray_fans.RayCaster."""
+        """Return the ranges; see core.geometry.ray_fans.RayCaster."""
         with np.errstate(divide="ignore", invalid="ignore"):
             walls = (np.sign(directions[:, :2]) * ROOM_HALF_WIDTH_M - origins[:, :2]) / directions[:, :2]
         far: Array = np.nanmin(np.where(walls > 0, walls, np.inf), axis=1)

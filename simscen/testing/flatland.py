@@ -1,6 +1,6 @@
-"""A world of boxes and discs with a robot that does what it is told: just enough to drive a stack without physics.
+"""Planar world of boxes and discs, in which a stack can drive a robot without physics.
 
-Ray casting and collision checks are closed forms, so they are also an independent truth.
+Ray casting and collision checks use closed formulas, so they are an independent reference.
 """
 
 import math
@@ -27,7 +27,7 @@ CONTROL, SCAN, ODOMETRY = 12, 24, 6
 
 
 def round_robot(radius: float = 0.22, speed: float = 0.5, **limits: float) -> RobotModel:
-    """Something like a TurtleBot."""
+    """Return a round robot like a TurtleBot."""
     angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
     corners = tuple((radius * math.cos(a), radius * math.sin(a)) for a in angles)
     data: dict[str, Any] = {
@@ -41,25 +41,25 @@ def round_robot(radius: float = 0.22, speed: float = 0.5, **limits: float) -> Ro
 
 
 def box_robot(length: float = 0.42, width: float = 0.31, speed: float = 2.0) -> RobotModel:
-    """Something like a Jackal."""
+    """Return a rectangular robot like a Jackal."""
     a, b = length / 2, width / 2
     return RobotModel(((a, b), (-a, b), (-a, -b), (a, -b)), None, speed, speed, 0.0, 2.0, 5.0, 5.0, 10.0)
 
 
 def setting(robot: RobotModel, *, name: str = "test", seed: int = 1, grid: OccupancyGrid | None = None) -> Setting:
-    """What a component that is tried alone is installed in: called at 20 Hz, on costmaps of 5 cm."""
+    """Return the setting of a single component, which is called at 20 Hz with costmaps of 5 cm."""
     return Setting(Surroundings(robot, grid, RATE, lidars=("lidar",)), name, Streams(seed), CONTROL / RATE, 0.05)
 
 
 @dataclass
 class Flatland:
-    """Boxes (min x, min y, max x, max y) and discs (x, y, radius) in meters; both may change while driving."""
+    """World of boxes (min x, min y, max x, max y) and discs (x, y, radius) in m, which can change during a drive."""
 
     boxes: list[tuple[float, float, float, float]] = field(default_factory=list)
     discs: list[tuple[float, float, float]] = field(default_factory=list)
 
     def room(self, width: float, height: float, wall: float = 0.1) -> "Flatland":
-        """Put walls around (0, 0) … (width, height)."""
+        """Add walls around the rectangle from (0, 0) to (width, height), and return the world."""
         self.boxes += [
             (-wall, -wall, width + wall, 0.0),
             (-wall, height, width + wall, height + wall),
@@ -69,7 +69,7 @@ class Flatland:
         return self
 
     def grid(self, bounds: tuple[float, float, float, float], resolution: float = 0.05) -> OccupancyGrid:
-        """The occupancy map: a cell is occupied when its center is inside something."""
+        """Return the occupancy map. A cell is occupied if its center is inside an obstacle."""
         columns, rows = (round((bounds[i + 2] - bounds[i]) / resolution) for i in (0, 1))
         y, x = (np.indices((rows, columns)) + 0.5) * resolution
         distance = self.distance(np.column_stack(((x + bounds[0]).ravel(), (y + bounds[1]).ravel())))
@@ -77,7 +77,7 @@ class Flatland:
         return OccupancyGrid(cells, resolution, Pose2(bounds[0], bounds[1]))
 
     def distance(self, points: Array) -> Array:
-        """Signed distance (n,) from points (n, 2) to the nearest surface; negative inside something."""
+        """Return signed distances (n,) from points (n, 2) to the nearest surface; negative inside obstacles."""
         result = np.full(len(points), np.inf)
         for ax, ay, bx, by in self.boxes:
             dx = np.maximum(ax - points[:, 0], points[:, 0] - bx)
@@ -91,7 +91,7 @@ class Flatland:
         return result
 
     def cast(self, origin: tuple[float, float], angles: Array) -> Array:
-        """Distances (n,) along rays."""
+        """Return the distances (n,) along rays."""
         c, s = np.cos(angles), np.sin(angles)
         best = np.full(len(angles), np.inf)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -108,7 +108,7 @@ class Flatland:
         return best
 
     def clearance(self, robot: RobotModel, pose: Pose2) -> float:
-        """Distance from the robot's hull to the nearest surface; not positive in contact."""
+        """Return the distance from the robot's hull to the nearest surface, which is not positive in contact."""
         if robot.radius is not None:
             return float(self.distance(np.array([[pose.x, pose.y]]))[0]) - robot.radius
         corners = np.array(robot.footprint)
@@ -119,7 +119,7 @@ class Flatland:
 
 @dataclass
 class Drive:
-    """A robot driving under a stack; `log` keeps events, `least` the smallest clearance so far."""
+    """Drive of a robot under a stack. `log` are the events, `least` is the smallest clearance so far."""
 
     world: Flatland
     robot: RobotModel
@@ -143,7 +143,7 @@ class Drive:
         self.least = math.inf
 
     def run(self, seconds: float, until: str = "navigation.ended") -> "Drive":
-        """Drive on for so long, or until an event of this kind."""
+        """Continue for some seconds, or until an event of the kind `until`."""
         end = self.tick + round(seconds * RATE)
         while self.tick < end:
             if any(event.kind == until for event in self.step()):
@@ -151,7 +151,7 @@ class Drive:
         return self
 
     def step(self) -> tuple[Event, ...]:
-        """One beat of 6 ticks."""
+        """Simulate one step of 6 ticks, and return its events."""
         readings: list[Reading] = []
         if self.tick % ODOMETRY == 0:
             readings += [Odometry(name, self.tick, self.pose, self.twist) for name in self.odometry]
@@ -167,7 +167,7 @@ class Drive:
         return decision.events
 
     def scan(self) -> Scan:
-        """What the lidar sees."""
+        """Return the scan of the lidar."""
         full = self.field_of_view >= 2 * math.pi - 1e-9
         step = self.field_of_view / (self.beams if full else self.beams - 1)
         first = -self.field_of_view / 2
@@ -195,12 +195,12 @@ class Drive:
         self.least = min(self.least, self.world.clearance(self.robot, self.pose))
 
     def kinds(self, kind: str) -> list[Event]:
-        """The events of a kind so far."""
+        """Return the events of a kind."""
         return [event for event in self.log if event.kind == kind]
 
     @property
     def result(self) -> str:
-        """How navigation ended."""
+        """Result of the navigation, or ""."""
         return self.kinds("navigation.ended")[-1].name if self.kinds("navigation.ended") else ""
 
 
@@ -215,7 +215,7 @@ def drive(
     stop_on_failure: bool = True,
     **options: Any,
 ) -> Drive:
-    """A reference stack with true poses in a world; `grid` None drives without a map."""
+    """Return a drive of the reference stack with true poses. Without `grid`, the robot has no map."""
     from simscen.stack.build import build_stack
 
     robot = robot or round_robot()

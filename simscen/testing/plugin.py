@@ -1,6 +1,6 @@
-"""The pytest plug-in: `pytest --simscen-contract my_package:MyPlanner` tries every promise that it has to keep.
+"""Plug-in of pytest: `pytest --simscen-contract my_package:MyPlanner` checks all promises of a component.
 
-It is loaded by every pytest in an environment where simscen is installed, so it imports nothing until it is asked.
+Every pytest in an environment with simscen loads the plug-in, so it imports the package only if the option is given.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from simscen.testing.contracts.base import Promise
 
 pytest_plugins = ("simscen.pytesting.plugin",)
-"""What collects scenarios stands above the command line, and this below it: it is named, not imported."""
+"""The collector of scenarios, by name because it is in a higher layer."""
 
 _PROMISES: pytest.StashKey[list[Promise]] = pytest.StashKey()
 
@@ -43,7 +43,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Find what is to be tried; without paths on the command line, that is all that is asked for."""
+    """Find the promises of the targets. Without paths on the command line, only these are tested."""
     targets: list[str] = config.getoption("--simscen-contract")
     if not targets:
         return
@@ -59,7 +59,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Add one item for each promise, before others select."""
+    """Add one item for each promise before other plug-ins select items."""
     items.extend(_items(session, config.stash.get(_PROMISES, []), config.getoption("--simscen-contract-limit")))
 
 
@@ -73,26 +73,26 @@ def _items(session: pytest.Session, promises: list[Promise], limit: float) -> It
 
 
 class SubjectCollector(pytest.Collector):
-    """What is tried."""
+    """Collector of the promises of one subject."""
 
     def collect(self) -> list[pytest.Item]:
-        """Nothing: its items are added by hand."""
+        """Return nothing, because the plug-in adds the items."""
         return []
 
 
 class PromiseItem(pytest.Item):
-    """One promise."""
+    """Test of one promise."""
 
     def __init__(self, *, promise: Promise, limit: float, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self._promise, self._limit = promise, limit
 
     def runtest(self) -> None:
-        """Try it."""
+        """Check the promise."""
         self._promise.check(self._limit)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """What was seen, what was promised, and where the component raised if it did."""
+        """Return the observation, the promise, and the traceback of an exception of the component."""
         from simscen.testing.contracts.base import PromiseBroken
 
         if not isinstance(excinfo.value, PromiseBroken):
@@ -103,5 +103,5 @@ class PromiseItem(pytest.Item):
         return "\n".join(told).rstrip()
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
-        """The promise as a sentence."""
+        """Return the promise as a sentence."""
         return self.path, None, f"{self._promise.role} {self._promise}"

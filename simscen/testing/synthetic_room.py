@@ -1,6 +1,6 @@
-"""A room without symmetry, a robot that drives a round in it, and its noisy sensors: numpy only, no physics.
+"""Asymmetric room, drives of a robot in it, and noisy sensors, without physics.
 
-The truth and the perfect scans of a drive are computed once; every seed only draws its own noise.
+The truth and the perfect scans of a drive are computed once. Each seed only changes the noise.
 """
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), 0.2, 0.
 
 @cache
 def grid(resolution: float = 0.05) -> OccupancyGrid:
-    """The map of the room: a cell is occupied when anything solid is in it, as in a map from SLAM."""
+    """Return the map of the room. A cell is occupied if it touches an obstacle, as in a map from SLAM."""
     x = np.arange(-5.2 + resolution / 2, 5.2, resolution)
     y = np.arange(-4.2 + resolution / 2, 4.2, resolution)[:, None]
     half = resolution / 2
@@ -45,7 +45,7 @@ def grid(resolution: float = 0.05) -> OccupancyGrid:
 
 
 def cast(poses: Array, angles: Array, boxes: Array = BOXES) -> Array:
-    """Exact ranges (n, b) from `poses` (n, 3) along `angles` (b,) to boxes, by the slab method."""
+    """Return exact ranges (n, b) from `poses` (n, 3) along `angles` (b,) to boxes, with the slab method."""
     heading = poses[:, 2:] + angles
     with np.errstate(divide="ignore"):
         inverse = 1 / np.stack((np.cos(heading), np.sin(heading)), axis=-1)
@@ -59,8 +59,9 @@ def cast(poses: Array, angles: Array, boxes: Array = BOXES) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """`truth` (k, 3) at 40 Hz, the first row at tick 0; `steps` (k, 3) that the wheels make to get to each row;
-    `ranges` (k / 4, 360) perfect scans at 10 Hz.
+    """Drive with `truth` (k, 3) at 40 Hz from tick 0, `steps` (k, 3) of the wheels to each row, and perfect scans.
+
+    The scans are `ranges` (k / 4, 360) at 10 Hz.
     """
 
     truth: Array
@@ -69,7 +70,7 @@ class Drive:
 
 
 def record(truth: Array) -> Drive:
-    """A drive along these poses."""
+    """Return the drive along some poses."""
     poses = [Pose2(*row) for row in truth]
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(poses))])
     angles = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS, dtype=np.float64)
@@ -78,7 +79,7 @@ def record(truth: Array) -> Drive:
 
 @cache
 def drive(seconds: float, first: int = 0) -> Drive:
-    """A drive around the room at up to 0.5 m/s and 1 rad/s, from the waypoint `first`."""
+    """Return a drive through the room at up to 0.5 m/s and 1 rad/s, from the waypoint `first`."""
     dt, pose, goal = ODOMETRY_PERIOD / TICK_RATE, Pose2(*ROUND[first], 0.0), first + 1
     truth = [pose]
     for _ in range(round(seconds / dt)):
@@ -93,12 +94,12 @@ def drive(seconds: float, first: int = 0) -> Drive:
 
 
 def surroundings(room: OccupancyGrid | None = None) -> Surroundings:
-    """What a stack is told of the room."""
+    """Return the surroundings for a stack in the room."""
     return Surroundings(ROBOT, grid() if room is None else room, TICK_RATE)
 
 
 def localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Localizer:
-    """A localizer in the room."""
+    """Return a localizer in the room."""
     setting = Setting(surroundings(), "localizer", Streams(seed), estimate=estimate)
     made: Localizer = spec.implementation()(spec, setting)
     return made
@@ -106,7 +107,7 @@ def localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Localizer:
 
 @dataclass(frozen=True)
 class Noise:
-    """Errors of the sensors, as in simscen.model.robot; odometry's grow with the square root of the way."""
+    """Noise of the sensors, as in simscen.model.robot. That of odometry grows with the square root of the distance."""
 
     lidar: float = 0.01
     translation: float = 0.01
@@ -120,7 +121,7 @@ USUAL = Noise()
 
 
 def run(subject: Localizer, drive: Drive, seed: int, noise: Noise = USUAL, *, imu: bool = False) -> list[Belief]:
-    """The beliefs (k) of a localizer, one for each row of the truth."""
+    """Return the beliefs (k) of a localizer, one for each row of the truth."""
     rng, beliefs = np.random.default_rng((seed, 2)), []
     ranges = drive.ranges + rng.normal(0, noise.lidar, drive.ranges.shape)
     ranges = np.where(ranges < RANGE_MAX, np.round(ranges, 3), np.inf)
@@ -141,7 +142,7 @@ def run(subject: Localizer, drive: Drive, seed: int, noise: Noise = USUAL, *, im
 
 
 def scan(ranges: Array, tick: int = 0, **changes: object) -> Scan:
-    """A full-circle scan by the lidar in the middle of the robot."""
+    """Return a scan of 360 degrees by a lidar at the center of the robot."""
     given = {
         "angle_min": -np.pi,
         "angle_increment": 2 * np.pi / max(len(ranges), 1),
@@ -152,12 +153,12 @@ def scan(ranges: Array, tick: int = 0, **changes: object) -> Scan:
 
 
 def errors(beliefs: list[Belief], truth: Array) -> Array:
-    """Errors (k, 3) of the beliefs in the map frame, headings wrapped."""
+    """Return the errors (k, 3) of the beliefs in the map frame, with wrapped headings."""
     error: Array = np.array([belief.pose for belief in beliefs]) - truth
     error[:, 2] = (error[:, 2] + np.pi) % (2 * np.pi) - np.pi
     return error
 
 
 def nees(belief: Belief, error: Array) -> float:
-    """Normalized estimation error squared of one belief (Bar-Shalom et al. 2001, section 5.4)."""
+    """Return the normalized estimation error squared of one belief (Bar-Shalom et al. 2001, section 5.4)."""
     return float(error @ np.linalg.solve(belief.covariance, error))

@@ -1,4 +1,4 @@
-"""Traces from a few words: golden cases and documentation say with them what a criterion means."""
+"""Traces and cases from short descriptions, for golden cases and the documentation of criteria."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,12 +16,12 @@ TICK_RATE, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
 
 
 def synthetic_trace(words: Mapping[str, Any]) -> Trace:
-    """A trace at the usual rates (240 Hz ticks, truth 40 Hz, scans and belief 10 Hz).
+    """Return a trace with 240 Hz ticks, truth at 40 Hz, scans and belief at 10 Hz.
 
-    seconds: how long it is · truth: waypoints [t, x, y, yaw], driven straight at constant speed between them ·
-    belief: waypoints too, or {offset: [dx, dy, dyaw]} from the truth, or null for none · clearance: [t, meters] or one
-    number · scans: [from, to] stretches in which they arrive · events: [t, kind, name, {data}] · plans: [t, [[x, y],
-    …]] · objects: {name: waypoints} · ended: why the run ended; null for a log that was cut off.
+    seconds: duration · truth: waypoints [t, x, y, yaw] with straight lines at constant speed between them · belief:
+    waypoints, or {offset: [dx, dy, dyaw]} from the truth, or null for none · clearance: [t, meters] or one number ·
+    scans: intervals [from, to] with scans · events: [t, kind, name, {data}] · plans: [t, [[x, y], …]] · objects:
+    {name: waypoints} · ended: why the run ended; null for a truncated log.
     """
     end = round(words["seconds"] * TICK_RATE)
     ticks = np.arange(0, end + 1, TRUTH_PERIOD, dtype=np.int64)
@@ -43,7 +43,7 @@ def synthetic_trace(words: Mapping[str, Any]) -> Trace:
 
 
 def _way(waypoints: Sequence[Sequence[float]], ticks: Ticks) -> Samples:
-    """x, y, yaw at `ticks`, linear between waypoints; headings take the shorter way."""
+    """Return x, y, yaw at `ticks`, interpolated between waypoints; headings turn the shorter way."""
     points = np.array([[*point, 0.0][:4] for point in waypoints], dtype=np.float64)
     times = ticks / TICK_RATE
     columns = [np.interp(times, points[:, 0], points[:, axis]) for axis in (1, 2)]
@@ -52,7 +52,7 @@ def _way(waypoints: Sequence[Sequence[float]], ticks: Ticks) -> Samples:
 
 
 def _velocity(truth: Samples) -> Array:
-    """vx, vy, wz in the base frame over the step that begins at each sample; the last one goes on as before."""
+    """Return vx, vy, wz in the base frame over the step after each sample; the last value is repeated."""
     if len(truth) < 2:
         return np.zeros((len(truth), 3))
     step = np.diff(truth.ticks) / TICK_RATE
@@ -98,7 +98,7 @@ def _events(words: Mapping[str, Any], end: int) -> tuple[Event, ...]:
 
 
 def _lifted(points: Sequence[Sequence[float]]) -> Array:
-    """Path points with the heading of the way."""
+    """Return path points with the heading of the path."""
     xy = np.array(points, dtype=np.float64)[:, :2]
     steps = np.diff(xy, axis=0)
     yaw = np.arctan2(steps[:, 1], steps[:, 0])
@@ -106,7 +106,7 @@ def _lifted(points: Sequence[Sequence[float]]) -> Array:
 
 
 def synthetic_case(words: Mapping[str, Any]) -> Case:
-    """A case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · sent ·
+    """Return a case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · sent ·
     expected {goal: failed or a code} · shortest {goal: meters} · passages [[goal, [x, y], [x, y], name, name]] ·
     disturbances [{name, kind, …}] ·
     masks {file: {resolution, origin: [x, y, yaw], blocks: [[column, row, width, height, value]]}} · …"""

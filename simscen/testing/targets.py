@@ -1,4 +1,4 @@
-"""From what a user names to the contracts that it has to keep."""
+"""Contracts of the plug-ins that a user names."""
 
 from __future__ import annotations
 
@@ -21,12 +21,15 @@ from simscen.model.robot import SensorSpec
 from simscen.model.stack_base import ControllerSpec, StackBase
 from simscen.spec.registry import GROUPS, BrokenPlugin, Entry, find
 from simscen.stack.protocols import RobotModel
-from simscen.testing.contracts.actions_and_triggers import ActionContract, TriggerContract
 from simscen.testing.contracts.base import Contract, Promise
 from simscen.testing.contracts.behavior import BehaviorContract
-from simscen.testing.contracts.controller import ControllerContract
-from simscen.testing.contracts.criteria_and_metrics import CriterionContract, MetricContract
-from simscen.testing.contracts.goal_checker import GoalCheckerContract
+from simscen.testing.contracts.controller import ControllerContract, GoalCheckerContract
+from simscen.testing.contracts.criteria_and_metrics import (
+    ActionContract,
+    CriterionContract,
+    MetricContract,
+    TriggerContract,
+)
 from simscen.testing.contracts.localizer import LocalizerContract
 from simscen.testing.contracts.planner import PlannerContract
 from simscen.testing.contracts.sensors_and_faults import FaultContract, SensorContract
@@ -35,7 +38,7 @@ from simscen.testing.flatland import box_robot, round_robot
 from simscen.triggers.base import Condition
 
 ROBOTS = {"round robot": round_robot(), "long robot": box_robot(speed=0.8)}
-"""What planners, controllers and behaviors are tried with where nobody says: 0.44 m wide, and 0.42 m by 0.31 m."""
+"""Default robots for planners, controllers and behaviors: 0.44 m wide, and 0.42 m by 0.31 m."""
 
 _WITH_ROBOTS: dict[type, Callable[..., Contract]] = {
     PlannerSpec: PlannerContract,
@@ -55,11 +58,11 @@ _ALONE: dict[type, Callable[..., Contract]] = {
 
 
 class InvalidTarget(Exception):
-    """What was named cannot be tried; the message says why."""
+    """A target cannot be tested; the message gives the reason."""
 
 
 def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Contract]:
-    """The contracts of a specification; one for each robot where it makes a difference."""
+    """Return the contracts of a specification, one for each robot if the robot matters."""
     for kind, contract in _WITH_ROBOTS.items():
         if isinstance(spec, kind):
             several = (robots or ROBOTS).items()
@@ -73,19 +76,19 @@ def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | N
 
 
 def promises_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Promise]:
-    """Every promise that a specification's component has to keep, to be tried one by one.
+    """Return all promises of the component of a specification.
 
-    `spec` is a specification: of a planner, a controller, a localizer, a behavior, a goal checker, a whole stack, a
-    criterion, a fault, a trigger, an action, a sensor or a metric. `robots` are those to try it with, by name.
+    `spec` is the specification of a planner, controller, localizer, behavior, goal checker, stack, criterion, fault,
+    trigger, action, sensor or metric. `robots` are the robots for the tests by name.
     """
     return [each for contract in contracts_of(spec, subject, robots) for each in contract.promises()]
 
 
 def promises_of_target(target: str) -> list[Promise]:
-    """The promises of what a user names: `package.module:Class`, or the name of an entry point.
+    """Return the promises of a target: `package.module:Class`, or the name of an entry point.
 
-    The class is a specification, or a component whose first argument is one. A specification that needs values gets
-    them as JSON behind a `=`: `my_planner={"weight": 2}`. Raises NoSubject.
+    The class is a specification, or a component whose first argument is one. Values of the specification follow as
+    JSON after `=`: `my_planner={"weight": 2}`. Raises InvalidTarget.
     """
     what, _, written = target.partition("=")
     try:
@@ -122,7 +125,7 @@ def _resolved(what: str) -> Any:
 
 
 def specification_of(promises_of_target: Any, what: str) -> Any:
-    """A specification as it is; of a component the specification that its constructor takes."""
+    """Return the specification, or for a component the specification that its constructor takes."""
     if not inspect.isclass(promises_of_target):
         raise InvalidTarget(f"{what} is no class")
     if hasattr(promises_of_target, "model_validate"):

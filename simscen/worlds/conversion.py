@@ -15,11 +15,11 @@ from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import Body, Box, Cylinder, Extrusion, MotionPath, Solid
 from simscen.model.world import Movable, Obstacle, Travel, WorldSpec
 from simscen.spec.places import PoseSpec
-from simscen.worlds.geometry.cross_section import section_segments
-from simscen.worlds.geometry.section_polygons import (
+from simscen.worlds.geometry.cross_section import (
     MAX_CORNERS,
     OpenCrossSection,
     rings_from_segments,
+    section_segments,
     signed_area,
     simple_polygons,
 )

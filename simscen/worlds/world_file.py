@@ -33,7 +33,7 @@ def world_from_spec(
     base = base or World(name, ())
     solids = [*base.solids]
     if grid is not None:
-        from simscen.worlds.maps.map_walls import walls_from_map
+        from simscen.worlds.maps.occupancy_map import walls_from_map
 
         solids += walls_from_map(grid, spec.map_height)
     for number, wall in enumerate(spec.walls, start=1):

@@ -1,8 +1,8 @@
-"""Fields of moving cylinders as in DynaBARN: each goes to and fro along a polynomial through a 20 m arena.
+"""Fields of moving cylinders as in DynaBARN. Each cylinder moves back and forth along a polynomial in a 20 m arena.
 
 Nair, Jiang, Hou, Xu, Li, Xiao, Stone: DynaBARN: Benchmarking Metric Ground Navigation in Dynamic Environments, SSRR
-2022: 5 … 24 cylinders of 0.5 m radius, polynomials through random points from border to border, and between any two
-points a speed of its own, drawn from a normal distribution. Theirs jump back to where they began; ours turn around.
+2022: 5 to 24 cylinders with a radius of 0.5 m move along polynomials through random points. The speed between points is
+drawn from a normal distribution. The cylinders of DynaBARN jump back to their start at the end; these turn around.
 """
 
 from dataclasses import dataclass
@@ -12,33 +12,33 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.random_streams import Streams
 
-HALF = 10.0
-"""Meters from the middle of the arena, which is square, to its border."""
-RADIUS, HEIGHT = 0.5, 1.0
-COUNT = (5, 24)
-"""Least and most cylinders of a field."""
-SPEEDS = (0.74, 1.23, 1.72)
-"""Mean speeds in m/s of DynaBARN's easy, medium and hard worlds."""
-SPREAD = 0.25
-"""m/s by which a cylinder's mean speed differs from the field's at most; no piece of its way is driven at more off."""
-DEVIATION = (0.05, 0.25)
-"""Least and most standard deviation of a cylinder's speeds, in m/s."""
-ORDER = (1, 5)
-"""Least and most degree of the polynomials."""
-PIECE = 2.0
-"""Meters of way between two keyframes."""
-LEAST_WAY = 8.0
-"""Meters: a polynomial that leaves the arena sooner is drawn again."""
+ARENA_HALF_WIDTH_M = 10.0
+"""Half of the side length of the square arena."""
+RADIUS_M, HEIGHT_M = 0.5, 1.0
+COUNT_RANGE = (5, 24)
+"""Smallest and largest number of cylinders."""
+SPEEDS_M_S = (0.74, 1.23, 1.72)
+"""Mean speeds of the easy, medium and hard worlds of DynaBARN."""
+MAX_SPEED_DEVIATION_M_S = 0.25
+"""Largest difference of a cylinder's mean speed from the field's, and of its speeds from its mean speed."""
+SPEED_STD_RANGE_M_S = (0.05, 0.25)
+"""Range of the standard deviation of a cylinder's speeds."""
+DEGREE_RANGE = (1, 5)
+"""Range of the degree of the polynomials."""
+KEYFRAME_DISTANCE_M = 2.0
+"""Distance between two keyframes."""
+MIN_PATH_LENGTH_M = 8.0
+"""Minimum length of a path in the arena. Shorter paths are drawn again."""
 START, GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14159)
-"""Where DynaBARN's robot sets out, a meter outside the arena, and where it goes."""
-MOST_TRIES = 1000
+"""Start of the robot in DynaBARN, 1 m outside of the arena, and its goal."""
+MAX_ATTEMPTS = 1000
 
 
 @dataclass(frozen=True, eq=False)
 class Mover:
-    """A cylinder's motion: at `times` (n,) in s its middle is at `points` (n, 2); there and back, for ever.
+    """Motion of a cylinder through `points` (n, 2) at `times` (n,) in s, back and forth.
 
-    It begins `phase` seconds into that.
+    The run starts `phase` seconds after the start of the motion.
     """
 
     times: Array
@@ -48,7 +48,7 @@ class Mover:
 
 @dataclass(frozen=True, eq=False)
 class DynamicField:
-    """The cylinders of a field, and the mean `speed` in m/s that it was asked for."""
+    """Moving cylinders of a field, and their requested mean `speed` in m/s."""
 
     number: int
     speed: float
@@ -56,49 +56,53 @@ class DynamicField:
 
 
 def dynamic_field(number: int, speed: float) -> DynamicField:
-    """The field of this number (from 1) and mean speed in m/s: always the same."""
+    """Generate the field with this number (from 1) and mean speed in m/s. The result depends on nothing else."""
     rng = Streams(number).generator(f"dynamic field {speed:g}")
-    count = int(rng.integers(COUNT[0], COUNT[1] + 1))
+    count = int(rng.integers(COUNT_RANGE[0], COUNT_RANGE[1] + 1))
     return DynamicField(number, speed, tuple(_mover(rng, speed) for _ in range(count)))
 
 
 def _mover(rng: np.random.Generator, speed: float) -> Mover:
-    points = _way(rng)
-    mean = speed + float(rng.uniform(-SPREAD, SPREAD))
-    deviation = float(rng.uniform(*DEVIATION))
+    points = _path(rng)
+    mean = speed + float(rng.uniform(-MAX_SPEED_DEVIATION_M_S, MAX_SPEED_DEVIATION_M_S))
+    deviation = float(rng.uniform(*SPEED_STD_RANGE_M_S))
     steps = np.hypot(*np.diff(points, axis=0).T)
-    speeds = np.clip(rng.normal(mean, deviation, len(steps)), mean - SPREAD, mean + SPREAD)
+    speeds = np.clip(
+        rng.normal(mean, deviation, len(steps)), mean - MAX_SPEED_DEVIATION_M_S, mean + MAX_SPEED_DEVIATION_M_S
+    )
     times = np.concatenate(([0.0], np.cumsum(steps / speeds)))
     return Mover(times, points, float(rng.uniform(0.0, 1.99 * times[-1])))
 
 
-def _way(rng: np.random.Generator) -> Array:
-    """Points (n, 2) about PIECE apart along a polynomial within the arena; every other one leads along y, or back.
+def _path(rng: np.random.Generator) -> Array:
+    """Return points (n, 2) about KEYFRAME_DISTANCE_M apart along a polynomial, with random axis and direction.
 
-    Raises RuntimeError after MOST_TRIES (never seen).
+    Raises RuntimeError after MAX_ATTEMPTS, which never happened so far.
     """
-    for _ in range(MOST_TRIES):
-        way = _inside(rng)
+    for _ in range(MAX_ATTEMPTS):
+        way = _polynomial_in_arena(rng)
         along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
-        if along[-1] < LEAST_WAY:
+        if along[-1] < MIN_PATH_LENGTH_M:
             continue
-        at = np.linspace(0.0, along[-1], round(along[-1] / PIECE) + 1)
+        at = np.linspace(0.0, along[-1], round(along[-1] / KEYFRAME_DISTANCE_M) + 1)
         points = np.column_stack((np.interp(at, along, way[:, 0]), np.interp(at, along, way[:, 1])))
         points = points[:, ::-1] if rng.integers(2) else points
         return points[::-1] if rng.integers(2) else points
-    raise RuntimeError(f"none of {MOST_TRIES} polynomials stays within the arena for {LEAST_WAY:g} m")
+    raise RuntimeError(f"none of {MAX_ATTEMPTS} polynomials stays within the arena for {MIN_PATH_LENGTH_M:g} m")
 
 
-def _inside(rng: np.random.Generator) -> Array:
-    """The longest piece within the arena, as points (n, 2), of a polynomial through random points of it."""
-    order = int(rng.integers(ORDER[0], ORDER[1] + 1))
+def _polynomial_in_arena(rng: np.random.Generator) -> Array:
+    """Return the longest piece, in the arena, of a polynomial through random points, as points (n, 2)."""
+    order = int(rng.integers(DEGREE_RANGE[0], DEGREE_RANGE[1] + 1))
     # Spread over the arena, so that the polynomial does not oscillate between points that nearly coincide.
-    edges = np.linspace(-HALF, HALF, order + 2)
+    edges = np.linspace(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, order + 2)
     through = rng.uniform(edges[:-1], edges[1:])
-    polynomial = np.polynomial.Polynomial.fit(through, rng.uniform(-HALF, HALF, order + 1), order)
-    x = np.linspace(-HALF, HALF, 401)
+    polynomial = np.polynomial.Polynomial.fit(
+        through, rng.uniform(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, order + 1), order
+    )
+    x = np.linspace(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, 401)
     y = polynomial(x)
-    outside = np.flatnonzero(np.abs(y) > HALF)
+    outside = np.flatnonzero(np.abs(y) > ARENA_HALF_WIDTH_M)
     pieces = np.split(np.column_stack((x, y)), outside)
-    kept = [piece[np.abs(piece[:, 1]) <= HALF] for piece in pieces]
+    kept = [piece[np.abs(piece[:, 1]) <= ARENA_HALF_WIDTH_M] for piece in pieces]
     return max(kept, key=len)

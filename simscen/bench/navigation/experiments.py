@@ -1,7 +1,6 @@
-"""What `simscen bench nav` drives: experiments, each a number of scenarios with seeds.
+"""Experiments of `simscen bench nav`: scenarios with seeds.
 
-Scenarios that are generated are written as files, so that everything goes through the front door and any run of them
-can be repeated by hand.
+Generated scenarios are written as files, so that each run can be repeated with `simscen run`.
 """
 
 import json
@@ -16,15 +15,15 @@ import numpy as np
 
 from simscen.bench.navigation import barn
 from simscen.bench.navigation import dynamic_fields as movers
-from simscen.bench.navigation.obstacle_fields import CELL, HEIGHT, ObstacleField, obstacle_field
+from simscen.bench.navigation.obstacle_fields import CELL_SIZE_M, HEIGHT_M, ObstacleField, obstacle_field
 from simscen.core.random_streams import Streams
 
 
 @dataclass(frozen=True)
 class Drive:
-    """A scenario file, the seeds to run it with, and BARN's reference length in meters where it has one.
+    """Scenario file, the seeds to run it with, and the reference length of BARN in m, if there is one.
 
-    `world` tells worlds apart, over which success rates are compared: drives in one world are no independent evidence.
+    `world` groups drives for confidence intervals, because drives in the same world are not independent.
     """
 
     file: Path
@@ -35,9 +34,13 @@ class Drive:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One line of the table. `root` and `world_path` are what `simscen run` needs to find everything.
+    """Drives that become one row of the table.
 
-    `mapless`: the robot has no map, so that only some localizers can be tried.
+    Attributes:
+        root: Folder of the scenarios.
+        world_path: Folders for `--world-path`.
+        localization: Whether to measure the consistency of the pose estimates.
+        mapless: Whether the robot has no map, so that only some localizers work.
     """
 
     name: str
@@ -48,18 +51,18 @@ class Experiment:
     mapless: bool = False
 
 
-NARROW = (0.30, 0.20, 0.10)
-"""Meters that the widest way through a narrow field is wider than the robot."""
-WIDTH = 0.42
-"""Meters from wheel to wheel of the robot that drives there."""
+NARROW_MARGINS_M = (0.30, 0.20, 0.10)
+"""Width of the widest path through a narrow field minus the width of the robot."""
+ROBOT_WIDTH_M = 0.42
+"""Width of the robot across its wheels."""
 LOCALIZATIONS = ("tour", "told 0.5 m and 20° off", "start unknown", "kidnapped")
-"""What the experiments on localization are called."""
+"""Names of the localization experiments."""
 
 
 def barn_challenge(
     folder: Path, dataset: Path, seeds: Sequence[int], variant: str = "", stack: str = barn.TUNED
 ) -> Experiment:
-    """The worlds of the dataset with these lines below `stack:`. Raises UsageError when it is unusable."""
+    """Return the drives in the worlds of BARN. `stack` are the lines below `stack:`. Raises UsageError for bad data."""
     name = f"BARN, {variant}" if variant else "BARN"
     drives = []
     for world in barn.barn_worlds(dataset):
@@ -70,16 +73,16 @@ def barn_challenge(
 
 
 def generated_fields(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Fields of the same kind and density, one seed each."""
+    """Return drives in generated fields like those of BARN, with one seed each."""
     drives = [_field(folder / "fields", obstacle_field(number)) for number in numbers]
     return Experiment("generated fields", tuple(drives), folder, mapless=True)
 
 
 def narrow_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
-    """Fields whose widest way is little wider than the robot: an experiment for each of three widths."""
+    """Return one experiment for each width in NARROW_MARGINS_M, with fields whose widest path has this width."""
     experiments = []
-    for room in NARROW:
-        gap, too_wide = (WIDTH + room) / 2, (WIDTH + room + 0.1) / 2
+    for room in NARROW_MARGINS_M:
+        gap, too_wide = (ROBOT_WIDTH_M + room) / 2, (ROBOT_WIDTH_M + room + 0.1) / 2
         to = folder / f"narrow/{round(100 * room)}_cm"
         drives = [_field(to, obstacle_field(number, gap, too_wide)) for number in numbers]
         experiments.append(Experiment(narrow_name(room), tuple(drives), folder, mapless=True))
@@ -87,7 +90,7 @@ def narrow_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
 
 
 def narrow_name(room: float) -> str:
-    """What the experiment is called with this much room in meters."""
+    """Return the name of the experiment with `room` in m beside the robot."""
     return f"narrow fields, robot + {100 * room:.0f} cm"
 
 
@@ -99,16 +102,18 @@ def _field(folder: Path, field: ObstacleField) -> Drive:
 
 
 def dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
-    """Fields of moving cylinders, an experiment for each mean speed; one seed each."""
+    """Return one experiment for each mean speed, with fields of moving cylinders and one seed each."""
     experiments = []
-    for speed in movers.SPEEDS:
+    for speed in movers.SPEEDS_M_S:
         drives = []
         for number in numbers:
             stem = f"dynamic/field_{number}_at_{speed:.2f}"
             world = write_scenario(
                 folder / f"{stem}.world.yaml", _moving_world_text(movers.dynamic_field(number, speed))
             )
-            text = barn.scenario(f"dynamic field {number}", world.name, movers.START, movers.GOAL, barn.AMONG_MOVING)
+            text = barn.scenario(
+                f"dynamic field {number}", world.name, movers.START, movers.GOAL, barn.TUNED_FOR_MOVING_WORLDS
+            )
             length = movers.START.distance(movers.GOAL)
             drives.append(Drive(write_scenario(folder / f"{stem}.scenario.yaml", text), [number], length))
         experiments.append(Experiment(dynamic_name(speed), tuple(drives), folder, mapless=True))
@@ -116,12 +121,12 @@ def dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
 
 
 def dynamic_name(speed: float) -> str:
-    """What the experiment is called with this mean speed in m/s."""
+    """Return the name of the experiment with a mean speed in m/s."""
     return f"dynamic fields, {speed:.2f} m/s"
 
 
 def sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
-    """Nav2's own system test, without and with the box that is not on its map."""
+    """Return the system test of Nav2, without and with a box that is not on the map."""
     return [
         Experiment(
             name,
@@ -139,23 +144,25 @@ def sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
 
 
 def corner_cases(scenarios: Path, root: Path, seeds: Sequence[int]) -> list[Experiment]:
-    """The shipped corner cases, each an experiment of its own."""
+    """Return one experiment for each shipped corner case."""
     return [Experiment(case_name(file), (Drive(file, seeds),), root) for file in case_files(scenarios)]
 
 
 def case_files(scenarios: Path) -> list[Path]:
-    """The shipped corner cases."""
+    """Return the scenario files of the shipped corner cases."""
     return sorted(scenarios.glob("corner_cases/*.scenario.yaml"))
 
 
 def case_name(file: Path) -> str:
-    """What the experiment with this corner case is called."""
+    """Return the name of the experiment with a corner case."""
     return file.name.split(".")[0].replace("_", " ")
 
 
 def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequence[int]) -> list[Experiment]:
-    """A tour of the shipped house told where it starts; and with the seeds `lost` told a pose 0.5 m and 20 degrees off,
-    told nothing, and kidnapped.
+    """Return the localization experiments in the shipped house.
+
+    The robot drives a tour with a known start for each of `seeds`. For each seed in `lost`, the initial estimate is
+    wrong by 0.5 m and 20 degrees, is unknown, or the robot is kidnapped.
     """
 
     def experiment(name: str, *drives: Drive, known: bool = False) -> Experiment:
@@ -179,7 +186,7 @@ def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequen
 
 def _world_text(field: ObstacleField) -> str:
     pillars = "\n".join(
-        f"  - {{name: pillar, cylinder: [{CELL / 2:g}, {HEIGHT:g}], pose: {{x: {x:.3f}, y: {y:.3f}}}}}"
+        f"  - {{name: pillar, cylinder: [{CELL_SIZE_M / 2:g}, {HEIGHT_M:g}], pose: {{x: {x:.3f}, y: {y:.3f}}}}}"
         for x, y in field.centers.tolist()
     )
     return f"simscen: 1\nname: field {field.number}\nobstacles:\n{pillars}\n"
@@ -194,7 +201,7 @@ def _moving_world_text(field: movers.DynamicField) -> str:
         )
         x, y = mover.points[0].tolist()
         lines.append(
-            f"  - name: cylinder {number}\n    cylinder: [{movers.RADIUS:g}, {movers.HEIGHT:g}]\n"
+            f"  - name: cylinder {number}\n    cylinder: [{movers.RADIUS_M:g}, {movers.HEIGHT_M:g}]\n"
             f"    pose: {{x: {x:.3f}, y: {y:.3f}}}\n    move:\n      keyframes: [{keyframes}]\n"
             f"      repeat: back_and_forth\n      ease: spline\n      phase: {mover.phase:.3f} s\n"
         )
@@ -202,17 +209,16 @@ def _moving_world_text(field: movers.DynamicField) -> str:
 
 
 def write_scenario(file: Path, text: str) -> Path:
-    """The file, with this text in it."""
+    """Write a text file, and return its path."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(text, encoding="utf-8")
     return file
 
 
 def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
-    """The same drives with these parameters on top of their own, as files in `folder` that extend theirs.
+    """Return the same drives with additional stack parameters, as files in `folder` that extend the scenarios.
 
-    The folder's name is part of theirs, as drives of two experiments may be called the same.
-    Where there is no map the robot keeps the localizer that the drive has chosen for that.
+    Without a map, the robot keeps the localizer of the drive.
     """
     drives = []
     stack = {key: value for key, value in stack.items() if not (experiment.mapless and key == "localizer")}
@@ -231,11 +237,11 @@ def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str,
 
 
 SANDBOX_BOX = "obstacles:\n    - {name: cardboard box, box: [0.5, 0.4, 0.3], pose: {x: -1.0, y: 0.6}}\n"
-"""Gazebo's `cardboard_box` where Nav2 puts its unmapped obstacle."""
+"""The `cardboard_box` of Gazebo at the place of the unmapped obstacle of Nav2."""
 
 
 def sandbox_scenario(name: str, box: bool) -> str:
-    """The text of the scenario; world and map are found with --world-path."""
+    """Return the text of the scenario, which needs --world-path for its world and map."""
     return f"""\
 simscen: 1
 name: "{name}"
@@ -256,9 +262,9 @@ pass:
 
 
 START = (0.8, 4.95, 0.0)
-"""The house's dock: x, y in m, yaw in rad."""
-OFF, TURNED = 0.5, math.radians(20.0)
-"""How wrong the told pose is, in m and rad."""
+"""Pose of the dock in the house: x, y in m, yaw in rad."""
+ESTIMATE_OFFSET_M, ESTIMATE_ROTATION_RAD = 0.5, math.radians(20.0)
+"""Error of the initial estimate in m and rad."""
 
 GOALS = """\
 goals:
@@ -269,7 +275,7 @@ goals:
 
 
 def tour_scenario() -> str:
-    """Three rooms; told the true start with Nav2's default covariance, AMCL's default noise."""
+    """Return the text of a tour through three rooms with a known start and default noise."""
     return f"""\
 simscen: 1
 name: tour of the house
@@ -283,9 +289,12 @@ robot: {{pose: dock}}
 
 
 def misled_scenario(direction: float, left: bool) -> str:
-    """Told a pose OFF away in this direction (rad) and TURNED; must be right again before the first goal."""
-    x, y = START[0] + OFF * math.cos(direction), START[1] + OFF * math.sin(direction)
-    yaw = START[2] + (TURNED if left else -TURNED)
+    """Return the text of a drive with a wrong initial estimate, and a correct one required at the goal.
+
+    The estimate is off by ESTIMATE_OFFSET_M in `direction` (rad), and by ESTIMATE_ROTATION_RAD to the `left` or right.
+    """
+    x, y = START[0] + ESTIMATE_OFFSET_M * math.cos(direction), START[1] + ESTIMATE_OFFSET_M * math.sin(direction)
+    yaw = START[2] + (ESTIMATE_ROTATION_RAD if left else -ESTIMATE_ROTATION_RAD)
     return f"""\
 simscen: 1
 name: told the wrong place
@@ -302,7 +311,7 @@ pass:
 """
 
 
-FINDS_ITSELF = """\
+SELF_LOCALIZATION = """\
 goals:
   - {pose: kitchen, timeout: 200 s}
 time_limit: 210 s
@@ -311,21 +320,21 @@ pass:
   - localization_error: {final: 0.2 m}
   - collisions: {max: 0, caused_by_robot: true}
 """
-"""With all defaults: it is the turning of the recoveries that shows a robot that stands where it is."""
+"""All parameters have their defaults. The rotation of the recoveries lets a standing robot localize itself."""
 
 
 def start_unknown_scenario() -> str:
-    """The robot is told nothing of where it is, and must find out while it drives to its goal."""
+    """Return the text of a drive without an initial estimate."""
     return f"""\
 simscen: 1
 name: start unknown
 world: house.world.yaml
 robot: {{pose: dock, initial_estimate: unknown}}
-{FINDS_ITSELF}"""
+{SELF_LOCALIZATION}"""
 
 
 def kidnapped_scenario() -> str:
-    """After 3 m the robot is carried from the corridor into the study."""
+    """Return the text of a drive in which the robot is kidnapped after 3 m, from the corridor to the study."""
     return f"""\
 simscen: 1
 name: kidnapped
@@ -333,4 +342,4 @@ world: house.world.yaml
 robot: {{pose: dock}}
 events:
   - {{name: kidnapped, when: {{travelled: 3 m}}, do: {{kidnap: {{pose: {{x: 9.4, y: 7.3, yaw: 90 deg}}}}}}}}
-{FINDS_ITSELF}"""
+{SELF_LOCALIZATION}"""

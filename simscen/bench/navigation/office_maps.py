@@ -1,64 +1,68 @@
-"""Maps of office floors, as SLAM leaves them: cells of 5 to 25 cm, thin walls, gray pockets; written as ROS maps."""
+"""Generated worlds of the benchmark: office maps, corridors in which two robots meet, and halls with ramps.
 
+Office maps look as if SLAM had made them: cells of 5 to 25 cm, thin walls, gray pockets. They are written as ROS maps.
+"""
+
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from simscen.bench.navigation.experiments import write_scenario
+from simscen.bench.navigation.experiments import Drive, Experiment, write_scenario
 from simscen.core.random_streams import Streams
 
-FINE = 0.05
-"""Meters: the cells that a floor is drawn in, before it becomes as coarse as its map."""
+FINE_CELL_M = 0.05
+"""Cell size in which a floor is drawn, before it is reduced to the resolution of its map."""
 RESOLUTIONS = (0.05, 0.05, 0.10, 0.15, 0.20, 0.25)
-WIDE, DEEP = (20.0, 45.0), (12.0, 28.0)
-"""Meters: least and most of a floor's two sides."""
-CORRIDOR, DOOR = (1.7, 2.6), (0.9, 1.3)
+FLOOR_WIDTHS_M, FLOOR_DEPTHS_M = (20.0, 45.0), (12.0, 28.0)
+"""Ranges of width and depth of a floor in m."""
+CORRIDOR_WIDTHS_M, DOOR_WIDTHS_M = (1.7, 2.6), (0.9, 1.3)
 FREE, WALL, UNKNOWN = 254, 0, 205
-"""As map_server writes them."""
+"""Pixel values of map_server."""
 Image = npt.NDArray[np.uint8]
 
 
 @dataclass
 class _Floor:
-    """A floor that is being drawn: row 0 is its lowest y."""
+    """Image of a floor; row 0 has the lowest y."""
 
     image: Image
     thick: float
 
     def wall(self, x0: float, y0: float, x1: float, y1: float, thick: float | None = None) -> None:
-        """From one point to another, along an axis; or a box, where it is along none."""
+        """Draw a wall between two points with the same x or y, and a box between other points."""
         half = (self.thick if thick is None else thick) / 2
-        rows = slice(max(0, int((min(y0, y1) - half) / FINE)), int((max(y0, y1) + half) / FINE) + 1)
-        columns = slice(max(0, int((min(x0, x1) - half) / FINE)), int((max(x0, x1) + half) / FINE) + 1)
+        rows = slice(max(0, int((min(y0, y1) - half) / FINE_CELL_M)), int((max(y0, y1) + half) / FINE_CELL_M) + 1)
+        columns = slice(max(0, int((min(x0, x1) - half) / FINE_CELL_M)), int((max(x0, x1) + half) / FINE_CELL_M) + 1)
         self.image[rows, columns] = WALL
 
 
 def building(number: int) -> tuple[Image, float]:
-    """The map of the floor of this number (from 1), and the edge of its cells in meters: always the same."""
+    """Generate the map of the floor with this number (from 1). Return the image and its resolution in m."""
     rng = Streams(number).generator("building")
     resolution = RESOLUTIONS[number % len(RESOLUTIONS)]
-    width, depth = float(rng.uniform(*WIDE)), float(rng.uniform(*DEEP))
-    image = np.full((int(depth / FINE), int(width / FINE)), FREE, np.uint8)
+    width, depth = float(rng.uniform(*FLOOR_WIDTHS_M)), float(rng.uniform(*FLOOR_DEPTHS_M))
+    image = np.full((int(depth / FINE_CELL_M), int(width / FINE_CELL_M)), FREE, np.uint8)
     floor = _Floor(image, float(rng.choice([0.05, 0.1, 0.2])))
     for wall in ((0, 0, width, 0), (0, depth, width, depth), (0, 0, 0, depth), (width, 0, width, depth)):
         floor.wall(*wall)
-    broad = float(rng.uniform(*CORRIDOR))
+    broad = float(rng.uniform(*CORRIDOR_WIDTHS_M))
     for y in np.arange(rng.uniform(4, 6), depth - 4, rng.uniform(9, 13)).tolist():
         for side in (-1, 1):
             _rooms(floor, rng, y + side * broad / 2, side)
-    _across(floor, rng, broad)
+    _crossing_corridors(floor, rng, broad)
     image[[0, -1]], image[:, [0, -1]] = WALL, WALL
-    return _as_mapped(image, resolution, rng), resolution
+    return _reduced_to_map(image, resolution, rng), resolution
 
 
 def _rooms(floor: _Floor, rng: np.random.Generator, y: float, side: int) -> None:
-    """A line of rooms along a corridor, each with a door to it and some furniture."""
-    depth, width = (size * FINE for size in floor.image.shape)
+    """Draw rooms with doors and furniture along a corridor."""
+    depth, width = (size * FINE_CELL_M for size in floor.image.shape)
     x = 0.0
     while x < width:
-        room, door = float(rng.uniform(3, 7)), float(rng.uniform(*DOOR))
+        room, door = float(rng.uniform(3, 7)), float(rng.uniform(*DOOR_WIDTHS_M))
         before = float(rng.uniform(0.3, room - door - 0.3))
         floor.wall(x, y, min(width, x + before), y)
         floor.wall(min(width, x + before + door), y, min(width, x + room), y)
@@ -67,17 +71,18 @@ def _rooms(floor: _Floor, rng: np.random.Generator, y: float, side: int) -> None
         for _ in range(int(rng.integers(0, 3))):
             left, low = x + float(rng.uniform(0.5, room - 0.5)), y + side * float(rng.uniform(1.2, 2.8))
             size = rng.uniform(0.2, 0.9, 2).tolist()
-            floor.wall(left, low, left + size[0], low + size[1], FINE)
+            floor.wall(left, low, left + size[0], low + size[1], FINE_CELL_M)
         x += room
 
 
-def _across(floor: _Floor, rng: np.random.Generator, broad: float) -> None:
-    """Corridors across, with walls that have gaps as wide as doors."""
-    depth, width = (size * FINE for size in floor.image.shape)
+def _crossing_corridors(floor: _Floor, rng: np.random.Generator, broad: float) -> None:
+    """Draw crossing corridors, whose walls have gaps with the width of doors."""
+    depth, width = (size * FINE_CELL_M for size in floor.image.shape)
     for x in np.arange(rng.uniform(5, 9), width - 3, rng.uniform(12, 20)).tolist():
-        floor.image[int(0.5 / FINE) : -int(0.5 / FINE), int((x - broad / 2) / FINE) : int((x + broad / 2) / FINE)] = (
-            FREE
-        )
+        floor.image[
+            int(0.5 / FINE_CELL_M) : -int(0.5 / FINE_CELL_M),
+            int((x - broad / 2) / FINE_CELL_M) : int((x + broad / 2) / FINE_CELL_M),
+        ] = FREE
         for side in (-1, 1):
             y = 0.5
             while y < depth - 1:
@@ -87,9 +92,9 @@ def _across(floor: _Floor, rng: np.random.Generator, broad: float) -> None:
                 y += long + float(rng.uniform(0.9, 1.6))
 
 
-def _as_mapped(image: Image, resolution: float, rng: np.random.Generator) -> Image:
-    """In cells of the map: occupied where a good part of a cell is; some gray, as where a scan never came."""
-    step = round(resolution / FINE)
+def _reduced_to_map(image: Image, resolution: float, rng: np.random.Generator) -> Image:
+    """Reduce the image to the resolution of the map. Some cells become unknown, as if no scan had reached them."""
+    step = round(resolution / FINE_CELL_M)
     rows, columns = (size // step * step for size in image.shape)
     parts = image[:rows, :columns].reshape(rows // step, step, columns // step, step)
     mapped = np.where((parts == WALL).mean(axis=(1, 3)) > (0.3 if step > 2 else 0.49), WALL, FREE).astype(np.uint8)
@@ -99,10 +104,94 @@ def _as_mapped(image: Image, resolution: float, rng: np.random.Generator) -> Ima
 
 
 def write_building(number: int, folder: Path) -> Path:
-    """The floor as `building_<number>.yaml` with its image beside it, as map_server would save it."""
+    """Write the floor as `building_<number>.yaml` with its image, in the format of map_server."""
     mapped, resolution = building(number)
     image = folder / f"building_{number}.pgm"
     folder.mkdir(parents=True, exist_ok=True)
     image.write_bytes(f"P5\n{mapped.shape[1]} {mapped.shape[0]}\n255\n".encode() + np.flipud(mapped).tobytes())
     text = f"image: {image.name}\nresolution: {resolution:g}\norigin: [0, 0, 0]\nnegate: 0\n"
     return write_scenario(image.with_suffix(".yaml"), f"{text}occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+
+
+MEETING_WIDTHS_M = (1.4, 2.4)
+"""Range of corridor widths. In the narrowest, two robots of 0.44 m pass each other with 17 cm on each side."""
+MEETING_LENGTH_M = 14.0
+SLOPES_DEG, HEIGHTS_M = (2.0, 8.0), (0.03, 0.16)
+"""Ranges of slope in degrees and height in m. A ramp at the height of the lidar would be a wall on the map."""
+HALL_WIDTH_M = 2.4
+"""Width of the hall with the ramps."""
+
+
+def two_robots(folder: Path, numbers: Iterable[int]) -> Experiment:
+    """Return drives of two robots that swap the ends of a corridor. Each number gives one corridor."""
+    return _numbered_experiment("two robots in a corridor", folder / "corridor", numbers, _meeting_scenario)
+
+
+def ramps(folder: Path, numbers: Iterable[int]) -> Experiment:
+    """Return drives up a ramp, over a platform and down again, with random slopes, heights and starts."""
+    return _numbered_experiment("ramps", folder / "ramp", numbers, _ramp_scenario)
+
+
+def _numbered_experiment(name: str, stem: Path, numbers: Iterable[int], text: Callable[[int], str]) -> Experiment:
+    """Return an experiment with one scenario for each number, which is also its seed."""
+    drives = [
+        Drive(write_scenario(stem.with_name(f"{stem.name}_{number}.scenario.yaml"), text(number)), [number])
+        for number in numbers
+    ]
+    return Experiment(name, tuple(drives), stem.parent)
+
+
+def _meeting_scenario(number: int) -> str:
+    rng, length = Streams(number).generator("corridor"), MEETING_LENGTH_M
+    width = float(rng.uniform(*MEETING_WIDTHS_M))
+    free = width / 2 - 0.35
+    west, east = rng.uniform(-free, free, 2).tolist()
+    return f"""\
+simscen: 1
+name: two robots meet in {width:.2f} m
+world:
+  simscen: 1
+  walls:
+    - {{name: corridor, points: [[0, 0], [{length:g}, 0], [{length:g}, {width:.3f}], [0, {width:.3f}], [0, 0]]}}
+robots:
+  eastbound:
+    pose: {{x: 1.0, y: {width / 2 + west:.3f}}}
+    goals: [{{name: east, pose: {{x: {length - 1:g}, y: {width / 2 + east:.3f}}}}}]
+  westbound:
+    pose: {{x: {length - 1:g}, y: {width / 2 + east:.3f}, yaw: 180 deg}}
+    goals: [{{name: west, pose: {{x: 1.0, y: {width / 2 + west:.3f}, yaw: 180 deg}}}}]
+time_limit: 120 s
+pass:
+  - goals_reached: {{}}
+  - collisions: {{max: 0}}
+"""
+
+
+def _ramp_scenario(number: int) -> str:
+    rng = Streams(number).generator("ramp")
+    slope, height = float(rng.uniform(*SLOPES_DEG)), float(rng.uniform(*HEIGHTS_M))
+    run, flat = height / float(np.tan(np.radians(slope))), float(rng.uniform(1.5, 3.0))
+    top, below = (3.0 + run, 3.0 + run + flat), 3.0 + 2 * run + flat
+    end, y = below + 3.0, float(rng.uniform(0.6, HALL_WIDTH_M - 0.6))
+    hall = HALL_WIDTH_M
+    middle, size = hall / 2, f"width: {hall - 0.1:g}, height: {height:.4f}"
+    return f"""\
+simscen: 1
+name: a ramp of {slope:.1f} degrees
+world:
+  simscen: 1
+  walls: [{{name: hall, points: [[0, 0], [{end:.3f}, 0], [{end:.3f}, {hall:g}], [0, {hall:g}], [0, 0]]}}]
+  ramps:
+    - {{name: up, start: [3, {middle:g}], end: [{top[0]:.4f}, {middle:g}], {size}}}
+    - {{name: down, start: [{below:.4f}, {middle:g}], end: [{top[1]:.4f}, {middle:g}], {size}}}
+  obstacles:
+    - name: platform
+      box: [{flat:.4f}, {hall - 0.1:g}, {height:.4f}]
+      pose: {{x: {sum(top) / 2:.4f}, y: {middle:g}}}
+robot: {{pose: {{x: 1.0, y: {y:.3f}}}}}
+goals: [{{pose: {{x: {end - 1:.3f}, y: {middle:g}}}}}]
+time_limit: 120 s
+pass:
+  - goals_reached: {{}}
+  - collisions: {{max: 0}}
+"""

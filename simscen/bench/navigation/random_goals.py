@@ -1,4 +1,4 @@
-"""Where a robot may start and where it may be sent: poses drawn from the free space of a world."""
+"""Drives between random poses in the free space of a world, with and without sensor faults."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -13,16 +13,16 @@ from simscen.core.geometry import Pose2
 from simscen.core.random_streams import Streams
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
-ROOM = 0.12
-"""Meters between a robot's hull, as a disc, and the nearest wall, where it starts and where it is sent."""
-MOVABLE = 1.5
-"""Meters from a door or a thing that may move within which no drive begins or ends."""
-TRIES = 2000
+WALL_MARGIN_M = 0.12
+"""Minimum distance of the robot to walls at its start and goal."""
+MOVABLE_MARGIN_M = 1.5
+"""Minimum distance of start and goal to doors and movable objects."""
+MAX_ATTEMPTS = 2000
 
 
 @dataclass(frozen=True)
 class RandomDrive:
-    """A number, from where to where, and the length in meters of the shortest way of the robot between them."""
+    """Start, goal, and the length in m of the shortest path of the robot between them."""
 
     number: int
     start: Pose2
@@ -33,17 +33,18 @@ class RandomDrive:
 def random_drives(
     built: BuiltWorld, radius: float, numbers: Iterable[int], least: float = 5.0
 ) -> Iterator[RandomDrive]:
-    """A drive of a disc of `radius` meters for each number, none shorter than `least` meters; always the same for a
-    number; none for a number of which TRIES draws find none.
+    """Yield a drive for each number, for a robot that is a disc of `radius` m. Paths are at least `least` m long.
+
+    The same number gives the same drive. A number without a drive after MAX_ATTEMPTS is skipped.
     """
-    ways = ShortestPaths(built.mesh, built.world.bounds, radius + ROOM)
+    ways = ShortestPaths(built.mesh, built.world.bounds, radius + WALL_MARGIN_M)
     free = np.argwhere(built.map.cells == 0)
     for number in numbers if len(free) else ():
         rng = Streams(number).generator("errand")
-        for _ in range(TRIES):
+        for _ in range(MAX_ATTEMPTS):
             ends = built.map.center_of(free[rng.integers(0, len(free), 2)]).tolist()
             start, goal = (Pose2(x, y, float(rng.uniform(-math.pi, math.pi))) for x, y in ends)
-            if start.distance(goal) < least / 2 or any(_near(end, built) for end in (start, goal)):
+            if start.distance(goal) < least / 2 or any(_is_near_movable(end, built) for end in (start, goal)):
                 continue
             length = ways.length(start, goal)
             if math.isfinite(length) and length >= least:
@@ -51,15 +52,15 @@ def random_drives(
                 break
 
 
-def _near(pose: Pose2, built: BuiltWorld) -> bool:
-    """Whether something that may move, of which the map knows nothing, is or may come there."""
-    return any(math.hypot(pose.x - body.pose.x, pose.y - body.pose.y) < MOVABLE for body in built.world.bodies)
+def _is_near_movable(pose: Pose2, built: BuiltWorld) -> bool:
+    """Return whether a movable object, which is not on the map, is near."""
+    return any(math.hypot(pose.x - body.pose.x, pose.y - body.pose.y) < MOVABLE_MARGIN_M for body in built.world.bodies)
 
 
-RADIUS = 0.22
-"""Meters: the disc of the default robot, a TurtleBot."""
-SLOWEST = 0.2
-"""m/s: whoever is slower than this on average has not arrived in time."""
+ROBOT_RADIUS_M = 0.22
+"""Radius of the default robot, a TurtleBot."""
+MIN_AVERAGE_SPEED_M_S = 0.2
+"""Average speed that the time limit requires."""
 FAULTS = {
     "lidar noise": ("{sensor: lidar, noise: {std: …}}", ("3 cm", "6 cm", "12 cm")),
     "lidar garbage": ("{sensor: lidar, garbage: {probability: …}}", ("10 %", "50 %", "80 %")),
@@ -70,19 +71,19 @@ FAULTS = {
     "odometry slip": ("{sensor: odom, slip: {left: …, right: 0 %}}", ("3 %", "10 %", "25 %")),
     "late commands": ("{sensor: cmd_vel, delay: {latency: …}}", ("50 ms", "120 ms", "250 ms")),
 }
-"""What a sensor or an actuator has during the whole drive: weak, medium and strong."""
+"""Fault during the whole drive, and its values for the three STRENGTHS."""
 STRENGTHS = ("weak", "medium", "strong")
-OTHER_DRIVES = 1_000_000
-"""Where the numbers of drives with a fault begin, so that they are not those without."""
+FIRST_FAULTY_DRIVE = 1_000_000
+"""First number of the drives with a fault, so that they differ from those without."""
 
 
-def scenario(name: str, world: str, errand: RandomDrive, faults: Sequence[str] = ()) -> str:
-    """The text of a scenario: one drive of the default robot, without a contact that it causes."""
+def scenario(name: str, world: str, drive: RandomDrive, faults: Sequence[str] = ()) -> str:
+    """Return the text of a scenario with one drive of the default robot, which must not collide."""
     disturbed = "".join(["faults:\n", *(f"  - {fault}\n" for fault in faults)]) if faults else ""
-    limit = errand.length / SLOWEST + 30.0
+    limit = drive.length / MIN_AVERAGE_SPEED_M_S + 30.0
     return (
-        f"simscen: 1\nname: {name}\nworld: {world}\nrobot: {{pose: {_pose(errand.start)}}}\n"
-        f"goals:\n  - {{pose: {_pose(errand.goal)}}}\n{disturbed}time_limit: {limit:.0f} s\n"
+        f"simscen: 1\nname: {name}\nworld: {world}\nrobot: {{pose: {_pose(drive.start)}}}\n"
+        f"goals:\n  - {{pose: {_pose(drive.goal)}}}\n{disturbed}time_limit: {limit:.0f} s\n"
         "pass:\n  - goals_reached: {}\n  - collisions: {max: 0}\n"
     )
 
@@ -90,32 +91,32 @@ def scenario(name: str, world: str, errand: RandomDrive, faults: Sequence[str] =
 def random_goals(
     name: str, folder: Path, worlds: Mapping[str, BuiltWorld], numbers: Sequence[int], world_path: tuple[Path, ...] = ()
 ) -> Experiment:
-    """The drives of these numbers in each of the worlds, which are named as a scenario in `folder` names them."""
+    """Return the drives with these numbers in each world. Scenarios refer to the keys of `worlds`."""
     drives = []
     for world, built in worlds.items():
-        for errand in random_drives(built, RADIUS, numbers):
-            file = folder / f"{_stem(world)}_{errand.number}.scenario.yaml"
-            drives.append(Drive(write_scenario(file, scenario(name, world, errand)), [errand.number], world=world))
+        for drive in random_drives(built, ROBOT_RADIUS_M, numbers):
+            file = folder / f"{_stem(world)}_{drive.number}.scenario.yaml"
+            drives.append(Drive(write_scenario(file, scenario(name, world, drive)), [drive.number], world=world))
     return Experiment(name, tuple(drives), folder, world_path)
 
 
 def degraded(
     folder: Path, worlds: Mapping[str, BuiltWorld], first: int, world_path: tuple[Path, ...] = ()
 ) -> list[Experiment]:
-    """A drive in each world with each fault, its own; an experiment for each of three strengths, with the same drives.
+    """Return one experiment for each strength, with the same drives: one for each world and fault.
 
-    `first` is the number of the first drives, and the seed.
+    `first` is the number of the first drives and the seed.
     """
-    faults = dict(enumerate(FAULTS, start=OTHER_DRIVES + first * len(FAULTS)))
-    errands_in = {world: list(random_drives(built, RADIUS, faults)) for world, built in worlds.items()}
+    faults = dict(enumerate(FAULTS, start=FIRST_FAULTY_DRIVE + first * len(FAULTS)))
+    drives_in = {world: list(random_drives(built, ROBOT_RADIUS_M, faults)) for world, built in worlds.items()}
     experiments = []
     for level, strength in enumerate(STRENGTHS):
         drives = []
-        for world, found in errands_in.items():
-            for errand in found:
-                fault = faults[errand.number]
+        for world, found in drives_in.items():
+            for drive in found:
+                fault = faults[drive.number]
                 said, values = FAULTS[fault]
-                text = scenario(f"{fault}, {strength}", world, errand, [said.replace("…", values[level])])
+                text = scenario(f"{fault}, {strength}", world, drive, [said.replace("…", values[level])])
                 file = folder / strength / f"{_stem(fault)}_{_stem(world)}.scenario.yaml"
                 drives.append(Drive(write_scenario(file, text), [first], world=world))
         experiments.append(Experiment(f"degraded sensing, {strength}", tuple(drives), folder, world_path))

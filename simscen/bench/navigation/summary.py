@@ -1,4 +1,4 @@
-"""Many runs of one case, summed up in the columns in which navigation benchmarks are published."""
+"""Summary of many runs in the columns of published navigation benchmarks, and comparison of two stacks."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from simscen.core.statistics import MIN_PAIRS, bootstrap_mean_interval, wilson_i
 from simscen.judge.metrics.compute import barn_score
 
 TIME_IS_UP = "time limit"
-"""What a run's `ended` says when nothing else ended it."""
+"""Value of `ended` of a run that reached its time limit."""
 
 
 class DriveOutcome(str, Enum):
-    """How a run came out; exactly one of these."""
+    """Outcome of a run in a benchmark table."""
 
     SUCCESS = "success"
     COLLISION = "collision"
@@ -27,9 +27,9 @@ class DriveOutcome(str, Enum):
 
 @dataclass(frozen=True)
 class Trial:
-    """A run, the reference length in meters that its score refers to (None = the case has no score), and its world.
+    """A run with the reference length in m for its BARN score (None without a score), and its world.
 
-    `top_speed` is the robot's, in m/s.
+    `top_speed` is the maximum speed of the robot in m/s.
     """
 
     run: RunFinished
@@ -39,7 +39,7 @@ class Trial:
 
     @property
     def fate(self) -> DriveOutcome:
-        """A collision outweighs all else that went wrong; whoever ran out of time did not merely fail."""
+        """Outcome of the run: collisions have priority over other failures, timeouts over the remaining ones."""
         if self.run.outcome is Outcome.ERROR:
             return DriveOutcome.ERROR
         if any(v.criterion == "collisions" and v.status is Status.FAIL for v in self.run.result.verdicts):
@@ -50,7 +50,7 @@ class Trial:
 
     @property
     def score(self) -> float | None:
-        """BARN's; None where the case has none."""
+        """BARN score, or None without a reference length."""
         if self.reference_length is None:
             return None
         seconds = self.metric("time_to_goal")
@@ -60,8 +60,9 @@ class Trial:
 
     @property
     def sct(self) -> float | None:
-        """Success weighted by completion time, for which the shortest way at top speed is the least; None where nobody
-        was to arrive. (Yokoyama et al. 2021.)
+        """Success weighted by completion time (Yokoyama et al. 2021), or None if the run has no goal.
+
+        The shortest path at top speed gives the minimum time.
         """
         if self.fate is not DriveOutcome.SUCCESS:
             return 0.0
@@ -72,17 +73,17 @@ class Trial:
         return least / max(least, seconds)
 
     def metric(self, name: str) -> float | None:
-        """A number that the judge measured; of several robots the mean."""
+        """Return a metric of the run, averaged over all robots."""
         return mean([value for key, value in self.run.result.metrics.items() if key.split("/")[-1] == name])
 
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table. Rates are of all runs; seconds and path ratio are means over those that arrived.
+    """Row of the table. Rates refer to all runs, `seconds` and `path_ratio` to the runs that arrived.
 
-    `path_ratio` is driven over shortest length; `sct` is None where nobody is to arrive. `success_interval` is the 95 %
-    interval of the success rate in worlds like these, None where there are too few: seeds tell of the noise in a world,
-    not of other worlds.
+    `path_ratio` is the driven length divided by the shortest length. `sct` is None without goals. `success_interval` is
+    the 95 % interval of the success rate over worlds, or None with fewer than five worlds: seeds sample the noise in a
+    world, but not other worlds.
     """
 
     case: str
@@ -100,7 +101,7 @@ class Row:
 
 
 def summarize(case: str, trials: Sequence[Trial]) -> Row:
-    """Sum up the runs of a case. Raises ValueError without any."""
+    """Return the row of a case. `trials` must not be empty."""
     fates = [trial.fate for trial in trials]
     weighted = [trial.sct for trial in trials]
     good = [trial for trial in trials if trial.fate is DriveOutcome.SUCCESS]
@@ -122,7 +123,7 @@ def summarize(case: str, trials: Sequence[Trial]) -> Row:
 
 
 def over_worlds(trials: Sequence[Trial]) -> tuple[float, float] | None:
-    """Between what bounds the success rate lies with 95 % in worlds like these; None of fewer than five worlds."""
+    """Return the 95 % interval of the success rate over worlds, or None with fewer than five worlds."""
     return ClusteredMean.of(
         (trial.world, float(trial.fate is DriveOutcome.SUCCESS)) for trial in trials
     ).interval_of_rates()
@@ -133,7 +134,7 @@ def _rate(fates: Sequence[DriveOutcome], which: DriveOutcome) -> float:
 
 
 def mean(values: Sequence[float | None]) -> float | None:
-    """The mean of the values that are there; None when none is."""
+    """Return the mean of the values that are not None, or None without any."""
     known = [value for value in values if value is not None]
     return sum(known) / len(known) if known else None
 
@@ -143,13 +144,13 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class ClusteredMean:
-    """A number of each drive, by its world. In means every drive counts the same, and worlds are drawn whole."""
+    """Values of drives, grouped by world. Every drive has the same weight; the bootstrap resamples whole worlds."""
 
     of_worlds: tuple[tuple[float, ...], ...]
 
     @classmethod
     def of(cls, values: Iterable[tuple[str, float]]) -> "ClusteredMean":
-        """Of pairs of a drive's world and number."""
+        """Group pairs of a world and a value."""
         worlds: dict[str, list[float]] = {}
         for world, value in values:
             worlds.setdefault(world, []).append(value)
@@ -157,26 +158,28 @@ class ClusteredMean:
 
     @property
     def mean(self) -> float | None:
-        """Of all drives; None without any."""
+        """Mean over all drives, or None without drives."""
         drives = sum(map(len, self.of_worlds))
         return sum(map(sum, self.of_worlds)) / drives if drives else None
 
     def interval(self) -> Interval | None:
-        """Between what bounds the mean lies with 95 %, by bootstrap over worlds; None of fewer than five worlds."""
+        """Return the 95 % bootstrap interval of the mean, or None with fewer than five worlds."""
         means = [sum(values) / len(values) for values in self.of_worlds]
         return bootstrap_mean_interval(
             means, Streams(1).generator("worlds"), [len(values) for values in self.of_worlds]
         )
 
     def interval_of_rates(self) -> Interval | None:
-        """The same of rates: where all worlds say the same, a bootstrap has no width, and it is Wilson's, each world a
-        trial.
+        """Return the interval of a rate.
+
+        If all worlds have the same rate, the bootstrap interval is empty. Then, the result is the Wilson interval with
+        one trial per world.
         """
         rate = self._common()
         return self.interval() if rate is None else wilson_interval(rate * len(self.of_worlds), len(self.of_worlds))
 
     def interval_of_changes(self) -> Interval | None:
-        """The same of differences of rates; that no world has changed does not say that none would."""
+        """Return the interval of a difference of rates: a Wilson interval if all worlds have the same difference."""
         change = self._common()
         if change is None:
             return self.interval()
@@ -186,7 +189,7 @@ class ClusteredMean:
         return (low, high) if change > 0.0 else (-high, -low)
 
     def _common(self) -> float | None:
-        """What all worlds say, where they are enough and all say the same."""
+        """Return the value that all worlds have, or None if they differ or are too few."""
         means = {sum(values) / len(values) for values in self.of_worlds}
         return means.pop() if len(self.of_worlds) >= MIN_PAIRS and len(means) == 1 else None
 
@@ -196,7 +199,7 @@ Pair = tuple[Trial, Trial]
 
 @dataclass(frozen=True)
 class Difference:
-    """The mean of `other` less `reference`; its 95 % interval by bootstrap over worlds, None of fewer than five."""
+    """Mean of `other` minus `reference`, and its 95 % interval over worlds, None with fewer than five worlds."""
 
     mean: float
     interval: tuple[float, float] | None
@@ -204,9 +207,9 @@ class Difference:
 
 @dataclass(frozen=True)
 class DriveComparison:
-    """`other` less `reference`: success rate, seconds where both arrived, SCT, BARN's score where there is one.
+    """Differences `other` minus `reference` in success rate, seconds if both arrived, SCT, and BARN score.
 
-    `better` and `worse` count the runs that only one of them succeeded in.
+    `better` and `worse` count the runs in which only `other` or only `reference` succeeded.
     """
 
     case: str
@@ -220,7 +223,7 @@ class DriveComparison:
 
 
 def compare_drives(case: str, reference: Sequence[Trial], other: Sequence[Trial]) -> DriveComparison:
-    """Compare trials of the same drives and seeds, in the same order. Raises ValueError where they are not."""
+    """Compare trials of the same drives and seeds in the same order. Raises ValueError if they differ."""
     pairs = list(zip(reference, other, strict=True))
     if any(one.world != two.world or one.run.key.seed != two.run.key.seed for one, two in pairs):
         raise ValueError(f"{case}: the runs are not of the same drives")
@@ -245,7 +248,7 @@ def _won(trial: Trial) -> bool:
 def _difference(
     pairs: Sequence[Pair], measure: Callable[[Trial], float | None], rate: bool = False
 ) -> Difference | None:
-    """None where no pair has the measure."""
+    """Return the difference of a measure, or None if no pair has it."""
     both = ((one.world, measure(one), measure(two)) for one, two in pairs)
     differences = ClusteredMean.of((world, b - a) for world, a, b in both if a is not None and b is not None)
     if differences.mean is None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simscen.bench.navigation import barn, corridors, dynamic_fields, experiments, random_goals
+from simscen.bench.navigation import barn, dynamic_fields, experiments, office_maps, random_goals
 from simscen.bench.navigation.experiments import Experiment
 from simscen.bench.navigation.office_maps import write_building
 
@@ -83,9 +83,9 @@ def _parts(name: str, scenarios: Path) -> list[str]:
         case "BARN":
             return [f"BARN, {variant}" for variant in ("default parameters", *barn.CONTROLLERS)]
         case "narrow fields":
-            return [experiments.narrow_name(room) for room in experiments.NARROW]
+            return [experiments.narrow_name(room) for room in experiments.NARROW_MARGINS_M]
         case "dynamic fields":
-            return [experiments.dynamic_name(speed) for speed in dynamic_fields.SPEEDS]
+            return [experiments.dynamic_name(speed) for speed in dynamic_fields.SPEEDS_M_S]
         case "random goals":
             return ["random goals, ROS maps"]
         case "degraded sensing":
@@ -118,9 +118,9 @@ def _offers(
         ),
         AvailableExperiment("random goals", worlds, lambda: list(_random_goals(made, worlds, sizes))),
         AvailableExperiment("degraded sensing", worlds, lambda: _degraded(made, worlds, sizes)),
-        AvailableExperiment("ramps", made, lambda: [corridors.ramps(made / "ramps", sizes.numbers(sizes.goals))]),
+        AvailableExperiment("ramps", made, lambda: [office_maps.ramps(made / "ramps", sizes.numbers(sizes.goals))]),
         AvailableExperiment(
-            "two robots", made, lambda: [corridors.two_robots(made / "corridors", sizes.numbers(sizes.goals))]
+            "two robots", made, lambda: [office_maps.two_robots(made / "corridors", sizes.numbers(sizes.goals))]
         ),
         AvailableExperiment(
             "tb3_sandbox", nav2, lambda: experiments.sandbox(made, nav2 or Path(), sizes.seeded(20)), NAV2

@@ -67,20 +67,20 @@ class Condition(Spec):
 
     @field_validator("op", mode="before")
     @classmethod
-    def _no_equality(cls, op: Any) -> Any:
+    def _check_operator(cls, op: Any) -> Any:
         if op in ("==", "=", "!="):
             raise ValueError(f"`{op}` never holds for long for what is measured; use `<=` and `>=` around it")
         return op
 
     @field_validator("value", "scale", mode="before")
     @classmethod
-    def _of_the_signals_dimension(cls, value: Any, info: ValidationInfo) -> Any:
+    def _parse_value(cls, value: Any, info: ValidationInfo) -> Any:
         name = info.data.get("signal")
         dimension = SIGNALS[name].dimension if name else _dimension_of(value)  # a misspelled signal is one mistake
         return Quantity(dimension).parse(value) if dimension in UNITS else value
 
     @model_validator(mode="after")
-    def _one_shape(self) -> Condition:
+    def _check_shape(self) -> Condition:
         given = [name.rstrip("_") for name in OPERATORS if getattr(self, name) is not None]
         if not given:
             raise ValueError(f"expected one of: {', '.join(name.rstrip('_') for name in OPERATORS)}")

@@ -1,1 +1,1 @@
-"""Signals of a run that criteria compare: what each measures, how it is read from a trace, how it is sampled."""
+"""Signals that criteria compare: their definitions, their readers, and their sampling."""

@@ -1,4 +1,4 @@
-"""The named signals of a run: what temporal criteria compare, and `simscen explain signals` lists."""
+"""Catalog of the named signals, which temporal criteria compare and `simscen explain signals` lists."""
 
 from __future__ import annotations
 
@@ -259,7 +259,7 @@ SIGNALS: dict[SignalName, Signal] = {
         required_arguments=("fault", "event"),
     ),
 }
-"""Every signal by name, in the order of the reference."""
+"""Signals by name, in the order of the reference."""
 
 
 def signal_evidence(name: SignalName) -> frozenset[Evidence]:

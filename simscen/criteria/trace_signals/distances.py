@@ -1,4 +1,4 @@
-"""Signals that measure where the robot is from something that has a place: a thing, a goal, its own plan."""
+"""Signals of distances between the robot and objects, goals, pedestrians and its plan."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Ticks, Trace
 
 _TINY = sys.float_info.min
-"""Square meters; stands for the square of a step of no length, to divide by."""
+"""Replacement in m² for the squared length of segments without length, to avoid a division by zero."""
 
 
 def distance_to(query: SignalQuery) -> Array:
-    """From the center of the robot to a point, to a goal of the scenario, or to the origin of a thing that moves."""
+    """Return the distance from the robot's center to a point, a goal, or the origin of an object."""
     poses, point, goal = poses_of(query.trace), query.arguments.get("point"), query.arguments.get("goal")
     if isinstance(point, Sequence):
         return np.hypot(poses[:, 0] - float(point[0]), poses[:, 1] - float(point[1]))
@@ -38,7 +38,7 @@ def distance_to(query: SignalQuery) -> Array:
 
 
 def _to_object(trace: Trace, name: str, poses: Array) -> Array:
-    """Infinite while the thing is not there."""
+    """Return the distance to an object; infinite while the object does not exist."""
     where = object_positions(trace, name)
     distance = np.hypot(poses[:, 0] - where[:, 0], poses[:, 1] - where[:, 1])
     apart: Array = np.where(is_present(trace, name), distance, np.inf)
@@ -46,14 +46,14 @@ def _to_object(trace: Trace, name: str, poses: Array) -> Array:
 
 
 def object_positions(trace: Trace, name: str) -> Array:
-    """Where a thing is at each truth sample, or where it always is, (n, 2 or 3) or (1, 2)."""
+    """Return the positions of an object at each truth sample (n, 2 or 3), or its constant position (1, 2)."""
     if name in trace.objects:
         return check_samples(trace.objects[name], f"the pose of {name}", trace).at(trace.truth.ticks)
     return _standing(trace, name)
 
 
 def _standing(trace: Trace, name: str) -> Array:
-    """Where a thing that never moved was put into the world, (1, 2)."""
+    """Return the position (1, 2) of an object that never moved."""
     for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
         x, y = event.data.get("x"), event.data.get("y")
         if event.name == name and isinstance(x, int | float) and isinstance(y, int | float):
@@ -62,7 +62,7 @@ def _standing(trace: Trace, name: str) -> Array:
 
 
 def is_present(trace: Trace, name: str) -> Array:
-    """Whether a thing is in the world at each truth sample; what was never put there was there from the start."""
+    """Return whether an object exists at each truth sample. Objects that were not spawned always exist."""
     clock = trace.truth.ticks
     changes = [
         event for event in trace.of_kind(EventKind.OBJECT_SPAWNED, EventKind.OBJECT_REMOVED) if event.name == name
@@ -76,7 +76,7 @@ def is_present(trace: Trace, name: str) -> Array:
 
 
 def distance_remaining(query: SignalQuery) -> Array:
-    """Along the newest plan from where the robot believes to be; before the first plan, as the crow flies in truth."""
+    """Return the remaining length of the newest plan; before the first plan, the true distance to the goal."""
     belief, clock = check_samples(query.trace.belief, "the belief", query.trace), query.trace.truth.ticks
     if not len(belief):
         raise SignalUnavailable("no belief was recorded")
@@ -88,7 +88,7 @@ def distance_remaining(query: SignalQuery) -> Array:
 
 
 def plan_deviation(query: SignalQuery) -> Array:
-    """From the true position to the nearest point of the newest plan; none before the first plan."""
+    """Return the distance from the true position to the newest plan; 0 before the first plan."""
     poses = poses_of(query.trace)
     off = np.zeros(len(poses))
     plans = _plans(query.trace, query.trace.truth.ticks)
@@ -100,7 +100,7 @@ def plan_deviation(query: SignalQuery) -> Array:
 
 
 def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
-    """(first sample, sample after the last, points) of each plan that was followed for at least a sample."""
+    """Yield first sample, sample after the last, and points of each plan that was followed for at least one sample."""
     plans = [plan for plan in trace.plans if len(plan.points)]
     begins: list[int] = np.searchsorted(clock, [plan.tick for plan in plans]).tolist()
     ends = [*begins, len(clock)][1:]
@@ -109,7 +109,7 @@ def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
 
 
 def _along(points: Array, way: Array) -> tuple[Array, Array]:
-    """Of each point (n, 2): its distance to a way (m, 2), and how much of the way is left from there."""
+    """Return, for points (n, 2), the distances to a path (m, 2), and the remaining length of the path."""
     if len(way) == 1:
         way = np.vstack((way, way))
     steps = np.diff(way, axis=0)
@@ -134,11 +134,11 @@ def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
 
 POINT = ((0.0, 0.0),)
 INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M = 0.45, 1.2, 3.6
-"""m of gap below which somebody's space is entered (Hall, The hidden dimension, 1966; as in HuNavSim)."""
+"""Gap in m below which the robot is in the intimate space of a person (Hall 1966; as in HuNavSim)."""
 
 
 def pedestrian_radii(trace: Trace) -> dict[str, float]:
-    """Everybody who ever was there, by name, and the radius of their body in meters."""
+    """Return the names of all pedestrians of the run, with their radii in m."""
     found: dict[str, float] = {}
     for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
         size = event.data.get("size")
@@ -148,9 +148,9 @@ def pedestrian_radii(trace: Trace) -> dict[str, float]:
 
 
 def pedestrian_gap(trace: Trace, case: Case) -> Array:
-    """Meters between the robot's hull and the nearest person at each truth sample; inf while nobody is there.
+    """Return the distance in m to the nearest pedestrian at each truth sample; infinite without pedestrians.
 
-    Of a robot without a footprint its inscribed circle is the hull. Raises Unavailable where nobody ever was there.
+    The inscribed circle replaces a missing footprint. Raises SignalUnavailable for a run without any pedestrian.
     """
     everybody = pedestrian_radii(trace)
     if not everybody:
@@ -170,7 +170,7 @@ def person_distance(query: SignalQuery) -> Array:
 
 
 def _gap(poses: Array, places: Array, case: Case) -> Array:
-    """From the hull of a robot at `poses` (n, 3) to points (n, 2)."""
+    """Return the distances from the footprint of a robot at `poses` (n, 3) to points (n, 2)."""
     off = places - poses[:, :2]
     if len(case.footprint) < 3:
         circle: Array = np.hypot(off[:, 0], off[:, 1]) - case.inscribed_radius

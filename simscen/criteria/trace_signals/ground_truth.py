@@ -1,4 +1,4 @@
-"""Signals that criteria read off a trace. All are checked to be finite: nan compares false and would hide a failure."""
+"""Signals of the true motion. All are checked to be finite, because comparisons with nan would hide failures."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ else:
     Flags = object  # annotations are not evaluated; commands that only read files need no numpy
 
 MIN_MOVE_M = 0.01
-"""Meters; shorter moves are the trembling of a body at rest and are not driven (METRICS: path_length)."""
+"""Minimum length in m of a move in path_length. Shorter moves are jitter of a body at rest."""
 
 BELIEF_TIMEOUT_S = 1.0
-"""Seconds; how long a pose estimate may be relied on (AMCL's transform_tolerance)."""
+"""Validity of a pose estimate in s (AMCL's transform_tolerance)."""
 
 
 def check_samples(samples: Samples, name: str, trace: Trace) -> Samples:
@@ -38,12 +38,12 @@ def check_samples(samples: Samples, name: str, trace: Trace) -> Samples:
 
 
 def truth(trace: Trace) -> Samples:
-    """x, y, yaw of the robot in the world."""
+    """Return x, y, yaw of the robot in the world."""
     return check_samples(trace.truth, "the true pose", trace)
 
 
 def true_pose(trace: Trace, tick: int) -> Pose2:
-    """Where the robot really was at `tick`. Raises MissingEvidence for a trace without the truth."""
+    """Return the true pose at `tick`. Raises MissingEvidence for a trace without the truth."""
     poses = truth(trace)
     if not len(poses):
         raise MissingEvidence("the robot's true way was not recorded")
@@ -51,7 +51,7 @@ def true_pose(trace: Trace, tick: int) -> Pose2:
 
 
 def clearance(trace: Trace) -> Samples:
-    """Distance of the hull to the nearest surface (m), (n, 1); space that is free for ever may be infinite."""
+    """Return the distance (n, 1) in m of the hull to the nearest surface; infinite in unbounded free space."""
     bad = np.isnan(trace.clearance.values[:, 0]) | np.isneginf(trace.clearance.values[:, 0])
     if bad.any():
         at = trace.seconds(int(trace.clearance.ticks[int(np.argmax(bad))]))
@@ -85,18 +85,18 @@ def turn_rate(trace: Trace) -> Samples:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """The driven way: corner k was left behind at `ticks[k]` after `travelled[k]` meters."""
+    """Driven path. The robot left corner k at `ticks[k]` after `travelled[k]` meters."""
 
     ticks: Ticks
     travelled: Array
 
     @property
     def length(self) -> float:
-        """Meters in all."""
+        """Total length in m."""
         return float(self.travelled[-1]) if len(self.travelled) else 0.0
 
     def until(self, tick: int) -> float:
-        """Meters driven up to `tick`."""
+        """Return the length in m up to `tick`."""
         driven = self.travelled[self.ticks <= tick]
         return float(driven[-1]) if len(driven) else 0.0
 
@@ -135,11 +135,10 @@ def teleport_samples(trace: Trace, ticks: Ticks | None = None) -> list[int]:
 
 
 def pose_error(trace: Trace) -> Samples:
-    """How far the belief is off: distance (m) and heading (rad, without its sign), (n, 2).
+    """Return the localization error (n, 2): distance in m and absolute heading error in rad.
 
-    Sampled whenever the belief is published, against the truth at that very tick; and at every truth sample while the
-    newest belief is older than STALE_AFTER, when the robot has nothing better than the old one. No alignment: a map
-    localizer answers in the map's frame, and an offset there is an error (evo would call it APE without --align).
+    The samples are the published beliefs, and all truth samples while the newest belief is older than STALE_AFTER.
+    There is no alignment, because an offset in the map frame is an error (APE of evo without --align).
     """
     from simscen.core.records.trace import Samples
 
@@ -177,14 +176,14 @@ def first_sustained(ticks: Ticks, true: Flags, hold: int, end: int) -> tuple[int
 
 
 DIMENSIONS = 3
-"""x, y and yaw: what NEES is on average when the covariance says the truth."""
+"""Degrees of freedom x, y and yaw, and the mean NEES of a correct covariance."""
 
 
 def nees(error: Array, covariance: Array) -> Array:
-    """e' P^-1 e of errors (n, 3) in m, m, rad and covariances given as xx, xy, xa, yy, ya, aa (n, 6).
+    """Return e' P^-1 e of errors (n, 3) in m, m, rad and covariances xx, xy, xa, yy, ya, aa (n, 6).
 
-    By Cholesky's decomposition, pivot by pivot; infinite where P is not positive definite, as that of a depleted
-    particle set is: it claims to know a direction exactly. (filterpy's stats.NEES; Bar-Shalom, Li, Kirubarajan 2001,
+    The Cholesky decomposition is used. The result is infinite if P is not positive definite, for example for a
+    depleted particle set. (filterpy's stats.NEES; Bar-Shalom, Li, Kirubarajan 2001,
     section 5.4.)
     """
     xx, xy, xa, yy, ya, aa = covariance.T
@@ -202,7 +201,7 @@ def nees(error: Array, covariance: Array) -> Array:
 
 
 def nees_samples(trace: Trace) -> Samples:
-    """NEES (n, 1) of each belief against the truth at its tick; none without covariances."""
+    """Return the NEES (n, 1) of each belief, or no samples without covariances."""
     from simscen.core.records.trace import Samples
 
     belief, poses = check_samples(trace.belief, "the belief", trace), truth(trace)

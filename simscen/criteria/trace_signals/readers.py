@@ -1,4 +1,4 @@
-"""How each named signal is read from a trace, sampled as `sampling` says."""
+"""Reader functions of the named signals, sampled as described in `sampling`."""
 
 from __future__ import annotations
 

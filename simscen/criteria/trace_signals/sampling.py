@@ -1,4 +1,4 @@
-"""When signals are sampled: the clock of every signal, how rarer ones are held, and how uneven ones are resampled.
+"""Sampling of signals: their common clock, holding of rarer signals, and resampling of uneven ones.
 
 A signal has one value for each sample of the truth, at whatever times these came.
 

@@ -1,8 +1,8 @@
-"""Why a finding failed: the root cause before the symptom, from the trace and the case alone.
+"""Likely causes of a failed finding, from the trace and the case.
 
-"why" is said of what follows from the geometry or the physics: a thing that closes the way, that was put in front of
-the robot, a robot that was set down elsewhere. "meanwhile" is said of what was under way, be it the cause or not.
-Where nothing is known, nothing is said.
+Lines with "why" follow from geometry or physics: an object that blocks the path, an object that was spawned in front of
+the robot, a robot that was kidnapped. Lines with "meanwhile" list faults and events that were active and may be the
+cause. Without evidence there are no lines.
 """
 
 import math
@@ -19,11 +19,11 @@ from simscen.judge.diagnosis.goal_failure import diagnose_goal_failure
 from simscen.judge.diagnosis.objects import MovableObject, movable_objects
 
 GOAL_CRITERIA = frozenset({"goals_reached", "result", "error_code", "time_to_goal", "stuck"})
-"""Criteria that fail when something keeps the robot from its goal."""
+"""Criteria that fail if something blocks the robot."""
 LOCALIZATION_CRITERIA = frozenset({"localization_error", "relocalized_within", "no_false_success", *GOAL_CRITERIA})
-"""Criteria that fail when the robot is not where it believes to be."""
+"""Criteria that fail if localization is wrong."""
 MAX_LINES = 6
-"""Lines for a finding."""
+"""Maximum number of lines for a finding."""
 
 
 def explain_failures(verdicts: Sequence[Verdict], trace: Trace, case: Case) -> tuple[Verdict, ...]:
@@ -60,11 +60,11 @@ def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
 
 
 RECENT_FAULT_S, RECENT_EVENT_S = 3.0, 5.0
-"""Seconds after the end of a fault, and after an event, in which it is still told."""
+"""Time in s after the end of a fault, and after an event, in which it is still listed."""
 
 
 def concurrent_disturbances(trace: Trace, tick: int, known: Set[str] = frozenset()) -> list[str]:
-    """Faults, then events, each in the order in which they began; those that are `known` already are left out."""
+    """Yield faults, then events, in the order of their start, without those that are `known`."""
     return [text for name, text in (*_faults(trace, tick), *_events(trace, tick)) if name not in known]
 
 
@@ -103,9 +103,9 @@ def _events(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
 
 
 OBJECT_MOVING_SPEED_M_S = 0.0625
-"""m/s from which a thing moves."""
+"""Minimum speed in m/s of a moving object."""
 OBJECT_SPEED_WINDOW_S = 0.25
-"""Seconds over which its speed is taken."""
+"""Time in s over which the speed is measured."""
 
 
 def diagnose_collision(trace: Trace, tick: int) -> tuple[list[str], set[str]]:
@@ -130,7 +130,7 @@ def _told(trace: Trace, thing: MovableObject, hit: Event) -> str:
 
 
 def _away(trace: Trace, thing: MovableObject) -> float:
-    """How far from the robot's middle it was put; nothing has moved it since."""
+    """Return the distance from the robot's center at which the object was placed, and has not moved since."""
     return float(thing.distance(np.array([trace.place(thing.since)]))[0])
 
 
@@ -144,15 +144,15 @@ def _speed(trace: Trace, name: str, tick: int) -> float:
 
 
 ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
-"""Faults whose error stays in the odometry when they are over."""
+"""Faults whose error remains in the odometry after their end."""
 WHEELS, BELIEF = frozenset({"Odometry", "Wheels"}), "Belief"
-"""What such faults affect, and those that come between the localizer and the navigator."""
+"""Targets of these faults, and of faults between localizer and navigator."""
 LOST_DISTANCE_M = 0.5
-"""Meters between belief and truth from which a robot is lost: two radii of a small one."""
+"""Distance in m between belief and truth of a lost robot: the diameter of a small robot."""
 
 
 def diagnose_localization(trace: Trace, tick: int, known: bool = False) -> tuple[list[str], set[str]]:
-    """How far off it was, if far and not `known`; how that came about; and which events and faults did it."""
+    """Return sentences on the localization error and its cause, and the names of the responsible events and faults."""
     off = _off(trace, tick)
     if not off >= LOST_DISTANCE_M:  # nan, too: not known
         return [], set()
@@ -185,7 +185,7 @@ def _off(trace: Trace, tick: int) -> float:
 
 
 def _falsified(trace: Trace, label: str) -> str:
-    """Which of its ideas of where it is a fault falsified; "" for none."""
+    """Return which pose information of the robot a fault falsified, or ""."""
     starts = [event.data for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == label]
     if not starts:
         return ""

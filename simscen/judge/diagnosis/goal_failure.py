@@ -1,4 +1,4 @@
-"""What keeps a robot from its goal: a closed passage, an occupied goal, something that it stands at."""
+"""Causes of a missed goal: a blocked passage, an occupied goal, an object in front of the robot."""
 
 import math
 from collections import Counter
@@ -16,11 +16,11 @@ from simscen.criteria.goal_outcomes import GoalOutcome, code_of, goal_outcomes, 
 from simscen.judge.diagnosis.objects import MovableObject, movable_objects
 
 NEAR_ROBOT_M = 0.3
-"""Meters from the robot's hull within which a thing may be what holds it."""
+"""Maximum distance in m from the robot's hull to an object that may block it."""
 
 
 def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
-    """Sentences on what is in the way of the goal that is driven to at `tick`; and the events that put it there."""
+    """Return sentences on what blocks the current goal at `tick`, and the events that caused it."""
     outcome = _story(trace, case, tick)
     if outcome is None:
         return [], set()
@@ -44,7 +44,7 @@ def _story(trace: Trace, case: Case, tick: int) -> GoalOutcome | None:
 
 
 def _over(outcome: GoalOutcome, tick: int) -> bool:
-    """Whether it was reached at `tick`, or canceled before; one that failed has been kept from the robot."""
+    """Return whether the goal was reached at `tick` or canceled before. Failed goals do not count."""
     if outcome.reached is not None:
         return outcome.reached <= tick
     return outcome.end is not None and outcome.end.kind == EventKind.GOAL_CANCELED and outcome.end.tick < tick
@@ -87,7 +87,7 @@ def _given_up(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
 
 
 def _failed_recoveries(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
-    """Recovery behaviors that came to nothing on the way to this goal, each with its code."""
+    """Return the recovery behaviors that failed on the way to this goal, with their codes."""
     ended = [e for e in trace.of_kind(EventKind.RECOVERY_ENDED) if outcome_start(outcome) <= e.tick <= tick]
     failed = Counter(f"{e.name} with {code_of(e)}" for e in ended if e.data.get("outcome") == "failed")
     told = (what if times == 1 else f"{what} {times} times" for what, times in failed.items())
@@ -127,19 +127,19 @@ def _standing_at(trace: Trace, case: Case, tick: int, there: list[MovableObject]
 
 
 SEARCH_STEP_M = 0.005
-"""Meters between the places in a passage that are tried."""
+"""Distance in m between the tested points of a passage."""
 NEGLIGIBLE_WIDTH_M = 0.02
-"""Meters that are as good as nothing, and as no change: passages are measured to that."""
+"""Resolution in m of the width of passages."""
 ON_PATH_DISTANCE_M = 0.5
-"""Meters from a passage within which a robot is on the way that leads through it; passages lie 0.25 m apart."""
+"""Maximum distance in m from a passage to a robot on its path. Passages are 0.25 m apart."""
 
 
 def diagnose_blocked_path(
     trace: Trace, case: Case, goal: str, tick: int, there: Sequence[MovableObject]
 ) -> tuple[list[str], set[str]]:
-    """Which things close the way to `goal`, or make it tight, as a sentence; and the events that brought them.
+    """Return a sentence on the objects that block or narrow the path to `goal`, and the events that placed them.
 
-    Only what is certain is said: a disc that fits into the robot cannot cross the passage at any place.
+    Passages are only listed if not even the inscribed disc of the robot can cross them.
     """
     needed, turning = 2 * case.inscribed_radius, 2 * _reach(case)
     rooms = [(free_width(passage, there), passage) for passage in _ahead(trace, case, goal, tick)]
@@ -188,5 +188,5 @@ def _ahead(trace: Trace, case: Case, goal: str, tick: int) -> list[Passage]:
 
 
 def _reach(case: Case) -> float:
-    """How far in meters the robot extends from its own origin."""
+    """Return the circumscribed radius of the robot in m."""
     return max((math.hypot(x, y) for x, y in case.footprint), default=case.inscribed_radius)

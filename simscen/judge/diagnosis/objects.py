@@ -1,4 +1,4 @@
-"""What can move: where it stands at a tick, and how it came there."""
+"""Movable objects at a tick: their places, and the events that placed them."""
 
 from dataclasses import dataclass
 
@@ -11,10 +11,10 @@ from simscen.core.records.trace import Trace
 
 @dataclass(frozen=True)
 class MovableObject:
-    """Something that can move, at a tick.
+    """Movable object at a tick.
 
-    `outlines` (n, 2) are what a robot may touch of it, in the world. `since` is the tick at which the `event` (its
-    name; "" for none) brought it or moved it last, `moved` tells which of both.
+    `outlines` (n, 2) are its outlines in the world. `since` is the tick at which the `event` (its name, or "") spawned
+    or last moved the object; `moved` says which of both.
     """
 
     name: str
@@ -24,20 +24,20 @@ class MovableObject:
     moved: bool
 
     def told(self, trace: Trace) -> str:
-        """Its name, and how it came there: "crate (spawned by event `crate falls` at t = 1.00 s)"."""
+        """Return its name and origin: "crate (spawned by event `crate falls` at t = 1.00 s)"."""
         if not self.event:
             return self.name
         verb = "moved" if self.moved else "spawned"
         return f"{self.name} ({verb} by event `{self.event}` at t = {trace.seconds(self.since):.2f} s)"
 
     def distance(self, points: Array) -> Array:
-        """Meters (n,) from points (n, 2) to it; 0 inside."""
+        """Return the distances in m (n,) from points (n, 2) to the object; 0 inside."""
         nearest: Array = np.min([_distance(points, outline) for outline in self.outlines], axis=0)
         return nearest
 
 
 def movable_objects(trace: Trace, tick: int) -> list[MovableObject]:
-    """All that can move and is there at `tick`, in the order in which it came."""
+    """Return all movable objects at `tick`, in the order of their appearance."""
     spawned: dict[str, Event] = {}
     last: dict[str, tuple[str, Event]] = {}
     doing = ""
@@ -59,7 +59,7 @@ def movable_objects(trace: Trace, tick: int) -> list[MovableObject]:
 
 
 def pose_at(trace: Trace, spawned: Event, tick: int) -> Pose2:
-    """Where a thing that was spawned is at `tick`."""
+    """Return the pose of a spawned object at `tick`."""
     x, y, yaw = (spawned.data.get(key) for key in ("x", "y", "yaw"))
     samples = trace.objects.get(spawned.name)
     if samples is not None:
@@ -79,7 +79,7 @@ def _thing(trace: Trace, tick: int, spawned: Event, by: str, last: Event) -> Mov
 
 
 def _distance(points: Array, corners: Array) -> Array:
-    """Meters (n,) from points (n, 2) to a filled polygon (m, 2)."""
+    """Return the distances in m (n,) from points (n, 2) to a filled polygon (m, 2)."""
     ends = np.roll(corners, 1, axis=0)
     step, apart = ends - corners, points[:, None] - corners
     along, squared = np.sum(apart * step, axis=2), np.sum(step**2, axis=1)

@@ -162,7 +162,7 @@ METRICS: dict[str, Metric] = {
         evidence=_BELIEF | {Evidence.COVARIANCE},
     ),
 }
-"""Every metric by name, in the order of the reference."""
+"""Metrics by name, in the order of the reference."""
 
 ADDRESSES = dict.fromkeys(METRICS, "simscen.judge.metrics.compute:compute_metrics")
-"""Where each is measured, for the registry: no package may add another of its name."""
+"""Names of the shipped metrics for the registry, which packages must not reuse."""

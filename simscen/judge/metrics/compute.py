@@ -28,17 +28,17 @@ from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.trajectory import PATH_METRICS, POSE_METRICS, Values, path_metrics, pose_metrics
 
 STANDING_SPEED_M_S, STANDING_TURN_RATE_RAD_S = 0.01, 0.02
-"""A slower robot does not move (HuNavSim, which takes the turn rate with its sign)."""
+"""Minimum speeds of a moving robot, as in HuNavSim, which uses the signed turn rate."""
 
 BARN_OPTIMAL_SPEED_M_S = 2.0
-"""BARN's optimal time is that of the reference path at this speed."""
+"""Speed of the optimal time of BARN on the reference path."""
 
 ZONES = {
     "intimate": (0.0, INTIMATE_SPACE_M),
     "personal": (INTIMATE_SPACE_M, PERSONAL_SPACE_M),
     "social": (PERSONAL_SPACE_M, SOCIAL_SPACE_M),
 }
-"""Hall's zones around a person, from and to in meters."""
+"""Zones around a person by Hall: from and to in m."""
 
 _SHORTEST = ("barn_score", "shortest_length", "path_length_ratio", "spl", "soft_spl")
 _NAVIGATION = ("success", "path_length", "time_to_goal", *_SHORTEST)
@@ -51,7 +51,7 @@ _EVENTS = ("collisions", "contact_time", "replans", "recoveries")
 
 @dataclass(frozen=True)
 class MetricValues:
-    """Every metric by name in SI units; one that is not defined for a run is None, with the reason in `undefined`."""
+    """Metrics by name in SI units. Undefined metrics are None, with the reason in `undefined`."""
 
     values: Mapping[str, float | None]
     undefined: Mapping[str, str]

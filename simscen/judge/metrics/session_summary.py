@@ -1,4 +1,4 @@
-"""A session in the figures in which navigation benchmarks are published, each with the runs it is made of."""
+"""Statistics of a session that navigation benchmarks publish, each with its number of runs."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,11 +9,12 @@ from simscen.core.statistics import wilson_interval
 
 @dataclass(frozen=True)
 class SessionSummary:
-    """`success_rate` is of all `runs`, also of those that broke; its interval is Wilson's at 95 %.
+    """Statistics of a session.
 
-    `spl` and `soft_spl` are means over the `spl_runs` that have a shortest way. Collisions are counted over the
-    `kilometers` driven and `hours` simulated of the `measured_runs`; a rate is None where nothing was driven. Each of
-    several robots counts as a run of its own would, but for `runs` and successes: a run succeeds where all robots do.
+    `success_rate` refers to all `runs`, including those with errors, with its 95 % Wilson interval. `spl` and
+    `soft_spl` are means over the `spl_runs` with a shortest path. Collisions are counted over the `kilometers` driven
+    and `hours` simulated in the `measured_runs`; a rate is None if nothing was driven. Each robot of a run counts like
+    a run, except in `runs` and successes: a run succeeds if all robots succeed.
     """
 
     runs: int
@@ -29,17 +30,17 @@ class SessionSummary:
 
     @property
     def collisions_per_km(self) -> float | None:
-        """None when nobody drove."""
+        """Collisions per km, or None if no robot drove."""
         return self.collisions / self.kilometers if self.kilometers > 0 else None
 
     @property
     def collisions_per_hour(self) -> float | None:
-        """None when no time passed."""
+        """Collisions per hour, or None without simulated time."""
         return self.collisions / self.hours if self.hours > 0 else None
 
 
 def summarize_session(results: Iterable[RunResult]) -> SessionSummary:
-    """Sum up the runs of a session, without those that were skipped; their order does not matter."""
+    """Return the statistics of a session without skipped runs. The order of the runs does not matter."""
     runs = sorted((run for run in results if run.outcome is not Outcome.SKIPPED), key=lambda run: run.key)
     measured = [run for run in runs if run.metrics]
     successes = sum(run.metrics.get("success") == 1.0 for run in measured)
@@ -59,7 +60,7 @@ def summarize_session(results: Iterable[RunResult]) -> SessionSummary:
 
 
 def session_summary_data(figures: SessionSummary) -> dict[str, float | list[float] | None]:
-    """As results.json holds it."""
+    """Return the statistics as in results.json."""
     interval = figures.success_interval
     return {
         "runs": figures.runs,
@@ -78,7 +79,7 @@ def session_summary_data(figures: SessionSummary) -> dict[str, float | list[floa
 
 
 def session_summary_line(figures: SessionSummary) -> str:
-    """One line: "success 93% of 14 runs (69% … 99%) · SPL 0.81 of 12 runs · 0.8 collisions/km, 1.9/h in …"."""
+    """Return one line: "success 93% of 14 runs (69% … 99%) · SPL 0.81 of 12 runs · 0.8 collisions/km, 1.9/h in …"."""
     parts = []
     if figures.success_interval is not None:
         assert figures.success_rate is not None

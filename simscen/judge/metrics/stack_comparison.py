@@ -1,4 +1,4 @@
-"""Compares stacks that drove the same scenarios with the same seeds, pair by pair."""
+"""Paired comparison of stacks on the same scenarios and seeds."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,19 +18,19 @@ COMPARED_METRICS = (
     *("time_to_goal", "path_length", "min_clearance", "mean_jerk", "time_not_moving", "replans", "recoveries"),
     "collisions",
 )
-"""The metrics that people choose a stack by, in the order of the table."""
+"""Compared metrics, in the order of the table."""
 OUTCOME_INDEPENDENT = frozenset({"collisions"})
-"""Metrics that mean something however far a run came; the others favor whoever gives up early."""
+"""Metrics that are comparable if a run fails. The others favor stacks that give up early."""
 _SEED = 1
-"""Of the bootstrap: the same runs give the same intervals."""
+"""Seed of the bootstrap: the same runs give the same intervals."""
 
 Pair = tuple[RunResult, RunResult]
 
 
 def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Comparison | None:
-    """Each of the `stacks` (NAME=VALUE) against the first; None for fewer than two. The order of results is no matter.
+    """Compare each of the `stacks` (NAME=VALUE) with the first. Returns None with fewer than two stacks.
 
-    Second runs, which are there to be equal to the first, do not count.
+    The order of the results does not matter. Repeated runs, which check determinism, do not count.
     """
     if len(stacks) < 2:
         return None
@@ -50,7 +50,7 @@ def _row(test: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> 
 
 
 def _came_out(run: RunResult) -> Outcome:
-    """How the robot did, whatever its scenario expected."""
+    """Return the outcome of the run without its expectation."""
     if run.outcome is Outcome.ERROR:
         return Outcome.ERROR
     decisive = [verdict for verdict in run.verdicts if verdict.severity == "fail" and verdict.criterion != EXPECTED]
@@ -132,7 +132,7 @@ def _why(run: RunResult) -> str:
 
 
 def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
-    """None where no pair has the metric."""
+    """Return the difference of a metric, or None if no pair has it."""
     both = [(one.metrics.get(name), two.metrics.get(name)) for one, two in pairs]
     known = [(one, two) for one, two in both if one is not None and two is not None]
     if not known:
@@ -155,7 +155,7 @@ def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
 
 
 def comparison_data(comparison: Comparison) -> dict[str, Any]:
-    """As plain data: stacks and scenarios as lists in their order."""
+    """Return plain data with stacks and scenarios as ordered lists."""
     return {
         "baseline": comparison.baseline,
         "stacks": [

@@ -8,10 +8,10 @@ from simscen.core.records.trace import Trace
 from simscen.criteria.trace_signals.ground_truth import Drive, nees_samples, pose_error, teleport_samples, truth
 
 CURVATURE_SPACING_M = 0.3
-"""Meters between the points of which curvature is taken; nearer ones are noise (bench-mr)."""
+"""Minimum distance in m of the points for the curvature; closer points are noise (bench-mr)."""
 
 Values = dict[str, float | str]
-"""Metrics by name; a text says why there is no number."""
+"""Metrics by name: a number, or the reason why it is undefined."""
 
 _CURVATURE = ("norm_curvature", "max_curvature")
 PATH_METRICS = ("heading_change", "path_irregularity", "aol", *_CURVATURE)
@@ -37,7 +37,7 @@ def path_segments(trace: Trace, way: Drive) -> list[Array]:
 
 
 def heading_change(trace: Trace) -> float:
-    """Sum of the changes of the true heading, in rad; yaw differences are wrapped (Arena's are not)."""
+    """Return the sum of the changes of the true heading in rad, with wrapped differences (unlike Arena)."""
     changes = np.abs(wrap_array(np.diff(truth(trace).values[:, 2])))
     changes[[k - 1 for k in teleport_samples(trace) if 0 < k <= len(changes)]] = 0.0
     return float(changes.sum())
@@ -77,7 +77,7 @@ def _curvature(legs: list[Array]) -> Values:
 
 
 def _resampled(leg: Array) -> Array:
-    """Its corners that are at least RESAMPLED from the one before."""
+    """Return the points that are at least RESAMPLED from the previous one."""
     kept = [0]
     xs, ys = leg[:, 0].tolist(), leg[:, 1].tolist()
     for k in range(1, len(xs)):
@@ -88,14 +88,14 @@ def _resampled(leg: Array) -> Array:
 
 
 RPE_DELTA_M = 1.0
-"""Meters of the true way between the two poses of a relative error."""
+"""Driven distance in m between the two poses of a relative error."""
 
 _SUMS = ("rmse", "mean", "median", "max")
 SILENT = "the robot never said where it believes to be"
 
 
 def pose_metrics(trace: Trace) -> Values:
-    """APE, RPE over DELTA meters, NEES."""
+    """Return APE, RPE over DELTA m, and NEES."""
     error = pose_error(trace)
     if not len(error):
         return dict.fromkeys(POSE_METRICS, SILENT)
@@ -119,7 +119,7 @@ def _summed(name: str, errors: Array) -> Values:
 
 
 def _relative(trace: Trace) -> Values:
-    """(Q_i^-1 Q_j)^-1 (P_i^-1 P_j) of truth Q and belief P, where the true way from i to j is DELTA long."""
+    """Return (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) of truth Q and belief P for pairs i, j that are DELTA m of driving apart."""
     believed, true = trace.belief.values, _truth_at_beliefs(trace)
     i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))
     if not len(i):
@@ -133,7 +133,7 @@ def _relative(trace: Trace) -> Values:
 
 
 def _pairs(steps: Array) -> tuple[list[int], list[int]]:
-    """Consecutive samples between which the steps add up to DELTA (evo's filter_pairs_by_path)."""
+    """Return consecutive samples between which the steps add up to DELTA (filter_pairs_by_path of evo)."""
     ids, length = [0], 0.0
     for k, step in enumerate(steps.tolist(), start=1):
         length += step

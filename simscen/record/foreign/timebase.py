@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simscen.core.clock import NS_PER_SECOND
 from simscen.core.records.trace import Ticks
 from simscen.record.foreign.raw_messages import UnusableLog
-from simscen.record.simtime import NS_PER_SECOND
 
 MAX_BACKWARD_JUMP_NS = NS_PER_SECOND
 """Maximum difference to an earlier but newer stamp of the topic. A larger one means that the clock was reset."""

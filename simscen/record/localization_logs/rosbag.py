@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from simscen.core.clock import NS_PER_SECOND
 from simscen.record import topics
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
 from simscen.record.foreign.transforms import (
@@ -35,7 +36,6 @@ from simscen.record.messages.decode import (
     laser_scan,
     transforms,
 )
-from simscen.record.simtime import NS_PER_SECOND
 
 INITIAL_POSE_TOPIC = "/initialpose"
 """Topic on which RViz and robots send the initial pose to AMCL."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from mcap import records
 
+from simscen.core.clock import SimTime
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.records.trace import Trace
@@ -16,7 +17,6 @@ from simscen.record.log_reader.message_counts import MessageCounts
 from simscen.record.log_reader.sensor_messages import SensorMessages
 from simscen.record.messages import decode, event_text
 from simscen.record.messages.decode import MessageReader
-from simscen.record.simtime import SimTime
 from simscen.record.trace_builder import TraceRows
 
 Handler = Callable[[int, bytes], None]

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from simscen.core.clock import SimTime
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
 from simscen.core.messages.sensor_data import Scan
@@ -10,7 +11,6 @@ from simscen.record import topics
 from simscen.record.frame_names import RobotFrames
 from simscen.record.messages import decode
 from simscen.record.messages.decode import MessageReader
-from simscen.record.simtime import SimTime
 from simscen.record.trace_builder import to_planar
 
 LoggedMessages = list[tuple[int, bytes]]

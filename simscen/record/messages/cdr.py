@@ -30,9 +30,9 @@ class Slot(NamedTuple):
 class Template:
     """Layout of a message of fixed size with constants, and with slots for the fields that vary.
 
-    Fields are appended in the order of the message definition and aligned to their own width, counted from `start`
-    bytes before the first field. `prefix` precedes the fields and does not count for the alignment: the encapsulation
-    header. `buffer` is the message with zeros in its slots.
+    Methods append fields in the order of the message definition and return the template. Fields are aligned to their
+    own width, counted from `start` bytes before the first field. `prefix` precedes the fields and does not count for
+    the alignment: the encapsulation header. `buffer` is the message with zeros in its slots.
     """
 
     def __init__(self, prefix: bytes = HEADER, start: int = 0) -> None:
@@ -40,26 +40,30 @@ class Template:
         self._shift = start - len(prefix)
         self._slots: list[tuple[int, Slot]] = []
 
-    def slot(self, codes: str, field: str) -> None:
+    def slot(self, codes: str, field: str) -> "Template":
         """Append a slot for numbers of one width, for example "iI" or "7d". "8x" stands for eight zero bytes."""
         self.align(max(struct.calcsize("<" + code) for code in codes if code.isalpha()))
         self._slots.append((len(self.buffer), Slot(codes, field)))
         self.buffer += bytes(struct.calcsize("<" + codes))
+        return self
 
-    def put(self, codes: str, *values: float) -> None:
+    def put(self, codes: str, *values: float) -> "Template":
         """Append constant numbers of one width."""
         self.align(struct.calcsize("<" + codes[-1]))
         self.buffer += struct.pack("<" + codes, *values)
+        return self
 
-    def string(self, text: str) -> None:
+    def string(self, text: str) -> "Template":
         """Append a constant string: its length with the terminating NUL, then its UTF-8 bytes."""
         encoded = text.encode() + b"\0"
         self.put("I", len(encoded))
         self.buffer += encoded
+        return self
 
-    def align(self, width: int) -> None:
+    def align(self, width: int) -> "Template":
         """Pad to a multiple of `width` bytes."""
         self.buffer += bytes(-(len(self.buffer) + self._shift) % width)
+        return self
 
     @property
     def parts(self) -> "list[bytes | Slot]":

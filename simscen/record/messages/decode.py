@@ -10,10 +10,10 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.record.messages.cdr import HEADER, CdrReader
-from simscen.record.simtime import NS_PER_SECOND
 
 Numbers = tuple[float, ...]
 T = TypeVar("T")

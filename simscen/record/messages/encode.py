@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.clock import Stamp
 from simscen.record.messages.cdr import Template
-from simscen.record.simtime import Stamp
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 _TWIST = "2d24xd"
@@ -24,23 +24,17 @@ _TWIST_VARIANCES = "d48xd216xd"
 
 def clock() -> Template:
     """Return the layout of rosgraph_msgs/msg/Clock: stamp."""
-    message = Template()
-    message.slot("iI", "*stamp")
-    return message
+    return Template().slot("iI", "*stamp")
 
 
 def float64() -> Template:
     """Return the layout of std_msgs/msg/Float64: value."""
-    message = Template()
-    message.slot("d", "value")
-    return message
+    return Template().slot("d", "value")
 
 
 def twist() -> Template:
     """Return the layout of geometry_msgs/msg/Twist: twist."""
-    message = Template()
-    message.slot(_TWIST, "*twist")
-    return message
+    return Template().slot(_TWIST, "*twist")
 
 
 def odometry(frame: str, child: str) -> Template:
@@ -48,13 +42,14 @@ def odometry(frame: str, child: str) -> Template:
 
     The pose is that of `child` in `frame`, the twist is in the child frame.
     """
-    message = _stamped(frame)
-    message.string(child)
-    message.slot("7d", "*pose")
-    message.put("36d", *[0.0] * 36)
-    message.slot(_TWIST, "*twist")
-    message.put("36d", *[0.0] * 36)
-    return message
+    return (
+        _stamped(frame)
+        .string(child)
+        .slot("7d", "*pose")
+        .put("36d", *[0.0] * 36)
+        .slot(_TWIST, "*twist")
+        .put("36d", *[0.0] * 36)
+    )
 
 
 def odometry_with_covariance(frame: str, child: str) -> Template:
@@ -62,13 +57,14 @@ def odometry_with_covariance(frame: str, child: str) -> Template:
 
     `covariance` has nine numbers for x, y, yaw, `variances` three for vx, vy, wz.
     """
-    message = _stamped(frame)
-    message.string(child)
-    message.slot("7d", "*pose")
-    message.slot(_COVARIANCE, "*covariance")
-    message.slot(_TWIST, "*twist")
-    message.slot(_TWIST_VARIANCES, "*variances")
-    return message
+    return (
+        _stamped(frame)
+        .string(child)
+        .slot("7d", "*pose")
+        .slot(_COVARIANCE, "*covariance")
+        .slot(_TWIST, "*twist")
+        .slot(_TWIST_VARIANCES, "*variances")
+    )
 
 
 def imu(frame: str) -> Template:
@@ -77,9 +73,7 @@ def imu(frame: str) -> Template:
     `turn` is the angular velocity and `force` the linear acceleration; each has the same variance for all axes. The
     first orientation covariance is -1, because there is no orientation.
     """
-    message = _stamped(frame)
-    message.put("4d", *_NO_ROTATION)
-    message.put("9d", -1.0, *[0.0] * 8)
+    message = _stamped(frame).put("4d", *_NO_ROTATION).put("9d", -1.0, *[0.0] * 8)
     for vector in ("turn", "force"):
         message.slot("3d", f"*{vector}")
         for _ in range(2):
@@ -90,17 +84,12 @@ def imu(frame: str) -> Template:
 
 def pose_with_covariance(frame: str) -> Template:
     """Return the layout of geometry_msgs/msg/PoseWithCovarianceStamped: stamp, pose, covariance (nine numbers)."""
-    message = _stamped(frame)
-    message.slot("7d", "*pose")
-    message.slot(_COVARIANCE, "*covariance")
-    return message
+    return _stamped(frame).slot("7d", "*pose").slot(_COVARIANCE, "*covariance")
 
 
 def pose_stamped(frame: str) -> Template:
     """Return the layout of geometry_msgs/msg/PoseStamped: stamp, pose."""
-    message = _stamped(frame)
-    message.slot("7d", "*pose")
-    return message
+    return _stamped(frame).slot("7d", "*pose")
 
 
 def transforms(links: Sequence[tuple[str, str, str]], more: int = 0, size: int = 0) -> Template:
@@ -109,8 +98,7 @@ def transforms(links: Sequence[tuple[str, str, str]], more: int = 0, size: int =
     Each link is a frame, its child frame, and the name of the field for the child's pose. The field `packed` exists if
     there are `more` links, serialized already, with `size` bytes in total.
     """
-    message = Template()
-    message.put("I", len(links) + more)
+    message = Template().put("I", len(links) + more)
     for frame, child, pose in links:
         message.slot("iI", "*stamp")
         message.string(frame)
@@ -122,35 +110,12 @@ def transforms(links: Sequence[tuple[str, str, str]], more: int = 0, size: int =
 
 
 def _stamped(frame: str) -> Template:
-    message = Template()
-    message.slot("iI", "*stamp")
-    message.string(frame)
-    return message
-
-
-def string(text: str) -> bytes:
-    """Return a std_msgs/msg/String."""
-    message = Template()
-    message.string(text)
-    return bytes(message.buffer)
+    return Template().slot("iI", "*stamp").string(frame)
 
 
 def boolean(value: bool) -> bytes:
     """Return a std_msgs/msg/Bool."""
-    message = Template()
-    message.put("B", value)
-    return bytes(message.buffer)
-
-
-def log(stamp: Stamp, level: int, name: str, text: str) -> bytes:
-    """Return a rcl_interfaces/msg/Log without a source location."""
-    message = Template()
-    message.put("iI", *stamp)
-    message.put("B", level)
-    for field in (name, text, "", ""):
-        message.string(field)
-    message.put("I", 0)
-    return bytes(message.buffer)
+    return bytes(Template().put("B", value).buffer)
 
 
 def image(frame: str, stamp: Stamp, pixels: "npt.NDArray[np.uint8] | npt.NDArray[np.float32]") -> bytes:
@@ -158,11 +123,13 @@ def image(frame: str, stamp: Stamp, pixels: "npt.NDArray[np.uint8] | npt.NDArray
     height, width = pixels.shape[:2]
     encoding, kind = ("rgb8", "u1") if pixels.ndim == 3 else ("32FC1", "<f4")
     content = pixels.astype(kind).tobytes()
-    message = Template()
-    message.put("iI", *stamp)
-    message.string(frame)
-    message.put("2I", height, width)
-    message.string(encoding)
-    message.put("B", 0)
-    message.put("2I", len(content) // height if height else 0, len(content))
-    return bytes(message.buffer) + content
+    head = (
+        Template()
+        .put("iI", *stamp)
+        .string(frame)
+        .put("2I", height, width)
+        .string(encoding)
+        .put("B", 0)
+        .put("2I", len(content) // height if height else 0, len(content))
+    )
+    return bytes(head.buffer) + content

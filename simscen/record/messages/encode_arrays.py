@@ -10,11 +10,11 @@ from struct import calcsize
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.clock import Stamp
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
 from simscen.core.messages.sensor_data import Scan
 from simscen.record.messages.cdr import HEADER, Template
-from simscen.record.simtime import Stamp
 
 Link = tuple[str, str, Stamp, Pose3]
 """Frame, child frame, stamp, and pose of the child in the frame."""
@@ -41,11 +41,7 @@ class LaserScanPacker:
     """Encoder of sensor_msgs/msg/LaserScan without intensities."""
 
     def __init__(self, frame: str) -> None:
-        head = Template()
-        head.slot("iI", "*stamp")
-        head.string(frame)
-        head.slot("7fI", "*numbers")
-        self._pack = head.packer()
+        self._pack = Template().slot("iI", "*stamp").string(frame).slot("7fI", "*numbers").packer()
 
     def __call__(self, stamp: Stamp, scan: Scan) -> bytes:
         """Encode a scan that was measured at `stamp`."""
@@ -63,10 +59,7 @@ class PathPacker:
     """
 
     def __init__(self, frame: str) -> None:
-        head = Template()
-        head.slot("iI", "*stamp")
-        head.string(frame)
-        head.slot("I", "count")
+        head = Template().slot("iI", "*stamp").string(frame).slot("I", "count")
         self._pack = head.packer()
         self._first = self._pose(frame, len(head.buffer) - len(HEADER))
         self._next = self._pose(frame, 0)
@@ -74,10 +67,7 @@ class PathPacker:
     @staticmethod
     def _pose(frame: str, start: int) -> bytes:
         """Return the bytes of a pose between its stamp and its numbers."""
-        pose = Template(prefix=b"", start=start)
-        pose.put("iI", 0, 0)
-        pose.string(frame)
-        pose.align(8)
+        pose = Template(prefix=b"", start=start).put("iI", 0, 0).string(frame).align(8)
         return bytes(pose.buffer[8:])
 
     def __call__(self, stamp: Stamp, points: Array) -> bytes:
@@ -97,12 +87,7 @@ class ParticleCloudPacker:
     """Encoder of nav2_msgs/msg/ParticleCloud."""
 
     def __init__(self, frame: str) -> None:
-        head = Template()
-        head.slot("iI", "*stamp")
-        head.string(frame)
-        head.slot("I", "count")
-        head.align(8)
-        self._pack = head.packer()
+        self._pack = Template().slot("iI", "*stamp").string(frame).slot("I", "count").align(8).packer()
 
     def __call__(self, stamp: Stamp, particles: Array) -> bytes:
         """Encode `particles` (n, 4) x, y, yaw, weight; n > 0."""
@@ -144,26 +129,30 @@ class TransformsPacker:
 
 def _transform(frame: str, child: str, before: bytes, start: int) -> Callable[[Stamp, Pose3], bytes]:
     """Return a packer of geometry_msgs/msg/TransformStamped that starts `start` bytes after a multiple of eight."""
-    message = Template(prefix=before, start=start)
-    message.slot("iI", "*stamp")
-    message.string(frame)
-    message.string(child)
-    message.slot("7d", "*pose")
-    return message.packer()
+    return (
+        Template(prefix=before, start=start)
+        .slot("iI", "*stamp")
+        .string(frame)
+        .string(child)
+        .slot("7d", "*pose")
+        .packer()
+    )
 
 
 def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
     """Return a nav_msgs/msg/OccupancyGrid."""
     height, width = grid.shape
-    message = Template()
-    message.put("iI", *stamp)
-    message.string(frame)
-    message.put("iI", *stamp)
-    message.put("f", grid.resolution)
-    message.put("2I", width, height)
-    message.put("7d", *Pose3.planar(grid.origin))
-    message.put("I", grid.cells.size)
-    return bytes(message.buffer) + grid.cells.astype(np.int8).tobytes()
+    head = (
+        Template()
+        .put("iI", *stamp)
+        .string(frame)
+        .put("iI", *stamp)
+        .put("f", grid.resolution)
+        .put("2I", width, height)
+        .put("7d", *Pose3.planar(grid.origin))
+        .put("I", grid.cells.size)
+    )
+    return bytes(head.buffer) + grid.cells.astype(np.int8).tobytes()
 
 
 def pose_array(frame: str, stamp: Stamp, points: Array) -> bytes:
@@ -171,12 +160,8 @@ def pose_array(frame: str, stamp: Stamp, points: Array) -> bytes:
 
     Numbers are rounded to 32 bits, so that they compress well.
     """
-    message = Template()
-    message.put("iI", *stamp)
-    message.string(frame)
-    message.put("I", len(points))
-    message.align(8)
-    return bytes(message.buffer) + planar_poses(points).astype("<f4").astype("<f8").tobytes()
+    head = Template().put("iI", *stamp).string(frame).put("I", len(points)).align(8)
+    return bytes(head.buffer) + planar_poses(points).astype("<f4").astype("<f8").tobytes()
 
 
 Bytes = npt.NDArray[np.uint8]

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from simscen.core.clock import SimTime
 from simscen.core.environment.scenery import Scenery
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.scripted_poses import PosesAtTick, PredictedPoses
@@ -10,6 +11,7 @@ from simscen.core.messages.navigation import Belief
 from simscen.core.records.case import Case
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Decision, Moment, Truth
+from simscen.peer import messages
 from simscen.record import frame_names, topics
 from simscen.record.frame_names import RobotFrames
 from simscen.record.log_header import LogHeader
@@ -24,7 +26,6 @@ from simscen.record.messages.encode_arrays import (
 from simscen.record.publishers.channels import BatchWriter, LogPublisher, MessageSink, NamespacedPublisher
 from simscen.record.publishers.scene import ScenePublisher
 from simscen.record.publishers.sensors import SensorPublisher
-from simscen.record.simtime import SimTime
 from simscen.record.trace_thinning import Thinning, Throttle
 
 
@@ -39,8 +40,8 @@ class EventPublisher:
     def write(self, now: int, event: Event) -> None:
         """Write an event at `now` nanoseconds."""
         stamp, line = self._time.stamp(event.tick), event_text.sentence(event)
-        self._out.publish(topics.EVENTS, now, encode.string(event_text.to_json(event)))
-        self._out.publish(topics.ROSOUT, now, encode.log(stamp, event_text.level(event), "simscen", line))
+        self._out.publish(topics.EVENTS, now, messages.string(event_text.to_json(event)))
+        self._out.publish(topics.ROSOUT, now, messages.log(stamp, event_text.level(event), "simscen", line))
         pose = self._pose(event) if event.kind == EventKind.GOAL_ACCEPTED else None
         if pose is not None:
             self._out.publish(topics.GOAL, now, self._goal(stamp, Pose3.planar(pose)))
@@ -72,7 +73,7 @@ class RobotPublisher:
         if header.map is not None:
             out.publish(topics.MAP, 0, encode_arrays.occupancy_grid(frame_names.MAP, (0, 0), header.map))
         if header.robot_description:
-            out.publish(topics.ROBOT_DESCRIPTION, 0, encode.string(header.robot_description))
+            out.publish(topics.ROBOT_DESCRIPTION, 0, messages.string(header.robot_description))
         self._truth = TruthPublisher(out, time, thinning, frames, clock)
         self._sensors = SensorPublisher(out, time, thinning, header.frames, header.sensors, frames)
         self._stack = StackPublisher(out, time, thinning, frames)
@@ -133,7 +134,7 @@ class StackPublisher:
         if self._thinning.keeps_command(tick, decision.command):
             self._command.write(now, decision.command)
         for line in decision.lines:
-            self._out.publish(topics.ROSOUT, now, encode.log(self._time.stamp(tick), *line))
+            self._out.publish(topics.ROSOUT, now, messages.log(self._time.stamp(tick), *line))
 
     def _write_belief(self, now: int, tick: int, belief: Belief) -> None:
         stamp = self._time.stamp(tick)

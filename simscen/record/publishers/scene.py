@@ -45,8 +45,7 @@ def marker_array(markers: Iterable[Marker]) -> bytes:
     Stamps are zero and frames locked, so that each marker moves with its frame.
     """
     shown = list(markers)
-    message = Template()
-    message.put("I", len(shown) + 1)
+    message = Template().put("I", len(shown) + 1)
     _put(message, Marker("map", "", ARROW, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0, _DELETE_ALL)
     for number, marker in enumerate(shown):
         _put(message, marker, number, _ADD)
@@ -54,30 +53,17 @@ def marker_array(markers: Iterable[Marker]) -> bytes:
 
 
 def _put(message: Template, marker: Marker, number: int, action: int) -> None:
-    message.put("iI", 0, 0)
-    message.string(marker.frame)
-    message.string(marker.group)
-    message.put("3i", number, marker.kind, action)
-    message.put("7d", *marker.pose)
-    message.put("3d", *marker.scale)
-    message.put("4f", *marker.color)
+    message.put("iI", 0, 0).string(marker.frame).string(marker.group).put("3i", number, marker.kind, action)
+    message.put("7d", *marker.pose).put("3d", *marker.scale).put("4f", *marker.color)
     message.put("iI", 0, 0)  # lifetime: forever
-    message.put("B", True)
-    message.put("I", len(marker.points))
+    message.put("B", True).put("I", len(marker.points))
     if len(marker.points):
         message.align(8)
         message.buffer += np.ascontiguousarray(marker.points, dtype="<f8").tobytes()
     message.put("I", 0)  # no colors per point
-    message.string("")  # no texture
-    message.put("iI", 0, 0)
-    for _ in ("frame", "format"):
-        message.string("")
-    message.put("2I", 0, 0)  # no texture image and coordinates
+    message.string("").put("iI", 0, 0).string("").string("").put("2I", 0, 0)  # no texture
     message.string(marker.text)
-    message.string("")  # no mesh
-    message.string("")
-    message.put("I", 0)
-    message.put("B", False)
+    message.string("").string("").put("I", 0).put("B", False)  # no mesh
 
 
 def outline_edges(outlines: Iterable[Sequence[Sequence[float]]], height: float = 0.0) -> Array:

@@ -4,13 +4,13 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from simscen.core.clock import SimTime, Stamp
 from simscen.core.geometry import Pose3
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readings, Scan
 from simscen.record import frame_names, topics
 from simscen.record.messages import encode
 from simscen.record.messages.encode_arrays import LaserScanPacker, TransformsPacker
 from simscen.record.publishers.channels import BatchWriter, MessageSink, TopicWriter
-from simscen.record.simtime import SimTime, Stamp
 from simscen.record.topics import Topic
 from simscen.record.trace_thinning import Thinning
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from simscen.core.clock import NS_PER_SECOND, SimTime
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -23,7 +24,6 @@ from simscen.peer.messages import read
 from simscen.record import frame_names, topics
 from simscen.record.messages import decode
 from simscen.record.messages.decode import MessageReader, StampedPose, decode_checked
-from simscen.record.simtime import NS_PER_SECOND, SimTime
 from simscen.record.trace_builder import to_planar
 from simscen.run.external.protocol import EXACT_SUFFIX, FLOAT64_ARRAY, POSE2D, STACK_TOPICS, ProtocolViolation
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.core.clock import SimTime
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
 from simscen.core.messages.navigation import Estimate
@@ -18,7 +19,6 @@ from simscen.record import frame_names, topics
 from simscen.record.messages import encode, encode_arrays
 from simscen.record.publishers.channels import BatchWriter, Layouts, TopicWriter
 from simscen.record.publishers.sensors import SensorPublisher
-from simscen.record.simtime import SimTime
 from simscen.record.topics import Topic
 from simscen.record.trace_thinning import Thinning
 from simscen.run.external.protocol import EXACT_SUFFIX, FLOAT64_ARRAY, INITIAL_POSE, POSE2D, TopicTable
@@ -50,7 +50,7 @@ class StepPublisher:
 
     def latch_robot(self, description: str, estimate: Estimate) -> None:
         """Publish robot description and initial pose with the first step."""
-        self._latched.append((topics.ROBOT_DESCRIPTION, encode.string(description)))
+        self._latched.append((topics.ROBOT_DESCRIPTION, messages.string(description)))
         if estimate.pose is not None:
             told = encode.pose_with_covariance(frame_names.MAP).packer()
             covariance = np.diag(np.square(estimate.std)).ravel().tolist()

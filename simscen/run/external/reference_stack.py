@@ -14,7 +14,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from simscen.core.clock import Clock
+from simscen.core.clock import NS_PER_SECOND, Clock, SimTime
 from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
@@ -30,7 +30,6 @@ from simscen.peer import Goal, Peer, Step, messages, wire
 from simscen.peer.client import EVENTS, Message
 from simscen.record import topics
 from simscen.record.messages import encode_arrays
-from simscen.record.simtime import NS_PER_SECOND, SimTime
 from simscen.run.external.protocol import EXACT_SUFFIX, KEEPOUT_MASK, SPEED_MASK
 from simscen.stack.build import build_stack
 from simscen.stack.protocols import RobotModel, Stack, Surroundings

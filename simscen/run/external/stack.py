@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path as FilePath
 from typing import Any, TypeVar
 
+from simscen.core.clock import SimTime
 from simscen.core.errors import RunError
 from simscen.core.external_command import ExternalCommand
 from simscen.core.geometry import Pose2
@@ -14,7 +15,6 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Decision
 from simscen.peer import wire
 from simscen.record import topics
-from simscen.record.simtime import SimTime
 from simscen.run.external import protocol
 from simscen.run.external.answer_decoder import Answer, decode_answer, group_by_topic
 from simscen.run.external.goal_tracker import GoalTracker

@@ -1,4 +1,4 @@
-"""Promises, and how they are checked: what the contracts of this kit are made of."""
+"""Base classes of contracts and promises, and helpers for checks."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from simscen.stack.setting import Setting
 from simscen.testing.flatland import RATE, Flatland, setting
 
 DEFAULT_LIMIT_S = 60.0
-"""Seconds of wall time after which a promise counts as broken because its component does not come to an end."""
+"""Wall time in s after which a promise counts as broken because the component does not return."""
 
 T = TypeVar("T")
 
 
 class PromiseBroken(AssertionError):
-    """A component does not keep what its protocol promises; the message says what was seen."""
+    """A component breaks a promise of its protocol; the message describes the observation."""
 
 
 def require(kept: object, seen: str) -> None:
-    """Raise PromiseBroken, with what was seen, unless `kept`."""
+    """Raise PromiseBroken with the observation `seen`, unless `kept` is true."""
     if not kept:
         raise PromiseBroken(seen)
 
 
 @dataclass(frozen=True)
 class Promise:
-    """One promise of one subject: `str(promise)` is a sentence, `check()` raises PromiseBroken where it is not kept."""
+    """Promise of one subject. `str(promise)` is a sentence; `check()` raises PromiseBroken if it is broken."""
 
     role: str
     subject: str
@@ -50,26 +50,26 @@ class Promise:
         return f"{self.subject} {self.name}" if self.subject else self.name
 
     def check(self, limit: float = DEFAULT_LIMIT_S) -> None:
-        """Try it, with global random generators in a state that no other try has."""
+        """Check the promise with a different state of the global random generators for each check."""
         reseed_global_generators()
         with time_limit(limit):
             self.keep()
 
 
 def promise(method: Callable[[T], None]) -> Callable[[T], None]:
-    """Marks a method of a contract as one of its promises; its name is the sentence, its docstring given … then …."""
+    """Mark a method of a contract as a promise. Its name is the sentence, its docstring states given … then …."""
     method.__is_promise__ = True  # type: ignore[attr-defined]
     return method
 
 
 class Contract:
-    """The promises of one role, for one subject. Each is tried on components that are built anew."""
+    """Promises of one role for one subject. Each promise is checked on new components."""
 
     role: ClassVar[str]
     subject: str = ""
 
     def promises(self) -> list[Promise]:
-        """All of them, in the order of the contract."""
+        """Return all promises in the order of the contract."""
         names = [n for kind in reversed(type(self).__mro__) for n, v in vars(kind).items() if _is_promise(v)]
         return [Promise(self.role, self.subject, n.replace("_", " "), getattr(self, n)) for n in dict.fromkeys(names)]
 
@@ -82,7 +82,7 @@ _turn = 0
 
 
 def reseed_global_generators() -> None:
-    """Put the global generators of Python and numpy into a state of their own: who draws from them shows it."""
+    """Seed the global generators of Python and numpy differently in each call, to detect components that use them."""
     global _turn  # noqa: PLW0603
     _turn += 1
     random.seed(_turn)
@@ -91,7 +91,7 @@ def reseed_global_generators() -> None:
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise PromiseBroken in what does not come to an end. Only the main thread can be interrupted."""
+    """Raise PromiseBroken if the block takes too long. Only the main thread can be interrupted."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -111,24 +111,24 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class ComponentContract(Contract):
-    """The promises of a component that is built as `Class(spec, setting)`, tried with this robot."""
+    """Contract of a component that is built as `Class(spec, setting)`, for one robot."""
 
     spec: Any
     robot: RobotModel
     subject: str = ""
 
     def setting(self) -> Setting:
-        """Where it is installed; each has a fresh random generator."""
+        """Return the setting of a component with a new random generator."""
         return setting(self.robot, name=self.role)
 
-    def built(self) -> Any:
-        """A new one."""
+    def build(self) -> Any:
+        """Build a new component."""
         spec: Component = self.spec
         return call_component("is built", lambda: spec.implementation()(spec, self.setting()))
 
 
 def call_component(when: str, call: Callable[..., T], *given: Any, **named: Any) -> T:
-    """What a call answers. Raises PromiseBroken for every exception but a NavigationFailure with a code of Nav2's."""
+    """Return the result of a call. Raises PromiseBroken for exceptions but NavigationFailure with an ErrorCode."""
     try:
         return call(*given, **named)
     except NavigationFailure as failure:
@@ -136,28 +136,28 @@ def call_component(when: str, call: Callable[..., T], *given: Any, **named: Any)
         raise
     except PromiseBroken:
         raise
-    except Exception as error:  # whatever a stranger's component raises
+    except Exception as error:  # plug-ins can raise anything
         what = f"raises {type(error).__name__} when it {when}, not a NavigationFailure: {error}"
         raise PromiseBroken(what) from error
 
 
 def view_of(world: Flatland, robot: RobotModel, bounds: tuple[float, float, float, float]) -> CostmapView:
-    """A costmap of all that is in the world, in cells of 5 cm."""
+    """Return a costmap of the world with cells of 5 cm."""
     return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid(bounds), RATE)).view
 
 
 def copy_costmap(view: CostmapView) -> CostmapView:
-    """The same costmap in arrays of its own."""
+    """Return a copy of a costmap."""
     return replace(view, costs=view.costs.copy(), distance=view.distance.copy())
 
 
 def equal_costmaps(one: CostmapView, other: CostmapView) -> bool:
-    """Whether two costmaps say the same."""
+    """Return whether two costmaps are equal."""
     return np.array_equal(one.costs, other.costs) and np.array_equal(one.distance, other.distance)
 
 
 def overwrite_costmap(view: CostmapView) -> None:
-    """What becomes of a costmap that somebody has kept: everything is lethal."""
+    """Make all cells of a costmap lethal, to detect components that keep it."""
     view.costs.setflags(write=True)
     view.distance.setflags(write=True)
     view.costs[:], view.distance[:] = 254, 0.0

@@ -1,4 +1,4 @@
-"""The promises of a controller."""
+"""Contracts of controllers and goal checkers."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.stack.footprint import Footprint
 from simscen.stack.path_geometry import poses_along
-from simscen.stack.protocols import Controller, CostmapView, NavigationFailure
+from simscen.stack.protocols import Controller, CostmapView, GoalChecker, NavigationFailure, RobotModel
 from simscen.testing.contracts.base import (
     ComponentContract,
     call_component,
@@ -29,40 +29,31 @@ GOAL = Goal("g", Pose2(7.0, 3.0, 1.0))
 STRAIGHT = np.column_stack((np.arange(1.0, 7.01, 0.05), np.full(121, 3.0), np.zeros(121)))
 SLACK = 1e-6
 NEAR, REST = 0.25, 3.0
-"""Meters and radians off the goal at most, and seconds for which it must stay there."""
+"""Maximum error in m and rad at the goal, and time in s for which the robot must stay there."""
 
 
 class ControllerContract(ComponentContract):
-    """Tried on a straight path of 6 m through a room of 9 m by 6 m."""
+    """Contract of a controller, on a straight path of 6 m through a room of 9 m by 6 m."""
 
     role = "controller"
 
     def view(self, *discs: tuple[float, float, float]) -> CostmapView:
-        """The costmap of the room with discs (x, y, radius) in it."""
+        """Return the costmap of the room with discs (x, y, radius)."""
         return view_of(Flatland(discs=list(discs)).room(9, 6), self.robot, (-0.5, -0.5, 9.5, 6.5))
 
-    def following(self) -> Controller:
-        """A new one that has been given the path."""
-        controller: Controller = self.built()
+    def controller_on_path(self) -> Controller:
+        """Build a controller that follows the path."""
+        controller: Controller = self.build()
         call_component("is given a path", lambda: controller.set_path(Path(STRAIGHT.copy())))
         return controller
 
     def command(self, controller: Controller, pose: Pose2, twist: Twist, view: CostmapView) -> Twist:
-        """Its command, looked at for type, finiteness and limits."""
+        """Return the command, checked for type, finiteness and limits."""
         command = call_component("is asked for a command", lambda: controller.command(pose, twist, view, GOAL))
-        require(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
-        require(all(map(math.isfinite, command)), f"commands {tuple(command)}")
-        robot = self.robot
-        within = -robot.max_reverse - SLACK <= command.vx <= robot.max_linear + SLACK
-        within = (
-            within and abs(command.vy) <= robot.max_lateral + SLACK and abs(command.wz) <= robot.max_angular + SLACK
-        )
-        require(within, f"commands {tuple(command)}, more than the base can do: {robot.max_linear:g} m/s ahead, "
-               f"{robot.max_reverse:g} back, {robot.max_lateral:g} sideways, {robot.max_angular:g} rad/s")  # fmt: skip
-        return command
+        return checked_command(command, self.robot)
 
     def drive(self, controller: Controller, view: CostmapView, pose: Pose2, seconds: float) -> list[Pose2]:
-        """The track of a base that does at once what it is told, until it has been at the goal for REST seconds."""
+        """Return the track of an ideal base until it has been at the goal for REST seconds."""
         track, twist, there = [pose], Twist(), 0
         for _ in range(round(seconds / PERIOD)):
             twist = self.command(controller, track[-1], twist, view)
@@ -74,8 +65,8 @@ class ControllerContract(ComponentContract):
 
     @promise
     def it_follows_the_path_to_its_end_and_turns_to_the_goals_heading(self) -> None:
-        """Given a free path then the robot gets to its end beside it by no more than 0.3 m, and to the heading."""
-        track = self.drive(self.following(), self.view(), Pose2(1.0, 3.1, 0.0), 40)
+        """Given a free path then the robot reaches its end and heading, and deviates from it by at most 0.3 m."""
+        track = self.drive(self.controller_on_path(), self.view(), Pose2(1.0, 3.1, 0.0), 40)
         off, turn = track[-1].distance(GOAL.pose), abs(track[-1].yaw - GOAL.pose.yaw)
         require(off < NEAR, f"ends {off:.2f} m from the end of the path after 40 s")
         require(turn < NEAR, f"ends {turn:.2f} rad from the goal's heading after 40 s")
@@ -89,12 +80,12 @@ class ControllerContract(ComponentContract):
         for _ in range(30):
             pose = Pose2(*rng.uniform((1, 2, -3), (6, 4, 3)).tolist())
             twist = Twist(float(rng.uniform(0, self.robot.max_linear)), 0.0, float(rng.uniform(-1, 1)))
-            self.command(self.following(), pose, twist, view)
+            self.command(self.controller_on_path(), pose, twist, view)
 
     @promise
     def a_speed_limit_is_kept_and_lifted(self) -> None:
         """Given a limit of 0.15 m/s then no command is faster; given None then it drives at its full speed again."""
-        controller, view = self.following(), self.view()
+        controller, view = self.controller_on_path(), self.view()
         require(
             math.isfinite(controller.full_speed) and controller.full_speed > 0, f"full speed {controller.full_speed!r}"
         )
@@ -107,12 +98,12 @@ class ControllerContract(ComponentContract):
         require(fast > min(0.2, 0.9 * controller.full_speed), f"drives at no more than {fast:.3f} m/s without a limit")
 
     @promise
-    def what_it_is_about_to_drive_is_free_or_it_fails_with_no_valid_control(self) -> None:
-        """Given an obstacle close ahead then half a second of its command is free, or NO_VALID_CONTROL."""
+    def a_command_is_collision_free_or_it_fails_with_no_valid_control(self) -> None:
+        """Given an obstacle close ahead then the command is collision-free for 0.5 s, or NO_VALID_CONTROL is raised."""
         front = max(x for x, _ in self.robot.footprint)
         footprint, pose = Footprint(self.robot, 0.05), Pose2(2.0, 3.0, 0.0)
         for gap in (0.02, 0.1, 0.3, 0.6):
-            view, controller = self.view((2.0 + front + gap + 0.5, 3.0, 0.5)), self.following()
+            view, controller = self.view((2.0 + front + gap + 0.5, 3.0, 0.5)), self.controller_on_path()
             try:
                 for _ in range(5):
                     command = self.command(controller, pose, Twist(), view)
@@ -126,7 +117,7 @@ class ControllerContract(ComponentContract):
     def it_never_drives_into_a_wall_across_its_path(self) -> None:
         """Given a wall across the path then the robot never touches it."""
         view = self.view(*((4.0, float(y), 0.3) for y in np.arange(0.0, 6.1, 0.3)))
-        controller, pose, twist = self.following(), Pose2(1.0, 3.0, 0.0), Twist()
+        controller, pose, twist = self.controller_on_path(), Pose2(1.0, 3.0, 0.0), Twist()
         footprint = Footprint(self.robot, 0.05)
         for _ in range(200):
             try:
@@ -139,15 +130,15 @@ class ControllerContract(ComponentContract):
 
     @promise
     def the_same_calls_give_the_same_commands_bit_for_bit(self) -> None:
-        """Given the same calls with the same generator then bit-identical commands: no clock, no global chance."""
+        """Given the same calls with the same generator then bit-identical commands."""
         view = self.view((4.0, 3.4, 0.15))
-        one, other = (self.drive(self.following(), view, Pose2(1, 3.15, 0.3), 2.0) for _ in range(2))
+        one, other = (self.drive(self.controller_on_path(), view, Pose2(1, 3.15, 0.3), 2.0) for _ in range(2))
         require(one == other, "two drives with the same generator differ")
 
     @promise
     def an_empty_path_is_an_invalid_path(self) -> None:
         """Given a path without points then fails with INVALID_PATH."""
-        controller = self.built()
+        controller = self.build()
         try:
             call_component("is given an empty path", lambda: controller.set_path(Path()))
         except NavigationFailure as failure:
@@ -158,8 +149,8 @@ class ControllerContract(ComponentContract):
     @promise
     def path_and_costmap_are_neither_changed_nor_kept(self) -> None:
         """Given a path and a costmap then they are not changed, and an old costmap changes no later command."""
-        view, controller, path = self.view(), self.built(), Path(STRAIGHT.copy())
-        other, pose = self.following(), Pose2(1, 3)
+        view, controller, path = self.view(), self.build(), Path(STRAIGHT.copy())
+        other, pose = self.controller_on_path(), Pose2(1, 3)
         controller.set_path(path)
         old, untouched = copy_costmap(view), copy_costmap(view)
         self.command(controller, pose, Twist(), old)
@@ -172,8 +163,8 @@ class ControllerContract(ComponentContract):
 
     @promise
     def its_local_plan_is_a_path_or_none(self) -> None:
-        """Given a command then what it expects to drive is a path of finite poses, or None."""
-        controller = self.following()
+        """Given a command then the local plan is a path of finite poses, or None."""
+        controller = self.controller_on_path()
         self.command(controller, Pose2(1, 3), Twist(), self.view())
         plan = call_component("is asked for its local plan", lambda: controller.local_plan)
         fine = plan is None or (
@@ -182,16 +173,99 @@ class ControllerContract(ComponentContract):
         require(fine, "the local plan is no path of finite poses (n, 3)")
 
 
+def checked_command(command: Twist, robot: RobotModel) -> Twist:
+    """Return a command, checked for type, finiteness and the limits of the robot."""
+    require(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
+    require(all(map(math.isfinite, command)), f"commands {tuple(command)}")
+    within = -robot.max_reverse - SLACK <= command.vx <= robot.max_linear + SLACK
+    within = within and abs(command.vy) <= robot.max_lateral + SLACK and abs(command.wz) <= robot.max_angular + SLACK
+    require(within, f"commands {tuple(command)}, more than the base can do: {robot.max_linear:g} m/s ahead, "
+           f"{robot.max_reverse:g} back, {robot.max_lateral:g} sideways, {robot.max_angular:g} rad/s")  # fmt: skip
+    return command
+
+
 def at_goal(pose: Pose2) -> bool:
-    """Whether the base is where it is to end."""
+    """Return whether the base is at the goal."""
     return pose.distance(GOAL.pose) < NEAR and abs(pose.yaw - GOAL.pose.yaw) < NEAR
 
 
 def moved(pose: Pose2, twist: Twist) -> Pose2:
-    """Where a base is after one period at this velocity."""
+    """Return the pose after one period at this velocity."""
     return Pose2(*poses_along(pose, twist, np.array([PERIOD]))[0].tolist())
 
 
 def no_valid_control(failure: NavigationFailure) -> None:
-    """The one failure that a blocked controller has."""
+    """Require the error code NO_VALID_CONTROL."""
     require(failure.code == ErrorCode.NO_VALID_CONTROL, f"fails with {failure.code.name}, not with NO_VALID_CONTROL")
+
+
+REACHED_GOAL = Goal("g", Pose2(2.0, -1.0, 0.5), xy_tolerance=0.25, yaw_tolerance=0.25)
+CALL_COUNT = 40
+"""Number of calls in 2 s at 20 Hz."""
+MOTIONS = (STOP, Twist(0.3), Twist(0.0, 0.0, 0.8), Twist(-0.2, 0.0, -0.4))
+
+
+class GoalCheckerContract(ComponentContract):
+    """Contract of a goal checker, with poses at the goal, outside its tolerances, and far away."""
+
+    role = "goal_checker"
+
+    def answers_at(self, checker: GoalChecker, pose: Pose2, twist: Twist = STOP) -> list[bool]:
+        """Return the answers of the checker during 2 s."""
+        call_component("is reset", checker.reset)
+        said = [
+            call_component("is asked", lambda: checker.reached(REACHED_GOAL, pose, twist)) for _ in range(CALL_COUNT)
+        ]
+        require(all(each in (True, False) for each in said), f"answers {said[0]!r}")
+        return said
+
+    @promise
+    def a_robot_that_stands_on_the_goal_has_reached_it_within_two_seconds(self) -> None:
+        """Given a robot that stands at the goal then the goal is reached within two seconds."""
+        require(
+            self.answers_at(self.build(), REACHED_GOAL.pose)[-1],
+            "does not say that a robot that stands on the goal is there",
+        )
+
+    @promise
+    def outside_the_tolerances_no_goal_is_reached(self) -> None:
+        """Given a robot outside a tolerance of the goal, standing or moving, then the goal is not reached."""
+        x, y, yaw = REACHED_GOAL.pose
+        for pose in (
+            Pose2(x + 0.26, y, yaw),
+            Pose2(x, y - 0.5, yaw),
+            Pose2(x, y, yaw + 0.26),
+            Pose2(x, y, yaw + math.pi),
+        ):
+            for twist in MOTIONS:
+                said = self.answers_at(self.build(), pose, twist)
+                require(
+                    not any(said),
+                    f"says that a robot at {tuple(pose)} has reached {tuple(REACHED_GOAL.pose)} ± 0.25 m, rad",
+                )
+
+    @promise
+    def a_heading_is_compared_around_the_circle(self) -> None:
+        """Given a heading that differs by a whole turn then it is the same heading."""
+        turned = Pose2(REACHED_GOAL.pose.x, REACHED_GOAL.pose.y, REACHED_GOAL.pose.yaw - 2 * math.pi)
+        require(self.answers_at(self.build(), turned)[-1], "takes a heading for another one after a whole turn")
+
+    @promise
+    def a_reset_forgets_the_goal_before(self) -> None:
+        """Given a reached goal and a reset then the next goal is not reached."""
+        checker, away = self.build(), Pose2(REACHED_GOAL.pose.x + 1.0, REACHED_GOAL.pose.y, REACHED_GOAL.pose.yaw)
+        self.answers_at(checker, REACHED_GOAL.pose)
+        require(not any(self.answers_at(checker, away)), "says that a goal is reached because the one before was")
+
+    @promise
+    def a_pose_that_is_no_number_reaches_nothing(self) -> None:
+        """Given a pose of nan then the goal is not reached."""
+        for pose in (Pose2(math.nan, math.nan, math.nan), Pose2(REACHED_GOAL.pose.x, REACHED_GOAL.pose.y, math.nan)):
+            require(not any(self.answers_at(self.build(), pose)), f"says that a robot at {tuple(pose)} is there")
+
+    @promise
+    def the_same_calls_give_the_same_answers(self) -> None:
+        """Given the same calls then the same answers, independent of clocks and global random generators."""
+        near = Pose2(REACHED_GOAL.pose.x + 0.15, REACHED_GOAL.pose.y, REACHED_GOAL.pose.yaw + 0.15)
+        answers = [[self.answers_at(self.build(), near, twist) for twist in MOTIONS] for _ in range(2)]
+        require(answers[0] == answers[1], "two checkers that are asked the same answer differently")

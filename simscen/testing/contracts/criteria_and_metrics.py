@@ -1,4 +1,4 @@
-"""The promises of a criterion."""
+"""Contracts of criteria, metrics, actions and triggers."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from simscen.core.geometry import Pose2
 from simscen.core.records.case import Case
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Evidence, Finding, Status
+from simscen.core.stage import Effect
 from simscen.criteria.base import Criterion
 from simscen.testing.contracts.base import Contract, call_component, promise, require
+from simscen.testing.fakes import FakeStage
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 CASE: dict[str, Any] = {"goals": [{"name": "shelf", "pose": [2.5, 0.5, 0]}], "shortest": {"shelf": 2.5}}
@@ -39,14 +42,14 @@ TRACES = {
 
 @dataclass(frozen=True, eq=False)
 class CriterionContract(Contract):
-    """Tried on the trace of a drive, of a robot that stands, and of a log that was cut off."""
+    """Contract of a criterion, on the traces of a drive, of a standing robot, and of a truncated log."""
 
     role = "criterion"
     spec: Any
     subject: str = ""
 
     def findings(self, trace: Trace, case: Case, what: str) -> list[Finding]:
-        """What it finds, looked at for type."""
+        """Return the findings, checked for their type."""
         criterion: Criterion = self.spec
         found = call_component(f"judges {what}", criterion.judge, trace, case)
         require(isinstance(found, list) and all(isinstance(f, Finding) for f in found), f"finds {found!r} in {what}")
@@ -54,7 +57,7 @@ class CriterionContract(Contract):
 
     @promise
     def every_bound_yields_a_finding(self) -> None:
-        """Given any trace then there is at least one finding: a criterion without findings has checked nothing."""
+        """Given any trace then there is at least one finding."""
         for what, words in TRACES.items():
             found = self.findings(synthetic_trace(words), synthetic_case(CASE), what)
             require(found, f"finds nothing in {what}, so it checks nothing")
@@ -64,7 +67,7 @@ class CriterionContract(Contract):
 
     @promise
     def a_margin_has_the_sign_of_the_status(self) -> None:
-        """Given a finding with a margin then it passes exactly where the margin is not negative, and is a number."""
+        """Given a finding with a margin then the margin is a number, and not negative if and only if it passes."""
         for what, words in TRACES.items():
             for finding in self.findings(synthetic_trace(words), synthetic_case(CASE), what):
                 if finding.margin is None or finding.status not in (Status.PASS, Status.FAIL):
@@ -75,7 +78,7 @@ class CriterionContract(Contract):
 
     @promise
     def the_same_trace_gives_the_same_findings(self) -> None:
-        """Given the same trace and case then the same findings: no clock, no chance, nothing remembered."""
+        """Given the same trace and case then the same findings, independent of clocks and earlier calls."""
         first = self.findings(synthetic_trace(DRIVE), synthetic_case(CASE), "a drive")
         self.findings(synthetic_trace(STATIONARY), synthetic_case(CASE), "a robot that stands")
         require(
@@ -85,7 +88,7 @@ class CriterionContract(Contract):
 
     @promise
     def a_trace_is_not_changed(self) -> None:
-        """Given a trace then it is not changed: other criteria judge it, too."""
+        """Given a trace then it is not changed, because other criteria use it."""
         trace, case = synthetic_trace(DRIVE), synthetic_case(CASE)
         before = copy.deepcopy((trace, case))
         self.findings(trace, case, "a drive")
@@ -103,22 +106,22 @@ class CriterionContract(Contract):
 
 @dataclass(frozen=True, eq=False)
 class MetricContract(Contract):
-    """Tried on the trace of a drive, of a robot that stands, and of a log that was cut off."""
+    """Contract of a metric, on the traces of a drive, of a standing robot, and of a truncated log."""
 
     role = "metric"
     spec: Any
     subject: str = ""
 
     def measured(self, words: dict[str, Any], what: str) -> float | str:
-        """What it measures."""
+        """Return the value of the metric."""
         value: float | str = call_component(
             f"measures {what}", self.spec.measure, synthetic_trace(words), synthetic_case(CASE)
         )
         return value
 
     @promise
-    def it_is_a_number_or_says_why_there_is_none(self) -> None:
-        """Given any trace then a finite number, or a text that says why there is none."""
+    def it_returns_a_finite_number_or_a_reason(self) -> None:
+        """Given any trace then the value is a finite number, or a text with the reason why there is none."""
         for what, words in TRACES.items():
             value = self.measured(words, what)
             if isinstance(value, str):
@@ -129,23 +132,94 @@ class MetricContract(Contract):
 
     @promise
     def the_same_trace_gives_the_same_number(self) -> None:
-        """Given the same trace and case then the same number: no clock, no chance, nothing remembered."""
+        """Given the same trace and case then the same number, independent of clocks and earlier calls."""
         first = self.measured(DRIVE, "a drive")
         self.measured(STATIONARY, "a robot that stands")
         require(self.measured(DRIVE, "a drive") == first, "the same drive is measured otherwise")
 
     @promise
     def a_trace_is_not_changed(self) -> None:
-        """Given a trace then it is not changed: criteria judge it, too."""
+        """Given a trace then it is not changed, because criteria use it."""
         trace, case = synthetic_trace(DRIVE), synthetic_case(CASE)
         before = copy.deepcopy((trace, case))
         call_component("measures a drive", self.spec.measure, trace, case)
         require(repr((trace, case)) == repr(before), "the trace is not what it was")
 
     @promise
-    def it_says_in_what_unit_and_of_what(self) -> None:
-        """Given a metric then its unit is a text, and its evidence None or a set of what a log may hold."""
+    def it_has_a_unit_and_valid_evidence(self) -> None:
+        """Given a metric then its unit is a text, and its evidence is None or a set of Evidence."""
         require(isinstance(self.spec.unit, str), f"has the unit {self.spec.unit!r}")
         evidence = call_component("is asked for its evidence", getattr, self.spec, "evidence")
         fine = evidence is None or all(isinstance(each, Evidence) for each in evidence)
         require(fine, f"needs {evidence!r}, which is no evidence")
+
+
+@dataclass(frozen=True, eq=False)
+class ActionContract(Contract):
+    """Contract of an action, on a stage that records calls."""
+
+    role = "action"
+    spec: Any
+    subject: str = ""
+
+    def performed(self) -> tuple[Effect, list[Any]]:
+        """Return the effect and the recorded calls."""
+        stage = FakeStage()
+        effect = call_component("is performed", self.spec.perform, stage)
+        return effect, stage.done
+
+    @promise
+    def it_returns_an_effect(self) -> None:
+        """Given a stage then the action returns an Effect with a description, and happened only if it did something."""
+        effect, done = self.performed()
+        require(isinstance(effect, Effect), f"answers {effect!r}, not an Effect")
+        require(isinstance(effect.happened, bool), f"happened is {effect.happened!r}")
+        require(isinstance(effect.what, str) and effect.what, "does not say what came of it")
+        require(done or not effect.happened, f"says that something happened ({effect.what}) and did nothing")
+
+    @promise
+    def the_same_stage_gives_the_same_calls(self) -> None:
+        """Given the same stage then the action makes the same calls, independent of clocks and earlier calls."""
+        require(self.performed() == self.performed(), "does something else the second time")
+
+
+MOMENTS = (
+    {"tick": 0},
+    {"tick": 240, "robot": Pose2(1.0, 0.0, 0.0), "travelled": 1.0},
+    {"tick": 2400, "robot": Pose2(5.0, -3.0, 2.0), "travelled": 12.0},
+    {"tick": 240_000, "robot": Pose2(0.1, 0.1, -1.0), "travelled": 500.0},
+)
+
+
+@dataclass(frozen=True, eq=False)
+class TriggerContract(Contract):
+    """Contract of a trigger, at four moments of a run in different orders."""
+
+    role = "trigger"
+    spec: Any
+    subject: str = ""
+
+    def answers(self, order: list[int]) -> dict[int, bool]:
+        """Return the answer for each moment."""
+        said = {k: call_component("is asked", self.spec.holds, FakeStage(**MOMENTS[k])) for k in order}
+        for answer in said.values():
+            require(answer is True or answer is False, f"answers {answer!r}")
+        return said
+
+    @promise
+    def it_returns_true_or_false_at_every_moment(self) -> None:
+        """Given any situation, also without belief, goal, plan or objects, then the answer is True or False."""
+        self.answers([0, 1, 2, 3])
+
+    @promise
+    def the_same_situation_gives_the_same_answer(self) -> None:
+        """Given the same situation then the same answer, independent of earlier calls and random numbers."""
+        forth, back, again = self.answers([0, 1, 2, 3]), self.answers([3, 2, 1, 0]), self.answers([1, 3, 0, 2])
+        require(forth == back == again, "answers depend on what was asked before")
+
+    @promise
+    def it_changes_nothing(self) -> None:
+        """Given a situation then the trigger changes nothing."""
+        stage = FakeStage(**MOMENTS[1])  # type: ignore[arg-type]
+        call_component("is asked", self.spec.holds, stage)
+        require(not stage.done, f"does something: {stage.done}")

@@ -1,4 +1,4 @@
-"""The promises of a localizer."""
+"""Contract of localizers."""
 
 from __future__ import annotations
 
@@ -21,32 +21,32 @@ SILENT = Noise(lidar=0, translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)
 
 @cache
 def short() -> Drive:
-    """Six seconds of a drive through the room."""
+    """Return six seconds of a drive through the room."""
     return drive(6.0)
 
 
 def here() -> Estimate:
-    """Where that drive begins."""
+    """Return the start of that drive as an estimate."""
     return Estimate(Pose2(*short().truth[0]), (0.1, 0.1, 0.05))
 
 
 @dataclass(frozen=True, eq=False)
 class LocalizerContract(Contract):
-    """Tried in a room of 10 m by 8 m with a lidar of 360 beams at 10 Hz and odometry at 40 Hz."""
+    """Contract of a localizer, in a room of 10 m by 8 m with a lidar of 360 beams at 10 Hz and odometry at 40 Hz."""
 
     role = "localizer"
     spec: Any
     subject: str = ""
 
     def told(self, estimate: Estimate) -> Localizer:
-        """A new one that starts from this estimate."""
+        """Build a localizer that starts from this estimate."""
         subject = call_component("is built", lambda: localizer(self.spec, estimate, 1))
         call_component("is reset", lambda: subject.reset(estimate))
         return subject
 
     @promise
     def the_same_calls_give_the_same_beliefs_bit_for_bit(self) -> None:
-        """Given the same readings with the same generator then bit-identical beliefs: no clock, no global chance."""
+        """Given the same readings with the same generator then bit-identical beliefs."""
         for pose in (here().pose, None):
             first, again = (
                 call_component("localizes", run, self.told(Estimate(pose)), short(), 4, imu=True) for _ in range(2)
@@ -57,7 +57,7 @@ class LocalizerContract(Contract):
                 require(np.array_equal(one.particles, other.particles), "two runs differ in particles")
 
     @promise
-    def without_motion_and_with_perfect_readings_the_belief_does_not_wander_off(self) -> None:
+    def without_motion_the_belief_does_not_drift(self) -> None:
         """Given no motion and perfect readings then the belief stays within 5 cm and 0.03 rad."""
         still = record(np.tile(short().truth[:1], (400, 1)))
         start = Estimate(here().pose, (0.02, 0.02, 0.01))
@@ -69,10 +69,10 @@ class LocalizerContract(Contract):
 
     @promise
     def a_belief_does_not_change_after_it_was_given(self) -> None:
-        """Given a belief then nothing that comes later changes its arrays."""
+        """Given a belief then later readings do not change its arrays."""
         subject = self.told(here())
         step(subject, 0, Pose2(0, 0, 0))
-        belief = sane(subject)
+        belief = valid_belief(subject)
         covariance, particles = belief.covariance.copy(), belief.particles.copy()
         for k in range(1, 20):
             step(subject, k, Pose2(0.3 * k, 0, 0.1 * k))
@@ -82,7 +82,7 @@ class LocalizerContract(Contract):
 
     @promise
     def a_scan_is_neither_changed_nor_kept_to_be_changed_later(self) -> None:
-        """Given a scan then its ranges are not changed, and what becomes of them later changes no belief."""
+        """Given a scan then its ranges are not changed, and later changes of them do not affect the belief."""
         subject, ranges = self.told(here()), short().ranges[0].copy()
         call_component("takes a scan", lambda: subject.on_scan(scan(ranges, 24)))
         require(np.array_equal(ranges, short().ranges[0]), "the ranges of a scan are not what they were")
@@ -94,18 +94,18 @@ class LocalizerContract(Contract):
         require(subject.belief.pose == other.belief.pose, "a scan that was changed later shows in the belief")
 
     @promise
-    def a_lidar_that_is_blind_or_lies_never_makes_the_belief_insane(self) -> None:
+    def invalid_ranges_never_make_the_belief_invalid(self) -> None:
         """Given ranges that are nan, infinite, negative or huge then the belief stays finite and semidefinite."""
         for start in (here(), Estimate(None)):
             subject = self.told(start)
             for k in range(30):
                 step(subject, k, Pose2(0.3 * k, 0.01 * k, 0.3 * k))
                 call_component("takes a scan", subject.on_scan, scan(_lies(k % 14), 24 * k))
-                sane(subject)
+                valid_belief(subject)
 
     @promise
-    def odometry_and_gyroscope_that_lie_never_make_the_belief_insane(self) -> None:
-        """Given odometry and turn rates that are nan, infinite or huge then the belief stays sane."""
+    def invalid_odometry_never_makes_the_belief_invalid(self) -> None:
+        """Given odometry and turn rates that are nan, infinite or huge then the belief stays valid."""
         subject, rng = self.told(here()), np.random.default_rng(5)
         for k in range(40):
             x, y, yaw = rng.choice([0.0, np.nan, np.inf, -np.inf, 1e300, -9e5, 4.0, 1e-300], 3).tolist()
@@ -114,10 +114,10 @@ class LocalizerContract(Contract):
             call_component("takes a turn rate", subject.on_imu, imu)
             step(subject, k, Pose2(x, y, yaw))
             call_component("takes a scan", subject.on_scan, scan(short().ranges[k % 20], 24 * k))
-            sane(subject)
+            valid_belief(subject)
 
     @promise
-    def scans_of_any_size_range_and_place_are_taken(self) -> None:
+    def scans_of_any_size_range_and_mount_are_accepted(self) -> None:
         """Given a scan of 0 to 4096 beams, of any range and mount, then the belief stays finite and semidefinite."""
         subject = self.told(here())
         for k, size in enumerate((0, 1, 2, 3, 59, 60, 61, 4096)):
@@ -125,23 +125,23 @@ class LocalizerContract(Contract):
             limits = {"range_max": [12.0, 0.0, np.nan, 1e6][k % 4], "mount": Pose2(0.3, -2.0, 5.0)}
             taken = scan(np.full(size, 2.0), 24 * k, **limits)
             call_component("takes a scan", subject.on_scan, taken)
-            sane(subject)
+            valid_belief(subject)
 
     @promise
     def a_reset_forgets_everything(self) -> None:
-        """Given a reset then the belief is the estimate's, within three standard deviations, wherever it was before."""
+        """Given a reset then the belief is within three standard deviations of the estimate."""
         used = self.told(Estimate(Pose2(3, 3, 3)))
         drive_ = short()
         begun = Drive(drive_.truth[:80], drive_.steps[:80], drive_.ranges[:20])
         call_component("localizes", lambda: run(used, begun, 1, imu=True))
         call_component("is reset", lambda: used.reset(here()))
-        near(sane(used), "after a reset")
+        near(valid_belief(used), "after a reset")
         step(used, 0, Pose2(-8, 4, 2))
-        near(sane(used), "after a reset and the first odometry")
+        near(valid_belief(used), "after a reset and the first odometry")
 
 
 def near(belief: Belief, when: str) -> None:
-    """Whether a belief is that of `here`."""
+    """Require that a belief is near `here`."""
     start = here()
     assert start.pose is not None
     x, y, yaw = np.abs(tuple(start.pose.between(belief.pose))).tolist()
@@ -150,12 +150,12 @@ def near(belief: Belief, when: str) -> None:
 
 
 def step(subject: Localizer, number: int, pose: Pose2) -> None:
-    """Odometry at 10 Hz."""
+    """Pass an odometry reading at 10 Hz."""
     call_component("takes odometry", lambda: subject.on_odometry(Odometry("odom", 24 * number, pose, Twist())))
 
 
-def sane(subject: Localizer) -> Belief:
-    """Its belief: finite, symmetric, positive semidefinite, with weights that add up to one."""
+def valid_belief(subject: Localizer) -> Belief:
+    """Return the belief, checked to be finite, with a positive semidefinite covariance and normalized weights."""
     belief: Belief = call_component("is asked for its belief", lambda: subject.belief)
     require(isinstance(belief, Belief), f"believes {type(belief).__name__}, not a Belief")
     covariance, particles = belief.covariance, belief.particles
@@ -178,7 +178,7 @@ def sane(subject: Localizer) -> Belief:
 
 
 def _lies(seed: int) -> Array:
-    """Ranges that no lidar should give, of a different kind for each seed."""
+    """Return invalid ranges of a different kind for each seed."""
     rng = np.random.default_rng(seed)
     kinds = [np.nan, np.inf, -np.inf, 0.0, -5.0, 1e300, 12.0, 0.05, 3.0]
     wild = rng.choice([np.nan, np.inf, -1.0, 1e9, 2.0, 0.3], BEAMS)

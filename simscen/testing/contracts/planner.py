@@ -1,4 +1,4 @@
-"""The promises of a planner."""
+"""Contract of planners."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ IMPOSSIBLE = (
     (START, Pose2(8.05, 5), ErrorCode.GOAL_OCCUPIED),
     (START, Pose2(15, 3.5), ErrorCode.NO_VALID_PATH),
 )
-"""A start or a goal off the map or in a wall, and a goal in a room without a door."""
+"""Start or goal outside the map or in a wall, and a goal in a room without a door."""
 
 
 @cache
 def house() -> Flatland:
-    """Two walls with gaps, a cupboard, and a room without a door."""
+    """Return a house: two walls with gaps, a cupboard, and a room without a door."""
     room = Flatland().room(12, 7)
     room.boxes += [(4.0, 0.0, 4.1, 4.5), (8.0, 2.5, 8.1, 7.0), (14.0, 1.0, 16.0, 1.1), (14.0, 1.0, 14.1, 6.0)]
     room.boxes += [(14.0, 5.9, 16.0, 6.0), (15.9, 1.0, 16.0, 6.0), (1.0, 5.0, 2.5, 6.0)]
@@ -49,18 +49,18 @@ def _house_for(robot: RobotModel) -> CostmapView:
 
 
 class PlannerContract(ComponentContract):
-    """Tried in a house of 12 m by 7 m with a goal two rooms away."""
+    """Contract of a planner, in a house of 12 m by 7 m with a goal two rooms away."""
 
     role = "planner"
 
     def view(self) -> CostmapView:
-        """The costmap of the house, in arrays of its own."""
+        """Return a copy of the costmap of the house."""
         return copy_costmap(_house_for(self.robot))
 
     def planned(
         self, planner: Planner, view: CostmapView, seed: int, ends: tuple[Pose2, Pose2] = (START, GOAL)
     ) -> Array:
-        """The points of a plan, looked at for shape and finiteness."""
+        """Return the points of a plan, checked for shape and finiteness."""
         path = call_component("plans", lambda: planner.plan(view, *ends, seed))
         require(isinstance(path, Path), f"returns {type(path).__name__}, not a Path")
         points = path.points
@@ -73,7 +73,7 @@ class PlannerContract(ComponentContract):
     def success_begins_at_the_start_and_ends_near_the_goal(self) -> None:
         """Given success then the path begins at the start and ends within the tolerance of the goal."""
         for seed in (1, 2, 3):
-            points = self.planned(self.built(), self.view(), seed)
+            points = self.planned(self.build(), self.view(), seed)
             off = float(np.hypot(*(points[0, :2] - START[:2])))
             require(off < 1e-9, f"the path begins {off:.3f} m from the start")
             off = float(np.hypot(*(points[-1, :2] - GOAL[:2])))
@@ -85,7 +85,7 @@ class PlannerContract(ComponentContract):
     @promise
     def points_are_at_most_a_tenth_of_a_meter_apart(self) -> None:
         """Given success then no two points that follow each other are further apart than 0.1 m."""
-        widest = float(np.hypot(*np.diff(self.planned(self.built(), self.view(), 1)[:, :2], axis=0).T).max())
+        widest = float(np.hypot(*np.diff(self.planned(self.build(), self.view(), 1)[:, :2], axis=0).T).max())
         require(widest <= APART + 1e-9, f"two points are {widest:.3f} m apart")
 
     @promise
@@ -94,17 +94,17 @@ class PlannerContract(ComponentContract):
         footprint = Footprint(self.robot, 0.05)
         for seed in (1, 2, 3):
             view = self.view()
-            points = self.planned(self.built(), view, seed)
+            points = self.planned(self.build(), view, seed)
             bad = ~footprint.free(view, points)
             bad[0] = False
             require(not bad.any(), f"the robot does not fit at {points[bad.argmax()].round(3).tolist()} (x, y, yaw)")
 
     @promise
-    def what_cannot_be_fails_with_its_code(self) -> None:
-        """Given a start or goal off the map, in an obstacle, or no way between them then fails with its code."""
+    def an_impossible_request_fails_with_its_error_code(self) -> None:
+        """Given a start or goal outside the map or in an obstacle, or no path, then it fails with the error code."""
         for start, goal, code in IMPOSSIBLE:
             try:
-                self.planned(self.built(), self.view(), 1, (start, goal))
+                self.planned(self.build(), self.view(), 1, (start, goal))
             except NavigationFailure as failure:
                 require(failure.code == code, f"fails with {failure.code.name}, not with {code.name}")
             else:
@@ -112,16 +112,16 @@ class PlannerContract(ComponentContract):
 
     @promise
     def the_same_seed_gives_the_same_path_bit_for_bit_whatever_was_planned_before(self) -> None:
-        """Given the same costmap, ends and seed then bit-identical paths: no clock, no global chance, no memory."""
-        one = self.planned(self.built(), self.view(), 7)
-        again = self.built()
+        """Given the same costmap, ends and seed then bit-identical paths, independent of earlier calls."""
+        one = self.planned(self.build(), self.view(), 7)
+        again = self.build()
         self.planned(again, self.view(), 3, (GOAL, START))
         require(np.array_equal(self.planned(again, self.view(), 7), one), "two paths from the same seed differ")
 
     @promise
     def a_costmap_is_neither_changed_nor_kept(self) -> None:
-        """Given a costmap then it is not changed, and what becomes of it later changes no later plan."""
-        planner, view, untouched = self.built(), self.view(), self.view()
+        """Given a costmap then it is not changed, and later changes of it do not affect later plans."""
+        planner, view, untouched = self.build(), self.view(), self.view()
         first = self.planned(planner, view, 1)
         require(equal_costmaps(view, untouched), "the costmap is not what it was before planning")
         kept = first.copy()

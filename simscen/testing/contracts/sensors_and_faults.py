@@ -1,4 +1,4 @@
-"""The promises of a fault."""
+"""Contracts of sensors and faults."""
 
 from __future__ import annotations
 
@@ -34,37 +34,37 @@ COUNT = 40
 GRID = OccupancyGrid(np.where(np.eye(20, dtype=bool), OCCUPIED, FREE).astype(np.int8), 0.25)
 
 
-class Elsewhere:
-    """What is seen from elsewhere, or through something: two meters more, and another picture."""
+class FakeSight:
+    """Fake view from a displaced sensor: longer distances and another image."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Straight ahead a wall, for want of a world."""
+        """Return constant distances, which depend on the arguments."""
         return np.full(len(scan.ranges), 2.0 if error is None and not without else 4.0)
 
     def image(self, error: Pose3) -> Image:
-        """Gray."""
+        """Return a gray image."""
         return Image("it", 0, np.full((4, 6, 3), 90, np.uint8), np.full((4, 6), 3.0, np.float32))
 
 
 @dataclass(frozen=True, eq=False)
 class FaultContract(Contract):
-    """Tried on forty readings or commands of each kind that it affects."""
+    """Contract of a fault, on forty readings or commands of each affected kind."""
 
     role = "fault"
     spec: Any
     subject: str = ""
 
-    def begun(self, kind: str, now: Callable[[], int] = lambda: 0) -> Disturbance:
-        """A new one at work on a kind of instance, with the same generator each time."""
+    def started(self, kind: str, now: Callable[[], int] = lambda: 0) -> Disturbance:
+        """Start a new fault on a kind of target, always with the same generator."""
         fault: Fault = self.spec
-        setting = FaultSetting(0.3, now=now, kind=kind, sight=Elsewhere() if kind in ("Scan", "Image") else None)
+        setting = FaultSetting(0.3, now=now, kind=kind, sight=FakeSight() if kind in ("Scan", "Image") else None)
         return call_component("begins", fault.begin, np.random.default_rng(5), setting)
 
-    def disturbed(self, kind: str) -> list[Any]:
-        """What it makes of readings or commands of a kind, with what it kept back where that arrives."""
+    def outputs(self, kind: str) -> list[Any]:
+        """Return the outputs for readings or commands of a kind, including delayed ones."""
         tick = 0
         answers: list[Any] = []
-        work = self.begun(kind, lambda: tick)
+        work = self.started(kind, lambda: tick)
         for k in range(COUNT):
             tick = 24 * k
             if kind in (COMMAND, WHEELS):
@@ -80,21 +80,21 @@ class FaultContract(Contract):
         return answers
 
     @promise
-    def it_says_what_it_affects(self) -> None:
-        """Given a fault then `affects` are kinds of readings that there are, or Command, and at least one."""
+    def it_affects_known_targets(self) -> None:
+        """Given a fault then `affects` contains at least one target, and only known ones."""
         affects = self.spec.affects
         require(affects, "affects nothing")
         strange = sorted(set(affects) - set(EVERY))
         require(not strange, f"affects {strange}, which there is not")
 
     @promise
-    def it_answers_with_the_same_kind_or_none(self) -> None:
-        """Given a reading then one of the same kind and sensor answers, or None; given a command a Twist, and so on.
+    def it_returns_the_same_type_or_none(self) -> None:
+        """Given a reading then the output has the same type and sensor, or is None; likewise for other targets.
 
-        A command may be kept back on cmd_vel only; a belief and a map are always answered.
+        Beliefs and maps must have an output.
         """
         for kind in sorted(self.spec.affects):
-            for answer in self.disturbed(kind):
+            for answer in self.outputs(kind):
                 if kind in (COMMAND, WHEELS):
                     fine = answer is None or (isinstance(answer, Twist) and bool(np.isfinite(answer).all()))
                 elif kind == BELIEF:
@@ -108,16 +108,16 @@ class FaultContract(Contract):
 
     @promise
     def the_same_generator_gives_the_same_answers_bit_for_bit(self) -> None:
-        """Given the same readings and generator then the same answers: no clock, no global chance."""
+        """Given the same readings and generator then the same answers."""
         for kind in sorted(self.spec.affects):
-            one, other = (self.disturbed(kind) for _ in range(2))
+            one, other = (self.outputs(kind) for _ in range(2))
             require(all(map(equal, one, other)), f"disturbs the same {kind} in two ways")
 
     @promise
     def a_reading_is_never_changed(self) -> None:
-        """Given a reading then it stays what it is: the log keeps it, and the answer is another one."""
+        """Given a reading then it is not changed, because the log contains it."""
         for kind in sorted(set(self.spec.affects) & set(KINDS)):
-            work = self.begun(kind)
+            work = self.started(kind)
             for k in range(COUNT):
                 reading = KINDS[kind](k)
                 before = copy.deepcopy(reading)
@@ -126,14 +126,14 @@ class FaultContract(Contract):
 
     @promise
     def its_end_leaves_a_disturbance_or_nothing(self) -> None:
-        """Given the end of a fault then what stays is a Disturbance, or None."""
+        """Given the end of a fault then the remaining disturbance is a Disturbance or None."""
         for kind in sorted(self.spec.affects):
-            left = call_component("ends", self.begun(kind).end)
+            left = call_component("ends", self.started(kind).end)
             require(left is None or isinstance(left, Disturbance), f"leaves {left!r}")
 
 
 def equal(one: Any, other: Any) -> bool:
-    """Whether two readings, or two commands, are the same to the last bit."""
+    """Return whether two readings or commands are bit-identical."""
     if one is None or isinstance(one, tuple):
         return bool(one == other)
     return type(one) is type(other) and all(
@@ -154,25 +154,25 @@ MAY_BE_MISSING = ("ranges", "depth")
 
 @dataclass(frozen=True, eq=False)
 class SensorContract(Contract):
-    """Tried on a robot with two wheels that drives a circle in a square room."""
+    """Contract of a sensor, on a robot with two wheels that drives a circle in a square room."""
 
     role = "sensor"
     spec: Any
     subject: str = ""
 
     def readings(self, seed: int = 1) -> list[Reading]:
-        """Twenty readings of a new one."""
-        return self.measured(*self.built(seed))
+        """Return twenty readings of a new sensor."""
+        return self.measured(*self.build(seed))
 
-    def built(self, seed: int = 1) -> tuple[Sensor, FakeSensorView, int]:
-        """A new one, what it looks at, and ticks between two readings."""
+    def build(self, seed: int = 1) -> tuple[Sensor, FakeSensorView, int]:
+        """Build a sensor. Return it with its view and its period in ticks."""
         clock, view = Clock(240), FakeSensorView()
         period, rng = clock.period(self.spec.rate), np.random.default_rng(seed)
         setting = SensorSetting(NAME, period, clock.seconds(period), rng, view, SquareRoomRays(), DRIVE)
         return call_component("is built", lambda: self.spec.implementation()(self.spec, setting)), view, period
 
     def measured(self, sensor: Sensor, view: FakeSensorView, period: int) -> list[Reading]:
-        """The next twenty readings."""
+        """Return the next twenty readings."""
         taken = []
         for k in range(1, READING_COUNT + 1):
             view.seconds = k * period / 240
@@ -180,9 +180,9 @@ class SensorContract(Contract):
         return taken
 
     @promise
-    def it_says_what_it_says_it_says(self) -> None:
-        """Given a reading then it is of the kind of its specification, with the sensor's own name and the tick."""
-        sensor, view, period = self.built()
+    def a_reading_has_the_declared_type_name_and_tick(self) -> None:
+        """Given a reading then it has the type of the specification, the name of the sensor, and the tick."""
+        sensor, view, period = self.build()
         require(sensor.name == NAME, f"is called {sensor.name!r}, not {NAME!r}")
         require(sensor.period == period, f"has a period of {sensor.period!r} ticks, not {period}")
         kind = getattr(sensor_data, self.spec.reading_type)
@@ -192,8 +192,8 @@ class SensorContract(Contract):
             require(signed == (NAME, k * period), f"signs a reading of tick {k * period} as {signed}")
 
     @promise
-    def what_it_says_are_numbers(self) -> None:
-        """Given a reading then its numbers are finite, but for ranges and depths that may be missing."""
+    def the_numbers_of_a_reading_are_finite(self) -> None:
+        """Given a reading then its numbers are finite, except ranges and depths."""
         for reading in self.readings():
             for field in fields(reading):
                 value = getattr(reading, field.name)
@@ -203,14 +203,14 @@ class SensorContract(Contract):
 
     @promise
     def the_same_world_and_generator_give_the_same_readings_bit_for_bit(self) -> None:
-        """Given the same world and generator then the same readings: no clock, no global chance."""
+        """Given the same world and generator then the same readings."""
         one, other = self.readings(), self.readings()
         require(all(map(equal, one, other)), "measures the same world in two ways")
 
     @promise
     def a_reading_does_not_change_after_it_was_given(self) -> None:
-        """Given a reading then nothing that is measured later changes it."""
-        sensor, view, period = self.built()
+        """Given a reading then later measurements do not change it."""
+        sensor, view, period = self.build()
         first = self.measured(sensor, view, period)
         kept = copy.deepcopy(first)
         self.measured(sensor, view, period)

@@ -1,4 +1,4 @@
-"""The promises of a whole stack."""
+"""Contract of stacks."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ ASIDE = Goal("aside", Pose2(1.5, 3.2, 1.5))
 ENDINGS = {EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED}
 
 
-class Heard:
-    """A stack whose decisions are looked at: type, finiteness, and events of the beat they come with."""
+class CheckedStack:
+    """Wrapper of a stack that checks the types, finiteness and events of decisions."""
 
     def __init__(self, stack: Stack) -> None:
         self.stack = stack
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """The stack's decision."""
+        """Return the checked decision of the stack."""
         ranges = [reading.ranges.copy() for reading in readings if isinstance(reading, Scan)]
         decision = call_component("decides", lambda: self.stack.decide(tick, readings))
         require(isinstance(decision, Decision), f"decides {type(decision).__name__}, not a Decision")
@@ -51,15 +51,15 @@ class Heard:
 
 @dataclass(frozen=True, eq=False)
 class StackContract(Contract):
-    """Tried with a round robot in a room of 6 m by 4 m; odometry and lidar tell the truth, nearly."""
+    """Contract of a stack, with a round robot in a room of 6 m by 4 m and almost perfect sensors."""
 
     role = "stack"
     spec: Any
     robot: RobotModel | None = None
     subject: str = ""
 
-    def driving(self, *goals: Goal, discs: tuple[tuple[float, float, float], ...] = (), seed: int = 1) -> Drive:
-        """A drive that is about to begin, in a room with discs (x, y, radius) that are not on the map."""
+    def new_drive(self, *goals: Goal, discs: tuple[tuple[float, float, float], ...] = (), seed: int = 1) -> Drive:
+        """Return a drive before its start, in a room with discs (x, y, radius) that are not on the map."""
         robot, world = self.robot or round_robot(), Flatland().room(6, 4)
         grid = world.grid((-0.5, -0.5, 6.5, 4.5))
         world.discs += discs
@@ -67,18 +67,18 @@ class StackContract(Contract):
         setting = Setting(around, "stack", Streams(seed), CONTROL / RATE, estimate=Estimate(START, (0.05, 0.05, 0.02)))
         stack = call_component("is built", lambda: self.spec.implementation()(self.spec, setting))
         call_component("starts", lambda: stack.start(setting.estimate, goals))
-        truth = ("odom", "ground_truth") if self.told_the_truth else ("odom",)
-        return Drive(world, robot, Heard(stack), START, odometry=truth)
+        truth = ("odom", "ground_truth") if self.has_true_poses else ("odom",)
+        return Drive(world, robot, CheckedStack(stack), START, odometry=truth)
 
     @property
-    def told_the_truth(self) -> bool:
-        """Whether its localizer is the one that believes true poses."""
+    def has_true_poses(self) -> bool:
+        """Whether the localizer uses true poses."""
         return bool(getattr(getattr(self.spec, "localizer", None), "type", "") == "ground_truth")
 
     @promise
     def it_reaches_a_goal_around_an_unmapped_obstacle_without_contact(self) -> None:
         """Given a goal and an obstacle in the way that is on no map then the robot gets there and touches nothing."""
-        d = self.driving(FAR, discs=((3.2, 1.9, 0.25),)).run(90)
+        d = self.new_drive(FAR, discs=((3.2, 1.9, 0.25),)).run(90)
         require(d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / RATE:.0f} s")
         off = d.pose.distance(FAR.pose)
         require(off <= FAR.xy_tolerance, f"says that it has reached a goal that is {off:.2f} m away")
@@ -86,15 +86,15 @@ class StackContract(Contract):
 
     @promise
     def without_a_goal_it_commands_zero(self) -> None:
-        """Given no goal then it commands zero, and follows no plan."""
-        d = self.driving().run(0.5)
+        """Given no goal then the command is zero, and there is no plan."""
+        d = self.new_drive().run(0.5)
         require(set(d.commands) == {STOP}, "commands a velocity without a goal")
         require(d.stack.goal is None and d.stack.plan is None, "has a goal or a plan without being given one")
 
     @promise
     def once_a_task_has_ended_it_commands_zero(self) -> None:
-        """Given a task that has ended then it commands zero from that beat on."""
-        d = self.driving(NEAR).run(30)
+        """Given a finished task then the command is zero from that step on."""
+        d = self.new_drive(NEAR).run(30)
         require(d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / RATE:.0f} s")
         ended = len(d.commands) - 1
         d.run(0.5, until="")
@@ -103,8 +103,8 @@ class StackContract(Contract):
 
     @promise
     def a_canceled_task_ends_at_once(self) -> None:
-        """Given a cancel then the goal and the task end as canceled, and it commands zero from the next beat on."""
-        d = self.driving(FAR, NEAR).run(2)
+        """Given a cancel then goal and task end as canceled, and the command is zero from the next step on."""
+        d = self.new_drive(FAR, NEAR).run(2)
         call_component("is canceled", lambda: d.stack.cancel(d.tick))
         begun = len(d.commands)
         d.run(0.5, until="")
@@ -114,8 +114,8 @@ class StackContract(Contract):
 
     @promise
     def a_goal_that_preempts_is_driven_to_first(self) -> None:
-        """Given another goal on the way then the current one is canceled and the other one is driven to."""
-        d = self.driving(FAR).run(1)
+        """Given a goal that preempts then the current goal is canceled, and the robot drives to the new one."""
+        d = self.new_drive(FAR).run(1)
         call_component("is preempted", lambda: d.stack.preempt(d.tick, ASIDE))
         d.run(0.5, until="")
         require(d.stack.goal == ASIDE, f"drives to {d.stack.goal} after it was sent to {ASIDE}")
@@ -126,8 +126,8 @@ class StackContract(Contract):
 
     @promise
     def every_goal_is_accepted_once_and_ends_once(self) -> None:
-        """Given goals, the last of which cannot be reached, then each is accepted and ends once, in order."""
-        d = self.driving(NEAR, Goal("never", Pose2(40.0, 0.0), timeout=3.0)).run(60)
+        """Given goals of which the last is unreachable then each goal is accepted once and ends once, in order."""
+        d = self.new_drive(NEAR, Goal("never", Pose2(40.0, 0.0), timeout=3.0)).run(60)
         accepted = [e.name for e in d.kinds("goal.accepted")]
         ended = [e.name for e in d.log if e.kind in ENDINGS]
         require(accepted == ["near", "never"], f"accepts {accepted}, not near, then never")
@@ -137,15 +137,15 @@ class StackContract(Contract):
 
     @promise
     def the_same_seed_gives_the_same_drive_bit_for_bit(self) -> None:
-        """Given the same readings and seed then bit-identical commands and events: no clock, no global chance."""
-        one, other = (self.driving(FAR, discs=((3.2, 1.9, 0.25),)).run(6) for _ in range(2))
+        """Given the same readings and seed then bit-identical commands and events."""
+        one, other = (self.new_drive(FAR, discs=((3.2, 1.9, 0.25),)).run(6) for _ in range(2))
         require(one.commands == other.commands, "two drives from the same seed differ in their commands")
         require(one.log == other.log, "two drives from the same seed differ in their events")
 
     @promise
-    def a_blind_lidar_breaks_nothing(self) -> None:
-        """Given scans of nan then its decisions stay decisions."""
-        d = self.driving(FAR)
+    def invalid_scans_never_make_a_decision_invalid(self) -> None:
+        """Given scans of nan then the decisions stay valid."""
+        d = self.new_drive(FAR)
         d.run(1, until="")
         d.range_max = -1.0  # nothing is within range any more
         d.run(1, until="")

@@ -1,4 +1,4 @@
-"""Horizontal cross sections of meshes, and the horizontal distance from a point to a mesh.
+"""Horizontal cross sections of meshes: segments, closed rings, simple polygons, and the distance of a point to them.
 
 A cross section is what a level lidar at that height can see.
 """
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
+from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import TriangleMesh
 
 
@@ -133,3 +134,100 @@ def _distance_from_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> float
     squared_length = np.einsum("ij,ij->i", edge, edge)
     share = np.clip(-np.einsum("ij,ij->i", a, edge) / np.where(squared_length > 0, squared_length, 1.0), 0.0, 1.0)
     return float(np.sqrt(np.min(np.sum((a + share[:, None] * edge) ** 2, axis=1))))
+
+
+Point = tuple[float, float]
+Ring = list[Point]
+
+STRAIGHTNESS_M = 1e-6
+"""Distance up to which a corner may be removed from a ring."""
+MAX_CORNERS = 200
+"""Maximum number of corners of a polygon in a world file."""
+
+
+class OpenCrossSection(ValueError):
+    """The cross section of a mesh that is not closed."""
+
+
+def rings_from_segments(segments: Array) -> list[Ring]:
+    """Return closed rings of directed segments (n, 2, 2), anticlockwise around solid.
+
+    Segments of a closed mesh meet in exactly equal points. Where rings touch at a corner, they are separated, so that
+    no ring visits a point twice. Raises OpenCrossSection if a ring is not closed.
+    """
+    next_points: dict[Point, list[Point]] = {}
+    for (ax, ay), (bx, by) in segments.tolist():
+        next_points.setdefault((ax, ay), []).append((bx, by))
+    rings = []
+    for start in list(next_points):
+        while next_points[start]:
+            path: dict[Point, None] = {start: None}  # a dict as an ordered set
+            while path:
+                last = next(reversed(path))
+                if not next_points.get(last):
+                    raise OpenCrossSection
+                point = next_points[last].pop()
+                if point in path:
+                    points = list(path)
+                    first = points.index(point)
+                    rings.append(_without_straight_corners(points[first:]))
+                    path = dict.fromkeys(points[: first + 1]) if first else {}
+                else:
+                    path[point] = None
+    return [ring for ring in rings if len(ring) >= 3]
+
+
+def simple_polygons(rings: list[Ring]) -> list[Ring]:
+    """Return simple polygons that cover what the rings enclose; rings with holes or many corners become triangles."""
+    outer_rings = [ring for ring in rings if signed_area(ring) > 0]
+    holes: dict[int, list[Ring]] = {number: [] for number in range(len(outer_rings))}
+    for ring in rings:
+        # The middle of an edge is tested, because a corner of a hole may touch the ring around it.
+        middle = ((ring[0][0] + ring[1][0]) / 2, (ring[0][1] + ring[1][1]) / 2)
+        around = [n for n, other in enumerate(outer_rings) if signed_area(ring) < 0 and polygon_contains(other, middle)]
+        if around:
+            holes[min(around, key=lambda n: signed_area(outer_rings[n]))].append(ring)
+    polygons: list[Ring] = []
+    for number, ring in enumerate(outer_rings):
+        is_simple = not holes[number] and len(ring) <= MAX_CORNERS
+        polygons += [ring] if is_simple else _triangles([ring, *holes[number]])
+    return polygons
+
+
+def signed_area(ring: Ring) -> float:
+    """Return the area in m², positive for an anticlockwise ring."""
+    x, y = np.array(ring).T
+    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2)
+
+
+def _triangles(rings: list[Ring]) -> list[Ring]:
+    """Triangulate an outer ring with holes."""
+    import mapbox_earcut
+
+    points = np.array([point for ring in rings for point in ring])
+    ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
+    faces = mapbox_earcut.triangulate_float64(points, ends).reshape(-1, 3)
+    triangles = [[(float(x), float(y)) for x, y in points[face]] for face in faces]
+    anticlockwise = [ring if signed_area(ring) > 0 else ring[::-1] for ring in triangles]
+    return [ring for ring in anticlockwise if signed_area(ring) > STRAIGHTNESS_M**2]
+
+
+def _without_straight_corners(ring: Ring) -> Ring:
+    """Return the ring without the corners that triangles leave on straight edges.
+
+    Each corner is compared with the last one that was kept, so that a round ring of short chords keeps its shape.
+    """
+    kept: Ring = [ring[0]]
+    for point, following in zip(ring[1:], [*ring[2:], ring[0]], strict=True):
+        if _sticks_out(kept[-1], point, following):
+            kept.append(point)
+    return kept if len(kept) < 3 or _sticks_out(kept[-1], kept[0], kept[1]) else kept[1:]
+
+
+def _sticks_out(before: Point, point: Point, after: Point) -> bool:
+    """Return whether removing the point would move the ring by more than STRAIGHTNESS_M."""
+    (ax, ay), (px, py), (bx, by) = before, point, after
+    length = math.hypot(bx - ax, by - ay)
+    if length < STRAIGHTNESS_M:
+        return True
+    return abs((bx - ax) * (py - ay) - (by - ay) * (px - ax)) / length > STRAIGHTNESS_M

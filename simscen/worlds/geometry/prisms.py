@@ -15,8 +15,7 @@ from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.meshes import FLOOR_HEIGHT_M
 from simscen.core.geometry.polygons import distance_to_segment
-from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid
-from simscen.worlds.geometry.circle_facets import facet_count
+from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid, facet_count
 
 
 class UprightPrism(NamedTuple):

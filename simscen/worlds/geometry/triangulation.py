@@ -13,6 +13,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array
 from simscen.core.geometry.meshes import MAX_CONVEX_FACES
 from simscen.core.geometry.shapes import (
+    MAX_SAGITTA_M,
     Box,
     Capsule,
     Cone,
@@ -24,8 +25,8 @@ from simscen.core.geometry.shapes import (
     Solid,
     Sphere,
     TriangleMesh,
+    facet_count,
 )
-from simscen.worlds.geometry.circle_facets import MAX_SAGITTA_M, facet_count
 
 Faces = npt.NDArray[np.int32]
 Profile = list[tuple[float, float]]

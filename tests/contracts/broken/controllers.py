@@ -65,7 +65,7 @@ class NeverLiftsALimit(Wrapper):
         self.inner.set_speed_limit(limit or 0.15)
 
 
-@breaks(CONTROLLER, "what it is about to drive", "with an obstacle")
+@breaks(CONTROLLER, "a command is collision free or it fails with no valid control", "with an obstacle")
 class IsBlind(Wrapper):
     def command(self, pose, twist, costmap, goal):
         return Twist(0.5, 0.0, 0.0)

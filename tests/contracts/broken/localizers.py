@@ -27,7 +27,7 @@ class BelievesInChance(Believing):
         return replace(belief, pose=belief.pose._replace(x=belief.pose.x + 1e-9 * random.random()))
 
 
-@breaks(LOCALIZER, "without motion", "wanders off")
+@breaks(LOCALIZER, "without motion the belief does not drift", "wanders off")
 class Drifts(Believing):
     off = 0.0
 
@@ -68,7 +68,7 @@ class KeepsTheScan(Believing):
         return replace(belief, pose=belief.pose._replace(x=belief.pose.x + (1.0 if blind else 0.0)))
 
 
-@breaks(LOCALIZER, "a lidar that is blind", "believes to be at")
+@breaks(LOCALIZER, "invalid ranges never make the belief invalid", "believes to be at")
 class BelievesTheLidar(Believing):
     last = 0.0
 
@@ -79,7 +79,7 @@ class BelievesTheLidar(Believing):
         return replace(belief, pose=belief.pose._replace(x=self.last))
 
 
-@breaks(LOCALIZER, "odometry and gyroscope that lie", "with a covariance that is not")
+@breaks(LOCALIZER, "invalid odometry never makes the belief invalid", "with a covariance that is not")
 class BelievesTheGyroscope(Believing):
     rate = 0.0
 
@@ -90,19 +90,19 @@ class BelievesTheGyroscope(Believing):
         return replace(belief, covariance=belief.covariance + self.rate)
 
 
-@breaks(LOCALIZER, "odometry and gyroscope that lie", "not positive semidefinite")
+@breaks(LOCALIZER, "invalid odometry never makes the belief invalid", "not positive semidefinite")
 class IsTooSure(Believing):
     def changed(self, belief):
         return replace(belief, covariance=-belief.covariance)
 
 
-@breaks(LOCALIZER, "scans of any size", "raises IndexError when it takes a scan")
+@breaks(LOCALIZER, "scans of any size range and mount are accepted", "raises IndexError when it takes a scan")
 class WantsAllBeams(Wrapper):
     def on_scan(self, scan):
         scan.ranges[359]
 
 
-@breaks(LOCALIZER, "scans of any size", "weights that add up to")
+@breaks(LOCALIZER, "scans of any size range and mount are accepted", "weights that add up to")
 class WeighsNothing(Believing):
     def changed(self, belief):
         return replace(belief, particles=np.zeros((3, 4)))

@@ -48,7 +48,11 @@ class GoesThroughWalls(Wrapper):
         return Path(np.array(start) * (1 - share) + np.array(goal) * share)
 
 
-@breaks(PLANNER, "what cannot be fails", "raises ValueError when it plans, not a NavigationFailure")
+@breaks(
+    PLANNER,
+    "an impossible request fails with its error code",
+    "raises ValueError when it plans, not a NavigationFailure",
+)
 class RaisesWhatItLikes(Wrapper):
     def plan(self, *asked):
         try:
@@ -57,7 +61,7 @@ class RaisesWhatItLikes(Wrapper):
             raise ValueError("no way") from failure
 
 
-@breaks(PLANNER, "what cannot be fails", "which is no ErrorCode")
+@breaks(PLANNER, "an impossible request fails with its error code", "which is no ErrorCode")
 class HasItsOwnCodes(Wrapper):
     def plan(self, *asked):
         try:
@@ -66,7 +70,7 @@ class HasItsOwnCodes(Wrapper):
             raise NavigationFailure(4711, "no way") from failure  # type: ignore[arg-type]
 
 
-@breaks(PLANNER, "what cannot be fails", "without points")
+@breaks(PLANNER, "an impossible request fails with its error code", "without points")
 class AnswersWithNothing(Wrapper):
     def plan(self, *asked):
         try:
@@ -75,7 +79,7 @@ class AnswersWithNothing(Wrapper):
             return Path()
 
 
-@breaks(PLANNER, "what cannot be fails", "does not come to an end")
+@breaks(PLANNER, "an impossible request fails with its error code", "does not come to an end")
 class NeverGivesUp(Wrapper):
     def plan(self, *asked):
         while True:

@@ -13,19 +13,19 @@ from tests.contracts.broken.cases import Wrapper, breaks
 SENSOR = Bumper()
 
 
-@breaks(SENSOR, "it says what it says", "signs a reading of tick")
+@breaks(SENSOR, "a reading has the declared type name and tick", "signs a reading of tick")
 class SignsForAnother(Wrapper):
     def read(self, tick):
         return replace(self.inner.read(tick), sensor="other")
 
 
-@breaks(SENSOR, "it says what it says", "returns Odometry, not Bump")
+@breaks(SENSOR, "a reading has the declared type name and tick", "returns Odometry, not Bump")
 class SaysSomethingElse(Wrapper):
     def read(self, tick):
         return Odometry(self.name, tick, Pose2(0, 0, 0), Twist())
 
 
-@breaks(Lidar(), "what it says are numbers", "says angle_min of nan")
+@breaks(Lidar(), "the numbers of a reading are finite", "says angle_min of nan")
 class KnowsNoAngles(Wrapper):
     def read(self, tick):
         return replace(self.inner.read(tick), angle_min=math.nan)

@@ -94,7 +94,7 @@ class TellsOfThePast(Deciding):
         return replace(decision, events=(Event(-5, EventKind.GOAL_REACHED, "x"),))
 
 
-@breaks(STACK, "a blind lidar", "raises ValueError when it decides")
+@breaks(STACK, "invalid scans never make a decision invalid", "raises ValueError when it decides")
 class CannotBeBlind(Deciding):
     def decide(self, tick, readings):
         for reading in readings:

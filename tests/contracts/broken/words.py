@@ -80,17 +80,17 @@ class OnScans(Spec, Fault):
         return reading
 
 
-@word("it says what it affects", "which there is not")
+@word("it affects known targets", "which there is not")
 class AffectsGhosts(OnScans):
     affects: ClassVar[frozenset[str]] = frozenset({"Sonar"})
 
 
-@word("it says what it affects", "affects nothing")
+@word("it affects known targets", "affects nothing")
 class AffectsNothing(OnScans):
     affects: ClassVar[frozenset[str]] = frozenset()
 
 
-@word("it answers with the same kind", "of a Scan")
+@word("it returns the same type or none", "of a Scan")
 class AnswersForAnother(OnScans):
     def changed(self, reading):
         return replace(reading, sensor="other")
@@ -120,13 +120,13 @@ class LeavesDust(OnScans):
 # triggers
 
 
-@word("it says yes or no", "raises AttributeError")
+@word("it returns true or false at every moment", "raises AttributeError")
 class NeedsAGoal(Spec, Condition):
     def holds(self, now):
         return now.goal.pose.x > 0
 
 
-@word("it says yes or no", "answers 0")
+@word("it returns true or false at every moment", "answers 0")
 class AnswersANumber(Spec, Condition):
     def holds(self, now):
         return now.tick and 240
@@ -138,7 +138,7 @@ class HoldsEverySecondTime(Spec, Condition):
         return next(COUNT) % 3 == 0
 
 
-@word("it only looks", "does something")
+@word("it changes nothing", "does something")
 class Meddles(Spec, Condition):
     def holds(self, now):
         now.push((1.0, 0.0))
@@ -148,20 +148,20 @@ class Meddles(Spec, Condition):
 # actions
 
 
-@word("it says what came of it", "does not say what came of it")
+@word("it returns an effect", "does not say what came of it")
 class SaysNothing(Spec, Action):
     def perform(self, stage):
         stage.push((1.0, 0.0))
         return Effect(True, "")
 
 
-@word("it says what came of it", "and did nothing")
+@word("it returns an effect", "and did nothing")
 class Boasts(Spec, Action):
     def perform(self, stage):
         return Effect(True, "moved the earth")
 
 
-@word("the same stage", "something else the second time")
+@word("the same stage gives the same calls", "something else the second time")
 class ActsByChance(Spec, Action):
     def perform(self, stage):
         stage.push((random.random(), 0.0))
@@ -171,7 +171,7 @@ class ActsByChance(Spec, Action):
 # metrics
 
 
-@word("it is a number", "measures nan")
+@word("it returns a finite number or a reason", "measures nan")
 class MeasuresNothing(Spec, Measure):
     def measure(self, trace, case):
         return math.nan
@@ -190,7 +190,7 @@ class Resets(Spec, Measure):
         return 0.0
 
 
-@word("it says in what unit", "has the unit 3")
+@word("it has a unit and valid evidence", "has the unit 3")
 class HasNoUnit(Spec, Measure):
     unit: ClassVar[Any] = 3
 

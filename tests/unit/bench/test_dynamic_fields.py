@@ -3,9 +3,16 @@
 import numpy as np
 import pytest
 
-from simscen.bench.navigation.dynamic_fields import COUNT, HALF, SPEEDS, SPREAD, DynamicField, dynamic_field
+from simscen.bench.navigation.dynamic_fields import (
+    ARENA_HALF_WIDTH_M,
+    COUNT_RANGE,
+    MAX_SPEED_DEVIATION_M_S,
+    SPEEDS_M_S,
+    DynamicField,
+    dynamic_field,
+)
 
-FIELDS = [dynamic_field(number, speed) for speed in SPEEDS for number in range(1, 21)]
+FIELDS = [dynamic_field(number, speed) for speed in SPEEDS_M_S for number in range(1, 21)]
 
 
 def of(speed: float) -> list[DynamicField]:
@@ -20,23 +27,26 @@ def test_a_number_and_a_speed_are_one_field() -> None:
 
 def test_there_are_5_to_24_cylinders_and_both_ends_occur() -> None:
     counts = [len(field.movers) for field in FIELDS]
-    assert COUNT[0] <= min(counts) < 8 and 21 < max(counts) <= COUNT[1]
+    assert COUNT_RANGE[0] <= min(counts) < 8 and 21 < max(counts) <= COUNT_RANGE[1]
 
 
 def test_cylinders_keep_to_the_arena_and_begin_at_different_places_of_their_ways() -> None:
     for field in FIELDS:
         for mover in field.movers:
-            assert np.abs(mover.points).max() <= HALF + 1e-9
+            assert np.abs(mover.points).max() <= ARENA_HALF_WIDTH_M + 1e-9
             assert 0 <= mover.phase < 2 * mover.times[-1]
 
 
-@pytest.mark.parametrize("speed", SPEEDS)
+@pytest.mark.parametrize("speed", SPEEDS_M_S)
 def test_the_mean_speed_is_the_one_asked_for_and_no_piece_is_much_faster_or_slower(speed: float) -> None:
     means = []
     for field in of(speed):
         for mover in field.movers:
             each = np.hypot(*np.diff(mover.points, axis=0).T) / np.diff(mover.times)
-            assert speed - 2 * SPREAD - 1e-9 <= each.min() and each.max() <= speed + 2 * SPREAD + 1e-9
+            assert (
+                speed - 2 * MAX_SPEED_DEVIATION_M_S - 1e-9 <= each.min()
+                and each.max() <= speed + 2 * MAX_SPEED_DEVIATION_M_S + 1e-9
+            )
             means.append(float(each.mean()))
     assert np.mean(means) == pytest.approx(speed, abs=0.04)
 

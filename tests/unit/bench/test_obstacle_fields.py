@@ -3,7 +3,7 @@ import pytest
 from shapely import MultiPoint, Point, box
 
 from simscen.bench.navigation import obstacle_fields
-from simscen.bench.navigation.obstacle_fields import CELL, GAP, GOAL, START, obstacle_field
+from simscen.bench.navigation.obstacle_fields import CELL_SIZE_M, GAP_RADIUS_M, GOAL, START, obstacle_field
 
 
 def test_the_same_number_gives_the_same_field_and_another_one_another() -> None:
@@ -15,9 +15,9 @@ def test_the_same_number_gives_the_same_field_and_another_one_another() -> None:
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_a_disc_has_a_way_by_the_word_of_another_library(number: int) -> None:
     field = obstacle_field(number)
-    lane = box(-30 * CELL, 0.0, 0.0, GOAL.y + 1.0)
+    lane = box(-30 * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)
     # 2 mm less than the disc: shapely's circles are polygons, and a lattice finds ways to its resolution only.
-    free = lane.difference(MultiPoint(field.centers).buffer(CELL / 2 + GAP - 0.002))
+    free = lane.difference(MultiPoint(field.centers).buffer(CELL_SIZE_M / 2 + GAP_RADIUS_M - 0.002))
     pieces = [piece for piece in getattr(free, "geoms", [free]) if piece.contains(Point(START.x, START.y))]
     assert pieces and pieces[0].contains(Point(GOAL.x, GOAL.y))
 
@@ -41,16 +41,16 @@ def test_lonely_cells_vanish_and_crowded_ones_fill() -> None:
 def test_a_narrow_field_has_a_way_for_the_robot_and_none_for_a_wider_one_by_the_word_of_another_library() -> None:
     gap, too_wide = 0.31, 0.36
     field = obstacle_field(2, gap, too_wide)
-    lane = box(-30 * CELL, 0.0, 0.0, GOAL.y + 1.0)
+    lane = box(-30 * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)
 
     def crossable(radius: float) -> bool:
-        free = lane.difference(MultiPoint(field.centers).buffer(CELL / 2 + radius))
+        free = lane.difference(MultiPoint(field.centers).buffer(CELL_SIZE_M / 2 + radius))
         pieces = [piece for piece in getattr(free, "geoms", [free]) if piece.contains(Point(START.x, START.y))]
         return bool(pieces) and bool(pieces[0].contains(Point(GOAL.x, GOAL.y)))
 
     assert crossable(gap - 0.002)
-    assert not crossable(too_wide + CELL / 3)  # as fine as the lattice on which that is looked for
+    assert not crossable(too_wide + CELL_SIZE_M / 3)  # as fine as the lattice on which that is looked for
 
 
 def test_a_field_of_another_width_leaves_the_usual_ones_as_they_are() -> None:
-    assert obstacle_field(3).shortest == obstacle_field(3, GAP).shortest
+    assert obstacle_field(3).shortest == obstacle_field(3, GAP_RADIUS_M).shortest

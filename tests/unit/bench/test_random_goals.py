@@ -7,10 +7,17 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from simscen.bench.navigation import corridors
+from simscen.bench.navigation import office_maps
 from simscen.bench.navigation.experiments import with_stack_parameters
 from simscen.bench.navigation.office_maps import FREE, building, write_building
-from simscen.bench.navigation.random_goals import FAULTS, MOVABLE, ROOM, degraded, random_drives, random_goals
+from simscen.bench.navigation.random_goals import (
+    FAULTS,
+    MOVABLE_MARGIN_M,
+    WALL_MARGIN_M,
+    degraded,
+    random_drives,
+    random_goals,
+)
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Body, Box, Solid
@@ -37,8 +44,8 @@ def test_every_errand_can_be_driven_and_has_room_at_both_ends() -> None:
         assert one.length >= max(2.0, one.start.distance(one.goal) - 1e-6)
         for end in (one.start, one.goal):
             to_walls = min(abs(end.x - x) for x in (0.0, 5.0, 10.0)), min(end.y, 6.0 - end.y)
-            assert min(to_walls) >= 0.05 + 0.22 + ROOM - 0.01
-            assert math.hypot(end.x - 2.0, end.y - 3.0) >= MOVABLE
+            assert min(to_walls) >= 0.05 + 0.22 + WALL_MARGIN_M - 0.01
+            assert math.hypot(end.x - 2.0, end.y - 3.0) >= MOVABLE_MARGIN_M
 
 
 def test_a_drive_is_that_of_its_number_whichever_others_are_drawn() -> None:
@@ -79,13 +86,13 @@ def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
 
 
 def test_corridors_and_ramps_load_and_are_not_all_alike(tmp_path: Path) -> None:
-    for made in (corridors.two_robots(tmp_path / "c", (1, 2, 3)), corridors.ramps(tmp_path / "r", (1, 2, 3))):
+    for made in (office_maps.two_robots(tmp_path / "c", (1, 2, 3)), office_maps.ramps(tmp_path / "r", (1, 2, 3))):
         names = {load_scenario(drive.file, made.root).spec.name for drive in made.drives}
         assert len(names) == 3
 
 
 def test_no_ramp_is_a_wall_on_the_map_that_the_robots_lidar_would_make(tmp_path: Path) -> None:
-    for drive in corridors.ramps(tmp_path, range(1, 21)).drives:
+    for drive in office_maps.ramps(tmp_path, range(1, 21)).drives:
         loaded = load_scenario(drive.file, tmp_path)
         (lidar,) = (sensor.lidar for sensor in loaded.robot.spec.sensors.values() if sensor.lidar)
         (platform,) = loaded.world.spec.obstacles
@@ -96,7 +103,7 @@ OTHER = {"controller": {"desired_linear_vel": 0.3}, "localizer": {"type": "odome
 
 
 def test_a_variant_has_the_same_drives_with_other_parameters(tmp_path: Path) -> None:
-    made = corridors.ramps(tmp_path / "r", (1, 2))
+    made = office_maps.ramps(tmp_path / "r", (1, 2))
     other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
     for before, after in zip(made.drives, other.drives, strict=True):
         one = load_scenario(before.file, made.root).spec
@@ -106,7 +113,7 @@ def test_a_variant_has_the_same_drives_with_other_parameters(tmp_path: Path) -> 
 
 
 def test_a_variant_of_drives_without_a_map_keeps_the_localizer_that_needs_none(tmp_path: Path) -> None:
-    made = replace(corridors.ramps(tmp_path / "r", (1,)), mapless=True)
+    made = replace(office_maps.ramps(tmp_path / "r", (1,)), mapless=True)
     other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
     spec = load_scenario(other.drives[0].file, other.root, other.world_path).spec
     assert (spec.stack.controller.desired_linear_vel, spec.stack.localizer.type) == (0.3, "amcl")

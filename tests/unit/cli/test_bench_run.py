@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from simscen.bench.navigation import corridors
+from simscen.bench.navigation import office_maps
 from simscen.bench.navigation.experiments import Experiment
 from simscen.cli.benchmarks.navigation import with_stack
 from simscen.cli.benchmarks.navigation_runs import _planned
 
 
 def hall(folder: Path) -> Experiment:
-    return corridors.ramps(folder, (1, 2))
+    return office_maps.ramps(folder, (1, 2))
 
 
 def test_runs_with_another_stack_have_different_keys(tmp_path: Path) -> None:

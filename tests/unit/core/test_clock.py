@@ -1,6 +1,10 @@
-import pytest
+from fractions import Fraction
 
-from simscen.core.clock import Clock
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simscen.core.clock import Clock, SimTime
 
 
 @pytest.mark.parametrize(("hertz", "ticks"), [(240, 1), (40, 6), (10, 24), (1, 240), (0.5, 480)])
@@ -17,3 +21,32 @@ def test_a_rate_that_does_not_divide_the_clock_is_refused_with_the_nearest_that_
 def test_ticks_and_seconds_are_inverse():
     clock = Clock(240)
     assert all(clock.ticks(clock.seconds(tick)) == tick for tick in range(100_000))
+
+
+rates = st.integers(1, 999_999_999)
+ticks = st.integers(0, 10**12)
+
+
+@given(rates, ticks)
+def test_every_tick_is_read_back_from_its_nanoseconds(rate: int, tick: int) -> None:
+    time = SimTime(rate)
+    assert time.tick(time.nanoseconds(tick)) == tick
+
+
+@given(rates, ticks)
+def test_nanoseconds_are_the_exact_time_rounded_down(rate: int, tick: int) -> None:
+    exact = Fraction(tick, rate) * 10**9
+    assert 0 <= exact - SimTime(rate).nanoseconds(tick) < 1
+
+
+@given(rates, ticks)
+def test_a_stamp_is_the_same_time_in_seconds_and_nanoseconds(rate: int, tick: int) -> None:
+    sec, nanosec = SimTime(rate).stamp(tick)
+    assert 0 <= nanosec < 10**9
+    assert sec * 10**9 + nanosec == SimTime(rate).nanoseconds(tick)
+
+
+@pytest.mark.parametrize("rate", [0, -1, 10**9])
+def test_a_clock_that_nanoseconds_cannot_tell_is_refused(rate: int) -> None:
+    with pytest.raises(ValueError, match="nanoseconds"):
+        SimTime(rate)

@@ -8,12 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from schemas_from_rosbags import humble
 
+from simscen.core.clock import Stamp
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Scan
+from simscen.peer import messages
 from simscen.record.messages import encode, encode_arrays
-from simscen.record.simtime import Stamp
 
 STORE = humble()
 names = st.text(max_size=20)
@@ -204,7 +205,7 @@ def test_grid_is_what_rosbags_writes(seed: int, stamp: Stamp, frame: str, height
 
 @given(st.text(max_size=40))
 def test_text_is_what_rosbags_writes(text: str) -> None:
-    assert encode.string(text) == serialized(make("std_msgs/String", text))
+    assert messages.string(text) == serialized(make("std_msgs/String", text))
 
 
 @pytest.mark.parametrize("value", [True, False])
@@ -215,7 +216,7 @@ def test_a_bumper_is_what_rosbags_writes(value: bool) -> None:
 @given(stamps, st.integers(0, 255), names, st.text(max_size=40))
 def test_log_lines_are_what_rosbags_writes(stamp: Stamp, level: int, name: str, text: str) -> None:
     expected = make("rcl_interfaces/Log", make("builtin_interfaces/Time", *stamp), level, name, text, "", "", 0)
-    assert encode.log(stamp, level, name, text) == serialized(expected)
+    assert messages.log(stamp, level, name, text) == serialized(expected)
 
 
 @settings(deadline=None)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from simscen.core.clock import SimTime
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Goal
@@ -23,7 +24,6 @@ from simscen.record.log_header import LogHeader
 from simscen.record.log_reader.read import Log
 from simscen.record.log_reader.sensor_messages import SensorMessages
 from simscen.record.messages.encode_arrays import occupancy_grid
-from simscen.record.simtime import SimTime
 from simscen.record.topics import GLOBAL_COSTMAP
 from simscen.report.replay import replay_page
 from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, keep_extremes, spaced_in_time

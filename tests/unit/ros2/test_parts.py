@@ -15,8 +15,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.peer import messages as peer_messages
 from simscen.record.messages import encode
 from simscen.ros2 import messages
-from simscen.ros2.domain import claim, ros_environment
-from simscen.ros2.options import AdapterError, TopicNames
+from simscen.ros2.options import AdapterError, TopicNames, claim, ros_environment
 
 FOLDER = Path(simscen.ros2.__file__).parent
 
@@ -75,9 +74,7 @@ def test_a_domain_in_use_cannot_be_claimed_by_number(tmp_path: Path) -> None:
 
 
 def test_the_lock_of_a_domain_ends_with_its_process(tmp_path: Path) -> None:
-    code = (
-        "import os, sys; from simscen.ros2.domain import claim; held = claim(7, os.environ); print(flush=True); input()"
-    )
+    code = "import os; from simscen.ros2.options import claim; held = claim(7, os.environ); print(flush=True); input()"
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)}
     holder = subprocess.Popen(
         [sys.executable, "-c", code], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from simscen.core.clock import SimTime
 from simscen.core.geometry import Pose2
 from simscen.peer import messages, wire
 from simscen.peer.cdr import HEADER
-from simscen.record.simtime import SimTime
 from simscen.run.external.answer_decoder import Answer, decode_answer
 from simscen.run.external.goal_tracker import GoalTracker
 from simscen.run.external.handshake import Welcome
@@ -117,7 +117,7 @@ events = st.fixed_dictionaries(
 
 @given(events)
 def test_an_event_of_any_kind_is_heard_or_refused_and_can_be_logged(said) -> None:
-    from simscen.record.messages.encode import log, string
+    from simscen.peer.messages import log, string
     from simscen.record.messages.event_text import sentence, to_json
 
     goals = GoalTracker(True, 240)

@@ -6,8 +6,18 @@ import trimesh
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.meshes import MAX_CONVEX_FACES, is_convex, submesh
-from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Solid, Sphere
-from simscen.worlds.geometry.circle_facets import facet_count
+from simscen.core.geometry.shapes import (
+    Box,
+    Capsule,
+    Cone,
+    Cylinder,
+    Ellipsoid,
+    Extrusion,
+    Mesh,
+    Solid,
+    Sphere,
+    facet_count,
+)
 from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
 L_SHAPE = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))

@@ -8,7 +8,7 @@ from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, Box, Solid
 from simscen.worlds.built_world import build_world_and_map
-from simscen.worlds.maps.map_walls import walls_from_map
+from simscen.worlds.maps.occupancy_map import walls_from_map
 from simscen.worlds.maps.world_picture import BODY, FREE_GROUND, MAPPED_WALL, SUPERSAMPLING, _view, draw_world
 
 

@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.ray_fans import RayFan
 from simscen.core.geometry.shapes import Box, Cylinder, Solid
 from simscen.worlds.geometry.triangulation import merge_solids
-from simscen.worlds.raycasting import mesh_scene, resting_bodies
+from simscen.worlds.raycasting import mesh_scene, ray_scene
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 WALLS = merge_solids([Solid(Box((20.0, 0.2, 1.0)), Pose3(0.0, y, 0.5)) for y in (-10.0, 10.0)])
@@ -51,13 +51,11 @@ def changes():
         yield dict(poses)
 
 
-@pytest.mark.parametrize(
-    ("many", "several"), [(resting_bodies.MAX_GROUP_TRIANGLES, resting_bodies.MAX_GROUPS), (60, 3)]
-)
+@pytest.mark.parametrize(("many", "several"), [(ray_scene.MAX_GROUP_TRIANGLES, ray_scene.MAX_GROUPS), (60, 3)])
 def test_how_things_are_piled_up_changes_not_one_bit(monkeypatch, many, several):
     """A scene that has seen all of it says what one says that sees it for the first time, or heard of less before."""
-    monkeypatch.setattr(resting_bodies, "MAX_GROUP_TRIANGLES", many)
-    monkeypatch.setattr(resting_bodies, "MAX_GROUPS", several)
+    monkeypatch.setattr(ray_scene, "MAX_GROUP_TRIANGLES", many)
+    monkeypatch.setattr(ray_scene, "MAX_GROUPS", several)
     old = RayScene(WALLS)
     for number, poses in enumerate(list(changes())[::2]):
         fresh = RayScene(WALLS)
