@@ -17,6 +17,7 @@ from simscen.stack.localizers.likelihood_field import SensorModel
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.particles import FreeSpace, Particles
+from simscen.stack.localizers.recovery import Recovery
 
 ODOMETRY_SHARE = 0.2
 """Share of the particles that follow odometry where scan matching is uncertain."""
@@ -42,6 +43,8 @@ class ScanMatchingParticleFilter(ParticleFilter):
     def begin(self, estimate: Estimate) -> None:
         """Restart with particles around the estimate's pose, or over all free space if it has none."""
         super().begin(estimate)
+        if self._spec.relocalization == "scan_matching":  # random particles would compete with its search
+            self._recovery = Recovery(0.0, 0.0)
         self._map_weight, self._is_one_group = 1.0, False
         self.fitting = 0.0
         """Share of the last scan's beams that fit the map at the particles, where the map shows anything."""

@@ -72,22 +72,6 @@ def test_a_certain_robot_compares_every_nth_scan_with_the_map(interval: int, com
     assert compared == looked_at[: CERTAIN_AFTER_UPDATES + 1] + looked_at[CERTAIN_AFTER_UPDATES + interval :: interval]
 
 
-@pytest.mark.parametrize(("std", "expected"), [(1.0, [0, 48]), (0.1, [0, 24, 48])])
-def test_a_blocked_view_is_ignored_while_particles_are_spread_widely(
-    std: float, expected: list[int], compared: list[int]
-) -> None:
-    """A person 0.3 m from the lidar hides half of the room. Narrow particles use the scan nevertheless."""
-    subject = localizer(ScanMatchingAmcl(settling_distance=400.0), Estimate(START, (std, std, 0.2)), 1)
-    for tick, meters in ((0, 0.0), (24, 0.26), (48, 0.52)):
-        there = Pose2(meters, 0.0, 0.0)
-        view = seen(START.compose(there), tick)
-        if tick == 24:
-            view.ranges[: BEAMS // 2] = 0.3
-        subject.on_odometry(odometry(tick, there))
-        subject.on_scan(view)
-    assert compared == expected
-
-
 def test_covariance_estimation_compares_every_scan(compared: list[int]) -> None:
     driven = drive(10.0)
     spec = SKIPPING.model_copy(update={"covariance": "scatter"})
