@@ -14,6 +14,7 @@ from simscen.bench.localization.generated_logs import Log, generate_log
 from simscen.bench.localization.recorded_drive import compare_with_reference, localize
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.random_streams import Streams
 from simscen.model.localizers import Amcl, AmclParameters
 from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.read import LocalizationLog
@@ -35,8 +36,15 @@ SPACING_M, SPACING_RAD = 1.0, 0.5
 DURATION_S = 180.0
 END_TURN_RAD = 1.0
 """Rotation over the last two steps between scans of a log that ends after a turn."""
+MISSED_TURN_SHARE, MISSED_TURN_STD_RAD = 0.05, 0.6
+"""Share of the steps between scans with a turn that odometry does not report, and its standard deviation.
+
+The odometry of the public log MIT CSAIL has a few such steps.
+"""
+MISSED_TURNS = "as mapped, turns that odometry misses"
 KINDS: Mapping[str, tuple[str, bool]] = {
     "as mapped, slipping wheels": ("slipping", False),
+    "as mapped, turns that odometry misses": ("slipping", False),
     "people, moved furniture, glass": ("tracked", False),
     "the same, ends after a turn": ("tracked", True),
     "half rebuilt": ("outdated", False),
@@ -84,6 +92,22 @@ def thinned(log: Log, ends_after_turn: bool = False) -> Log:
     return replace(log, sensed=sensed)
 
 
+def with_missed_turns(log: Log) -> Log:
+    """Return a sparse log whose odometry misses some turns: it continues with a wrong heading."""
+    rng = Streams(log.building).generator("missed turns")
+    readings: list[Odometry | Scan] = []
+    before, reported, turn = Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0), 0.0
+    for reading in log.sensed.readings:
+        if isinstance(reading, Odometry):
+            step, before = before.between(reading.pose), reading.pose
+            reported, turn = reported.compose(Pose2(step.x, step.y, step.yaw + turn)), 0.0
+            readings.append(replace(reading, pose=reported))
+        elif isinstance(reading, Scan):
+            turn = float(rng.normal(0.0, MISSED_TURN_STD_RAD)) if rng.random() < MISSED_TURN_SHARE else 0.0
+            readings.append(reading)
+    return replace(log, sensed=replace(log.sensed, readings=readings))
+
+
 def _is_apart(last: Pose2, now: Pose2) -> bool:
     return last.distance(now) >= SPACING_M or abs(wrap(now.yaw - last.yaw)) >= SPACING_RAD
 
@@ -92,7 +116,8 @@ def _is_apart(last: Pose2, now: Pose2) -> bool:
 def sparse_log(kind: str, building: int) -> Log:
     """Return the sparse log of a kind in a building, the same every time."""
     circumstance, ends_after_turn = KINDS[kind]
-    return thinned(generate_log(building, building, circumstance, DURATION_S), ends_after_turn)
+    log = thinned(generate_log(building, building, circumstance, DURATION_S), ends_after_turn)
+    return with_missed_turns(log) if kind == MISSED_TURNS else log
 
 
 def run_sparse(buildings: Sequence[int], workers: int) -> Iterator[Sequence[SparseTrial]]:
