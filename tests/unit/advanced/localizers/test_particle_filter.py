@@ -10,7 +10,9 @@ from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.stack.localizers.motion_models import DifferentialMotionModel
-from simscen.testing.synthetic_room import grid
+from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
+
+START, ELSEWHERE = Pose2(-2.5, -1.8, 0.6), Pose2(3.9, -0.2, 2.4)
 
 
 def poses_after(scan_matching: Pose2, odometry: Pose2, overlap: float = 1.0) -> Array:
@@ -42,3 +44,19 @@ def test_a_match_of_few_points_may_be_wrong_although_odometry_agrees(overlap: fl
     motion = Pose2(1.0, 0.0, 0.0)
     by_odometry = np.abs(poses_after(motion, motion, overlap)[:, 2]) > 0.03
     assert abs(by_odometry.mean() - share) < 0.05
+
+
+@pytest.mark.parametrize(("relocalization", "stays"), [("scan_matching", True), ("random", False)])
+def test_random_particles_do_not_compete_with_the_search_of_the_map(relocalization: str, stays: bool) -> None:
+    """A group of particles that scans stopped fitting."""
+    spec = ScanMatchingAmcl.model_validate({
+        "relocalization": relocalization, "recovery_alpha_slow": 0.01, "recovery_alpha_fast": 0.5,
+        "map_trust_full": 0.0, "settling_distance": 0.0,
+    })  # fmt: skip
+    models, motion = map_models(grid(), spec), DifferentialMotionModel((0.2, 0.2, 0.2, 0.2))
+    subject = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
+    subject.begin(Estimate(START, (0.05, 0.05, 0.02)))
+    angles = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
+    for pose in [START] * 5 + [ELSEWHERE] * 5:
+        subject.correct(scan(cast(np.array([pose]), angles)[0]))
+    assert subject.particles.within(1.5) is stays
