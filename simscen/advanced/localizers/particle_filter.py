@@ -6,7 +6,7 @@ import numpy as np
 
 from simscen.advanced.localizers.map_trust import MapTrust
 from simscen.advanced.localizers.relocalization import sample_around
-from simscen.advanced.localizers.scan_matcher import CLEAR_OVERLAP, Step, apply_step
+from simscen.advanced.localizers.scan_matcher import Step, apply_step
 from simscen.advanced.localizers.scan_memory import METERS_PER_RAD
 from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
@@ -20,7 +20,7 @@ from simscen.stack.localizers.particles import FreeSpace, Particles
 from simscen.stack.localizers.recovery import Recovery
 
 ODOMETRY_SHARE = 0.2
-"""Share of the particles that follow odometry where scan matching is uncertain."""
+"""Share of the particles that follow odometry where odometry and scan matching disagree."""
 FIRST_SCAN_WEIGHT = 0.2
 """Exponent of the first scan's likelihood; it grows to 1 over `settling_distance`."""
 CERTAIN_FIT = 0.9
@@ -65,13 +65,12 @@ class ScanMatchingParticleFilter(ParticleFilter):
     def follow(self, seen: Step, delta: Pose2) -> None:
         """Move each particle by its own sample of a motion from scan matching. `delta` is the same by odometry.
 
-        Where the two disagree, wheels slip, people walk beside the robot, or the match is wrong, as it may be without
-        disagreement where scans have little in common. Some particles then follow the motion model of odometry, and the
-        map decides, unless it does not show the surroundings.
+        Where the two disagree, wheels slip, people walk beside the robot, or the match is wrong. Some particles then
+        follow the motion model of odometry, and the map decides, unless it does not show the surroundings.
         """
         self._settle(delta)
         poses = apply_step(self.particles.poses, seen, self._rng)
-        if self._map_weight > 0 and not (seen.agrees(delta) and seen.overlap >= CLEAR_OVERLAP):
+        if self._map_weight > 0 and not seen.agrees(delta):
             some = self._rng.random(len(poses)) < ODOMETRY_SHARE
             poses[some] = self._motion.sample(self.particles.poses[some], delta, self._rng)
         self.particles = Particles(poses, self.particles.weights)

@@ -53,9 +53,6 @@ robot was carried elsewhere.
 
 After a longer one, e.g. around a corner between sparse scans, the scans may share little anyway.
 """
-CLEAR_OVERLAP = 0.7
-"""Overlap from which on the match is certain. With less, as between sparse scans, the few common points may fit wrong
-surfaces, and the covariance of the match does not show this."""
 COVARIANCE_SCALE, COVARIANCE_FLOOR = 0.5, (0.004**2, 0.003**2, 0.0015**2)
 """Factor of the match's own covariance, and variances (m², m², rad²) added to it.
 
@@ -124,14 +121,10 @@ class _Reference:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Motion between two scans in the base frame of the first, with its covariance (3, 3).
-
-    `overlap` is the share of the scan's points that earlier scans showed.
-    """
+    """Motion between two scans in the base frame of the first, with its covariance (3, 3)."""
 
     delta: Pose2
     covariance: Array
-    overlap: float = 1.0
 
     def agrees(self, odometry: Pose2) -> bool:
         """Return whether odometry measured nearly the same motion."""
@@ -183,14 +176,11 @@ class ScanMatcher:
             return None
         seen = surfaces_of(scan)
         found = self._matched(seen, guess) if len(seen.points) and any(len(f.points) for f in self._frames) else None
-        overlap = self.overlap
         if math.hypot(guess.x, guess.y) > MAX_OVERLAP_STEP[0] or abs(guess.yaw) > MAX_OVERLAP_STEP[1]:
             self.overlap = None
         last, self.pose = self.pose, found[0] if found else self.pose.compose(guess)
         self._frames.append(seen.thinned(REFERENCE_POINTS).placed(self.pose))
-        if found is None or overlap is None:
-            return None
-        return Step(last.between(self.pose), _step_covariance(last.yaw, found[1]), overlap)
+        return Step(last.between(self.pose), _step_covariance(last.yaw, found[1])) if found else None
 
     def _matched(self, seen: Surface, guess: Pose2) -> tuple[Pose2, Symmetric] | None:
         """Return the pose in the matcher's frame, and its covariance in units of POINT_STD_M²."""

@@ -5,7 +5,7 @@ import pytest
 
 from simscen.advanced.localizers.build import map_models
 from simscen.advanced.localizers.particle_filter import ODOMETRY_SHARE, ScanMatchingParticleFilter
-from simscen.advanced.localizers.scan_matcher import CLEAR_OVERLAP, Step
+from simscen.advanced.localizers.scan_matcher import Step
 from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
@@ -15,13 +15,13 @@ from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
 START, ELSEWHERE = Pose2(-2.5, -1.8, 0.6), Pose2(3.9, -0.2, 2.4)
 
 
-def poses_after(scan_matching: Pose2, odometry: Pose2, overlap: float = 1.0) -> Array:
+def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:
     """Return the poses (n, 3) of particles that all started at the origin."""
     spec = ScanMatchingAmcl()
     models, motion = map_models(grid(), spec), DifferentialMotionModel((0.2, 0.2, 0.2, 0.2))
     subject = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
     subject.begin(Estimate(Pose2(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    subject.follow(Step(scan_matching, np.diag(np.square((0.01, 0.01, 0.005))), overlap), odometry)
+    subject.follow(Step(scan_matching, np.diag(np.square((0.01, 0.01, 0.005)))), odometry)
     return subject.particles.poses
 
 
@@ -37,13 +37,6 @@ def test_some_particles_rotate_as_odometry_says_where_it_disagrees() -> None:
     by_odometry = np.abs(poses[:, 2] - 0.3) > 0.03
     assert abs(by_odometry.mean() - ODOMETRY_SHARE) < 0.05
     assert 0.4 < np.median(poses[by_odometry, 2]) < 0.6
-
-
-@pytest.mark.parametrize(("overlap", "share"), [(1.0, 0.0), (CLEAR_OVERLAP - 0.1, ODOMETRY_SHARE)])
-def test_a_match_of_few_points_may_be_wrong_although_odometry_agrees(overlap: float, share: float) -> None:
-    motion = Pose2(1.0, 0.0, 0.0)
-    by_odometry = np.abs(poses_after(motion, motion, overlap)[:, 2]) > 0.03
-    assert abs(by_odometry.mean() - share) < 0.05
 
 
 @pytest.mark.parametrize(("relocalization", "stays"), [("scan_matching", True), ("random", False)])
