@@ -17,6 +17,7 @@ from simscen.stack.localizers.likelihood_field import SensorModel
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.particles import FreeSpace, Particles
+from simscen.stack.localizers.recovery import Recovery
 
 ODOMETRY_SHARE = 0.2
 """Share of the particles that follow odometry where odometry and scan matching disagree."""
@@ -42,6 +43,8 @@ class ScanMatchingParticleFilter(ParticleFilter):
     def begin(self, estimate: Estimate) -> None:
         """Restart with particles around the estimate's pose, or over all free space if it has none."""
         super().begin(estimate)
+        if self._spec.relocalization == "scan_matching":  # random particles would compete with its search
+            self._recovery = Recovery(0.0, 0.0)
         self._map_weight, self._is_one_group = 1.0, False
         self.fitting = 0.0
         """Share of the last scan's beams that fit the map at the particles, where the map shows anything."""
@@ -62,15 +65,14 @@ class ScanMatchingParticleFilter(ParticleFilter):
     def follow(self, seen: Step, delta: Pose2) -> None:
         """Move each particle by its own sample of a motion from scan matching. `delta` is the same by odometry.
 
-        Where the two disagree, wheels slip or people walk beside the robot. Some particles then translate as odometry
-        says, and the map decides, unless it does not show the surroundings. All rotate as the scans show.
+        Where the two disagree, wheels slip, people walk beside the robot, or the match is wrong. Some particles then
+        follow the motion model of odometry, and the map decides, unless it does not show the surroundings.
         """
         self._settle(delta)
         poses = apply_step(self.particles.poses, seen, self._rng)
         if self._map_weight > 0 and not seen.agrees(delta):
             some = self._rng.random(len(poses)) < ODOMETRY_SHARE
-            driven = Step(Pose2(delta.x, delta.y, seen.delta.yaw), seen.covariance)
-            poses[some] = apply_step(self.particles.poses[some], driven, self._rng)
+            poses[some] = self._motion.sample(self.particles.poses[some], delta, self._rng)
         self.particles = Particles(poses, self.particles.weights)
 
     def _settle(self, delta: Pose2) -> None:

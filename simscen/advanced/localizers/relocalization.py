@@ -46,9 +46,9 @@ SAME_POSE = 0.7, 0.3
 """Maximum difference (m, rad) of the poses found by two searches that agree."""
 AGREEMENT_LENGTH_M = 2.0
 """Distance driven over which searches must agree."""
-UNMAPPED_SCANS, RETURN_SCORE, RETURN_LEAD = 20, 0.9, 0.1
-"""After this many scans outside the mapped area, the map is searched, too. The robot has returned if score and lead
-have these values. They are higher because unmapped rooms often resemble mapped ones."""
+UNMAPPED_DISTANCE_M, RETURN_SCORE, RETURN_LEAD = 5.0, 0.9, 0.1
+"""After this distance driven outside the mapped area, the map is searched, too. The robot has returned if score and
+lead have these values. They are higher because unmapped rooms often resemble mapped ones."""
 SCORE_SCALE = 0.02
 """Difference of two scores for which one pose is e times as likely as the other, and gets e times as many particles."""
 NO_MOTION = ObservedMotion()
@@ -74,7 +74,7 @@ class Relocalizer:
         self._interval, self._was_in_doubt = 0.0, False
         self._last: Pose2 | None = None
         self._candidate: tuple[Pose2, Pose2] | None = None  # pose found by the last search, and the base there
-        self._unmapped_scans, self._knows_overlap = 0, False
+        self._mapped_at, self._knows_overlap = 0.0, False
 
     def update(
         self, scan: Scan, base: Pose2, estimated: Pose2, limits: tuple[float, float],
@@ -100,10 +100,10 @@ class Relocalizer:
             fit = self._trust.fit(here, ends, MIN_MAPPED)
         if fit is not None:
             self._fits.append(fit)
-        self._unmapped_scans = self._unmapped_scans + 1 if fit is None else 0
+            self._mapped_at = self._driven
         if self._has_pose and (near := self._search_nearby(base, here)) is not None:
             return near
-        if self._has_pose and not (self._is_in_doubt() or self._unmapped_scans >= UNMAPPED_SCANS):
+        if self._has_pose and not (self._is_in_doubt() or self._is_unmapped):
             return None
         if self._since_search < self._interval:
             return None
@@ -208,9 +208,14 @@ class Relocalizer:
         return is_in_doubt
 
     @property
+    def _is_unmapped(self) -> bool:
+        """The believed pose has been outside the mapped area for a long way."""
+        return self._driven - self._mapped_at >= UNMAPPED_DISTANCE_M
+
+    @property
     def _has_left_map(self) -> bool:
         """The robot drove out of the mapped area. If it had been carried there, it could be anywhere."""
-        return self._unmapped_scans >= UNMAPPED_SCANS and self._certain is not None
+        return self._is_unmapped and self._certain is not None
 
     def _search_map(self, view: View, base: Pose2, here: Array) -> tuple[Array, Array] | None:
         """Return the poses that fit, or for a robot that had a pose, the one that two searches agree on."""
@@ -233,7 +238,7 @@ class Relocalizer:
                 self._candidate, self._since_candidate = (found, base), 0.0
             elif self._since_candidate >= AGREEMENT_LENGTH_M:
                 self._candidate = None
-                self._unmapped_scans = 0
+                self._mapped_at = self._driven
                 return self._found(poses[:1], base)
         else:
             interval = MAX_SEARCH_INTERVAL_M if self._has_left_map else 2 * max(last_interval, SEARCH_INTERVAL_M)

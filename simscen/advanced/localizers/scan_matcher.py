@@ -46,9 +46,10 @@ AGREEMENT = (0.03, 0.1, 0.03, 0.1)
 """Difference up to which scan matching and odometry agree: m and share of the distance, rad and share of the rotation.
 """
 MIN_OVERLAP = 0.3
-"""Share of a scan's points that earlier scans showed, below which the robot was carried elsewhere."""
+"""Share of a scan's points that earlier scans showed, below which the scans do not show the motion."""
 MAX_OVERLAP_STEP = 0.75, 0.75
-"""Longest step between two scans (m, rad) after which a small overlap means that the robot was carried elsewhere.
+"""Longest step between two scans (m, rad) after which a small overlap means something: below MIN_OVERLAP, that the
+robot was carried elsewhere.
 
 After a longer one, e.g. around a corner between sparse scans, the scans may share little anyway.
 """
@@ -160,7 +161,7 @@ class ScanMatcher:
         self._frames: deque[Surface] = deque(maxlen=REFERENCE_SCANS)
         self.pose = Pose2(0.0, 0.0, 0.0)
         self.overlap: float | None = None
-        """Share of the last scan's points that earlier scans showed; None if unknown."""
+        """Share of the last scan's points that earlier scans showed; None if unknown or after a long step."""
 
     @property
     def was_carried(self) -> bool | None:
@@ -175,8 +176,7 @@ class ScanMatcher:
             return None
         seen = surfaces_of(scan)
         found = self._matched(seen, guess) if len(seen.points) and any(len(f.points) for f in self._frames) else None
-        is_long = math.hypot(guess.x, guess.y) > MAX_OVERLAP_STEP[0] or abs(guess.yaw) > MAX_OVERLAP_STEP[1]
-        if self.was_carried and is_long:
+        if math.hypot(guess.x, guess.y) > MAX_OVERLAP_STEP[0] or abs(guess.yaw) > MAX_OVERLAP_STEP[1]:
             self.overlap = None
         last, self.pose = self.pose, found[0] if found else self.pose.compose(guess)
         self._frames.append(seen.thinned(REFERENCE_POINTS).placed(self.pose))
@@ -206,7 +206,7 @@ class ScanMatcher:
                 break
             gate = last if _within(step, LAST_GATE_STEP) else min(gate + 1, last)
         self.overlap = reference.overlap
-        return pose, inverse
+        return None if self.overlap < MIN_OVERLAP else (pose, inverse)
 
 
 def _prior_information(guess: Pose2) -> tuple[float, float]:

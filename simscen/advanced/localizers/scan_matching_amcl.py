@@ -5,7 +5,7 @@ from dataclasses import replace
 from simscen.advanced.localizers.covariance_estimator import CovarianceEstimator
 from simscen.advanced.localizers.global_search import GlobalSearch
 from simscen.advanced.localizers.map_residuals import MapResiduals
-from simscen.advanced.localizers.map_trust import CLUSTER_RADIUS_M, MapTrust
+from simscen.advanced.localizers.map_trust import MapTrust
 from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter
 from simscen.advanced.localizers.pose_prior import ObservedMotion
 from simscen.advanced.localizers.relocalization import NO_MOTION, Relocalizer
@@ -20,11 +20,6 @@ from simscen.stack.localizers.motion_models import MotionModel
 
 CERTAIN_AFTER_UPDATES = 8
 """The robot is certain of its pose after this many consecutive updates in which map, scans and wheels agreed."""
-MIN_OVERLAP = 0.7
-"""Minimum share of a scan's points that earlier scans showed, for scans to weigh particles that are spread widely.
-
-A person in front of the lidar hides most of the room, and fits wherever an obstacle is equally near.
-"""
 
 
 class ScanMatchingAmclLocalizer(AmclLocalizer):
@@ -92,7 +87,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         self._mark_updated(scan, odometry)
         certain = agreed and not was_carried and self._consistent_updates >= CERTAIN_AFTER_UPDATES
         self._skipped = self._skipped + 1 if certain and self._skipped + 1 < self._update_interval else 0
-        estimate = None if self._skipped or self._is_view_blocked else self._filter.correct(scan)
+        estimate = None if self._skipped else self._filter.correct(scan)
         if estimate is not None:
             pose, covariance = estimate
             if self._covariance_estimator is not None and self._residuals is not None:
@@ -107,12 +102,6 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         if not self._skipped:
             consistent = agreed and estimate is not None and self._filter.is_certain
             self._consistent_updates = self._consistent_updates + 1 if consistent else 0
-
-    @property
-    def _is_view_blocked(self) -> bool:
-        """The last scan shows little of what earlier scans showed, and the particles are spread widely."""
-        overlap = None if self._matcher is None else self._matcher.overlap
-        return overlap is not None and overlap < MIN_OVERLAP and not self._filter.particles.within(CLUSTER_RADIUS_M)
 
     def _match(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
         """Return the motion since the last update by scan matching of the first lidar; None if it cannot tell."""

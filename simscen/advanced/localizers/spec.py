@@ -42,7 +42,8 @@ class ScanMatchingAmcl(AmclParameters):
     room alone fits many poses. A turn of 2 rad counts as 1 m. 0 = full weight at once, as in Nav2."""
     relocalization: Literal["scan_matching", "random"] = "scan_matching"
     """How a lost robot is found: the scans of the last meters are matched with the whole map, or only random particles
-    at the start and by `recovery_alpha_*` find it, as in Nav2."""
+    at the start and by `recovery_alpha_*` find it, as in Nav2. `scan_matching` ignores `recovery_alpha_*`, because
+    random particles at poses that look alike would lead away from a correct pose."""
     sure_update_interval: Annotated[int, Field(ge=1, le=10)] = 2
     """Number of scans per comparison with the map while the robot is certain of its pose: map, scan matching and
     odometry agree. The other scans are only matched with each other. Always 1 with `covariance: scatter`."""

@@ -1,6 +1,7 @@
 """Tests of how particles move when scan matching and odometry disagree."""
 
 import numpy as np
+import pytest
 
 from simscen.advanced.localizers.build import map_models
 from simscen.advanced.localizers.particle_filter import ODOMETRY_SHARE, ScanMatchingParticleFilter
@@ -9,7 +10,9 @@ from simscen.advanced.localizers.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.stack.localizers.motion_models import DifferentialMotionModel
-from simscen.testing.synthetic_room import grid
+from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
+
+START, ELSEWHERE = Pose2(-2.5, -1.8, 0.6), Pose2(3.9, -0.2, 2.4)
 
 
 def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:
@@ -22,14 +25,31 @@ def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:
     return subject.particles.poses
 
 
-def test_some_particles_translate_as_odometry_says_where_scans_show_no_motion() -> None:
+def test_some_particles_move_as_odometry_says_where_scans_show_no_motion() -> None:
     """People who walk beside a robot look like a room that moves with it."""
-    poses = poses_after(Pose2(0.0, 0.0, 0.0), Pose2(0.25, 0.0, 0.0))
-    by_odometry = np.abs(poses[:, 0] - 0.25) < 0.05
+    poses = poses_after(Pose2(0.0, 0.0, 0.0), Pose2(1.0, 0.0, 0.0))
+    by_odometry = np.hypot(poses[:, 0], poses[:, 1]) > 0.1
     assert abs(by_odometry.mean() - ODOMETRY_SHARE) < 0.05
-    assert (np.abs(poses[~by_odometry, 0]) < 0.05).all()
 
 
-def test_all_particles_rotate_as_the_scans_show() -> None:
+def test_some_particles_rotate_as_odometry_says_where_it_disagrees() -> None:
     poses = poses_after(Pose2(0.0, 0.0, 0.3), Pose2(0.0, 0.0, 0.5))
-    assert (np.abs(poses[:, 2] - 0.3) < 0.03).all()
+    by_odometry = np.abs(poses[:, 2] - 0.3) > 0.03
+    assert abs(by_odometry.mean() - ODOMETRY_SHARE) < 0.05
+    assert 0.4 < np.median(poses[by_odometry, 2]) < 0.6
+
+
+@pytest.mark.parametrize(("relocalization", "stays"), [("scan_matching", True), ("random", False)])
+def test_random_particles_do_not_compete_with_the_search_of_the_map(relocalization: str, stays: bool) -> None:
+    """A group of particles that scans stopped fitting."""
+    spec = ScanMatchingAmcl.model_validate({
+        "relocalization": relocalization, "recovery_alpha_slow": 0.01, "recovery_alpha_fast": 0.5,
+        "map_trust_full": 0.0, "settling_distance": 0.0,
+    })  # fmt: skip
+    models, motion = map_models(grid(), spec), DifferentialMotionModel((0.2, 0.2, 0.2, 0.2))
+    subject = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
+    subject.begin(Estimate(START, (0.05, 0.05, 0.02)))
+    angles = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
+    for pose in [START] * 5 + [ELSEWHERE] * 5:
+        subject.correct(scan(cast(np.array([pose]), angles)[0]))
+    assert subject.particles.within(1.5) is stays

@@ -29,17 +29,22 @@ def corner_of_the_map() -> OccupancyGrid:
 
 def found(
     off: Pose2, apart: float = 0.25, way: float = 2.0, settling: float = 0.0, estimated: Pose2 = Pose2(0, 0, 0),
-    std: tuple[float, float, float] = (0.5, 0.5, 0.26), map_: OccupancyGrid | None = None,
+    std: tuple[float, float, float] = (0.5, 0.5, 0.26), map_: OccupancyGrid | None = None, turn: float = 0.0,
 ) -> list[Array]:  # fmt: skip
-    """Where a robot is put that starts at START, drives some `way`, scans each so many m and believes to be `off`.
+    """Return where a robot is put that believes to be `off`.
 
-    It was `estimated` to be that far off, with standard deviations `std`.
+    It starts at START and drives some `way` with a curvature `turn` (rad/m), with scans so many m `apart`. It was
+    `estimated` to be that far off, with standard deviations `std`.
     """
     known = map_ or grid()
     trust = MapTrust(obstacle_field(known, 2.0), beyond_the_map(known).ravel(), 0.45, 0.8)
     finder, places = Relocalizer(GlobalSearch(known), trust, Estimate(START.compose(estimated), std), settling), []
     for driven in np.arange(0.0, way, apart).tolist():
-        base = Pose2(driven, 0.0, 0.0)
+        base = (
+            Pose2(driven, 0.0, 0.0)
+            if not turn
+            else Pose2(np.sin(turn * driven) / turn, (1 - np.cos(turn * driven)) / turn, turn * driven)
+        )
         pose = START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
         put = finder.update(scan(ranges), base, pose.compose(off), (0.0, 100.0))
@@ -59,8 +64,10 @@ def test_a_robot_that_knows_its_place_is_left_there(off: Pose2) -> None:
     assert found(off) == []
 
 
-def test_a_robot_that_believes_to_be_off_the_map_is_found_when_it_is_back() -> None:
-    (place,) = found(Pose2(40.0, 3.0, 0.7), apart=0.05, way=3.5)
+@pytest.mark.parametrize("apart", [0.25, 1.0], ids=["dense", "sparse"])
+def test_a_robot_that_believes_to_be_off_the_map_is_found_when_it_is_back(apart: float) -> None:
+    """The distance driven outside the map counts, not the number of scans."""
+    place = found(Pose2(40.0, 3.0, 0.7), apart=apart, way=11.0, turn=0.5)[0]
     assert np.hypot(place[0], place[1]) < 0.1
     assert abs(place[2]) < 0.03
 
@@ -115,12 +122,13 @@ def test_who_was_carried_off_is_found_by_what_is_too_little_for_who_left_the_map
     """Rooms that nobody mapped look like mapped ones, and who went there is there; who was carried off is anywhere."""
     trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
     finder, away, puts = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(40.0, 3.0, 0.7), []
-    for k, driven in enumerate([0.04 * k for k in range(25)] + [1.0 + 0.25 * k for k in range(10)]):
-        pose = START.compose(Pose2(driven, 0.0, 0.0))
+    for k, driven in enumerate([0.25 * k for k in range(44)]):
+        base = Pose2(2 * np.sin(driven / 2), 2 * (1 - np.cos(driven / 2)), driven / 2)  # a circle
+        pose = START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
         ranges[::6] *= 0.5  # people
         way = ObservedMotion(was_carried=carried_off and k == 1)
-        put = finder.update(scan(ranges), Pose2(driven, 0.0, 0.0), pose.compose(away), (0.0, 100.0), way)
+        put = finder.update(scan(ranges), base, pose.compose(away), (0.0, 100.0), way)
         if put is not None:
             puts.append(pose.between(Pose2(*put[0][0].tolist())))
     assert [np.hypot(off.x, off.y) < 0.1 for off in puts[:1]] == [True] * carried_off

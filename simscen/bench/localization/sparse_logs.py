@@ -1,0 +1,160 @@
+"""Comparison of localizers on sparse logs: scans are 1 m or 0.5 rad apart, as in many public data sets."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from multiprocessing import get_context
+
+import numpy as np
+
+from simscen.advanced.localizers.spec import ScanMatchingAmcl
+from simscen.bench.localization.campaign import LOST_M, ROBOT
+from simscen.bench.localization.generated_logs import Log, generate_log
+from simscen.bench.localization.recorded_drive import compare_with_reference, localize
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.core.random_streams import Streams
+from simscen.model.localizers import Amcl, AmclParameters
+from simscen.model.stack import StackSpec
+from simscen.record.localization_logs.read import LocalizationLog
+from simscen.record.localization_logs.rows import TICK_RATE_HZ
+from simscen.stack.protocols import Surroundings
+
+RECOVERY = {"recovery_alpha_slow": 0.001, "recovery_alpha_fast": 0.1}
+"""Random particles as nav2_amcl's documentation recommends."""
+LOCALIZERS: Mapping[str, AmclParameters] = {
+    "likelihood_field": Amcl(laser_model_type="likelihood_field"),
+    "likelihood_field, recovery": Amcl.model_validate({"laser_model_type": "likelihood_field", **RECOVERY}),
+    "amcl": Amcl(),
+    "amcl, recovery": Amcl.model_validate(RECOVERY),
+    "scan_matching_amcl": ScanMatchingAmcl(),
+}
+SEEDS = 5
+SPACING_M, SPACING_RAD = 1.0, 0.5
+"""Motion between two scans: at least one of these."""
+DURATION_S = 180.0
+END_TURN_RAD = 1.0
+"""Rotation over the last two steps between scans of a log that ends after a turn."""
+MISSED_TURN_SHARE, MISSED_TURN_STD_RAD = 0.05, 0.6
+"""Share of the steps between scans with a turn that odometry does not report, and its standard deviation.
+
+The odometry of the public log MIT CSAIL has a few such steps.
+"""
+MISSED_TURNS = "as mapped, turns that odometry misses"
+KINDS: Mapping[str, tuple[str, bool]] = {
+    "as mapped, slipping wheels": ("slipping", False),
+    "as mapped, turns that odometry misses": ("slipping", False),
+    "people, moved furniture, glass": ("tracked", False),
+    "the same, ends after a turn": ("tracked", True),
+    "half rebuilt": ("outdated", False),
+    "half a map": ("half", False),
+}
+"""Circumstance of each kind of log, and whether it ends after a turn."""
+
+
+@dataclass(frozen=True)
+class SparseTrial:
+    """Result of one seed on one log: errors in m, and whether the error ever exceeded LOST_M."""
+
+    kind: str
+    localizer: str
+    building: int
+    seed: int
+    median: float
+    end: float
+    lost: bool
+
+
+def thinned(log: Log, ends_after_turn: bool = False) -> Log:
+    """Return the log with scans at least SPACING_M or SPACING_RAD apart by odometry.
+
+    With `ends_after_turn`, it ends at the last scan after a turn of END_TURN_RAD, if there is one.
+    """
+    readings: list[Odometry | Scan] = []
+    kept: list[tuple[int, Pose2]] = []  # tick and odometry of each scan that is kept
+    odometry, end = Pose2(0.0, 0.0, 0.0), 0
+    for reading in log.sensed.readings:
+        if isinstance(reading, Odometry):
+            odometry = reading.pose
+        elif isinstance(reading, Scan):
+            if kept and not _is_apart(kept[-1][1], odometry):
+                continue
+            kept.append((reading.tick, odometry))
+            if len(kept) > 2 and abs(wrap(odometry.yaw - kept[-3][1].yaw)) > END_TURN_RAD:
+                end = reading.tick
+        readings.append(reading)
+    if not ends_after_turn or not end:
+        return replace(log, sensed=replace(log.sensed, readings=readings))
+    before = log.sensed.ticks <= end
+    sensed = LocalizationLog([one for one in readings if one.tick <= end], log.sensed.ticks[before],
+                             log.sensed.truth[before])  # fmt: skip
+    return replace(log, sensed=sensed)
+
+
+def with_missed_turns(log: Log) -> Log:
+    """Return a sparse log whose odometry misses some turns: it continues with a wrong heading."""
+    rng = Streams(log.building).generator("missed turns")
+    readings: list[Odometry | Scan] = []
+    before, reported, turn = Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0), 0.0
+    for reading in log.sensed.readings:
+        if isinstance(reading, Odometry):
+            step, before = before.between(reading.pose), reading.pose
+            reported, turn = reported.compose(Pose2(step.x, step.y, step.yaw + turn)), 0.0
+            readings.append(replace(reading, pose=reported))
+        elif isinstance(reading, Scan):
+            turn = float(rng.normal(0.0, MISSED_TURN_STD_RAD)) if rng.random() < MISSED_TURN_SHARE else 0.0
+            readings.append(reading)
+    return replace(log, sensed=replace(log.sensed, readings=readings))
+
+
+def _is_apart(last: Pose2, now: Pose2) -> bool:
+    return last.distance(now) >= SPACING_M or abs(wrap(now.yaw - last.yaw)) >= SPACING_RAD
+
+
+@lru_cache(maxsize=1)
+def sparse_log(kind: str, building: int) -> Log:
+    """Return the sparse log of a kind in a building, the same every time."""
+    circumstance, ends_after_turn = KINDS[kind]
+    log = thinned(generate_log(building, building, circumstance, DURATION_S), ends_after_turn)
+    return with_missed_turns(log) if kind == MISSED_TURNS else log
+
+
+def run_sparse(buildings: Sequence[int], workers: int) -> Iterator[Sequence[SparseTrial]]:
+    """Yield the trials of all localizers and seeds, one log at a time."""
+    logs = [(kind, building) for kind in KINDS for building in buildings]
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        yield from pool.map(run_sparse_log, *zip(*logs, strict=True))
+
+
+def run_sparse_log(kind: str, building: int) -> Sequence[SparseTrial]:
+    """Run the log of a kind in a building through all localizers, with each seed."""
+    return [run_sparse_trial(kind, building, name, seed) for name in LOCALIZERS for seed in range(1, SEEDS + 1)]
+
+
+def run_sparse_trial(kind: str, building: int, name: str, seed: int) -> SparseTrial:
+    """Run the log of a kind in a building through a localizer."""
+    log, spec = sparse_log(kind, building), StackSpec.model_validate({"localizer": LOCALIZERS[name]})
+    localized = localize(log.sensed, spec, Surroundings(ROBOT, log.map, TICK_RATE_HZ), log.estimate, seed)
+    errors = compare_with_reference(localized, log.sensed, LOST_M)
+    assert errors is not None  # a generated log has a reference from its first reading to its last
+    figures = errors.figures()
+    return SparseTrial(kind, name, building, seed, figures["median"], figures["final"], bool(errors.lost))
+
+
+def sparse_table(trials: Sequence[SparseTrial]) -> list[tuple[str, ...]]:
+    """Return the rows of a table: the kind of log, then for each localizer lost runs, median error and end error.
+
+    The errors are medians over buildings and seeds.
+    """
+    rows = [("log", *LOCALIZERS)]
+    for kind in KINDS:
+        groups = [[one for one in trials if (one.kind, one.localizer) == (kind, name)] for name in LOCALIZERS]
+        rows.append((kind, *map(_cell, groups)))
+    return rows
+
+
+def _cell(trials: Sequence[SparseTrial]) -> str:
+    lost = sum(one.lost for one in trials)
+    median, end = (float(np.median([getattr(one, name) for one in trials])) for name in ("median", "end"))
+    return f"{lost} of {len(trials)}, {median:.2f} m, {end:.2f} m"
