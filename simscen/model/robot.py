@@ -17,6 +17,7 @@ from simscen.spec.quantities import (
     Angle,
     Duration,
     Frequency,
+    Friction,
     Length,
     NonNegativeAcceleration,
     NonNegativeAngle,
@@ -170,25 +171,22 @@ class Mount(Spec):
     """Distance to the left of the origin of the base frame."""
     z: NonNegativeLength = 0.2
     """Height above the ground."""
+    roll: Angle = 0.0
+    """Angle about the viewing direction, right side down; 180 deg: mounted upside down."""
+    pitch: Annotated[Angle, Field(ge=-1.6, le=1.6)] = 0.0
+    """Downward angle of the viewing direction; negative: upward."""
     yaw: Angle = 0.0
     """Viewing direction, counterclockwise from straight ahead."""
 
     @property
-    def pose(self) -> Pose3:
-        """Pose of the sensor frame in the base frame."""
-        return Pose3.from_rpy(self.x, self.y, self.z, 0.0, 0.0, self.yaw)
-
-
-class CameraMount(Mount):
-    """Pose of a camera in the base frame of the robot, with its pitch."""
-
-    pitch: Annotated[Angle, Field(ge=-1.6, le=1.6)] = 0.0
-    """Downward angle of the viewing direction; negative: upward."""
+    def is_level(self) -> bool:
+        """Whether the x-y plane of the sensor is horizontal and not upside down."""
+        return self.roll == 0.0 and self.pitch == 0.0
 
     @property
     def pose(self) -> Pose3:
-        """Pose of the sensor frame in the base frame; yaw is applied before pitch, as in URDF."""
-        return Pose3.from_rpy(self.x, self.y, self.z, 0.0, self.pitch, self.yaw)
+        """Pose of the sensor frame in the base frame; roll, pitch, and yaw are those of a URDF's `rpy`."""
+        return Pose3.from_rpy(self.x, self.y, self.z, self.roll, self.pitch, self.yaw)
 
 
 class SensorSpec(Component):
@@ -268,6 +266,8 @@ class InertialUnit(SensorSpec):
     """Standard deviation of the gyroscope bias, which is constant in a run."""
     accelerometer_noise: Annotated[NonNegativeAcceleration, Field(le=100)] = 0.02
     """Standard deviation of the acceleration."""
+    mount: Mount | None = None
+    """Pose on the robot; default: the base frame."""
 
 
 class Bumper(SensorSpec):
@@ -296,8 +296,8 @@ class Camera(SensorSpec):
     """Horizontal field of view."""
     max_range: PositiveLength = 10.0
     """Maximum range of the depth image."""
-    mount: CameraMount = by_default()
-    """Pose on the robot, with pitch."""
+    mount: Mount = by_default()
+    """Pose on the robot."""
 
 
 class Sensor(Choice):
@@ -359,6 +359,9 @@ class RobotSpec(Spec):
     """Radius of the footprint of a round robot."""
     footprint: Ring | None = None
     """Corners of the footprint in the base frame for any other robot; default: computed from the shapes."""
+    hull_friction: Friction = 0.5
+    """Friction coefficient of the hull against walls and objects. It is multiplied by theirs: 1 for walls and fixed
+    obstacles, 0.6 for movable ones."""
     drive: Drive
     """Wheels and their kinematics."""
     limits: Limits

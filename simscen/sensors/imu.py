@@ -1,6 +1,6 @@
-"""Inertial measurement unit at the origin of the base frame."""
+"""Inertial measurement unit."""
 
-from simscen.core.geometry import rotated
+from simscen.core.geometry import Pose3, Vector, rotated
 from simscen.core.messages.sensor_data import Imu
 from simscen.model.robot import InertialUnit
 from simscen.sensors.sensor import NormalStream, SensorSetting
@@ -11,6 +11,7 @@ GRAVITY = 9.81  # m/s²
 class ImuSensor:
     """Measures the angular velocity with a constant bias, and the mean specific force since the last reading.
 
+    Its frame is the base frame, or `spec.mount`, where turning causes centripetal and tangential acceleration as well.
     A robot that is placed elsewhere at rest (`kidnap`) is not accelerated: the next reading contains gravity only.
     """
 
@@ -21,13 +22,15 @@ class ImuSensor:
         self._seconds, self._view = setting.seconds, setting.view
         self._bias: list[float] = setting.rng.normal(0.0, spec.gyro_bias, 3).tolist()
         self._normals = NormalStream(setting.rng)
-        self._velocity, _ = self._view.base_velocity()
+        self._mount = Pose3() if spec.mount is None else spec.mount.pose
+        self._is_at_base = spec.mount is None
+        self._velocity = self._view.base_velocity()[0] if self._is_at_base else self._sensor_motion()[1]
         self._placements = self._view.placements()
 
     def read(self, tick: int) -> Imu:
-        """Return a reading in the base frame. A level robot at rest measures +9.81 m/s² along z."""
-        _, _, _, i, j, k, w = self._view.base_pose()
-        (ax, ay, az), (linear, angular) = self._velocity, self._view.base_velocity()
+        """Return a reading in the frame of the sensor. A level one at rest measures +9.81 m/s² along z."""
+        (i, j, k, w), linear, angular = self._sensor_motion()
+        ax, ay, az = self._velocity
         if (placements := self._view.placements()) != self._placements:
             self._placements, (ax, ay, az) = placements, linear
         self._velocity = vx, vy, vz = linear
@@ -43,4 +46,15 @@ class ImuSensor:
             (x + force * nx, y + force * ny, z + force * nz),
             self._gyro_variance,
             self._force_variance,
+            self._mount,
         )
+
+    def _sensor_motion(self) -> tuple[tuple[float, float, float, float], Vector, Vector]:
+        """Return the orientation of the sensor, and its linear and angular velocity, all in the world frame."""
+        pose, (linear, angular) = self._view.base_pose(), self._view.base_velocity()
+        if self._is_at_base:
+            return pose.quaternion, linear, angular
+        x, y, z = rotated(pose.quaternion, self._mount.position)
+        (vx, vy, vz), (wx, wy, wz) = linear, angular
+        moved = vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
+        return pose.compose(self._mount).quaternion, moved, angular

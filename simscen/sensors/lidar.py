@@ -29,7 +29,9 @@ class LidarSensor:
         self._increment = spec.field_of_view / max(1, spec.beams if is_full_circle else spec.beams - 1)
         self._first = -spec.field_of_view / 2 if spec.beams > 1 else 0.0
         self._mount = Pose2(spec.mount.x, spec.mount.y, spec.mount.yaw)
-        self._fan = RayFan(self._first + spec.mount.yaw, self._increment, spec.beams)
+        self._tilted_mount = None if spec.mount.is_level else spec.mount.pose
+        yaw = spec.mount.yaw if spec.mount.is_level else 0.0  # the ray fan of a tilted lidar is in the lidar frame
+        self._fan = RayFan(self._first + yaw, self._increment, spec.beams)
         # Beyond this distance, a range exceeds the maximum in spite of noise and rounding.
         self._cast_range = spec.max_range + MAX_NOISE_STDS * spec.noise + spec.resolution
         self._origin = spec.mount.x, spec.mount.y, spec.mount.z
@@ -37,13 +39,23 @@ class LidarSensor:
 
     def read(self, tick: int) -> Scan:
         """Return a scan; inf: no hit within range, -inf: a hit below the minimum range (REP 117)."""
-        pose = self._view.base_pose()
+        pose, spec = self._view.base_pose(), self._spec
+        if self._tilted_mount is not None:
+            ranges = self._to_ranges(self._tilted_distances(pose.compose(self._tilted_mount)))
+            limits = self._first, self._increment, spec.min_range, spec.max_range
+            return Scan(self.name, tick, ranges, *limits, self._mount, self._tilted_mount)
         px, py, pz, i, j, k, w = pose
         x, y, z = rotated((i, j, k, w), self._origin)
         origin = Pose3(px + x, py + y, pz + z, i, j, k, w)
         ranges = self._to_ranges(self._rays.sweep(self._fan, origin, self._cast_range))
-        spec = self._spec
         return Scan(self.name, tick, ranges, self._first, self._increment, spec.min_range, spec.max_range, self._mount)
+
+    def _tilted_distances(self, lidar: Pose3) -> Array:
+        """Return the distances to obstacles or to the floor, whichever is nearer."""
+        distances = np.asarray(self._rays.sweep(self._fan, lidar, self._cast_range), dtype=np.float64)
+        angles = self._first + self._increment * np.arange(self._spec.beams)
+        slopes = np.array((np.cos(angles), np.sin(angles))).T @ lidar.rotation()[2, :2]
+        return np.minimum(distances, floor_distances(lidar.z, slopes))
 
     def _to_ranges(self, distances: Array | Singles) -> Array:
         """Return reported ranges for true distances: with noise, rounded, and limited to the sensor's range."""
@@ -68,3 +80,12 @@ class LidarSensor:
         self._next += 1
         noise: Array = self._noise_buffer[self._next - 1]
         return noise
+
+
+def floor_distances(height: float, slopes: Array) -> Array:
+    """Return the distance along each beam from `height` to the floor (z = 0); inf for beams that do not point down.
+
+    `slopes` (n,) are the z components of their unit vectors.
+    """
+    down = slopes < -1e-9
+    return np.where(down, height / np.where(down, -slopes, 1.0), np.inf)

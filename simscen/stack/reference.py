@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.messages.level_readings import imu_in_base_frame, level_scan
 from simscen.core.messages.navigation import ErrorCode, Estimate, Goal, Path
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readings, Scan
 from simscen.core.records.events import Event
@@ -204,12 +205,13 @@ class ReferenceStack:
                 case Odometry():
                     self._process_odometry(reading)
                 case Imu():
+                    imu = imu_in_base_frame(reading)
                     if self._odometry_filter is not None:
-                        self._odometry_filter.on_imu(reading)
-                    self._localizer.on_imu(reading)
-                    self._on_motion(reading)
+                        self._odometry_filter.on_imu(imu)
+                    self._localizer.on_imu(imu)
+                    self._on_motion(imu)
                 case Scan():
-                    scans.append(reading)
+                    scans.append(level_scan(reading))
                 case Image() if reading.field_of_view > 0.0:
                     self._costmaps.add_reading(reading)
                 case _:

@@ -190,7 +190,6 @@ _ROBOT: dict[str, type[BaseModel]] = {
     "body": robot.Part,
     "limits": robot.Limits,
     "mount": robot.Mount,
-    "mount of a camera": robot.CameraMount,
 }
 
 

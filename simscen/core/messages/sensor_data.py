@@ -25,7 +25,8 @@ class Scan:
 
     `ranges` (n,) are in m; by REP 117, inf if nothing was hit up to `range_max`, -inf if a hit is closer than
     `range_min`, and nan if a beam gave no valid measurement. Beam k points at `angle_min + k * angle_increment` in the
-    lidar frame, which is at `mount` in the base frame of the robot.
+    lidar frame, which is at `mount` in the base frame of the robot. For a lidar that is not level, `tilted_mount` is
+    its full pose and `mount` its projection on the plane; see `level_readings.level_scan`.
     """
 
     sensor: str
@@ -36,6 +37,7 @@ class Scan:
     range_min: float
     range_max: float
     mount: Pose2 = Pose2(0.0, 0.0, 0.0)
+    tilted_mount: Pose3 | None = None
 
     def angles(self) -> Array:
         """Return the beam directions (n,) in the lidar frame in rad."""
@@ -45,7 +47,10 @@ class Scan:
         """Return the hits (m, 2) in the base frame of the robot, without beams that hit nothing."""
         hit = np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
         angles, ranges = self.angles()[hit], self.ranges[hit]
-        return self.mount.apply(np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles))))
+        flat = np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles)))
+        if self.tilted_mount is not None:
+            return self.tilted_mount.apply(np.column_stack((flat, np.zeros(len(flat)))))[:, :2]
+        return self.mount.apply(flat)
 
 
 @fast_dataclass()
@@ -66,9 +71,10 @@ class Odometry:
 
 @fast_dataclass()
 class Imu:
-    """Angular velocity (rad/s) and specific force (m/s², including gravity) about x, y, z of the base frame.
+    """Angular velocity (rad/s) and specific force (m/s², including gravity) about x, y, z of the sensor frame.
 
-    The variances are those of the white noise of each axis; a constant bias comes on top. 0 = unknown, as in ROS.
+    The sensor frame is at `mount` in the base frame; by default both are the same. The variances are those of the
+    white noise of each axis; a constant bias comes on top. 0 = unknown, as in ROS.
     """
 
     sensor: str
@@ -77,6 +83,7 @@ class Imu:
     linear_acceleration: tuple[float, float, float]
     angular_velocity_variance: float = 0.0
     linear_acceleration_variance: float = 0.0
+    mount: Pose3 = Pose3()
 
 
 @fast_dataclass()

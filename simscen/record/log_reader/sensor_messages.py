@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from simscen.core.clock import SimTime
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
+from simscen.core.messages.level_readings import level_scan
 from simscen.core.messages.sensor_data import Scan
 from simscen.record import topics
 from simscen.record.frame_names import RobotFrames
@@ -52,11 +53,13 @@ class SensorMessages:
         return None
 
     def scan(self, data: bytes) -> Scan:
-        """Decode a scan; its tick is that of the measurement."""
+        """Decode a scan, level; its tick is that of the measurement."""
         scan = decode.laser_scan(MessageReader(data))
         frame = self.frames.stack_frame(scan.frame)
         limits = scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max
-        return Scan(frame, self.time.tick(scan.stamp), scan.ranges, *limits, self.mounts.get(frame, Pose3()).plane)
+        mount = self.mounts.get(frame, Pose3())
+        tilted = mount if mount.qx or mount.qy else None
+        return level_scan(Scan(frame, self.time.tick(scan.stamp), scan.ranges, *limits, mount.plane, tilted))
 
     def cloud(self, data: bytes) -> Array:
         """Decode the poses x, y, yaw (n, 3) of particles."""

@@ -128,7 +128,7 @@ class SensorPublisher:
             frame = self._frames.sensor_frame(scan.sensor)
             packer = self._scan_packers[scan.sensor] = LaserScanPacker(frame)
         if scan.sensor not in self._mounts:
-            self._mounts[scan.sensor] = Pose3.planar(scan.mount)
+            self._mounts[scan.sensor] = scan.tilted_mount or Pose3.planar(scan.mount)
             self._publish_mounts(now)
         self._topic_writer("Scan", scan.sensor).write(now, packer(self._time.stamp(scan.tick), scan))
 
@@ -136,7 +136,8 @@ class SensorPublisher:
         writer = self._imu_writers.get(imu.sensor)
         if writer is None:
             topic = self._topic(imu.sensor, *_DEFAULT_TOPICS["Imu"])
-            writer = self._imu_writers[imu.sensor] = self._out.batch_writer([(topic, encode.imu(self._frames.base))])
+            frame = self._frames.sensor_frame(imu.sensor) if imu.sensor in self._mounts else self._frames.base
+            writer = self._imu_writers[imu.sensor] = self._out.batch_writer([(topic, encode.imu(frame))])
         writer.write(
             now, self._time.stamp(imu.tick),
             imu.angular_velocity, imu.angular_velocity_variance,

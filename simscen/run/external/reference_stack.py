@@ -17,7 +17,7 @@ import numpy as np
 from simscen.core.clock import NS_PER_SECOND, Clock, SimTime
 from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Estimate, Mode
 from simscen.core.messages.navigation import Goal as CoreGoal
@@ -115,7 +115,10 @@ class ReferenceStackPeer(Peer):
                     scan = message.content
                     angle, step, least, most, x, y, yaw = told[:7]
                     ranges = np.array(told[7:], dtype=np.float64)
-                    yield Scan(sensor, self._tick(scan.stamp), ranges, angle, step, least, most, Pose2(x, y, yaw))
+                    limits = angle, step, least, most
+                    mount = self._mount(sensor)
+                    tilted = mount if mount.qx or mount.qy else None
+                    yield Scan(sensor, self._tick(scan.stamp), ranges, *limits, Pose2(x, y, yaw), tilted)
                 case topics.ODOMETRY_TYPE:
                     odom = message.content
                     twist, covariance = Twist(odom.vx, odom.vy, odom.wz), odom.twist_covariance
@@ -124,11 +127,15 @@ class ReferenceStackPeer(Peer):
                 case topics.IMU_TYPE:
                     imu = message.content
                     variances = imu.angular_velocity_covariance[0], imu.linear_acceleration_covariance[0]
-                    yield Imu(sensor, self._tick(imu.stamp), imu.angular_velocity, imu.linear_acceleration, *variances)
+                    values = imu.angular_velocity, imu.linear_acceleration
+                    yield Imu(sensor, self._tick(imu.stamp), *values, *variances, self._mount(sensor))
                 case topics.BUMPER_TYPE:
                     yield Bump(sensor, 0, message.content)
                 case topics.IMAGE_TYPE:
                     yield _NO_PIXELS
+
+    def _mount(self, sensor: str) -> Pose3:
+        return Pose3(*(self.hello["sensors"][sensor]["mount"] or ()))
 
     def _tick(self, stamp: messages.Stamp) -> int:
         return self._time.tick(stamp[0] * NS_PER_SECOND + stamp[1])

@@ -16,6 +16,7 @@ from simscen.core.records.events import KIND_BY_INSTANCE
 from simscen.faults.base import FaultSetting, Sight
 from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import Camera, Mount, RobotSpec
+from simscen.sensors.lidar import floor_distances
 from simscen.sensors.sensor import SensorView
 from simscen.stack.protocols import Localizer
 
@@ -82,7 +83,9 @@ class HypotheticalSensor:
         directions = flat @ pose.rotation().T
         origins = np.repeat([pose.position], len(directions), axis=0)
         hits = self._rays(frozenset(without)).cast(origins, directions, 2 * scan.range_max)
-        return hits if error is None else np.minimum(hits, _floor(pose.z, directions[:, 2]))
+        if error is None and self._mount.is_level:
+            return hits
+        return np.minimum(hits, floor_distances(pose.z, directions[:, 2]))
 
     def image(self, error: Pose3) -> Image:
         """See faults.base.Sight."""
@@ -94,12 +97,6 @@ class HypotheticalSensor:
     def _placed(self, error: Pose3 | None) -> Pose3:
         thought = self._mount.pose
         return thought if error is None else thought.compose(error)
-
-
-def _floor(height: float, slopes: Array) -> Array:
-    """Return the distance along each beam from `height` to the floor (z = 0); inf for beams that do not point down."""
-    down = slopes < -1e-9
-    return np.where(down, height / np.where(down, -slopes, 1.0), np.inf)
 
 
 class CommandLink:

@@ -21,7 +21,8 @@ from simscen.sim.body.undercarriage import Wheel, add_casters, add_motors, wheel
 class RobotBody:
     """Everything needed to build a robot, in its base frame: on the ground under the middle of its axle.
 
-    `hull` and `casters` touch obstacles; `casters` also glide on the ground without friction; wheels only roll on it.
+    `hull` and `casters` touch obstacles, the hull with the coefficient `hull_friction`; `casters` also glide on the
+    ground without friction; wheels only roll on it.
     `chassis` is the mass of all but the wheels; `power` is the share of their force that its motors have. `footprint`
     is anticlockwise; `radius` is set for a round robot.
     """
@@ -35,6 +36,7 @@ class RobotBody:
     radius: float | None
     drive: Drive
     limits: Limits
+    hull_friction: float
     power: float = 1.0
 
     @property
@@ -71,7 +73,7 @@ def assemble(
     corners = circle(spec.radius) if spec.radius is not None else given or outline
     wheels = add_motors(wheels, spec.drive, chassis.mass + sum(wheel.inertia.mass for wheel in wheels))
     return RobotBody(spec.name, hull, casters, wheels, chassis, _anticlockwise(corners), spec.radius, spec.drive,
-                     spec.limits)  # fmt: skip
+                     spec.limits, spec.hull_friction)  # fmt: skip
 
 
 def _anticlockwise(polygon: Polygon) -> Polygon:

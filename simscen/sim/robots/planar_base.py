@@ -59,8 +59,8 @@ class PlanarBase:
         pybullet.changeDynamics(self.id, 2, localInertiaDiagonal=moments, physicsClientId=client)
         for link in range(2 + len(hulls)):
             pybullet.changeDynamics(
-                self.id, link, lateralFriction=0.0, restitution=0.0, linearDamping=0, angularDamping=0, jointDamping=0,
-                physicsClientId=client,
+                self.id, link, lateralFriction=body.hull_friction, restitution=0.0, linearDamping=0, angularDamping=0,
+                jointDamping=0, physicsClientId=client,
             )  # fmt: skip
         for link in self.hull_links:
             engine.set_collision_filter(client, self.id, link, engine.HULL, ~engine.GROUND)

@@ -32,8 +32,8 @@ class WheeledBase:
 
     The contact shape of a wheel is a sphere of its radius: it has a single contact point in the center plane of the
     wheel, so that radius and separation of the datasheet apply to the contact, and it takes half the time of a
-    cylinder. Only the hull collides with obstacles. On uneven ground, the casters are a separate link, to distinguish
-    a caster that stands on a ramp from a hull that scrapes it.
+    cylinder. Only the hull collides with obstacles. Casters are a separate link: they have no friction, and a caster
+    that stands on a ramp is distinguished from a hull that scrapes it.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class WheeledBase:
         self._center = self._base_from_center.position
         self._center_from_base = self._base_from_center.inverse()
         self._is_aligned = self._center_from_base.quaternion == IDENTITY
-        casters = compliant_casters(body.casters) if terrain else ()
+        casters = compliant_casters(body.casters) if terrain else body.casters
         self.id, self.joints, self.hull_links = _build(client, body, casters, tick, visual_shape)
         self.ground_links: Mapping[int, float] = _ground_links(body, self.joints, self.hull_links, casters)
         on_ground = [(caster.pose.x, caster.pose.y) for caster in body.casters if not caster_gap(caster)]
@@ -142,7 +142,7 @@ def _build(
 ) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
     """Return the body id, the first joint of each wheel (steering before rolling), and the links of the hull.
 
-    `casters` become the last link of the hull; without any, those of the body are part of its first link.
+    The `casters`, if any, become the last link of the hull.
     """
     links: list[_Link] = []
     joints: list[int] = []
@@ -150,12 +150,8 @@ def _build(
         joints.append(len(links))
         max_roll = tick * (body.limits.linear + body.limits.angular * abs(wheel.y))
         links += _wheel_links(client, wheel, len(links), max_roll)
-    shapes = (
-        [*engine.hull_shapes(client, body.hull), *engine.hull_shapes(client, casters)]
-        if casters
-        else (engine.hull_shapes(client, body.solid))
-    )
-    first, *others = shapes
+    hull_shapes = engine.hull_shapes(client, body.hull)
+    first, *others = [*hull_shapes, *engine.hull_shapes(client, casters)]
     hull = (-1, *range(len(links), len(links) + len(others)))
     links += [_Link(HULL_LINK_MASS_KG, shape, (0.0, 0.0, 0.0), 0, pybullet.JOINT_FIXED, (0, 0, 1)) for shape in others]
     _, center = body.chassis.principal()
@@ -177,10 +173,11 @@ def _build(
         linkJointAxis=[link.axis for link in links],
         physicsClientId=client,
     )
-    for link in hull:
+    for index, link in enumerate(hull):
+        friction = body.hull_friction if index < len(hull_shapes) else 0.0  # the last link may be that of the casters
         engine.set_collision_filter(client, robot, link, engine.HULL, ~engine.WHEEL)
         pybullet.changeDynamics(
-            robot, link, lateralFriction=0.0, restitution=0.0, linearDamping=0, angularDamping=0,
+            robot, link, lateralFriction=friction, restitution=0.0, linearDamping=0, angularDamping=0,
             physicsClientId=client,
         )  # fmt: skip
     return robot, tuple(joints), hull

@@ -1,5 +1,6 @@
 """A robot's specification from its URDF alone, where the URDF makes it plain."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -28,6 +29,8 @@ from simscen.sim.urdf.wheels import WheelJoint, infer_wheels
 
 STRAIGHT = 0.02
 """m by which wheels of one axle may differ along x."""
+UPSIDE_DOWN_Z = -0.9
+"""The z axis of a lidar that is mounted upside down has a smaller z component in the frame of the robot."""
 LIDAR_NAMES = ("laser", "lidar", "scan")
 """What links are called that a lidar is on."""
 HINT = "write a short *.robot.yaml beside it that names its drive, limits and sensors: see `simscen explain robot`"
@@ -97,6 +100,7 @@ def _lidar_mount(tree: Tree, draft: RobotSpec, wheels: list[WheelJoint]) -> Moun
         if any(word in name.lower() for word in LIDAR_NAMES):
             pose = tree.poses[name]
             x, y, z = float(pose.x - axle[0]), float(pose.y - axle[1]), float(pose.z - ground)
-            return Mount(x=x, y=y, z=max(0.0, z), yaw=pose.yaw)
+            roll = math.pi if pose.rotation()[2, 2] < UPSIDE_DOWN_Z else 0.0
+            return Mount(x=x, y=y, z=max(0.0, z), roll=roll, yaw=pose.yaw)
     top = max(float(solid.pose.apply(hull_points(solid.shape))[:, 2].max()) for solid in body.hull)
     return Mount(z=top + 0.02)

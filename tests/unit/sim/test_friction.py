@@ -1,12 +1,15 @@
 """Slippery floor, against Coulomb's closed forms."""
 
 import math
+from dataclasses import replace
 
 import pytest
+from playground import box, shipped
 
 from simscen.core.environment.world_model import Patch, disc_outline
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.sim.body.from_spec import build_robot_body
 
 TICKS, GRAVITY = 240, 9.81
 
@@ -75,3 +78,47 @@ def test_a_patch_elsewhere_changes_nothing_at_all(simulate, robot):
         simulation.step(TICKS)
         poses.append((simulation.truth(), simulation.encoders()))
     assert poses[0] == poses[1]
+
+
+@pytest.mark.parametrize("share", [0.5, 2.0])
+def test_hull_slides_along_wall_by_coulombs_law(simulate, share):
+    """A robot on ice is pressed against a wall, and pushed along it with `share` of the friction that it can have."""
+    body = build_robot_body(shipped("jackal"))
+    reach = max(x for x, _ in body.footprint)
+    wall = box("wall", 1.0, 0.0, 1.0, 20.0)
+    simulation = simulate(body, solids=[wall], pose=Pose2(0.5 - reach - 0.001, 0.0, 0.0))
+    simulation.add_friction_patch("ice", Patch(EVERYWHERE, 0.0))
+    pressing = 0.5 * body.mass * GRAVITY
+    along = share * body.hull_friction * pressing
+
+    def press(ticks):
+        for _ in range(ticks):
+            simulation.push((pressing / TICKS, along / TICKS))
+            simulation.step(1)
+
+    press(TICKS // 4)
+    before = simulation.truth().twist.vy
+    press(TICKS)
+    gained = simulation.truth().twist.vy - before
+    assert gained == pytest.approx(max(0.0, along - body.hull_friction * pressing) / body.mass, abs=0.03)
+
+
+@pytest.mark.parametrize("friction", [0.5, 1.5])
+def test_motors_of_planar_base_overcome_friction_of_hull_below_one(simulate, friction):
+    """Its motors press it against a wall with the force that they push it along with."""
+    body = replace(build_robot_body(shipped("omni")), hull_friction=friction)
+    reach = max(x for x, _ in body.footprint)
+    simulation = simulate(body, [box("wall", 1.0, 0.0, 1.0, 20.0)], pose=Pose2(0.499 - reach, 0.0, 0.0))
+    simulation.drive(Twist(0.3, 0.2, 0.0))
+    simulation.step(2 * TICKS)
+    assert simulation.truth().twist.vy == pytest.approx(0.2 if friction < 1 else 0.0, abs=0.01)
+
+
+def test_casters_glide_without_friction(simulate):
+    """A robot whose wheels stand on ice keeps its speed, although its hull has friction."""
+    simulation = simulate("turtlebot", drive=(0.4, 0.0, 0.0))
+    simulation.step(2 * TICKS)
+    simulation.add_friction_patch("ice", Patch(EVERYWHERE, 0.0))
+    simulation.drive(STOP)
+    simulation.step(2 * TICKS)
+    assert simulation.truth().twist.vx == pytest.approx(0.4, abs=0.005)

@@ -1,0 +1,96 @@
+"""Lidars and IMUs with roll and pitch: raw readings in closed form, and readings converted to the plane of the base."""
+
+import math
+
+import numpy as np
+import pytest
+from puppet import Nothing, Puppet, SquareRoom, at
+
+from simscen.core.geometry import Pose3
+from simscen.core.messages.level_readings import imu_in_base_frame, level_scan
+from simscen.model.robot import InertialUnit, Lidar, Mount
+from simscen.sensors.imu import ImuSensor
+from simscen.sensors.lidar import LidarSensor
+from simscen.sensors.sensor import SensorSetting
+
+HEIGHT = 0.3
+EXACT = {"gyro_noise": 0.0, "gyro_bias": 0.0, "accelerometer_noise": 0.0}
+
+
+def scan(view, rays, mount, **spec):
+    setting = SensorSetting("lidar", 24, 0.1, np.random.default_rng(1), view, rays, None)
+    return LidarSensor(Lidar(noise=0.0, mount=Mount(z=HEIGHT, **mount), **spec), setting).read(24)
+
+
+def imu(view, **mount):
+    setting = SensorSetting("imu", 4, 1 / 60, np.random.default_rng(1), view, None, None)
+    return ImuSensor(InertialUnit(**EXACT, mount=Mount(**mount)), setting)
+
+
+@pytest.mark.parametrize("field_of_view", [2 * math.pi, math.radians(270)])
+@pytest.mark.parametrize("yaw", [0.0, 0.7, math.pi])
+def test_upside_down_lidar_reports_reversed_beams(field_of_view, yaw):
+    place, room, mount = at(0.5, -0.3, 0.4), SquareRoom(3.0), {"x": 0.1, "yaw": yaw}
+    upright = scan(place, room, mount, field_of_view=field_of_view, beams=271)
+    inverted = scan(place, room, {**mount, "roll": math.pi}, field_of_view=field_of_view, beams=271)
+    assert np.abs(inverted.ranges - upright.ranges).max() > 0.5
+    assert np.sort(np.abs(inverted.points()).max(axis=1)) == pytest.approx(
+        np.sort(np.abs(upright.points()).max(axis=1)), abs=0.03
+    )
+    level = level_scan(inverted)
+    if field_of_view < 6:  # its first beam is that of the upright lidar
+        assert level.ranges == pytest.approx(upright.ranges)
+    assert np.sort(np.hypot(*level.points().T)) == pytest.approx(np.sort(np.hypot(*inverted.points().T)))
+
+
+def test_pitched_lidar_measures_the_floor_and_its_level_scan_does_not():
+    pitch = math.radians(3)
+    tilted = scan(at(0, 0), Nothing(), {"pitch": pitch}, max_range=20.0)
+    ahead = np.argmin(np.abs(tilted.angles()))
+    assert tilted.ranges[ahead] == pytest.approx(HEIGHT / math.sin(pitch), abs=0.001)
+    assert np.isposinf(tilted.ranges[0])  # backward, it looks up
+    level = level_scan(tilted)
+    assert np.isnan(level.ranges[ahead])
+    assert np.isposinf(level.ranges[0])
+    assert not len(level.points())
+
+
+@pytest.mark.parametrize("mount", [{"pitch": 0.03}, {"roll": 0.05}, {"pitch": -0.04, "roll": 0.02, "yaw": 1.0}])
+def test_level_scan_of_a_tilted_lidar_shows_the_walls(mount):
+    level = level_scan(scan(at(0.5, -0.3, 0.4), SquareRoom(3.0), mount))
+    hits = at(0.5, -0.3, 0.4).pose.plane.apply(level.points())
+    assert len(hits) > 300
+    # A beam is off by at most half an increment, which matters most in the corners.
+    assert np.abs(np.abs(hits).max(axis=1) - 3.0).max() < math.hypot(3.5, 3.3) * level.angle_increment / 2
+
+
+def test_scan_of_a_level_lidar_is_not_converted():
+    level = scan(at(0, 0), SquareRoom(3.0), {"yaw": 0.3})
+    assert level_scan(level) is level
+
+
+def test_tilted_imu_measures_gravity_along_its_own_axes():
+    reading = imu(Puppet(), roll=math.pi).read(4)
+    assert reading.linear_acceleration == pytest.approx((0.0, 0.0, -9.81))
+    reading = imu(Puppet(), pitch=0.1).read(4)
+    assert reading.linear_acceleration == pytest.approx((-9.81 * math.sin(0.1), 0.0, 9.81 * math.cos(0.1)))
+    assert imu_in_base_frame(reading).linear_acceleration == pytest.approx((0.0, 0.0, 9.81))
+
+
+@pytest.mark.parametrize(
+    ("mount", "rate"), [({"roll": math.pi}, -2.0), ({"yaw": 1.0}, 2.0), ({"roll": math.pi / 2}, 0)]
+)
+def test_turn_rate_is_about_the_axes_of_the_imu(mount, rate):
+    reading = imu(Puppet(angular=(0.0, 0.0, 2.0)), **mount).read(4)
+    assert reading.angular_velocity[2] == pytest.approx(rate, abs=1e-12)
+    assert imu_in_base_frame(reading).angular_velocity == pytest.approx((0.0, 0.0, 2.0))
+
+
+def test_imu_beside_the_axis_of_a_turn_measures_centripetal_acceleration():
+    rate, distance = 2.0, 0.4
+    view = Puppet(angular=(0.0, 0.0, rate))
+    sensor = imu(view, x=distance)
+    view.pose = Pose3.from_rpy(0, 0, 0, 0, 0, rate / 60)
+    forward, left, _ = sensor.read(4).linear_acceleration
+    assert forward == pytest.approx(-(rate**2) * distance, rel=0.001)
+    assert left == pytest.approx(rate**2 * distance * rate / 120, rel=0.01)  # its frame turns during the period
