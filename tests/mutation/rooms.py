@@ -10,7 +10,11 @@ ALL_TESTS = {
     "judge": ["tests/unit/judge", "tests/unit/criteria/test_every_criterion.py"],
     "triggers": ["tests/unit/triggers", "tests/unit/run/test_firing.py"],
 }
-EVERY_CRITERION = ["tests/unit/criteria/test_every_criterion.py", "tests/unit/criteria/test_specs.py"]
+EVERY_CRITERION = [
+    "tests/unit/criteria/test_every_criterion.py",
+    "tests/unit/criteria/test_specs.py",
+    "tests/unit/judge/test_required_evidence.py",
+]
 TEMPORAL = ["golden", "always", "eventually", "until", "whenever"]
 _STL, _SIGNALS, _METRICS = "tests/unit/criteria/stl", "tests/unit/criteria/trace_signals", "tests/unit/judge/metrics"
 CONCERNED = {
@@ -34,6 +38,11 @@ CONCERNED = {
     "criteria/temporal": [
         TEMPORAL,
         [f"{_STL}/test_criterion.py", f"{_STL}/test_decision_horizon.py", *EVERY_CRITERION],
+    ],
+    "criteria/speed": [["golden", "speed"], ["tests/unit/criteria/test_masks.py", *EVERY_CRITERION]],
+    "criteria/keepout": [
+        ["golden", "keepout"],
+        ["tests/unit/criteria/test_keepout.py", "tests/unit/criteria/test_masks.py", *EVERY_CRITERION],
     ],
     "criteria/event_counts": [["golden", "replans", "recoveries"], EVERY_CRITERION],
     "criteria/result": [

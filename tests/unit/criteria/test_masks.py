@@ -14,6 +14,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion
+from simscen.criteria.speed import _highest_around
 from simscen.judge.evaluation import judge
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
@@ -142,8 +143,23 @@ def test_a_mask_that_the_log_does_not_have_is_no_pass():
         ({"speed": {"mask": {"file": "a.yaml"}}}, "expected full_speed"),
         ({"speed": {"mask": {"file": "a.yaml", "type": "absolute"}, "full_speed": 1.0}}, "full_speed is for a mask"),
         ({"speed": {"max": 1.0, "full_speed": 1.0}}, "full_speed is for a mask"),
+        ({"speed": {"max": 1.0, "while_on": True}}, "while_on is for the zone of a region"),
+        (
+            {"speed": {"mask": {"file": "a.yaml", "type": "absolute"}, "in": "wet", "while_on": True}},
+            "while_on is for the zone of a region",
+        ),
     ],
 )
 def test_what_contradicts_itself_is_refused(criterion, words):
     with pytest.raises(ValueError, match=words):
         AnyCriterion.model_validate(criterion)
+
+
+@given(SEEDS)
+def test_highest_value_around_each_sample_is_that_of_all_samples_within_reach(seed):
+    """Against a comparison with each other sample; some are exactly at the end of the reach."""
+    rng = np.random.default_rng(seed)
+    ticks = np.unique(rng.integers(0, 60, 20))
+    values, reach = rng.normal(size=len(ticks)) - 5.0, int(rng.integers(0, 15))
+    expected = [values[np.abs(ticks - tick) <= reach].max() for tick in ticks]
+    assert _highest_around(values, ticks, reach).tolist() == expected

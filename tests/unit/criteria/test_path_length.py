@@ -53,8 +53,11 @@ def test_a_goal_nearby_has_a_ratio_too():
 
 
 def test_what_cannot_be_compared_is_told_in_order():
-    twice = {"goals": [{"name": n, "pose": [4, 0]} for n in "cbacba"], "shortest": dict.fromkeys("abc", 1.0)}
-    assert found({"max_ratio": 1.0}, case=twice).measured.startswith("several goals are called a, b, c:")
+    twice = {
+        "goals": [{"name": n, "pose": [4, 0]} for n in "gfedcbagfedcba"],
+        "shortest": dict.fromkeys("abcdefg", 1.0),
+    }
+    assert found({"max_ratio": 1.0}, case=twice).measured.startswith("several goals are called a, b, c, d, e, f, g:")
     sent = {**CASE, "sent": [{"name": n, "pose": [4, 0]} for n in "dcb"]}
     events = [[k, "goal.accepted", name] for k, name in enumerate("dcb")]
     assert found({"max_ratio": 1.0}, case=sent, events=events).measured.startswith("b, c, d was sent on the way")

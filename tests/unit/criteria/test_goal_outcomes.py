@@ -1,0 +1,66 @@
+"""Outcomes of goals: which report belongs to which goal, and how near the robot came to a via pose."""
+
+import pytest
+
+from simscen.core.records.events import EventKind
+from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_outcomes
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
+
+
+def goal(name, x=0.0, via=False):
+    return {"name": name, "pose": [x, 0, 0], "via": via}
+
+
+def outcomes(goals, events):
+    trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0], [10, 10, 0]], "events": events})
+    return trace, goal_outcomes(trace, synthetic_case({"goals": goals}))
+
+
+def test_kth_goal_of_a_name_has_the_kth_report_of_that_name():
+    events = [[t, kind, "dock"] for t in (1, 3, 5) for kind in ("goal.accepted", "goal.reached")]
+    events = [[t + (0.5 if kind == "goal.reached" else 0), kind, name] for t, kind, name in events]
+    trace, found = outcomes([goal("dock"), goal("dock"), goal("dock")], events)
+    assert [trace.seconds(each.reached) for each in found] == [1.5, 3.5, 5.5]
+
+
+def test_via_pose_without_reports_has_the_outcome_of_the_next_stop():
+    """The stop before it is reached, the one after it fails."""
+    events = [
+        [0, "goal.accepted", "first"],
+        [2, "goal.reached", "first"],
+        [2, "goal.accepted", "last"],
+        [6, "goal.failed", "last", {"error_name": "TF_ERROR"}],
+    ]
+    _, found = outcomes([goal("first"), goal("between", via=True), goal("last")], events)
+    between = next(each for each in found if each.goal.name == "between")
+    assert between.end.kind == EventKind.GOAL_FAILED
+    assert between.end.name == "between"
+
+
+@pytest.mark.parametrize("position", [0.0, 2.0, 7.0, 8.0, 10.0])
+def test_closest_approach_is_within_the_drive(position):
+    """The robot is at x = t; the drive lasts from 2 s to 8 s, both included."""
+    events = [
+        [2, "goal.accepted", "via"],
+        [3, "goal.passed", "via"],
+        [3, "goal.accepted", "stop"],
+        [8, "goal.reached", "stop"],
+    ]
+    trace, found = outcomes([goal("via", position, via=True), goal("stop", 9)], events)
+    via = next(each for each in found if each.goal.name == "via")
+    tick, distance = closest_approach(trace, via, found)
+    expected = min(max(position, 2.0), 8.0)
+    assert trace.seconds(tick) == pytest.approx(expected)
+    assert distance == pytest.approx(abs(position - expected))
+
+
+@pytest.mark.parametrize("stop", [[], [goal("stop", 9)]])
+def test_closest_approach_of_an_unfinished_drive_is_within_the_run(stop):
+    trace, found = outcomes([goal("via", 12.0, via=True), *stop], [[1, "goal.accepted", "via"]])
+    via = next(each for each in found if each.goal.name == "via")
+    assert closest_approach(trace, via, found) == (trace.end, pytest.approx(2.0))
+
+
+def test_closest_approach_of_a_pose_that_was_never_accepted_is_that_of_the_whole_run():
+    trace, found = outcomes([goal("via", -1.0, via=True)], [])
+    assert closest_approach(trace, GoalOutcome(found[0].goal, None, None), [*found]) == (0, pytest.approx(1.0))
