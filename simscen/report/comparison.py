@@ -1,17 +1,31 @@
-"""Comparison of several stacks as console lines, HTML and Markdown."""
+"""Comparison of stacks or sessions as console lines, HTML and Markdown."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 
-from simscen.core.records.session_events import BaselineComparison, Comparison, MetricDifference, OutcomeCounts
+from simscen.core.records.session_events import (
+    BaselineComparison,
+    Comparison,
+    Flip,
+    MetricDifference,
+    OutcomeCounts,
+    ScenarioChange,
+)
 from simscen.report.display_text import one_line
-from simscen.report.styled_line import StyledLine, StyledText
+from simscen.report.styled_line import Role, StyledLine, StyledText
 
 MAX_FLIPS = 10
 """Maximum number of runs with different outcomes to list."""
+MAX_CHANGES = 10
+"""Maximum number of significant changes to list."""
 MIN_NAME_COLUMNS = 24
 """Minimum width of the column of scenario names."""
 MAX_STACK_NAME = 16
+
+
+Links = Mapping[tuple[str, str, int], str]
+"""Replay, log, or command of a failed run by stack or session, scenario, and seed."""
+NO_LINKS: Links = {}
 
 
 def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | None = None) -> Iterator[StyledLine]:
@@ -25,6 +39,31 @@ def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | No
         yield ()
         yield from _comparison_section(comparison.baseline, against, prefix)
     yield ()
+
+
+def session_comparison_lines(comparison: Comparison, links: Links, is_worse: bool) -> Iterator[StyledLine]:
+    """Yield the comparison of a session with the baseline: changed outcomes first, and the verdict last."""
+    (against,) = comparison.against
+    yield from _comparison_section(comparison.baseline, against, "", links)
+    yield from _outcome_table(comparison, "", None, changed_only=True)
+    yield (StyledText(""),)
+    lost = any(flip.failed == against.stack for flip in against.flips)
+    yield (StyledText(_session_verdict(against, is_worse), "bad" if is_worse else "warning" if lost else "good"),)
+
+
+def session_comparison_markdown(comparison: Comparison, links: Links, is_worse: bool) -> list[str]:
+    """Return the comparison of a session with the baseline as lines of Markdown, for a pull request."""
+    (against,) = comparison.against
+    return [f"### simscen: {_session_verdict(against, is_worse)}", *as_markdown(comparison, links, changed_only=True)]
+
+
+def _session_verdict(against: BaselineComparison, is_worse: bool) -> str:
+    lost = sum(flip.failed == against.stack for flip in against.flips)
+    if is_worse:
+        return f"{against.stack} is significantly worse"
+    runs = "1 run fails that passed" if lost == 1 else f"{lost} runs fail that passed"
+    more = f"; {runs} before, which may be chance" if lost else ""
+    return f"{against.stack} is not significantly worse in {_pairs(against.pairs)}{more}"
 
 
 def outcome_text(outcomes: OutcomeCounts) -> str:
@@ -62,6 +101,22 @@ def comparison_headline(baseline: str, against: BaselineComparison) -> str:
     return f"{text}, {won} better, {lost} worse (p = {against.p:.2g})"
 
 
+def change_text(change: ScenarioChange, prefix: str = "") -> str:
+    """Return a significant change of a scenario in one line."""
+    if change.what == "passed":
+        values = f"pass rate {change.baseline:.0%} → {change.value:.0%}"
+    else:
+        digits = 3 if change.unit and max(abs(change.baseline), abs(change.value)) < 1 else 2
+        unit = f" {change.unit}" if change.unit else ""
+        values = f"{change.what} {change.baseline:.{digits}f} → {change.value:.{digits}f}{unit}"
+    return f"{change.scenario.removeprefix(prefix)}: {values} (p = {change.p:.2g}, {_pairs(change.pairs)})"
+
+
+def change_verdict(change: ScenarioChange) -> str:
+    """Return "worse", "better", or "other" for a metric that may go either way."""
+    return "other" if change.is_worse is None else "worse" if change.is_worse else "better"
+
+
 def difference_columns(one: MetricDifference) -> tuple[str, str, str, str]:
     """Return the two means, their difference, and its interval, with an extra digit for values below 1."""
     digits = 3 if one.unit and max(abs(one.baseline), abs(one.value)) < 1 else 2
@@ -69,15 +124,22 @@ def difference_columns(one: MetricDifference) -> tuple[str, str, str, str]:
     return f"{one.baseline:.{digits}f}", f"{one.value:.{digits}f}", f"{one.difference:+.{digits}f}", interval
 
 
-def _outcome_table(comparison: Comparison, prefix: str, columns: int | None) -> Iterator[StyledLine]:
+def _listed(comparison: Comparison, changed_only: bool) -> dict[str, Mapping[str, OutcomeCounts]]:
+    """Return the outcomes by scenario; with `changed_only`, not of those in which as many runs pass as before."""
+    return {name: row for name, row in comparison.outcomes.items() if not changed_only or len(set(row.values())) > 1}
+
+
+def _outcome_table(
+    comparison: Comparison, prefix: str, columns: int | None, changed_only: bool = False
+) -> Iterator[StyledLine]:
     rows = [
         (one_line(scenario.removeprefix(prefix)), [outcome_text(row[name]) for name in comparison.stacks])
-        for scenario, row in comparison.outcomes.items()
+        for scenario, row in _listed(comparison, changed_only).items()
     ]
-    if len(rows) > 1:
+    if len(comparison.outcomes) > 1 or not rows:
         rows.append(("all", [outcome_text(comparison.total(name)) for name in comparison.stacks]))
     heads = [shorten(name) for name in comparison.stacks]
-    widths = [max(len(head), *(len(cells[number]) for _, cells in rows)) + 3 for number, head in enumerate(heads)]
+    widths = [max([len(head), *(len(cells[number]) for _, cells in rows)]) + 3 for number, head in enumerate(heads)]
     available = None if columns is None else max(MIN_NAME_COLUMNS, columns - 2 - sum(widths))
     names = [shorten(name, available) if available else name for name, _ in rows]
     longest = max(len(name) for name in ("passed", *names))
@@ -92,7 +154,9 @@ def _outcome_table(comparison: Comparison, prefix: str, columns: int | None) -> 
         yield (StyledText("  ! = runs with errors, which are not counted", "quiet"),)
 
 
-def _comparison_section(baseline: str, against: BaselineComparison, prefix: str) -> Iterator[StyledLine]:
+def _comparison_section(
+    baseline: str, against: BaselineComparison, prefix: str, links: Links = NO_LINKS
+) -> Iterator[StyledLine]:
     yield (StyledText(f"  {comparison_headline(baseline, against)}", "name"),)
     for flip in against.flips[:MAX_FLIPS]:
         better = flip.passed == against.stack
@@ -102,12 +166,31 @@ def _comparison_section(baseline: str, against: BaselineComparison, prefix: str)
             StyledText(f" {one_line(flip.scenario.removeprefix(prefix))}, seed {flip.seed}: "),
             StyledText(one_line(f"passed with {flip.passed}, failed with {flip.failed}: {flip.why}"), "quiet"),
         )
+        if link := links.get((flip.failed, flip.scenario, flip.seed)):
+            yield (StyledText(f"           {link}"),)
     if len(against.flips) > MAX_FLIPS:
         yield (StyledText(f"    and {len(against.flips) - MAX_FLIPS} more, in results.json", "quiet"),)
     yield from _differences(baseline, against)
+    yield from _changes(against, prefix)
     for note in (unfinished_text(against), excluded_text(against)):
         if note:
             yield (StyledText(f"    {note}", "quiet"),)
+
+
+def _changes(against: BaselineComparison, prefix: str) -> Iterator[StyledLine]:
+    if not against.changes:
+        return
+    yield (StyledText("    significant changes of single scenarios", "quiet"),)
+    roles: dict[str, Role] = {"worse": "bad", "better": "good", "other": "plain"}
+    for change in against.changes[:MAX_CHANGES]:
+        verdict = change_verdict(change)
+        yield (
+            StyledText("    "),
+            StyledText(f"{verdict:6}", roles[verdict]),
+            StyledText(f" {one_line(change_text(change, prefix))}"),
+        )
+    if len(against.changes) > MAX_CHANGES:
+        yield (StyledText(f"    and {len(against.changes) - MAX_CHANGES} more, in JSON", "quiet"),)
 
 
 def _differences(baseline: str, against: BaselineComparison) -> Iterator[StyledLine]:
@@ -143,7 +226,8 @@ def _pairs(number: int) -> str:
 
 EXPLANATION = (
     "Runs are paired by scenario and seed. Passed: number of passed and of finished runs. Differences are means over "
-    "pairs with 95 % bootstrap intervals; p is from the sign test. - / = / +: pairs with a lower, equal, higher value."
+    "pairs with 95 % bootstrap intervals; p is from McNemar's exact test for outcomes and from Wilcoxon's signed-rank "
+    "test for metrics, for single scenarios with Holm's correction. - / = / +: pairs with a lower, equal, higher value."
 )
 _HEAD = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "- / = / +", "p")
 
@@ -167,17 +251,21 @@ def as_html(comparison: Comparison) -> str:
     )
 
 
-def as_markdown(comparison: Comparison, cell: Callable[[str], str]) -> list[str]:
-    """Return the comparison as lines of Markdown. `cell` escapes text of users."""
+def as_markdown(comparison: Comparison, links: Links = NO_LINKS, changed_only: bool = False) -> list[str]:
+    """Return the comparison as lines of Markdown; `changed_only` omits scenarios in which as many runs pass."""
+    cell = markdown_cell
     names = [cell(name) for name in comparison.stacks]
     lines = ["", f"| passed | {' | '.join(names)} |", f"|---|{'---:|' * len(names)}"]
-    rows = [*comparison.outcomes.items(), ("all", {name: comparison.total(name) for name in comparison.stacks})]
+    rows = [
+        *_listed(comparison, changed_only).items(),
+        ("all", {name: comparison.total(name) for name in comparison.stacks}),
+    ]
     lines += [f"| {cell(name)} | {' | '.join(outcome_text(row[stack]) for stack in row)} |" for name, row in rows]
     for against in comparison.against:
         lines += ["", f"**{cell(comparison_headline(comparison.baseline, against))}**", ""]
         lines += [
             f"- {cell(flip.scenario)}, seed {flip.seed}: passed with {cell(flip.passed)}, failed with "
-            f"{cell(flip.failed)}: {cell(flip.why)}"
+            f"{cell(flip.failed)}: {cell(flip.why)}{_link_markdown(flip, links)}"
             for flip in against.flips[:MAX_FLIPS]
         ]
         more = len(against.flips) - MAX_FLIPS
@@ -185,8 +273,25 @@ def as_markdown(comparison: Comparison, cell: Callable[[str], str]) -> list[str]
         heads = [cell(head.format(comparison.baseline, against.stack)) for head in _HEAD]
         lines += ["", f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
         lines += [f"| {' | '.join(_cells(one))} |" for one in against.differences]
+        lines += [""] if against.changes else []
+        lines += [f"- {change_verdict(one)}: {cell(change_text(one))}" for one in against.changes[:MAX_CHANGES]]
+        more = len(against.changes) - MAX_CHANGES
+        lines += [f"- and {more} more significant changes, in JSON"] if more > 0 else []
         lines += [f"\n{cell(note)}" for note in (unfinished_text(against), excluded_text(against)) if note]
     return [*lines, "", EXPLANATION]
+
+
+def _link_markdown(flip: Flip, links: Links) -> str:
+    link = links.get((flip.failed, flip.scenario, flip.seed))
+    return f" (`{link}`)" if link else ""
+
+
+_MARKDOWN_ESCAPES = {ord(sign): f"&#{ord(sign)};" for sign in "\\`*_[]|~#@&<>"}
+
+
+def markdown_cell(text: str) -> str:
+    """Escape text for a cell of a Markdown table."""
+    return one_line(text).translate(_MARKDOWN_ESCAPES)
 
 
 def _cell(outcomes: OutcomeCounts) -> str:
@@ -206,6 +311,11 @@ def _against_html(baseline: str, against: BaselineComparison) -> str:
     _, *named = (_html_text(head.format(baseline, against.stack)) for head in _HEAD)
     heads = "<th></th>" + "".join(f'<th class="margin">{head}</th>' for head in named)
     rows = "".join(_difference(one) for one in against.differences)
+    changes = "".join(
+        f'<tr class="{"bad" if one.is_worse else ""}"><td>{change_verdict(one)}</td>'
+        f"<td>{_html_text(change_text(one))}</td></tr>"
+        for one in against.changes
+    )
     notes = "".join(
         f'<p class="quiet">{_html_text(note)}</p>'
         for note in (unfinished_text(against), excluded_text(against))
@@ -215,6 +325,7 @@ def _against_html(baseline: str, against: BaselineComparison) -> str:
         f"<h3>{_html_text(comparison_headline(baseline, against))}</h3>"
         + (f"<table>{flips}</table>" if flips else "")
         + (f"<table><tr>{heads}</tr>{rows}</table>" if rows else "")
+        + (f"<table>{changes}</table>" if changes else "")
         + notes
     )
 

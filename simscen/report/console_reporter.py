@@ -1,10 +1,11 @@
-"""Choice of the reporter that prints a session on the console."""
+"""Choice of the reporter that prints a session on the console, and printing of single lines."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TextIO
 
-from simscen.report.styled_line import TerminalStyle, detect_style
+from simscen.report.display_text import ascii_only, escape_ci_commands
+from simscen.report.styled_line import StyledLine, TerminalStyle, can_encode, detect_style, plain_text, wrap_line
 from simscen.report.text_reporters import PlainReporter, Reporter
 
 
@@ -23,3 +24,17 @@ def text_reporter(
     from simscen.report.live_console import ColorReporter, LiveReporter  # rich is slow to import
 
     return LiveReporter(out, style, slow) if style.live else ColorReporter(out, style, slow)
+
+
+def print_lines(lines: Iterable[StyledLine], out: TextIO, environ: Mapping[str, str] = os.environ) -> None:
+    """Print lines, with color where it is supported, wrapped to the width of a terminal."""
+    style = detect_style(out, environ)
+    wrapped = [part for line in lines for part in wrap_line(line, style.columns)]
+    if style.color:
+        from simscen.report.live_console import print_colored
+
+        print_colored(wrapped, out, style)
+        return
+    for line in wrapped:
+        text = escape_ci_commands(plain_text(line))
+        out.write(f"{text if can_encode(out) else ascii_only(text)}\n")

@@ -7,15 +7,14 @@ from urllib.parse import quote
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.finding_text import tightest_margin
-from simscen.report.comparison import as_markdown
+from simscen.report.comparison import as_markdown, markdown_cell
 from simscen.report.console_reporter import text_reporter
-from simscen.report.display_text import one_line, relative_to_checkout
+from simscen.report.display_text import relative_to_checkout
 from simscen.report.results_json import relative
 from simscen.report.text_reporters import Reporter
 from simscen.report.violations import error_summary, excuse_text, reported_violations, scenario_file, short_run_name
 
 MAX_PICTURES = 10
-_MARKDOWN_ESCAPES = {ord(sign): f"&#{ord(sign)};" for sign in "\\`*_[]|~#@&<>"}
 
 
 def github_reporter(
@@ -87,9 +86,9 @@ def markdown(runs: list[RunFinished], session: SessionFinished, pictures: str = 
     more = f", {session.expected} failed as expected" if session.expected else ""
     more += f", {session.skipped} skipped" if session.skipped else ""
     head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}{more}"
-    compared = [] if session.comparison is None else as_markdown(session.comparison, _cell)
+    compared = [] if session.comparison is None else as_markdown(session.comparison)
     rows = [
-        f"| {symbols[run.outcome]} | {_cell(short_run_name(run.key))} "
+        f"| {symbols[run.outcome]} | {markdown_cell(short_run_name(run.key))} "
         f"| {run.result.simulated:.1f} s | {_reason_cell(run)} |"
         for run in ordered
     ]
@@ -104,19 +103,19 @@ def _picture_lines(runs: list[RunFinished], folder: str, pictures: str) -> list[
     lines = []
     for run in failures[:MAX_PICTURES]:
         address = f"{pictures.rstrip('/')}/{quote(relative(run.artifacts.picture, folder))}"
-        lines += [f"**{_cell(short_run_name(run.key))}**", "", f"![map of the run]({address})", ""]
+        lines += [f"**{markdown_cell(short_run_name(run.key))}**", "", f"![map of the run]({address})", ""]
     return lines
 
 
 def _reason_cell(run: RunFinished) -> str:
     """Return a table cell with one line per violated criterion, or with the tightest margin if the run passed."""
     if run.outcome is Outcome.ERROR:
-        return _cell(error_summary(run))
+        return markdown_cell(error_summary(run))
     if excuse := excuse_text(run):
-        return _cell(excuse)
-    messages = [_cell(violation.message) for violation in reported_violations(run)]
+        return markdown_cell(excuse)
+    messages = [markdown_cell(violation.message) for violation in reported_violations(run)]
     tightest = tightest_margin(run.result.verdicts)
-    return "<br>".join(messages) if messages or not tightest else f"tightest: {_cell(tightest)}"
+    return "<br>".join(messages) if messages or not tightest else f"tightest: {markdown_cell(tightest)}"
 
 
 def _command(level: str, run: RunFinished, line: int, title: str, message: str) -> str:
@@ -133,8 +132,3 @@ def _escape_message(text: str) -> str:
 def _escape_property(text: str) -> str:
     """Escape a property of a command as @actions/core does."""
     return _escape_message(text).replace(":", "%3A").replace(",", "%2C")
-
-
-def _cell(text: str) -> str:
-    """Escape text for a cell of a Markdown table."""
-    return one_line(text).translate(_MARKDOWN_ESCAPES)

@@ -22,7 +22,8 @@ JOURNAL_FORMAT = 2
 class PlannedRun:
     """A run of a session that may not have started yet. `path` is the scenario file.
 
-    `digest` is a hash of everything that the result depends on, so that a result is reused only if nothing has changed.
+    `digest` is a hash of everything that the result depends on, so that a result is reused only if nothing has changed;
+    `question` is one of the scenario without the stack, so that versions of a stack can be compared.
     `again` and `file` have the same meaning as in RunFinished, `stack` as in RunResult.
     """
 
@@ -32,17 +33,19 @@ class PlannedRun:
     again: str = field(default="", compare=False)
     file: str = field(default="", compare=False)
     stack: str = field(default="", compare=False)
+    question: str = field(default="", compare=False)
 
 
 def planned_run_to_data(run: PlannedRun) -> dict[str, Any]:
     """Return a planned run as JSON data."""
-    source = {"path": run.path, "file": run.file, "again": run.again, "stack": run.stack}
+    source = {"path": run.path, "file": run.file, "again": run.again, "stack": run.stack, "question": run.question}
     return {**asdict(run.key), **source, "digest": run.digest}
 
 
 def planned_run_from_data(data: dict[str, Any]) -> PlannedRun:
     """Read the data of `planned_run_to_data`. Raises KeyError or TypeError if they are invalid."""
-    return PlannedRun(read_key(data), data["path"], data["digest"], data["again"], data["file"], data.get("stack", ""))
+    stack, question = data.get("stack", ""), data.get("question", "")
+    return PlannedRun(read_key(data), data["path"], data["digest"], data["again"], data["file"], stack, question)
 
 
 def finished_run_to_data(run: RunFinished, folder: Path) -> dict[str, Any]:

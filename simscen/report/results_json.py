@@ -8,8 +8,8 @@ from typing import Any, TextIO
 
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.session_events import Comparison, RunFinished, SessionEvent, SessionFinished
+from simscen.judge.metrics.comparison import comparison_data
 from simscen.judge.metrics.session_summary import session_summary_data, summarize_session
-from simscen.judge.metrics.stack_comparison import comparison_data
 from simscen.judge.result_json import result_data
 from simscen.report.display_text import escape_ci_markers_in_json
 from simscen.report.text_reporters import Reporter

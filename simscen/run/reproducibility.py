@@ -6,16 +6,18 @@ import importlib.util
 import json
 import math
 import platform
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from simscen.core.geometry import Array
 from simscen.core.version import PACKAGE
 from simscen.loading.loaded import LoadedMap, LoadedScenario
 from simscen.loading.plugins import plugins_of
 from simscen.loading.yaml.library import DEFAULTS_FILE
+from simscen.model.stack_base import StackBase
 from simscen.spec.registry import Entry
 
 PACKAGES = (
@@ -167,6 +169,39 @@ def scenario_digest(loaded: LoadedScenario) -> str:
     for file in sorted({*referenced_files(loaded), *loaded.read}):
         _take(sha, _name(file, loaded), file.read_bytes())
     return sha.hexdigest()
+
+
+def question_digest(loaded: LoadedScenario) -> str:
+    """Return the SHA-256 of what a scenario asks: itself without the parameters of stacks, and its world and robots.
+
+    Results of two versions of a stack or of simscen can be compared if it is the same. Comments of the scenario and
+    `extends` do not count. Raises OSError.
+    """
+    plain = _without_stack(loaded.tree.plain)
+    if isinstance(robots := plain.get("robots"), Mapping):
+        plain["robots"] = {
+            name: _without_stack(robot) if isinstance(robot, Mapping) else robot for name, robot in robots.items()
+        }
+    sha = hashlib.sha256(json.dumps(plain, sort_keys=True, default=str).encode())
+    for name, text in sorted(loaded.sources.items()):
+        if name.endswith(_QUESTION_FILES):
+            _take(sha, name, text.encode())
+    for file in sorted({*referenced_files(loaded), *loaded.read}):
+        if not file.name.endswith(_STACK_FILES):
+            _take(sha, _name(file, loaded), file.read_bytes())
+    return sha.hexdigest()
+
+
+def _without_stack(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a scenario or robot with only those parameters of its stack that apply to every stack."""
+    stack = entry.get("stack")
+    keys = StackBase.model_fields.keys() - {"controller_frequency"}
+    common = {key: stack[key] for key in sorted(keys) if key in stack} if isinstance(stack, Mapping) else {}
+    return {**{key: value for key, value in entry.items() if key not in ("stack", "extends")}, "stack": common}
+
+
+_QUESTION_FILES = (".world.yaml", ".robot.yaml", ".sdf", ".world")
+_STACK_FILES = (".stack.yaml", "params.yaml")
 
 
 def _circumstances(loaded: LoadedScenario) -> dict[str, object]:

@@ -82,7 +82,7 @@ CONCERNED = {
         [f"{_METRICS}/test_compute.py"],
     ],
     "judge/metrics/compute": [[_METRICS], ["tests/unit/judge"]],
-    **{f"judge/metrics/{of}": [[f"{_METRICS}/test_{of}.py"]] for of in ("session_summary", "stack_comparison")},
+    **{f"judge/metrics/{of}": [[f"{_METRICS}/test_{of}.py"]] for of in ("session_summary", "comparison")},
     **{f"judge/diagnosis/{of}": [DIAGNOSIS] for of in ("causes", "objects", "goal_failure")},
 }
 """Tests of a module that many others use, or that a criterion shares: those of the module itself come first."""

@@ -10,8 +10,8 @@ from simscen.cli.diagnostics import print_text
 from simscen.cli.session.output_files import JunitFamily, Reports, exit_code, require_writable
 from simscen.cli.session.terminal import Format, screen
 from simscen.core.errors import Exit
+from simscen.judge.metrics.comparison import compare_stacks
 from simscen.judge.metrics.session_summary import session_summary_line, summarize_session
-from simscen.judge.metrics.stack_comparison import compare_stacks
 from simscen.report.journal import require_free
 from simscen.report.journal_reader import read_journal
 from simscen.report.results_json import results_by_stack

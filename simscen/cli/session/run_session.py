@@ -18,7 +18,7 @@ from simscen.cli.session.terminal import Format, Screen, screen
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import Listener, SessionEvent
-from simscen.judge.metrics.stack_comparison import compare_stacks
+from simscen.judge.metrics.comparison import compare_stacks
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.report.journal import Journal, require_free

@@ -23,7 +23,7 @@ class OutcomeCounts:
 
 @dataclass(frozen=True)
 class Flip:
-    """A scenario and seed that passes with only one of two stacks; `why` is the failed criterion."""
+    """A scenario and seed that passes with only one of two stacks or sessions; `why` is the failed criterion."""
 
     scenario: str
     seed: int
@@ -34,10 +34,10 @@ class Flip:
 
 @dataclass(frozen=True)
 class MetricDifference:
-    """Difference of a metric between a stack and the baseline, over the `pairs` of runs that can be compared.
+    """Difference of a metric between a stack or session and the baseline, over the `pairs` that can be compared.
 
     `baseline` and `value` are means; `interval` is the 95 % confidence interval of their difference, None for too few
-    pairs. `lower`, `equal`, and `higher` count pairs; `p` is the p-value of the sign test.
+    pairs. `lower`, `equal`, and `higher` count pairs; `p` is the p-value of Wilcoxon's signed-rank test.
     """
 
     metric: str
@@ -54,12 +54,29 @@ class MetricDifference:
 
 
 @dataclass(frozen=True)
+class ScenarioChange:
+    """Significant change in one scenario: of the pass rate (`what` is "passed"), or of the mean of a metric.
+
+    `p` is adjusted for the number of scenarios (Holm). `is_worse` is None for a metric that may go either way.
+    """
+
+    scenario: str
+    what: str
+    unit: str
+    pairs: int
+    baseline: float
+    value: float
+    p: float
+    is_worse: bool | None
+
+
+@dataclass(frozen=True)
 class BaselineComparison:
-    """Comparison of one stack with the baseline, over the `pairs` of completed runs.
+    """Comparison of one stack or session with the baseline, over the `pairs` of completed runs.
 
     `broken` pairs contain a run that could not be completed, `alone` runs have no partner. `parted` counts the pairs of
     which only one reached the last goal; only their collisions are compared. `p` is the p-value of the sign test of the
-    flips.
+    flips. `changes` are the significant changes of single scenarios.
     """
 
     stack: str
@@ -70,13 +87,15 @@ class BaselineComparison:
     flips: tuple[Flip, ...]
     p: float
     differences: tuple[MetricDifference, ...]
+    changes: tuple[ScenarioChange, ...] = ()
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Comparison of several stacks: `stacks` maps names to the values of --stack; the first one is the baseline.
+    """Comparison of stacks or sessions, of which the first one is the baseline.
 
-    `outcomes` contains for each scenario the outcomes of each stack by name.
+    `stacks` maps names to the values of --stack, or to output folders. `outcomes` contains for each scenario the
+    outcomes of each of them by name.
     """
 
     stacks: Mapping[str, str]

@@ -8,7 +8,7 @@ from PIL import Image
 
 from simscen.cli.session.selection import Selection, load_all
 from simscen.run import reproducibility as module
-from simscen.run.reproducibility import scenario_digest
+from simscen.run.reproducibility import question_digest, scenario_digest
 
 SCENARIO = """\
 extends: base.yaml
@@ -196,3 +196,35 @@ def test_software_and_processor_matter(of: Digest, monkeypatch: pytest.MonkeyPat
     before = of()
     monkeypatch.setattr(module, what, lambda: {"pybullet": "0"})
     assert of() != before
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "is_other_question"),
+    [
+        ("p/a.scenario.yaml", "x: 2", "x: 2.1", True),
+        ("p/base.yaml", "simscen: 1", "simscen: 1\nname: other", True),
+        ("p/defaults.yaml", "30 s", "31 s", True),
+        ("p/hall.sdf", "6 6 0", "6 7 0", True),
+        ("models/shelf/model.sdf", "1 1 1", "1 1 2", True),
+        ("p/crate.stl", "1 0 0\nvertex", "2 0 0\nvertex", True),
+        ("p/cart.robot.yaml", "linear: 0.5", "linear: 0.6", True),
+        ("p/cart.xacro", "0.3 0.2 0.3", "0.4 0.2 0.3", True),
+        ("p/judged.pgm", "254 254 254", "254 0 254", True),
+        ("p/a.scenario.yaml", "keepout_mask: closed.yaml, ", "", True),  # applies to every stack
+        ("p/a.scenario.yaml", "stack: {", "stack: {controller: {type: dwb}, ", False),
+        ("p/a.scenario.yaml", "goals:", "# a comment\ngoals:", False),
+    ],
+)
+def test_question_is_that_of_the_scenario_without_its_stack(
+    project: Path, file: str, old: str, new: str, is_other_question: bool
+) -> None:
+    def question() -> str:
+        (loaded,), _ = load_all(
+            [project / "p/a.scenario.yaml"], project / "p", [project / "models"], False, Selection()
+        )
+        return question_digest(loaded)
+
+    before, text = question(), (project / file).read_text()
+    assert old in text
+    (project / file).write_text(text.replace(old, new, 1))
+    assert (question() != before) == is_other_question

@@ -9,7 +9,7 @@ from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResu
 from simscen.core.records.session_events import OutcomeCounts
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.metrics.catalog import METRICS
-from simscen.judge.metrics.stack_comparison import COMPARED_METRICS, compare_stacks, comparison_data
+from simscen.judge.metrics.comparison import COMPARED_METRICS, compare_stacks, comparison_data
 
 STACKS = ("ref=reference", "mine=./nav --fast")
 GOOD = {"time_to_goal": 10.0, "path_length": 5.0, "min_clearance": 0.5, "collisions": 0.0}

@@ -1,15 +1,22 @@
-"""Paired comparison of stacks on the same scenarios and seeds."""
+"""Paired comparison of stacks or sessions on the same scenarios and seeds."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from simscen.core.random_streams import Streams
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
-from simscen.core.records.session_events import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
+from simscen.core.records.session_events import (
+    BaselineComparison,
+    Comparison,
+    Flip,
+    MetricDifference,
+    OutcomeCounts,
+    ScenarioChange,
+)
 from simscen.core.records.verdict import Status
-from simscen.core.statistics import bootstrap_mean_interval, sign_test
+from simscen.core.statistics import bootstrap_mean_interval, holm, sign_test, signed_rank_test
 from simscen.judge.evaluation import EXPECTED
 from simscen.judge.finding_text import sentence, violations
 from simscen.judge.metrics.catalog import METRICS
@@ -19,12 +26,29 @@ COMPARED_METRICS = (
     "collisions",
 )
 """Compared metrics, in the order of the table."""
+HIGHER_IS_BETTER = frozenset({"min_clearance"})
+"""Compared metrics of which a lower value is worse; of the others, a higher one is."""
 OUTCOME_INDEPENDENT = frozenset({"collisions"})
 """Metrics that are comparable if a run fails. The others favor stacks that give up early."""
 _SEED = 1
 """Seed of the bootstrap: the same runs give the same intervals."""
 
 Pair = tuple[RunResult, RunResult]
+
+
+@dataclass(frozen=True)
+class Significance:
+    """When a change of one scenario is significant.
+
+    alpha:       largest p-value, after Holm's correction for the number of scenarios
+    min_effect:  smallest change of a mean, relative to that of the baseline; smaller ones do not matter
+    """
+
+    alpha: float = 0.05
+    min_effect: float = 0.05
+
+
+DEFAULT_SIGNIFICANCE = Significance()
 
 
 def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Comparison | None:
@@ -35,12 +59,35 @@ def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Compa
     if len(stacks) < 2:
         return None
     given = {name: value for name, _, value in (text.partition("=") for text in stacks)}
+    return _compare(results, given, DEFAULT_SIGNIFICANCE)
+
+
+def compare_sessions(
+    sessions: Mapping[str, Sequence[RunResult]], folders: Mapping[str, str], significance: Significance
+) -> Comparison:
+    """Compare the runs of two sessions, both by name, of which the first one is the baseline.
+
+    Runs with several stacks are paired by stack as well. `folders` are the output folders by name.
+    """
+    runs = [replace(run, key=labeled_key(run.key, name)) for name, own in sessions.items() for run in own]
+    return _compare(runs, folders, significance)
+
+
+def labeled_key(key: RunKey, session: str) -> RunKey:
+    """Return the key with the session in place of the stack, which becomes part of the name of the scenario."""
+    if key.repeats:
+        return key
+    scenario = f"{key.scenario} ({key.stack_name})" if key.stack_name else key.scenario
+    return replace(key, scenario=scenario, stack_name=session)
+
+
+def _compare(results: Iterable[RunResult], given: Mapping[str, str], significance: Significance) -> Comparison:
     runs = {one.key: one for one in results if not one.key.repeats and one.outcome is not Outcome.SKIPPED}
     baseline, *others = given
     return Comparison(
         given,
         {test: _row(test, given, runs) for test in sorted({key.test for key in runs})},
-        tuple(_against(runs, baseline, other) for other in others),
+        tuple(_against(runs, baseline, other, significance) for other in others),
     )
 
 
@@ -63,7 +110,9 @@ def _outcomes(runs: Iterable[RunResult]) -> OutcomeCounts:
     return OutcomeCounts(count[Outcome.PASSED], count[Outcome.FAILED], count[Outcome.ERROR])
 
 
-def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> BaselineComparison:
+def _against(
+    runs: Mapping[RunKey, RunResult], baseline: str, other: str, significance: Significance
+) -> BaselineComparison:
     first, second = (
         {(key.test, key.seed): run for key, run in sorted(runs.items()) if key.stack_name == name}
         for name in (baseline, other)
@@ -73,6 +122,7 @@ def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> Bas
     alike = [(one, two) for one, two in whole if _arrived(one) == _arrived(two)]
     flips = tuple(flip for pair in whole if (flip := _flip(pair)))
     won = sum(flip.passed == other for flip in flips)
+    names = (*_chosen(whole), *_added(whole))
     return BaselineComparison(
         stack=other,
         pairs=len(whole),
@@ -83,10 +133,71 @@ def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> Bas
         p=sign_test(won, len(flips) - won),
         differences=tuple(
             found
-            for name in (*_chosen(whole), *_added(whole))
+            for name in names
             if (found := _difference(name, whole if _kind(name) in OUTCOME_INDEPENDENT else alike)) is not None
         ),
+        changes=(
+            *_pass_rate_changes(whole, significance),
+            *(
+                change
+                for name in names
+                for change in _metric_changes(
+                    name, whole if _kind(name) in OUTCOME_INDEPENDENT else alike, significance
+                )
+            ),
+        ),
     )
+
+
+def _by_scenario(pairs: Iterable[Pair]) -> dict[str, list[Pair]]:
+    found: dict[str, list[Pair]] = {}
+    for pair in pairs:
+        found.setdefault(pair[0].key.test, []).append(pair)
+    return found
+
+
+def _pass_rate_changes(pairs: Sequence[Pair], significance: Significance) -> list[ScenarioChange]:
+    """Return the scenarios whose pass rate changed, by McNemar's exact test."""
+    found = []
+    for scenario, own in _by_scenario(pairs).items():
+        passed = [tuple(_came_out(run) is Outcome.PASSED for run in pair) for pair in own]
+        lost, won = passed.count((True, False)), passed.count((False, True))
+        before, after = (sum(pair[side] for pair in passed) / len(own) for side in (0, 1))
+        p = sign_test(won, lost)
+        found.append(ScenarioChange(scenario, "passed", "", len(own), before, after, p, lost > won))
+    return _significant(found, significance)
+
+
+def _metric_changes(name: str, pairs: Sequence[Pair], significance: Significance) -> list[ScenarioChange]:
+    """Return the scenarios in which a metric changed, by Wilcoxon's signed-rank test."""
+    found = []
+    for scenario, own in _by_scenario(pairs).items():
+        known = _values(name, own)
+        if not known:
+            continue
+        baseline, value = (sum(side) / len(known) for side in zip(*known, strict=True))
+        p = signed_rank_test([two - one for one, two in known])
+        is_worse = (value > baseline) != (_kind(name) in HIGHER_IS_BETTER) if _kind(name) in COMPARED_METRICS else None
+        unit = METRICS[_kind(name)].unit if _kind(name) in METRICS else ""
+        found.append(ScenarioChange(scenario, name, unit, len(known), baseline, value, p, is_worse))
+    return _significant(found, significance)
+
+
+def _significant(changes: Sequence[ScenarioChange], significance: Significance) -> list[ScenarioChange]:
+    """Return the changes that are significant and large enough, with adjusted p-values."""
+    adjusted = [replace(change, p=p) for change, p in zip(changes, holm([each.p for each in changes]), strict=True)]
+    return [
+        change
+        for change in adjusted
+        if change.p <= significance.alpha
+        and abs(change.value - change.baseline) >= significance.min_effect * abs(change.baseline)
+    ]
+
+
+def _values(name: str, pairs: Sequence[Pair]) -> list[tuple[float, float]]:
+    """Return the values of a metric in the pairs in which both runs have it."""
+    both = [(one.metrics.get(name), two.metrics.get(name)) for one, two in pairs]
+    return [(one, two) for one, two in both if one is not None and two is not None]
 
 
 def _kind(name: str) -> str:
@@ -133,8 +244,7 @@ def _why(run: RunResult) -> str:
 
 def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
     """Return the difference of a metric, or None if no pair has it."""
-    both = [(one.metrics.get(name), two.metrics.get(name)) for one, two in pairs]
-    known = [(one, two) for one, two in both if one is not None and two is not None]
+    known = _values(name, pairs)
     if not known:
         return None
     differences = [two - one for one, two in known]
@@ -150,7 +260,7 @@ def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
         lower=lower,
         equal=len(known) - lower - higher,
         higher=higher,
-        p=sign_test(higher, lower),
+        p=signed_rank_test(differences),
     )
 
 
@@ -179,6 +289,7 @@ def _against_data(against: BaselineComparison) -> dict[str, Any]:
         "flips": [asdict(flip) for flip in against.flips],
         "flips_p": against.p,
         "differences": [_difference_data(one) for one in against.differences],
+        "changes": [asdict(one) for one in against.changes],
     }
 
 

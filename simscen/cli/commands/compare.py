@@ -1,0 +1,133 @@
+"""`simscen compare`."""
+
+import json
+import sys
+from collections.abc import Iterable
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli.diagnostics import print_text
+from simscen.core.errors import Exit, InvalidInput, Problem
+from simscen.core.records.session_events import BaselineComparison, Comparison, RunFinished
+from simscen.judge.metrics.comparison import Significance, compare_sessions, comparison_data, labeled_key
+from simscen.report.comparison import Links, session_comparison_lines, session_comparison_markdown
+from simscen.report.console_reporter import print_lines
+from simscen.report.journal import require_free
+from simscen.report.journal_reader import JournaledSession, read_journal
+
+BASELINE, CANDIDATE = "baseline", "candidate"
+
+
+class Gate(str, Enum):
+    """What makes `simscen compare` exit with 1."""
+
+    WORSE = "worse"
+    FLIP = "flip"
+    NEVER = "never"
+
+
+class ComparisonFormat(str, Enum):
+    """Output format of `simscen compare`."""
+
+    TEXT = "text"
+    JSON = "json"
+    MARKDOWN = "markdown"
+
+
+def command(
+    baseline: Annotated[Path, typer.Argument(help="Output folder of the baseline, e.g. of the main branch.")],
+    candidate: Annotated[Path, typer.Argument(help="Output folder that is compared with it.")],
+    fail_on: Annotated[
+        Gate,
+        typer.Option(
+            help="Exit with 1 if: worse: a pass rate or metric is significantly worse; flip: any run passed before and "
+            "fails now; never."
+        ),
+    ] = Gate.WORSE,
+    alpha: Annotated[
+        float, typer.Option(min=1e-6, max=0.5, help="Significance level, after correction for the number of scenarios.")
+    ] = Significance.alpha,
+    min_effect: Annotated[
+        float, typer.Option(min=0.0, help="Smallest relative change of a mean that matters: 0.05 is 5 %.")
+    ] = Significance.min_effect,
+    changed_scenarios: Annotated[
+        bool, typer.Option("--changed-scenarios", help="Compare scenarios that differ between the folders as well.")
+    ] = False,
+    format_: Annotated[
+        ComparisonFormat, typer.Option("--format", help="Output format; markdown is for a pull request.")
+    ] = ComparisonFormat.TEXT,
+) -> None:
+    """Compare the runs of two output folders, such as of two commits.
+
+    Runs are paired by scenario, variation, seed, and stack. Runs whose outcome changed are listed first, with the
+    replay of the failure. Nothing is simulated again.
+
+    Exit code 0: not worse; 1: worse, see --fail-on; 2: a folder cannot be read, or its scenarios differ; 3: the
+    candidate has runs that could not be completed.
+    """
+    folders = {BASELINE: baseline, CANDIDATE: candidate}
+    sessions = {name: read_journal(folder) for name, folder in folders.items()}
+    for folder in folders.values():
+        require_free(folder)
+    _check_scenarios(sessions, candidate, changed_scenarios)
+    comparison = compare_sessions(
+        {name: [run.result for run in session.runs] for name, session in sessions.items()},
+        {name: str(folder) for name, folder in folders.items()},
+        Significance(alpha, min_effect),
+    )
+    (against,) = comparison.against
+    if not against.pairs + against.broken:
+        hint = "run the same scenarios with the same seeds in both"
+        raise InvalidInput([Problem(str(candidate), 0, 0, "SC811", f"no run has a partner in {baseline}", hint)])
+    is_worse = _is_significantly_worse(against, alpha)
+    _print(comparison, _links(sessions), format_, is_worse)
+    incomplete = any(row[CANDIDATE].errors for row in comparison.outcomes.values())
+    lost = any(flip.failed == CANDIDATE for flip in against.flips)
+    has_failed = {Gate.WORSE: is_worse, Gate.FLIP: lost, Gate.NEVER: False}[fail_on]
+    sys.exit(Exit.FAILED if has_failed else Exit.INCOMPLETE if incomplete else Exit.PASSED)
+
+
+def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, changed_scenarios: bool) -> None:
+    """Raise InvalidInput if a scenario is not the same in both sessions."""
+    before, now = ({run.key.test: run for run in session.planned if run.question} for session in sessions.values())
+    changed = [run for test, run in now.items() if test in before and run.question != before[test].question]
+    if changed and not changed_scenarios:
+        hint = "compare runs of the same scenario files, or accept it with --changed-scenarios"
+        raise InvalidInput([
+            Problem(str(candidate), 0, 0, "SC811", f"{run.key.test} is another scenario than in the baseline", hint)
+            for run in changed
+        ])  # fmt: skip
+
+
+def _is_significantly_worse(against: BaselineComparison, alpha: float) -> bool:
+    """Return whether the pass rate over all scenarios, or anything in a single scenario, is significantly worse."""
+    lost = sum(flip.failed == CANDIDATE for flip in against.flips)
+    fails_more = against.p <= alpha and 2 * lost > len(against.flips)
+    return fails_more or any(change.is_worse for change in against.changes)
+
+
+def _links(sessions: dict[str, JournaledSession]) -> Links:
+    """Return the replay of each run that did not pass, or else the command that repeats it."""
+    return {
+        (name, labeled_key(run.key, name).test, run.key.seed): _replay(run)
+        for name, session in sessions.items()
+        for run in session.runs
+        if not run.outcome.good
+    }
+
+
+def _replay(run: RunFinished) -> str:
+    files: Iterable[str] = (run.artifacts.replay, run.artifacts.mcap)
+    return next((file for file in files if file and Path(file).is_file()), run.again)
+
+
+def _print(comparison: Comparison, links: Links, format_: ComparisonFormat, is_worse: bool) -> None:
+    if format_ is ComparisonFormat.JSON:
+        print_text(json.dumps({"worse": is_worse, **comparison_data(comparison)}, indent=2, ensure_ascii=False))
+    elif format_ is ComparisonFormat.MARKDOWN:
+        print_text("\n".join(session_comparison_markdown(comparison, links, is_worse)))
+    else:
+        print_lines(session_comparison_lines(comparison, links, is_worse), sys.stdout)

@@ -1,0 +1,178 @@
+"""`simscen compare` on journals of known results: pairing, gates, refusals, and formats."""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import Result
+from typer.testing import CliRunner
+
+from simscen.cli.main import app
+from simscen.core.errors import InvalidInput
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.session_events import RunFinished
+from simscen.core.records.verdict import Finding, Status, Verdict
+from simscen.report.journal import Journal
+from simscen.report.journal_reader import PlannedRun
+
+PASS, FAIL, ERROR = Outcome.PASSED, Outcome.FAILED, Outcome.ERROR
+
+
+def result(
+    outcome: Outcome, seed: int, scenario: str = "a", time: float = 10.0, stack: str = "", clearance: float = 0.5
+) -> RunResult:
+    found = Finding(Status.FAIL, "clearance", "0.03 m", "≥ 0.05 m", -0.02, "m", tick=240, place=(1.0, 2.0))
+    verdicts = (Verdict("clearance", "clearance", "fail", (found,)),) if outcome is FAIL else ()
+    error = RunFailure("crashed", "SIGSEGV") if outcome is ERROR else None
+    metrics = {"time_to_goal": time, "path_length": 5.0, "min_clearance": clearance, "collisions": 0.0}
+    key = RunKey(scenario, seed, stack_name=stack)
+    return RunResult(key, f"{scenario}.scenario.yaml", outcome, verdicts, metrics={} if error else metrics, error=error)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Callable[..., Path]:
+    """Writes an output folder with the journal of finished runs."""
+
+    def write(name: str, results: Sequence[RunResult], question: str = "same") -> Path:
+        path = tmp_path / name
+        path.mkdir()
+        journal = Journal(path)
+        journal.plan([PlannedRun(one.key, one.path, question=question) for one in results], "0.1.0", 1)
+        for one in results:
+            journal(RunFinished(one, again=f"simscen run {one.path} --seed {one.key.seed}"))
+        journal.close()
+        return path
+
+    return write
+
+
+def compare(*arguments: object) -> Result:
+    return CliRunner().invoke(app, ["compare", *map(str, arguments)])
+
+
+def test_equal_sessions_are_not_worse(folder: Callable[..., Path]) -> None:
+    runs = [result(PASS, seed) for seed in range(4)]
+    done = compare(folder("a", runs), folder("b", runs))
+    assert done.exit_code == 0
+    assert "4 pairs of the same scenario and seed, all with equal outcomes" in done.output
+    assert done.output.rstrip().endswith("candidate is not significantly worse in 4 pairs")
+
+
+def test_six_of_six_runs_that_fail_now_are_worse_and_five_are_not(folder: Callable[..., Path]) -> None:
+    """McNemar's exact test: p = 2 / 2^6 = 0.031 and 2 / 2^5 = 0.0625."""
+    before = [result(PASS, seed) for seed in range(6)]
+    after = [result(FAIL, seed) for seed in range(6)]
+    worse = compare(folder("a", before), folder("b", after))
+    assert worse.exit_code == 1
+    assert "worse  a: pass rate 100% → 0% (p = 0.031, 6 pairs)" in worse.output
+    assert "simscen run a.scenario.yaml --seed 3" in worse.output
+    chance = compare(folder("c", before[:5]), folder("d", after[:5]))
+    assert chance.exit_code == 0
+    assert "5 runs fail that passed before, which may be chance" in chance.output
+
+
+def test_a_better_candidate_is_not_worse(folder: Callable[..., Path]) -> None:
+    before = [result(FAIL, seed, time=20.0) for seed in range(8)]
+    after = [result(PASS, seed, time=10.0 + seed / 100) for seed in range(8)]
+    done = compare(folder("a", before), folder("b", after))
+    assert done.exit_code == 0
+    assert "better a: pass rate 0% → 100%" in done.output
+    assert "better a: time_to_goal 20.00 → 10.04 s" in done.output
+
+
+@pytest.mark.parametrize(
+    ("metric", "before", "after", "is_worse"),
+    [
+        ("time", 10.0, 12.0, True),
+        ("time", 12.0, 10.0, False),
+        ("clearance", 0.5, 0.4, True),
+        ("clearance", 0.4, 0.5, False),
+        ("time", 10.0, 10.4, False),  # less than 5 %
+    ],
+)
+def test_metrics_have_a_direction_and_a_smallest_effect(
+    folder: Callable[..., Path], metric: str, before: float, after: float, is_worse: bool
+) -> None:
+    first = [result(PASS, seed, **{metric: before + seed / 1000}) for seed in range(8)]
+    second = [result(PASS, seed, **{metric: after + seed / 900}) for seed in range(8)]
+    assert compare(folder("a", first), folder("b", second)).exit_code == is_worse
+
+
+def test_correction_for_many_scenarios(folder: Callable[..., Path]) -> None:
+    """p = 0.031 in one scenario is significant alone, but not as one of two."""
+    rest = [result(PASS, seed, "b") for seed in range(6)]
+    before = [result(PASS, seed, time=10.0 + seed) for seed in range(6)]
+    after = [result(PASS, seed, time=13.0 + 2 * seed) for seed in range(6)]
+    assert compare(folder("a", before), folder("b", after)).exit_code == 1
+    assert compare(folder("c", before + rest), folder("d", after + rest)).exit_code == 0
+
+
+def test_any_flip_can_be_the_gate(folder: Callable[..., Path]) -> None:
+    before, after = folder("a", [result(PASS, 1), result(FAIL, 2)]), folder("b", [result(FAIL, 1), result(PASS, 2)])
+    assert compare(before, after).exit_code == 0
+    assert compare(before, after, "--fail-on", "flip").exit_code == 1
+    assert compare(before, after, "--fail-on", "never").exit_code == 0
+
+
+def test_runs_of_several_stacks_are_paired_by_stack(folder: Callable[..., Path]) -> None:
+    before = [result(PASS, 1, stack="rpp"), result(FAIL, 1, stack="dwb")]
+    after = [result(PASS, 1, stack="rpp"), result(PASS, 1, stack="dwb")]
+    done = compare(folder("a", before), folder("b", after))
+    assert "better a (dwb), seed 1: passed with candidate, failed with baseline" in done.output
+    assert "simscen run a.scenario.yaml --seed 1" in done.output
+
+
+def test_runs_that_could_not_be_completed_are_not_compared(folder: Callable[..., Path]) -> None:
+    done = compare(folder("a", [result(PASS, 1), result(PASS, 2)]), folder("b", [result(PASS, 1), result(ERROR, 2)]))
+    assert done.exit_code == 3
+    assert "1 pair with an error" in done.output
+
+
+def test_changed_scenarios_are_refused_unless_allowed(folder: Callable[..., Path]) -> None:
+    before, after = folder("a", [result(PASS, 1)]), folder("b", [result(PASS, 1)], question="other")
+    refused = compare(before, after)
+    assert isinstance(refused.exception, InvalidInput)
+    assert [problem.code for problem in refused.exception.problems] == ["SC811"]
+    assert "a is another scenario than in the baseline" in str(refused.exception)
+    assert compare(before, after, "--changed-scenarios").exit_code == 0
+
+
+def test_sessions_without_a_common_run_are_refused(folder: Callable[..., Path]) -> None:
+    refused = compare(folder("a", [result(PASS, 1)]), folder("b", [result(PASS, 2)]))
+    assert isinstance(refused.exception, InvalidInput)
+    assert "no run has a partner" in str(refused.exception)
+
+
+def test_json_and_markdown(folder: Callable[..., Path]) -> None:
+    before, after = folder("a", [result(PASS, 1)]), folder("b", [result(FAIL, 1)])
+    data = json.loads(compare(before, after, "--format", "json").output)
+    assert data["worse"] is False
+    assert data["against"][0]["flips"][0]["scenario"] == "a"
+    lines = compare(before, after, "--format", "markdown").output.splitlines()
+    assert lines[0].startswith("### simscen: candidate is not significantly worse in 1 pair")
+    assert "| a | 1/1 | 0/1 |" in lines
+
+
+def test_equal_commits_are_seldom_called_worse(folder: Callable[..., Path]) -> None:
+    """Runs that fail by chance, and a metric with noise: the rate of false alarms of each kind is at most alpha."""
+    from simscen.judge.metrics.comparison import Significance, compare_sessions
+
+    rng, alarms, trials = np.random.default_rng(7), {"passed": 0, "time_to_goal": 0}, 300
+    for _ in range(trials):
+        sessions = {
+            name: [
+                result(PASS if rng.random() < 0.7 else FAIL, seed, scenario, time=rng.normal(10.0, 2.0))
+                for scenario in "abc"
+                for seed in range(10)
+            ]
+            for name in ("baseline", "candidate")
+        }
+        significance = Significance(alpha=0.1, min_effect=0.0)
+        (against,) = compare_sessions(sessions, dict.fromkeys(sessions, ""), significance).against
+        for what in alarms:
+            alarms[what] += any(change.what == what for change in against.changes)
+    # Three standard errors above alpha.
+    assert max(alarms.values()) <= trials * (0.1 + 3 * (0.1 * 0.9 / trials) ** 0.5)
+    assert alarms["time_to_goal"] > 0
