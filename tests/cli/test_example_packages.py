@@ -31,7 +31,7 @@ def call(tmp_path: Path, lay_out):
     return run
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_its_own_tests_pass(call, name: str) -> None:
     pytest_ = ("-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", "--import-mode=importlib", "-o", "addopts=")

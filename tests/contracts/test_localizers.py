@@ -31,6 +31,7 @@ SPECS: dict[str, LocalizerSpec] = {
 }
 
 
+@pytest.mark.sample(30)
 @pytest.mark.parametrize("promise", [p for name, spec in SPECS.items() for p in promises_of(spec, name)], ids=str)
 def test_it_keeps_its_promise(promise: Promise) -> None:
     promise.check()

@@ -28,6 +28,7 @@ SPECS = {
 PROMISES = [each for name, (spec, robot) in SPECS.items() for each in PlannerContract(spec, robot, name).promises()]
 
 
+@pytest.mark.sample(24)
 @pytest.mark.parametrize("promise", PROMISES, ids=str)
 def test_it_keeps_its_promise(promise: Promise) -> None:
     promise.check()

@@ -19,6 +19,7 @@ from tests.contracts.broken.cases import CASES, Case
 ROUND = {"round": round_robot()}
 
 
+@pytest.mark.sample(15)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_a_component_that_breaks_a_promise_is_caught(case: Case) -> None:
     (promise,) = [each for each in promises_of(case.spec, robots=ROUND) if each.name.startswith(case.promise)]

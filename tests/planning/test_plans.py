@@ -32,6 +32,7 @@ def medial_axis(**options: object) -> MedialAxisPlanner:
     return MedialAxisPlanner(MedialAxisSpec(type="medial_axis", **options), ROBOT)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("multiplier", [2.0, 5.0])
 @pytest.mark.parametrize("kind", GROUNDS)
 @pytest.mark.parametrize(

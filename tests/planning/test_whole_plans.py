@@ -74,6 +74,7 @@ def test_nowhere_does_a_plan_lead_over_a_single_cell_that_is_not_known(kind: str
         assert np.isfinite(passed(TraversalCosts(view, ROBOT, 2.0, False), points)).all(), (ground, number)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("space", "kind", "ground", "numbers"),
     [("reeds_shepp", "kpiece", "rooms", (506, 520)), ("dubins", "aorrtc", "forest", (501,))],

@@ -51,6 +51,7 @@ def test_every_run_leaves_its_log_its_result_its_picture_and_its_scenario(togeth
         assert left >= {"run.mcap", "result.json", "map.png", "scenario.yaml", "worker.log"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("every", [16, pytest.param(1, marks=pytest.mark.slow)], ids=["every sixteenth", "all"])
 def test_one_at_a_time_from_another_folder_every_log_and_every_result_is_the_same_to_the_byte(
     together, tmp_path, every: int

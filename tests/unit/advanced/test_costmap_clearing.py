@@ -24,6 +24,7 @@ def in_a_hall(seconds: float, *, entirely: bool = False) -> Drive:
     return d.run(seconds)
 
 
+@pytest.mark.slow
 def test_a_wall_across_a_hall_whose_ends_are_never_in_sight_together_ends_with_no_valid_path_soon() -> None:
     d = in_a_hall(60)
     assert [event.data["error_name"] for event in d.kinds("goal.failed")] == ["NO_VALID_PATH"]

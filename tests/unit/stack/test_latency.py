@@ -31,6 +31,7 @@ def start(world: Flatland | None = None, seed: int = 1, mapped: bool = True, **l
     return drive(here, START, FAR, grid=room.grid((-0.5, -0.5, 10.5, 3.5)) if mapped else None, spec=spec, seed=seed)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("zero", [{}, dict.fromkeys(Latency.model_fields, 0.0), {"planner": 0.001, "costmap": 0.002}])
 def test_no_latency_is_bit_identical_to_none_said(seed: int, zero: dict[str, float]) -> None:

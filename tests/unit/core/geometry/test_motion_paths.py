@@ -160,6 +160,7 @@ def swept(path, begin, end, reach):
     return max(sum(a.distance(b) for a, b in itertools.pairwise(track)) for track in tracks)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
 @pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
 def test_no_part_ever_moves_farther_than_the_largest_step(mode, ease):

@@ -82,7 +82,7 @@ def test_an_answer_has_its_limit_of_wall_time(play, text: str) -> None:
     assert "no answer to the step of t = 0.000 s (tick 0) within 0.2 s" in str(error)
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(
     ("text", "says"),
     [

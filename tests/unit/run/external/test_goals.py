@@ -77,6 +77,7 @@ def test_after_a_failure_the_other_goals_are_dropped_or_follow_as_the_scenario_s
     assert [name for kind, name in told(run) if kind == "goal.failed"] == ["a", "b", "c"]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("events", "says"),
     [

@@ -70,6 +70,7 @@ def test_each_is_told_whose_it_is_and_leaves_what_it_printed_and_said(fleet, tmp
     }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("does", "kind", "told"),
     [

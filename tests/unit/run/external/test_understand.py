@@ -46,6 +46,7 @@ def test_there_is_an_example_of_each_topic() -> None:
     assert EXAMPLES.keys() == {topic.name for topic in STACK_TOPICS}
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", EXAMPLES)
 @given(data=st.data())
 def test_bytes_gone_wrong_are_refused_or_understood(name: str, data) -> None:

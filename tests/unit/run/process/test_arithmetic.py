@@ -41,6 +41,7 @@ def printed(code: str, environment: dict[str, str]) -> list[str]:
     return done.stdout.split("\n")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("chosen", [{}, CHOSEN], ids=["default", "the user's choice"])
 def test_a_worker_has_the_fingerprint_of_its_caller(chosen: dict[str, str]) -> None:
     caller, worker, *_ = printed(BOTH, {**NONE_CHOSEN, **chosen, "SECRET": "x"})
@@ -51,6 +52,7 @@ def test_the_choice_of_a_user_changes_the_fingerprint() -> None:
     assert printed(PINNED, {**NONE_CHOSEN, **CHOSEN}) != printed(PINNED, NONE_CHOSEN)
 
 
+@pytest.mark.sample(1)
 @needs_avx512
 @pytest.mark.parametrize("chosen", [{"OPENBLAS_CORETYPE": "SkylakeX"}, {"NPY_DISABLE_CPU_FEATURES": ""}])
 def test_kernels_for_avx512_have_another_fingerprint(chosen: dict[str, str]) -> None:
@@ -75,6 +77,7 @@ def digest(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
     return run
 
 
+@pytest.mark.sample(1)
 @needs_avx2
 @pytest.mark.parametrize("core", ["Haswell", "Zen"])
 def test_logs_of_processors_with_avx2_are_equal(digest: Callable[..., str], core: str) -> None:

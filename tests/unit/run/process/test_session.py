@@ -53,6 +53,7 @@ def test_a_run_that_ends_well_is_answered_with_its_result(session):
     assert events[1].simulated == 1.5
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize(
     ("fault", "kind", "told"),
     [

@@ -44,12 +44,14 @@ def test_recovery_leaves_a_robot_alone_that_knows_where_it_is() -> None:
     assert measure.tracking(measure.RECOVERING, SEEDS[:1], 60.0).rmse.max() <= 0.05
 
 
+@pytest.mark.slow
 def test_people_moved_furniture_and_slipping_wheels_do_not_make_recovery_throw_a_good_cloud_away() -> None:
     """Scans are hard to explain, but the robot is not lost; averages of the likelihood itself made it 6 m wrong."""
     assert measure.among_people(measure.RECOVERING_PROB, SEEDS_AMONG_PEOPLE, 40.0).max() <= 0.6
     assert measure.among_people(measure.RECOVERING, SEEDS_AMONG_PEOPLE, 40.0).max() <= 1.5
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("world", ["clutter", "pillars"])
 def test_recovery_does_not_take_a_good_cloud_apart_with_what_it_puts_anywhere(world: str) -> None:
     """Errors of 5 and 16 m when as large a share as the averages asked for went anywhere with each scan, of 2.3 m in

@@ -228,6 +228,7 @@ def test_a_robot_in_a_narrow_gap_and_a_goal_beside_a_wall_are_planned_for() -> N
     assert path.length() < 4.0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("clearance", [0.03, 0.07, 0.2])
 def test_blocked_gaps_are_those_of_a_comparison_of_all_cells(clearance: float) -> None:
     """A cell is blocked unless it, or a cell within the clearance, is farther from obstacles than needed."""
