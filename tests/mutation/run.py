@@ -13,7 +13,7 @@ from pathlib import Path
 
 import yaml
 from mutants import Mutant, mutants
-from rooms import ROOT, module_name, modules, tests_of
+from targets import ROOT, module_name, modules, tests_of
 from trial import survives, tried
 
 EQUIVALENT = Path(__file__).with_name("equivalent.yaml")

@@ -1,9 +1,9 @@
-"""What is mutated, and which tests concern it."""
+"""The modules that are mutated, and the tests of each."""
 
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("criteria", "judge", "triggers")
+PACKAGES = ("criteria", "judge", "triggers")
 DIAGNOSIS = ["tests/unit/judge/diagnosis"]
 ALL_TESTS = {
     "criteria": ["tests/unit/criteria", "tests/unit/judge"],
@@ -17,7 +17,7 @@ EVERY_CRITERION = [
 ]
 TEMPORAL = ["golden", "always", "eventually", "until", "whenever"]
 _STL, _SIGNALS, _METRICS = "tests/unit/criteria/stl", "tests/unit/criteria/trace_signals", "tests/unit/judge/metrics"
-CONCERNED = {
+TESTS_OF_MODULE = {
     "criteria/clearance": [["golden", "clearance"], ["golden", "personal_space"], EVERY_CRITERION],
     "criteria/localization": [
         ["golden", "localization_error"],
@@ -85,31 +85,33 @@ CONCERNED = {
     **{f"judge/metrics/{of}": [[f"{_METRICS}/test_{of}.py"]] for of in ("session_summary", "comparison")},
     **{f"judge/diagnosis/{of}": [DIAGNOSIS] for of in ("causes", "objects", "goal_failure")},
 }
-"""Tests of a module that many others use, or that a criterion shares: those of the module itself come first."""
-IDLE = {"__init__.py"}
-"""What decides nothing."""
+"""Tests of single modules, in stages. The stage with all tests of the package follows."""
+IGNORED_FILES = {"__init__.py"}
 
 
 def modules() -> list[Path]:
-    """Every module that has something to decide."""
-    files = [file for room in ROOMS for file in sorted((ROOT / "simscen" / room).rglob("*.py"))]
-    return [file for file in files if file.name not in IDLE]
+    """Return all modules of the mutated packages."""
+    files = [file for package in PACKAGES for file in sorted((ROOT / "simscen" / package).rglob("*.py"))]
+    return [file for file in files if file.name not in IGNORED_FILES]
 
 
 def module_name(file: Path) -> str:
-    """simscen.criteria.speed"""
+    """Return the dotted name, such as simscen.criteria.speed."""
     return ".".join(file.relative_to(ROOT).with_suffix("").parts)
 
 
 def tests_of(file: Path) -> list[list[str]]:
-    """Return the tests to try, in stages: golden cases first, then the module's own, then those of its package."""
+    """Return the tests to try, in stages: golden cases first, then the module's own, then those of its package.
+
+    Later stages run only for mutants that survive the earlier ones.
+    """
     path = file.relative_to(ROOT / "simscen").with_suffix("")
-    room, kind = path.parts[0], file.stem
-    if path.as_posix() in CONCERNED:
-        return CONCERNED[path.as_posix()]
-    found = sorted((ROOT / "tests/unit" / room).rglob(f"test_{kind}*.py"))
+    package, kind = path.parts[0], file.stem
+    if path.as_posix() in TESTS_OF_MODULE:
+        return [*TESTS_OF_MODULE[path.as_posix()], ALL_TESTS[package]]
+    found = sorted((ROOT / "tests/unit" / package).rglob(f"test_{kind}*.py"))
     own = [test.relative_to(ROOT).as_posix() for test in found]
-    if room == "criteria" and (ROOT / f"tests/cases/{kind}.yaml").exists():
+    if package == "criteria" and (ROOT / f"tests/cases/{kind}.yaml").exists():
         return [["golden", kind], [*own, *EVERY_CRITERION]]
-    golden = [["golden"]] if room in ("criteria", "judge") else []
-    return [*golden, *([own] if own else []), ALL_TESTS[room]]
+    golden = [["golden"]] if package in ("criteria", "judge") else []
+    return [*golden, *([own] if own else []), ALL_TESTS[package]]
