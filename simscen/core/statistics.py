@@ -1,6 +1,6 @@
-"""Statistics: bootstrap, sign test, signed-rank test, Holm's correction, Wilson interval, chi-square.
+"""Statistics without scipy, whose import takes half a second.
 
-All but the signed-rank test do without scipy, whose import takes half a second.
+Bootstrap, sign test, Holm's correction, Wilson interval, and chi-square.
 """
 
 from __future__ import annotations
@@ -56,19 +56,6 @@ def sign_test(more: int, less: int) -> float:
         term *= k / (pairs - k + 1)  # from the binomial coefficient of k to that of k - 1
         tail += term
     return min(1.0, 2 * tail)
-
-
-def signed_rank_test(differences: Sequence[float]) -> float:
-    """Return the p-value of Wilcoxon's two-sided signed-rank test of paired differences, by scipy.
-
-    Pairs without a difference do not count; 1 if there is no difference at all. (Wilcoxon: Individual Comparisons by
-    Ranking Methods, 1945.)
-    """
-    if not any(differences):
-        return 1.0
-    from scipy.stats import wilcoxon
-
-    return float(wilcoxon(differences).pvalue)
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

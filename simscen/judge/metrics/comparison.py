@@ -16,7 +16,7 @@ from simscen.core.records.session_events import (
     ScenarioChange,
 )
 from simscen.core.records.verdict import Status
-from simscen.core.statistics import bootstrap_mean_interval, holm, sign_test, signed_rank_test
+from simscen.core.statistics import bootstrap_mean_interval, holm, sign_test
 from simscen.judge.evaluation import EXPECTED
 from simscen.judge.finding_text import sentence, violations
 from simscen.judge.metrics.catalog import METRICS
@@ -262,6 +262,19 @@ def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
         higher=higher,
         p=signed_rank_test(differences),
     )
+
+
+def signed_rank_test(differences: Sequence[float]) -> float:
+    """Return the p-value of Wilcoxon's two-sided signed-rank test of paired differences, by scipy.
+
+    Pairs without a difference do not count; 1 if there is no difference at all. (Wilcoxon: Individual Comparisons by
+    Ranking Methods, 1945.)
+    """
+    if not any(differences):
+        return 1.0
+    from scipy.stats import wilcoxon
+
+    return float(wilcoxon(differences).pvalue)
 
 
 def comparison_data(comparison: Comparison) -> dict[str, Any]:

@@ -1,14 +1,10 @@
 """Paired statistics, against scipy's, which are made otherwise."""
 
-import itertools
-
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy import stats
 
-from simscen.core.statistics import MIN_PAIRS, bootstrap_mean_interval, holm, sign_test, signed_rank_test
+from simscen.core.statistics import MIN_PAIRS, bootstrap_mean_interval, holm, sign_test
 
 
 def rng(seed: int = 1) -> np.random.Generator:
@@ -56,21 +52,6 @@ def test_an_interval_of_many_pairs_is_drawn_in_parts() -> None:
     low, high = bootstrap_mean_interval(rng(4).normal(1.0, 1.0, 8_000).tolist(), rng()) or (0.0, 0.0)
     assert high - low == pytest.approx(2 * 1.96 / 8_000**0.5, rel=0.1)
     assert low < 1.0 < high
-
-
-@given(st.lists(st.integers(-30, 30), min_size=1, max_size=9, unique_by=abs).filter(lambda values: 0 not in values))
-def test_the_signed_rank_test_is_the_share_of_all_signs_that_are_as_extreme(differences: list[int]) -> None:
-    """By enumeration of all signs, without ties."""
-    ranks = stats.rankdata(np.abs(differences))
-    mean = ranks.sum() / 2
-    observed = abs(ranks[np.array(differences) > 0].sum() - mean)
-    signs = itertools.product((0, 1), repeat=len(ranks))
-    extreme = sum(abs(np.dot(sign, ranks) - mean) >= observed - 1e-9 for sign in signs)
-    assert signed_rank_test(differences) == pytest.approx(extreme / 2 ** len(ranks))
-
-
-def test_pairs_without_any_difference_have_p_1() -> None:
-    assert signed_rank_test([0.0, 0.0, 0.0]) == 1.0
 
 
 def test_holm_adjusts_from_the_smallest_p_value_and_never_decreases() -> None:

@@ -1,15 +1,20 @@
 """Stacks against each other: what is paired, what is left out, and what is said of the rest."""
 
+import itertools
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
 
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.session_events import OutcomeCounts
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.metrics.catalog import METRICS
-from simscen.judge.metrics.comparison import COMPARED_METRICS, compare_stacks, comparison_data
+from simscen.judge.metrics.comparison import COMPARED_METRICS, compare_stacks, comparison_data, signed_rank_test
 
 STACKS = ("ref=reference", "mine=./nav --fast")
 GOOD = {"time_to_goal": 10.0, "path_length": 5.0, "min_clearance": 0.5, "collisions": 0.0}
@@ -168,3 +173,18 @@ def test_a_pair_in_which_another_robot_arrived_is_compared_by_collisions_alone()
     one = against(fleet("ref", a_time_to_goal=None), fleet("mine", b_time_to_goal=None, a_collisions=1.0))
     assert one.parted == 1
     assert {found.metric: found.difference for found in one.differences} == {"a/collisions": 1.0, "b/collisions": 0.0}
+
+
+@given(st.lists(st.integers(-30, 30), min_size=1, max_size=9, unique_by=abs).filter(lambda values: 0 not in values))
+def test_the_signed_rank_test_is_the_share_of_all_signs_that_are_as_extreme(differences: list[int]) -> None:
+    """By enumeration of all signs, without ties."""
+    ranks = stats.rankdata(np.abs(differences))
+    mean = ranks.sum() / 2
+    observed = abs(ranks[np.array(differences) > 0].sum() - mean)
+    signs = itertools.product((0, 1), repeat=len(ranks))
+    extreme = sum(abs(np.dot(sign, ranks) - mean) >= observed - 1e-9 for sign in signs)
+    assert signed_rank_test(differences) == pytest.approx(extreme / 2 ** len(ranks))
+
+
+def test_pairs_without_any_difference_have_p_1() -> None:
+    assert signed_rank_test([0.0, 0.0, 0.0]) == 1.0
