@@ -28,6 +28,7 @@ COMMANDS = {
     "list": "List the scenarios that a selection matches.",
     "judge": "Evaluate criteria on recorded runs without simulating them.",
     "report": "Write the reports of an output folder again.",
+    "merge": "Merge the output folders of shards into one.",
     "compare": "Compare the runs of two output folders, such as of two commits.",
     "plot": "Draw a recorded run as a picture.",
     "replay": "Write a page that plays a recorded run, or two runs side by side.",

@@ -77,5 +77,6 @@ CODES = {
     "SC805": "The log was judged with a criterion of an installed package that is not installed as it was then.",
     "SC810": "The folder has no journal of a session, or one that cannot be understood.",
     "SC811": "The scenarios of two output folders to compare differ, or they have none in common.",
+    "SC812": "Output folders to merge do not fit together.",
 }
 """Code → what it means."""

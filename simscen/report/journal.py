@@ -65,7 +65,7 @@ class Journal:
                 if self._write({"event": "finished", "run": self._numbers[event.key], **data}):
                     self._finished.add(event.key)
             case SessionFinished():
-                self._write({"event": "ended", "interrupted": event.interrupted})
+                self._write({"event": "ended", "interrupted": event.interrupted, "wall": round(event.wall, 3)})
             case _:
                 pass
 

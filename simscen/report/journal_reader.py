@@ -76,7 +76,7 @@ class JournaledSession:
         planned: All runs of the session.
         finished: Finished runs by key.
         started: Runs that had at least started.
-        wall: Seconds from the start of the session to the last line.
+        wall: Seconds from the start of the session to its end, or to the last line if it did not end.
         interrupted: Whether the session ended before all runs were finished.
     """
 
@@ -154,7 +154,7 @@ def _parse_session(lines: list[dict[str, Any]], folder: Path) -> JournaledSessio
         planned=planned,
         finished=finished,
         started=frozenset(started),
-        wall=last["at"],
+        wall=last.get("wall", last["at"]),
         interrupted=len(finished) < len(planned) or bool(last.get("interrupted")),
     )
 

@@ -194,7 +194,7 @@ stack against the first (`baseline`): `pairs` with the same scenario and seed, t
 (passed with one stack, failed with the other) with McNemar's exact `flips_p`, and `differences` of time, path length,
 clearance, jerk, standing time, replans, recoveries, collisions (of each robot: `a/collisions`), and the metrics of
 installed packages: `difference` is the mean over pairs, `interval` its 95 % bootstrap interval (from five pairs on),
-and `p` the sign test."""
+and `p` Wilcoxon's signed-rank test ([Statistics](statistics.md))."""
 
 
 def metric_topics(installed: bool = False) -> list[Topic]:

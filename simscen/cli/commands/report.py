@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -34,10 +34,19 @@ def command(
     Exit code as for `simscen run`: 0: all passed; 1: a criterion failed; 2: not an output folder, or still in use; 3: a
     run was not completed.
     """
-    past = read_journal(folder)
     require_free(folder)
+    write_reports(folder, junit, junit_family, format_, only_junit=junit is not None)
+
+
+def write_reports(
+    folder: Path, junit: Path | None, junit_family: JunitFamily, format_: Format, only_junit: bool
+) -> NoReturn:
+    """Write the reports of an output folder from its journal, print the session, and exit with its code."""
+    past = read_journal(folder)
     require_writable(junit, folder)
-    reports = Reports(folder, junit, junit_family.value, only=junit is not None)
+    reports = Reports(folder, junit, junit_family.value, only=only_junit)
+    if not only_junit and not (folder / "run.json").exists():
+        reports.begin()
     answers = past.runs
     with screen(format_) as output:
         output(past.start_event(folder))

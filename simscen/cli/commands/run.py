@@ -1,5 +1,6 @@
 """`simscen run`."""
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +10,8 @@ import typer
 from simscen.cli import completions
 from simscen.cli.session.output_files import JunitFamily
 from simscen.cli.session.run_session import SessionRequest, available_cores, execute_session
-from simscen.cli.session.selection import Selection, shard_of
+from simscen.cli.session.selection import Selection
+from simscen.cli.session.shards import scenario_times, shard_of
 from simscen.cli.session.stacks import STACK_HELP
 from simscen.cli.session.terminal import Format
 from simscen.cli.session.watch import watch_session
@@ -62,7 +64,17 @@ def command(
     resume: Annotated[
         Path | None, typer.Option(help="Continue in this output folder: run what has no verdict yet or has changed.")
     ] = None,
-    shard: Annotated[str, typer.Option(help="i/n: run every n-th scenario, starting with the i-th.")] = "1/1",
+    shard: Annotated[
+        str,
+        typer.Option(
+            help="i/n: run the i-th of n parts of the scenarios; auto: by the variables of GitLab, CircleCI, "
+            "Buildkite, Slurm arrays, and Kubernetes indexed jobs. `simscen merge` joins the results."
+        ),
+    ] = "1/1",
+    shard_by: Annotated[
+        list[Path] | None,
+        typer.Option(help="Output folder of earlier runs whose times balance the shards; repeatable."),
+    ] = None,
     stack: Annotated[
         list[str] | None,
         typer.Option(
@@ -116,7 +128,7 @@ def command(
         paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]
     request = SessionRequest(
         paths,
-        Selection(keyword, tag or [], shard_of(shard), variation or []),
+        Selection(keyword, tag or [], shard_of(shard, os.environ), variation or [], scenario_times(shard_by or [])),
         SessionOptions(
             workers or available_cores(),
             seed,

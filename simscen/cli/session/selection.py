@@ -1,13 +1,14 @@
 """Selection, loading, and validation of the scenarios given on the command line."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 
-from simscen.cli.diagnostics import escaped, from_here
+from simscen.cli.diagnostics import from_here
+from simscen.cli.session.shards import share_of_scenarios
 from simscen.cli.session.stacks import Stacks, stacks_of
-from simscen.core.errors import InvalidInput, NothingSelected, Problem, UsageError
+from simscen.core.errors import InvalidInput, NothingSelected, Problem
 from simscen.core.files import collect_read_files
 from simscen.loading.builders import world_from_file
 from simscen.loading.checks.built_world import check_built_world
@@ -28,13 +29,15 @@ from simscen.loading.world_cache import WorldCache
 class Selection:
     """Filter of scenarios: `keyword` and `tags` as in pytest, `shard` (i, n) with 1 <= i <= n.
 
-    `variations` are names of variations; () selects all.
+    `variations` are names of variations; () selects all. `times` are the seconds of scenarios in earlier runs, by which
+    shards are balanced.
     """
 
     keyword: str = ""
     tags: Sequence[str] = ()
     shard: tuple[int, int] = (1, 1)
     variations: Sequence[str] = ()
+    times: Mapping[str, float] = field(default_factory=dict)
 
 
 def load_all(
@@ -64,7 +67,7 @@ def load_all(
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(from_here(problems, home))
     firsts = select_variations([stacked[0] for stacked in loaded.values()], wanted.variations)
-    chosen = _shard(select(firsts, wanted.keyword, wanted.tags), *wanted.shard)
+    chosen = share_of_scenarios(select(firsts, wanted.keyword, wanted.tags), *wanted.shard, wanted.times)
     relevant = dict.fromkeys(warning for one in chosen for warning in warnings[one.id])
     return [stacked for one in chosen for stacked in loaded[one.title]], from_here(relevant, home)
 
@@ -76,22 +79,6 @@ def select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> 
         hint = suggestion(missing[0], known) or "no scenario has variations"
         raise NothingSelected(f"no variation is called {quoted(missing[0], 120)}; {hint}")
     return [one for one in scenarios if not names or one.variation in names]
-
-
-def shard_of(text: str) -> tuple[int, int]:
-    """Parse `i/n`. Raises UsageError."""
-    number, slash, count = text.partition("/")
-    if slash and text.isascii() and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count):
-        return int(number), int(count)
-    raise UsageError(f"cannot read --shard {escaped(text)}: expected i/n with 1 <= i <= n, e.g. 2/4")
-
-
-def _shard(scenarios: list[LoadedScenario], number: int, count: int) -> list[LoadedScenario]:
-    """Return every n-th scenario, so that folders with slow scenarios are spread over all shards."""
-    share = scenarios[number - 1 :: count]
-    if not share:
-        raise NothingSelected(f"shard {number}/{count} of {len(scenarios)} scenarios is empty")
-    return share
 
 
 @dataclass(frozen=True)

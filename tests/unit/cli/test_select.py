@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.session.selection import Selection, load_all, shard_of
+from simscen.cli.session.selection import Selection, load_all
+from simscen.cli.session.shards import shard_of
 from simscen.core.errors import InvalidInput, UsageError
 
 TEXT = """\
@@ -36,7 +37,7 @@ def test_every_scenario_is_in_exactly_one_shard(folder: Path, count: int) -> Non
 @pytest.mark.parametrize("text", ["", "1", "0/2", "3/2", "1/0", "-1/2", "a/b", "1/2/3", "１/２x"])
 def test_invalid_shards_are_rejected(text: str) -> None:
     with pytest.raises(UsageError, match="expected i/n"):
-        shard_of(text)
+        shard_of(text, {})
 
 
 def test_invalid_file_stops_the_session_even_if_not_selected(folder: Path) -> None:

@@ -1,6 +1,8 @@
+import numpy as np
 import pytest
 
-from simscen.criteria.timeline import Span, spans
+from simscen.core.records.trace import Samples
+from simscen.criteria.timeline import Span, clip_samples, enabled_spans, never_started, spans
 from simscen.testing.synthetic_trace import synthetic_trace
 
 SECOND = 240
@@ -37,3 +39,65 @@ def to_the_end(start):
 )
 def test_a_fault_lasts_from_its_own_start_to_its_own_end(events, expected):
     assert happened(*events) == expected
+
+
+def switched(*switches, grace=0.0, region="wet"):
+    """Intervals in seconds in which the keepout zone `wet` was on; `switches` are (seconds, enabled, region, filter)."""
+    events = [
+        [at, "zone.switched", *(rest[:1] or ["wet"]), {"filter": (rest[1:] or ["keepout"])[0], "enabled": enabled}]
+        for at, enabled, *rest in switches
+    ]
+    trace = synthetic_trace({"seconds": 20, "truth": [[0, 0, 0]], "events": events})
+    return [(first / SECOND, last / SECOND) for first, last in enabled_spans(trace, "keepout", region, grace)]
+
+
+def test_zone_is_on_from_each_switch_on_to_the_next_switch_off():
+    assert switched((2, True), (5, False), (7, True), (9, False)) == [(2, 5), (7, 9)]
+    assert switched((2, True)) == [(2, 20)]
+    assert switched() == []
+
+
+def test_zone_that_is_switched_off_first_was_on_from_the_start():
+    assert switched((3, False)) == [(0, 3)]
+    assert switched((0, False)) == [(0, 0)]
+
+
+def test_switching_to_the_same_state_changes_nothing():
+    assert switched((2, True), (4, True), (6, False), (8, False), (9, True)) == [(2, 6), (9, 20)]
+
+
+def test_grace_is_left_out_after_each_switch_on():
+    assert switched((2, True), (5, False), (7, True), (8, False), grace=1.0) == [(3, 5), (8, 8)]
+    assert switched((2, True), (3, False), grace=1.5) == []
+
+
+def test_other_zones_and_filters_do_not_count():
+    assert switched((2, True), (3, False, "dry"), (4, False, "wet", "speed"), (5, False)) == [(2, 5)]
+
+
+def samples():
+    return Samples(np.array([10, 20, 30, 40]), np.array([[1.0], [2.0], [3.0], [4.0]]))
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "expected"),
+    [
+        (20, 30, {20: 2.0, 30: 3.0}),
+        (15, 35, {15: 1.0, 20: 2.0, 30: 3.0, 35: 3.0}),
+        (0, 50, {10: 1.0, 20: 2.0, 30: 3.0, 40: 4.0}),
+        (10, 40, {10: 1.0, 20: 2.0, 30: 3.0, 40: 4.0}),
+        (40, 40, {40: 4.0}),
+        (0, 5, {}),
+    ],
+)
+def test_clipped_samples_are_held_at_both_ends(first, last, expected):
+    clipped = clip_samples(samples(), first, last)
+    assert dict(zip(clipped.ticks.tolist(), clipped.values[:, 0].tolist(), strict=True)) == expected
+
+
+def test_what_did_start_is_listed_by_name():
+    events = [[k, "event.started", name] for k, name in enumerate("gfedcba")]
+    trace = synthetic_trace({"seconds": 20, "truth": [[0, 0, 0]], "events": events})
+    because, detail = never_started(trace, "gust")
+    assert because.startswith("`gust` never started; the run ended at t = 20.00 s")
+    assert detail == ["started in this run: `a`, `b`, `c`, `d`, `e`, `f`, `g`"]

@@ -1,0 +1,42 @@
+"""`simscen merge`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli.commands.report import write_reports
+from simscen.cli.session.output_files import JunitFamily
+from simscen.cli.session.terminal import Format
+from simscen.core.errors import UsageError
+from simscen.report.journal import require_free
+from simscen.report.merge import merge_shards, read_shards
+from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
+
+
+def command(
+    shards: Annotated[list[Path], typer.Argument(help="Output folders of `simscen run --shard`.")],
+    out: Annotated[Path, typer.Option(help="Output folder to create.")],
+    junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
+    junit_family: Annotated[
+        JunitFamily, typer.Option(help="xunit2 omits what the schema of Jenkins forbids.")
+    ] = JunitFamily.SIMSCEN,
+    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
+) -> None:
+    """Merge the output folders of shards into one.
+
+    The reports are those that a single session with all runs would have written. Runs that a shard did not finish are
+    errors, as in `simscen report`. The shards are not changed.
+
+    Exit code as for `simscen run`: 0: all passed; 1: a criterion failed; 2: a folder is not an output folder, still in
+    use, or does not fit to the others; 3: a run was not completed.
+    """
+    sessions = read_shards(shards)
+    for shard in shards:
+        require_free(shard)
+    folder = create_output_folder(out)
+    try:
+        merge_shards(sessions, folder, RUNS_FOLDER)
+    except OSError as error:
+        raise UsageError(f"cannot write {folder}: {error.strerror}") from error
+    write_reports(folder, junit, junit_family, format_, only_junit=False)

@@ -1,0 +1,78 @@
+"""Merging of output folders of shards into one."""
+
+import os
+import shutil
+from collections.abc import Sequence
+from dataclasses import astuple, replace
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import Artifacts, RunFinished, RunStarted, SessionFinished
+from simscen.report.journal import Journal
+from simscen.report.journal_reader import JournaledSession, read_journal
+
+
+def read_shards(folders: Sequence[Path]) -> dict[Path, JournaledSession]:
+    """Read the journals of shards. Raises InvalidInput if one is missing, or if they do not fit together."""
+    sessions = {folder: read_journal(folder) for folder in folders}
+    owners: dict[RunKey, Path] = {}
+    problems = []
+    first = next(iter(sessions.values()))
+    for folder, session in sessions.items():
+        if session.version != first.version:
+            message = f"it was written by simscen {session.version}, the first shard by {first.version}"
+            problems.append(Problem(str(folder), 0, 0, "SC812", message))
+        for run in session.planned:
+            if owners.setdefault(run.key, folder) != folder:
+                message = f"{run.key.test}, seed {run.key.seed} is in {owners[run.key]} as well"
+                problems.append(Problem(str(folder), 0, 0, "SC812", message, "merge each shard once"))
+    if problems:
+        raise InvalidInput(problems)
+    return sessions
+
+
+def merge_shards(sessions: dict[Path, JournaledSession], folder: Path, runs_folder: str) -> None:
+    """Write the journal of all shards to `folder`, and copy their run folders. Raises OSError.
+
+    Files are hard links if the file system supports them. The session took as long as the longest shard.
+    """
+    planned = sorted((run for session in sessions.values() for run in session.planned), key=lambda run: run.key)
+    journal = Journal(folder)
+    try:
+        journal.plan(
+            planned, next(iter(sessions.values())).version, sum(session.workers for session in sessions.values())
+        )
+        for source, session in sessions.items():
+            if (source / runs_folder).is_dir():
+                shutil.copytree(
+                    source / runs_folder, folder / runs_folder, copy_function=_link_or_copy, dirs_exist_ok=True
+                )
+            paths = {run.key: run.path for run in session.planned}
+            for key in sorted(session.started):
+                journal(RunStarted(key, paths[key]))
+            for key in sorted(session.finished):
+                journal(_moved(session.finished[key], source, folder))
+        interrupted = any(session.interrupted for session in sessions.values())
+        wall = max(session.wall for session in sessions.values())
+        journal(SessionFinished(0, 0, 0, simulated=0.0, wall=wall, interrupted=interrupted))
+        if journal.error:
+            raise journal.error
+    finally:
+        journal.close()
+
+
+def _link_or_copy(source: str, target: str) -> None:
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
+
+
+def _moved(run: RunFinished, source: Path, folder: Path) -> RunFinished:
+    """Return the run with its files in `folder` instead of `source`."""
+    files = (
+        str(folder / Path(file).relative_to(source)) if file and Path(file).is_relative_to(source) else file
+        for file in astuple(run.artifacts)
+    )
+    return replace(run, artifacts=Artifacts(*files))

@@ -1,0 +1,135 @@
+"""`simscen merge` and `--shard`: the merged results are those of a single session."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from simscen.cli.main import app
+from simscen.cli.session.shards import PARALLEL_JOBS, shard_of, share_of_scenarios
+from simscen.core.errors import InvalidInput, NothingSelected, UsageError
+
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 0.5 s
+pass: [{collisions: {max: 0}}, {clearance: {min: LIMIT}}]
+"""
+
+
+def simscen(*arguments: object) -> int:
+    """Run a process of its own, because a session locks its folder until the process ends."""
+    command = [sys.executable, "-m", "simscen", *map(str, arguments)]
+    return subprocess.run(command, check=False, capture_output=True).returncode
+
+
+@pytest.fixture(scope="module")
+def sessions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five scenarios, of which one fails, in a single session `whole` and in the shards `s1` to `s3`."""
+    folder = tmp_path_factory.mktemp("sessions")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for name in "abcde":
+            Path(f"{name}.scenario.yaml").write_text(SCENARIO.replace("LIMIT", "3 m" if name == "c" else "0.1 m"))
+        assert simscen("run", ".", "--repeat", 2, "--out", "whole") == 1
+        assert [simscen("run", ".", "--repeat", 2, "--out", f"s{k}", "--shard", f"{k}/3") for k in (1, 2, 3)] == [
+            0,
+            0,
+            1,
+        ]
+    return folder
+
+
+def test_merged_results_are_those_of_a_single_session(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(sessions)
+    assert simscen("merge", "s3", "s1", "s2", "--out", "all") == 1
+    assert Path("all/results.json").read_bytes() == Path("whole/results.json").read_bytes()
+    times = re.compile(rb' time="[0-9.]+"')
+    merged, whole = (times.sub(b"", Path(name, "junit.xml").read_bytes()) for name in ("all", "whole"))
+    assert merged.replace(b"all/runs", b"whole/runs") == whole
+    for run in json.loads(Path("all/results.json").read_text())["runs"]:
+        assert Path("all", run["artifacts"]["mcap"]).is_file()
+    assert Path("all/report.html").is_file()
+    assert Path("all/run.json").is_file()
+
+
+def test_merged_folder_can_be_reported_again(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(sessions)
+    simscen("merge", "s1", "s2", "s3", "--out", "again")
+    before = Path("again/results.json").read_bytes()
+    assert simscen("report", "again") == 1
+    assert Path("again/results.json").read_bytes() == before
+
+
+def test_unfinished_runs_of_a_shard_are_errors(sessions: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(sessions)
+    killed = tmp_path / "killed"
+    killed.mkdir()
+    lines = Path("s1/events.jsonl").read_bytes().splitlines(keepends=True)
+    (killed / "events.jsonl").write_bytes(b"".join(lines[:3]))  # the plan, and that a run started
+    assert simscen("merge", killed, "s2", "--out", tmp_path / "all") == 3
+    kinds = [
+        run["error"]["kind"] for run in json.loads((tmp_path / "all/results.json").read_text())["runs"] if run["error"]
+    ]
+    assert set(kinds) <= {"interrupted", "not-run"}
+    assert kinds
+
+
+def test_runs_that_are_in_two_shards_are_refused(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(sessions)
+    done = CliRunner().invoke(app, ["merge", "whole", "s1", "--out", "twice"])
+    assert isinstance(done.exception, InvalidInput)
+    assert {problem.code for problem in done.exception.problems} == {"SC812"}
+    assert not Path("twice").exists()
+
+
+def test_output_folder_must_be_empty(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(sessions)
+    done = CliRunner().invoke(app, ["merge", "s1", "s2", "--out", "whole"])
+    assert isinstance(done.exception, UsageError)
+
+
+class Titled:
+    def __init__(self, title: str) -> None:
+        self.title = title
+
+
+def test_measured_times_balance_the_shards() -> None:
+    """One scenario takes as long as all others; each scenario is in exactly one shard, in its order."""
+    scenarios = [Titled(name) for name in "abcdef"]
+    times = {"a": 1.0, "b": 1.0, "c": 5.0, "d": 1.0, "e": 1.0}  # f counts as the median
+    first, second = ([one.title for one in share_of_scenarios(scenarios, k, 2, times)] for k in (1, 2))  # type: ignore[arg-type]
+    assert (first, second) == (["c"], ["a", "b", "d", "e", "f"])
+
+
+def test_without_times_each_shard_has_every_nth_scenario() -> None:
+    scenarios = [Titled(name) for name in "abcde"]
+    assert [one.title for one in share_of_scenarios(scenarios, 2, 2, {})] == ["b", "d"]  # type: ignore[arg-type]
+    with pytest.raises(NothingSelected):
+        share_of_scenarios(scenarios, 6, 6, {})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("environ", "expected"),
+    [
+        ({"CI_NODE_INDEX": "2", "CI_NODE_TOTAL": "4"}, (2, 4)),
+        ({"CIRCLE_NODE_INDEX": "0", "CIRCLE_NODE_TOTAL": "3"}, (1, 3)),
+        ({"BUILDKITE_PARALLEL_JOB": "2", "BUILDKITE_PARALLEL_JOB_COUNT": "3"}, (3, 3)),
+        ({"SLURM_ARRAY_TASK_ID": "12", "SLURM_ARRAY_TASK_COUNT": "5", "SLURM_ARRAY_TASK_MIN": "10"}, (3, 5)),
+        ({"JOB_COMPLETION_INDEX": "4", "JOB_COMPLETIONS": "5"}, (5, 5)),
+    ],
+)
+def test_the_number_of_a_parallel_job_is_found(environ: dict[str, str], expected: tuple[int, int]) -> None:
+    assert shard_of("auto", environ) == expected
+
+
+@pytest.mark.parametrize("environ", [{}, {"CI_NODE_INDEX": "2"}, {"CI_NODE_INDEX": "x", "CI_NODE_TOTAL": "3"}])
+def test_auto_outside_of_a_parallel_job_is_an_error(environ: dict[str, str]) -> None:
+    with pytest.raises(UsageError, match=PARALLEL_JOBS[0].index_variable):
+        shard_of("auto", environ)
