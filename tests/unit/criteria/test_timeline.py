@@ -42,7 +42,7 @@ def test_a_fault_lasts_from_its_own_start_to_its_own_end(events, expected):
 
 
 def switched(*switches, grace=0.0, region="wet"):
-    """Intervals in seconds in which the keepout zone `wet` was on; `switches` are (seconds, enabled, region, filter)."""
+    """Return when the keepout zone `wet` was on, in s; `switches` are (seconds, enabled, region, filter)."""
     events = [
         [at, "zone.switched", *(rest[:1] or ["wet"]), {"filter": (rest[1:] or ["keepout"])[0], "enabled": enabled}]
         for at, enabled, *rest in switches
