@@ -55,7 +55,11 @@ TESTS_OF_MODULE = {
     "criteria/stl/robustness": [TEMPORAL, [f"{_STL}/test_robustness.py"]],
     "criteria/stl/operators": [TEMPORAL, [f"{_STL}/test_operators.py"]],
     "criteria/stl/criterion": [TEMPORAL, [f"{_STL}/test_criterion.py", f"{_STL}/test_description.py"]],
-    "criteria/trace_signals/distances": [[f"{_SIGNALS}/test_readers.py"], TEMPORAL, ["golden", "personal_space"]],
+    "criteria/trace_signals/distances": [
+        [f"{_SIGNALS}/test_distances.py", f"{_SIGNALS}/test_readers.py"],
+        TEMPORAL,
+        ["golden", "personal_space"],
+    ],
     "criteria/trace_signals/catalog": [
         [f"{_SIGNALS}/test_catalog.py", f"{_STL}/test_condition.py", f"{_STL}/test_criterion.py"]
     ],

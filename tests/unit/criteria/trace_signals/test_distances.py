@@ -1,0 +1,53 @@
+"""Distances to pedestrians against shapely, for robots of any shape and heading."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+import shapely.affinity
+
+from simscen.core.records.events import Event, EventKind
+from simscen.criteria.trace_signals.distances import pedestrian_gap, pedestrian_radii
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
+
+SHAPES = {
+    "triangle": [[0.5, 0.0], [-0.3, 0.3], [-0.3, -0.3]],
+    "box off center": [[0.9, 0.2], [-0.1, 0.2], [-0.1, -0.3], [0.9, -0.3]],
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("seed", range(6))
+def test_gap_is_that_of_shapely(shape: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, y, yaw = (float(value) for value in rng.uniform(-3.0, 3.0, 3))
+    people = {name: [[0, *rng.uniform(-3.0, 3.0, 2).tolist()]] for name in ("anna", "bert")}
+    radii = {"anna": 0.25, "bert": 0.4}
+    trace = synthetic_trace({
+        "seconds": 2,
+        "truth": [[0, x, y, yaw], [2, x, y, yaw]],
+        "objects": people,
+        "events": [[0, "object.spawned", name, {"person": True, "size": [radius]}] for name, radius in radii.items()],
+    })  # fmt: skip
+    robot = shapely.affinity.translate(
+        shapely.affinity.rotate(shapely.Polygon(SHAPES[shape]), yaw, origin=(0, 0), use_radians=True), x, y
+    )
+    expected = min(
+        max(0.0, robot.distance(shapely.Point(place[0][1:])) - radii[name]) for name, place in people.items()
+    )
+    assert pedestrian_gap(trace, synthetic_case({"footprint": SHAPES[shape]})) == pytest.approx(expected, abs=1e-9)
+
+
+def test_objects_are_people_only_with_a_radius() -> None:
+    data = {
+        "anna": {"person": True, "size": [0.25, 1.7]},
+        "bert": {"person": True, "size": [0.3]},
+        "crate": {"size": [0.5]},
+        "ghost": {"person": True, "size": []},
+        "unknown": {"person": True},
+        "named": {"person": True, "size": ["large", 1.7]},
+    }
+    trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
+    events = tuple(Event(0, EventKind.OBJECT_SPAWNED, name, found) for name, found in data.items())
+    assert pedestrian_radii(replace(trace, events=events)) == {"anna": 0.25, "bert": 0.3}
