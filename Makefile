@@ -65,7 +65,7 @@ test-lowest:  ## Test with the oldest packages that pyproject.toml allows, in .v
 	@$(LOWEST)/bin/simscen run scenarios/navigation scenarios/faults --out $$(mktemp -d)/out
 
 served: setup  ## Compare each shipped scenario with its stack behind the stack protocol to the same in the engine
-	@SIMSCEN_SERVED=all $(BIN)/python -m pytest tests/scenarios/test_served.py
+	@SIMSCEN_SERVED=all $(BIN)/python -m pytest tests/scenarios/test_stack_protocol_parity.py
 
 library: setup  ## Run each shipped scenario with twenty seeds, and write what came of it into the docs (minutes)
 	@$(BIN)/python tests/scenarios/twenty_seeds.py

@@ -8,7 +8,7 @@ DIAGNOSIS = ["tests/unit/judge/diagnosis"]
 ALL_TESTS = {
     "criteria": ["tests/unit/criteria", "tests/unit/judge"],
     "judge": ["tests/unit/judge", "tests/unit/criteria/test_every_criterion.py"],
-    "triggers": ["tests/unit/triggers", "tests/unit/run/test_firing.py"],
+    "triggers": ["tests/unit/triggers", "tests/unit/run/test_trigger_evaluation.py"],
 }
 EVERY_CRITERION = [
     "tests/unit/criteria/test_every_criterion.py",

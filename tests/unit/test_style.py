@@ -7,6 +7,8 @@ from pathlib import Path
 SIMSCEN = Path(__file__).parents[2] / "simscen"
 MODULES = sorted(SIMSCEN.rglob("*.py"))
 MAX_FILES = 20
+REGISTRIES = frozenset({"cli/commands"})
+"""Folders with one file for each name that users see; they may have any number of files."""
 LARGER_FOLDERS = {"stack": 27, "model": 25}
 """Folders that are still to be divided. The numbers may only fall."""
 PREPOSITIONS = re.compile(
@@ -27,4 +29,5 @@ def test_no_module_is_named_by_a_preposition_or_a_participle() -> None:
 
 def test_a_folder_has_few_files() -> None:
     counts = Counter(path.parent.relative_to(SIMSCEN).as_posix() for path in MODULES if path.stem != "__init__")
-    assert {folder: count for folder, count in counts.items() if count > LARGER_FOLDERS.get(folder, MAX_FILES)} == {}
+    limits = {folder: LARGER_FOLDERS.get(folder, MAX_FILES) for folder in counts.keys() - REGISTRIES}
+    assert {folder: counts[folder] for folder, limit in limits.items() if counts[folder] > limit} == {}

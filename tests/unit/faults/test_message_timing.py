@@ -1,4 +1,4 @@
-"""Messages that come late, seldom, not at all, or always the same."""
+"""Faults that delay, drop, thin out, or freeze messages."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a lidar sees of things that lie about, of which the robot drives into some."""
+"""Lidar ranges of objects that stand about, some of which the robot pushes."""
 
 import math
 

@@ -1,7 +1,4 @@
-"""Until a fault or an event begins, a run is bit for bit the run without it; with one that never begins, to its end.
-
-All words of the registries are tried: a new one without an example here, or in its docstring, fails.
-"""
+"""A fault or event has no effect before it starts: until then, the run is the same bit for bit."""
 
 import random
 import re

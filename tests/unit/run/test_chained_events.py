@@ -1,4 +1,4 @@
-"""A story is told in its order: each step is waited for from when the one before it has happened."""
+"""Chained events happen in their order: each one waits for the one before."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Things whose poses were worked out ahead are logged and traced as those that were looked at one by one."""
+"""Objects whose poses are computed in advance are logged like those that are queried one by one."""
 
 import io
 from dataclasses import replace

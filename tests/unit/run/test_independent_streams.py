@@ -1,4 +1,4 @@
-"""What is random about one entry is nobody else's business."""
+"""The random numbers of an event or fault do not depend on other ones."""
 
 import math
 

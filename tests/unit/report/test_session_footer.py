@@ -1,4 +1,4 @@
-"""What the end of a session says once more."""
+"""Lines at the end of a session."""
 
 import io
 import re

@@ -1,4 +1,4 @@
-"""For each promise a component that breaks it, and the contract says so: one that cannot fail promises nothing."""
+"""For each promise of a contract, a component that breaks it is found."""
 
 import pytest
 

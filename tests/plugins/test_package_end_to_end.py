@@ -1,4 +1,4 @@
-"""A package of another maker, through the front door: files, schema, explain, runs, reports, and life without it."""
+"""An installed package end to end: files, schema, explain, runs, reports, and without it."""
 
 import json
 import os

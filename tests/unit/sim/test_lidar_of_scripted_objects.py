@@ -1,4 +1,4 @@
-"""What a lidar sees of things that follow scripts, of which most are out of its reach."""
+"""Lidar ranges of objects that follow scripts, most of them out of range."""
 
 import math
 

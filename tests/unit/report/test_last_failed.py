@@ -1,4 +1,4 @@
-"""What the sessions of an output folder say has failed last."""
+"""The runs that failed last, according to the sessions of an output folder."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What is worked out once for as long as a thing lives."""
+"""Values that are computed once in the life of an object."""
 
 import gc
 import weakref

@@ -1,4 +1,4 @@
-"""Why a run failed is told from end to end, and a log judged again says the same."""
+"""The reasons of failed runs, end to end; judging the log again gives the same ones."""
 
 from pathlib import Path
 

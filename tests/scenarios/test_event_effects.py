@@ -1,4 +1,4 @@
-"""Teleport, stop, push, doors and marks in a run: where things are afterwards, by the log."""
+"""Effects of the actions teleport, stop, push, and of doors and marks, according to the log."""
 
 import math
 

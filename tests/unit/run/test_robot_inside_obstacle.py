@@ -1,4 +1,4 @@
-"""A robot inside something solid collides with it, however it got there."""
+"""A robot inside a solid obstacle collides with it, however it got there."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What falls through the floor, flies off or is nowhere ends the run as an error."""
+"""A body that falls through the floor, flies off, or has no finite pose ends the run with an error."""
 
 import math
 

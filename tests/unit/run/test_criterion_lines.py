@@ -1,4 +1,4 @@
-"""Where a verdict's criterion is written."""
+"""The line of the scenario in which a criterion is written."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Maps and shortest ways that earlier sessions worked out change nothing but the time a session takes."""
+"""Cached maps and shortest paths change nothing but the duration of a session."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The process of a run hardly looks for garbage, unless code of others runs in it."""
+"""The garbage collector hardly runs during a run, unless plug-ins take part."""
 
 import gc
 from dataclasses import replace

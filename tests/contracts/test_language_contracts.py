@@ -1,4 +1,4 @@
-"""Every shipped criterion, fault, trigger and action keeps the promises of its base, as its docstring's example."""
+"""Every shipped criterion, fault, trigger, and action keeps the promises of its base class."""
 
 import re
 from collections.abc import Iterator

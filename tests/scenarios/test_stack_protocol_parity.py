@@ -1,7 +1,4 @@
-"""simscen's own stack behind the stack protocol gives the same log as in the engine, to the last bit.
-
-`make served` compares all shipped scenarios, `make test` a few in which different things happen.
-"""
+"""The reference stack behind the stack protocol gives the same log as in the process of the run."""
 
 import os
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Who gets colors and a live display."""
+"""Detection of color and live display."""
 
 import io
 

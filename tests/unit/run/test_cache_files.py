@@ -1,4 +1,4 @@
-"""Files that are kept between sessions: sound ones only, of this user only, and never too many."""
+"""Files of the cache between sessions: only valid ones, only of this user, and a limited number."""
 
 import os
 import threading

@@ -1,4 +1,4 @@
-"""Whatever surrounds simscen is broken or goes away: proper exit codes, whole reports, never a traceback."""
+"""Full disks, closed descriptors, and damaged logs: proper exit codes, whole reports, no traceback."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Noise, bias, scale and drift, on every kind of message, against their definitions."""
+"""Noise, bias, scale, and drift of every kind of message, against their definitions."""
 
 import math
 

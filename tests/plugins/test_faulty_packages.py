@@ -1,4 +1,4 @@
-"""What a package of another maker may do wrong in a run, and what becomes of it: never a pass, and always its name."""
+"""Components of an installed package that fail in a run: never a pass, and the message names them."""
 
 from textwrap import dedent
 

@@ -1,4 +1,4 @@
-"""Messages that say nonsense, as they are said to."""
+"""Faults that corrupt the content of messages."""
 
 import numpy as np
 import pytest

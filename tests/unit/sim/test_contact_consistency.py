@@ -1,4 +1,4 @@
-"""Clearance, collisions and the engine's own contacts speak of the same bodies, polled or ruled out."""
+"""Clearance, collisions, and the contacts of the engine agree about the same bodies."""
 
 import random
 
