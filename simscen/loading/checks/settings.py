@@ -135,6 +135,19 @@ def deprecated_parameters(loaded: LoadedScenario) -> Iterator[Finding]:
 
 
 @MEANING.check("SC055", severity="warning")
+def ignored_recovery_parameters(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find parameters of AMCL's recovery that a localizer with `relocalization: scan_matching` does not use."""
+    localizer = getattr(loaded.spec.stack, "localizer", None)
+    if getattr(localizer, "relocalization", None) != "scan_matching":
+        return
+    for key in ("recovery_alpha_slow", "recovery_alpha_fast"):
+        keys = ("stack", "localizer", key)
+        if getattr(localizer, key, 0.0) > 0.0 and existing_keys(loaded.tree, keys) == keys:
+            hint = "use `relocalization: random` to find a lost robot as nav2_amcl does"
+            yield Finding(keys, f"`{key}` has no effect with `relocalization: scan_matching`", hint)
+
+
+@MEANING.check("SC055", severity="warning")
 def latency_without_values(loaded: LoadedScenario) -> Iterator[Finding]:
     """Find `latency: robot` for a robot whose file gives no latency."""
     robot = loaded.robot.spec
