@@ -9,7 +9,6 @@ from typing import NamedTuple
 from simscen.cli.diagnostics import escaped
 from simscen.core.errors import NothingSelected, UsageError
 from simscen.loading.loaded import LoadedScenario
-from simscen.report.journal_reader import read_journal
 
 
 class _ParallelJob(NamedTuple):
@@ -77,6 +76,8 @@ def scenario_times(folders: Sequence[Path]) -> dict[str, float]:
 
     Raises InvalidInput if a folder has no journal.
     """
+    from simscen.report.journal_reader import read_journal  # not needed by light commands, which select scenarios, too
+
     walls = defaultdict(list)
     for folder in folders:
         for run in read_journal(folder).finished.values():
