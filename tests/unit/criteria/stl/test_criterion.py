@@ -136,3 +136,16 @@ def test_when_each_note_was_is_told():
     finding = found(answer, trace)
     assert finding.status is Status.FAIL
     assert finding.detail[1:] == ("the answer was due at t = 2.02 s",)
+
+
+WHENEVER = {"whenever": HURT, "then": FAR}
+
+
+@pytest.mark.parametrize(
+    ("words", "has_hint"),
+    [(WHENEVER, True), ({"always": {"all": [FAR, WHENEVER]}}, False), ({"eventually": WHENEVER}, False)],
+)
+def test_only_an_untested_whenever_at_the_top_can_be_made_optional(words, has_hint):
+    finding = found(words, {**WAY, "events": [[4, "run.ended", "time limit"]]}, FAR_SIGHTED)
+    assert finding.status is Status.INCONCLUSIVE
+    assert ("`required: false` lets such a run pass" in finding.detail) == has_hint
