@@ -1,6 +1,7 @@
 """Comparison of stacks or sessions as console lines, HTML and Markdown."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from html import escape
 
 from simscen.core.records.session_events import (
@@ -44,7 +45,7 @@ def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | No
 def session_comparison_lines(comparison: Comparison, links: Links, is_worse: bool) -> Iterator[StyledLine]:
     """Yield the comparison of a session with the baseline: changed outcomes first, and the verdict last."""
     (against,) = comparison.against
-    yield from _comparison_section(comparison.baseline, against, "", links)
+    yield from _comparison_section(comparison.baseline, _with_changed_metrics(against), "", links)
     yield from _outcome_table(comparison, "", None, changed_only=True)
     yield (StyledText(""),)
     lost = any(flip.failed == against.stack for flip in against.flips)
@@ -54,7 +55,13 @@ def session_comparison_lines(comparison: Comparison, links: Links, is_worse: boo
 def session_comparison_markdown(comparison: Comparison, links: Links, is_worse: bool) -> list[str]:
     """Return the comparison of a session with the baseline as lines of Markdown, for a pull request."""
     (against,) = comparison.against
-    return [f"### simscen: {_session_verdict(against, is_worse)}", *as_markdown(comparison, links, changed_only=True)]
+    shown = replace(comparison, against=(_with_changed_metrics(against),))
+    return [f"### simscen: {_session_verdict(against, is_worse)}", *as_markdown(shown, links, changed_only=True)]
+
+
+def _with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
+    """Return the comparison without metrics that are equal in all pairs."""
+    return replace(against, differences=tuple(one for one in against.differences if one.equal < one.pairs))
 
 
 def _session_verdict(against: BaselineComparison, is_worse: bool) -> str:

@@ -18,7 +18,11 @@ EVERY_CRITERION = [
 TEMPORAL = ["golden", "always", "eventually", "until", "whenever"]
 _STL, _SIGNALS, _METRICS = "tests/unit/criteria/stl", "tests/unit/criteria/trace_signals", "tests/unit/judge/metrics"
 TESTS_OF_MODULE = {
-    "criteria/clearance": [["golden", "clearance"], ["golden", "personal_space"], EVERY_CRITERION],
+    "criteria/clearance": [
+        ["golden", "clearance"],
+        ["golden", "personal_space"],
+        [f"{_SIGNALS}/test_distances.py", *EVERY_CRITERION],
+    ],
     "criteria/localization": [
         ["golden", "localization_error"],
         ["golden", "relocalized_within"],

@@ -8,6 +8,9 @@ import shapely
 import shapely.affinity
 
 from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Samples
+from simscen.core.records.verdict import Status
+from simscen.criteria.clearance import PersonalSpace
 from simscen.criteria.trace_signals.distances import pedestrian_gap, pedestrian_radii
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
@@ -51,3 +54,17 @@ def test_objects_are_people_only_with_a_radius() -> None:
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     events = tuple(Event(0, EventKind.OBJECT_SPAWNED, name, found) for name, found in data.items())
     assert pedestrian_radii(replace(trace, events=events)) == {"anna": 0.25, "bert": 0.3}
+
+
+@pytest.mark.parametrize(("speed", "drives"), [(0.1, False), (0.1001, True)])
+def test_robot_drives_if_it_is_faster_than_a_tenth_of_a_meter_per_second(speed: float, drives: bool) -> None:
+    trace = synthetic_trace({
+        "seconds": 2,
+        "truth": [[0, 0, 0]],
+        "objects": {"anna": [[0, 1, 0]]},
+        "events": [[0, "object.spawned", "anna", {"person": True, "size": [0.25]}]],
+    })  # fmt: skip
+    velocity = Samples(trace.truth.ticks, np.tile((speed, 0.0, 0.0), (len(trace.truth), 1)))
+    criterion = PersonalSpace(min=2.0, while_driving=True)
+    (finding,) = criterion.judge(replace(trace, velocity=velocity), synthetic_case({"inscribed_radius": 0.2}))
+    assert finding.status is (Status.FAIL if drives else Status.INCONCLUSIVE)
