@@ -1,0 +1,60 @@
+"""What the stack itself reported about a goal, up to the tick of the failure, this tick included."""
+
+import pytest
+
+from simscen.criteria.goal_outcomes import goal_outcomes
+from simscen.judge.diagnosis.goal_failure import _failed_recoveries, _given_up, _held
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
+
+SECOND = 240
+
+
+def recorded(*events):
+    """A run of 10 s with these events, and the outcome of its goal `study`, accepted at 2 s."""
+    accepted = [2, "goal.accepted", "study"]
+    trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]], "events": [accepted, *events]})
+    return trace, goal_outcomes(trace, synthetic_case({"goals": [{"name": "study", "pose": [9, 0, 0]}]}))[0]
+
+
+HELD = [3, "robot.held", "collision_monitor", {"message": "scans are late"}]
+
+
+@pytest.mark.parametrize(
+    ("events", "at", "is_held"),
+    [
+        ([HELD], 3, True),
+        ([HELD], 2.99, False),
+        ([HELD, [5, "robot.released", "collision_monitor"]], 5, True),  # it had been held until then
+        ([HELD, [5, "robot.released", "collision_monitor"]], 5.1, False),
+        ([HELD, [5, "robot.released", "collision_monitor"], [7, *HELD[1:]]], 8, True),
+    ],
+)
+def test_robot_is_held_from_the_report_until_after_its_release(events, at, is_held):
+    trace, _ = recorded(*events)
+    assert bool(_held(trace, round(at * SECOND))) == is_held
+
+
+def test_the_report_of_a_goal_that_was_given_up_counts_from_its_own_tick_on():
+    trace, outcome = recorded(
+        [1, "recovery.started", "wait"],
+        [2, "recovery.started", "clear"],
+        [6, "recovery.started", "spin"],
+        [6, "goal.failed", "study", {"message": "no valid path", "error_name": "NO_VALID_PATH"}],
+        [7, "recovery.started", "backup"],
+    )
+    assert _given_up(trace, outcome, 6 * SECOND - 1) == []
+    assert _given_up(trace, outcome, 6 * SECOND) == ["it gave up and said: no valid path; clear, spin had not helped"]
+
+
+def test_recoveries_that_failed_count_from_the_acceptance_of_the_goal_to_the_failure():
+    failed = {"outcome": "failed", "error_name": "COLLISION_AHEAD"}
+    trace, outcome = recorded(
+        [1, "recovery.ended", "wait", failed],
+        [2, "recovery.ended", "spin", failed],
+        [4, "recovery.ended", "clear", {"outcome": "succeeded"}],
+        [6, "recovery.ended", "backup", failed],
+        [7, "recovery.ended", "retrace", failed],
+    )
+    assert _failed_recoveries(trace, outcome, 6 * SECOND) == [
+        "what it tried failed, too: spin with COLLISION_AHEAD, backup with COLLISION_AHEAD"
+    ]
