@@ -204,12 +204,12 @@ def _differences(baseline: str, against: BaselineComparison) -> Iterator[StyledL
     if not against.differences:
         return
     stacks = shorten(baseline), shorten(against.stack)
-    head = ("mean over pairs", *stacks, "difference", "95 % interval", "- / = / +")
+    head = ("mean over pairs", *stacks, "difference", "95 % interval", "-/=/+")
     rows = [
         (
             f"{one.metric}, {one.unit}".removesuffix(", "),
             *difference_columns(one),
-            f"{one.lower} / {one.equal} / {one.higher}",
+            f"{one.lower}/{one.equal}/{one.higher}",
         )
         for one in against.differences
     ]
@@ -234,9 +234,9 @@ def _pairs(number: int) -> str:
 EXPLANATION = (
     "Runs are paired by scenario and seed. Passed: number of passed and of finished runs. Differences are means over "
     "pairs with 95 % bootstrap intervals; p is from McNemar's exact test for outcomes and from Wilcoxon's signed-rank "
-    "test for metrics, for single scenarios with Holm's correction. - / = / +: pairs with a lower, equal, higher value."
+    "test for metrics, for single scenarios with Holm's correction. -/=/+: pairs with a lower, equal, higher value."
 )
-_HEAD = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "- / = / +", "p")
+_HEAD = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "-/=/+", "p")
 
 
 def as_html(comparison: Comparison) -> str:
@@ -348,7 +348,7 @@ def _cells(one: MetricDifference) -> tuple[str, ...]:
     """Return a row of the table of differences."""
     before, after, difference, interval = difference_columns(one)
     name = f"{one.metric}, {one.unit}".removesuffix(", ")
-    signs = f"{one.lower} / {one.equal} / {one.higher}"
+    signs = f"{one.lower}/{one.equal}/{one.higher}"
     return name, str(one.pairs), before, after, difference, interval, signs, f"{one.p:.2g}"
 
 

@@ -35,9 +35,9 @@ EXPECTED = """\
 
   mine against ref: 10 pairs of the same scenario and seed, 0 better, 1 worse (p = 1)
     worse  navigation/goal, seed 3: passed with ref, failed with mine: clearance: 0.03 m < 0.05 m, at t = 4.10 s, (2.59, 4.42)
-    mean over pairs    ref   mine  difference  95 % interval  - / = / +
-    time_to_goal, s  25.34  28.23       +2.89  +0.78 … +4.95  1 / 0 / 7
-    replans           3.00   3.00       +0.00                 0 / 2 / 0
+    mean over pairs    ref   mine  difference  95 % interval  -/=/+
+    time_to_goal, s  25.34  28.23       +2.89  +0.78 … +4.95  1/0/7
+    replans           3.00   3.00       +0.00                 0/2/0
     in 2 pairs only one run reached its goals, so their metrics are not compared
     left out: 1 pair with an error, 1 run without a partner
 
