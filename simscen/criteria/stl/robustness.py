@@ -144,11 +144,10 @@ class _UntilRobustness(Robustness):
         hold, release = self.hold.bound(bound)[sample:end], self.release.bound(bound)[sample:end]
         before = np.concatenate(([math.inf], np.minimum.accumulate(hold)[:-1]))
         best = np.minimum(before, release)
-        if first >= len(best):  # the window begins after the run, and `hold` was broken within it
-            at, value = len(best), float(hold.min())
-        else:
-            at = first + int(np.argmax(best[first:]))
-            value = float(best[at])
+        value = float(self.bound(bound)[sample])
+        at = first + int(np.argmax(best[first:])) if first < len(best) else len(best)
+        if at < len(best) and best[at] != value:  # a release after the run would be better, but `hold` was broken
+            at = len(best)
         if at < len(best) and release[at] <= before[at]:
             decides = self.release.witness(sample + at, bound)
         else:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_formulas import CASE, FORMULAS, NUMBERS, VALUES, horizon, run, validated
+from random_formulas import CASE, FORMULAS, NUMBERS, VALUES, WINDOWS, horizon, run, validated
 
 from simscen.core.messages.navigation import Path
 from simscen.core.records.trace import Samples
@@ -128,3 +128,27 @@ def test_a_signal_that_is_no_number_is_named_with_its_first_moment():
             validated({"signal": "plan_deviation", "op": "<", "value": 1.0}),
             EvaluationContext(trace, CASE, over=True),
         )
+
+
+HOLD = {"signal": "clearance", "op": ">", "value": 0.5}
+RELEASE = {"signal": "yaw_rate", "op": ">", "value": 0.5}
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=12), WINDOWS, st.booleans())
+def test_the_witness_of_until_has_its_value_at_each_sample(values, window, ended):
+    """Where the sign is known, the comparison that decides is as far from its bound as the value of `until` says."""
+    p, q = ([float(value) for value in side] for side in zip(*values, strict=True))
+    words = {"until": {"hold": HOLD, "release": RELEASE, "between": list(window)}}
+    result = robustness(validated(words), EvaluationContext(run(p, q, ended), CASE, over=ended))
+    for sample in range(len(p)):
+        for bound in ("low", "high"):
+            value = result.bound(bound)[sample]
+            decided = value > 0 if bound == "low" else value < 0
+            if not decided or np.isinf(value):
+                continue
+            witness = result.witness(sample, bound)
+            assert abs(witness.value - 0.5) == pytest.approx(abs(value))
+            assert sample <= witness.sample <= sample + window[1]
+            signal = p if witness.comparison.signal == "clearance" else q
+            assert witness.value == signal[witness.sample]
