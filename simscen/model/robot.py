@@ -181,7 +181,7 @@ class Mount(Spec):
     @property
     def is_level(self) -> bool:
         """Whether the x-y plane of the sensor is horizontal and not upside down."""
-        return self.roll == 0.0 and self.pitch == 0.0
+        return self.pose.is_level
 
     @property
     def pose(self) -> Pose3:

@@ -32,6 +32,8 @@ class LidarSensor:
         self._tilted_mount = None if spec.mount.is_level else spec.mount.pose
         yaw = spec.mount.yaw if spec.mount.is_level else 0.0  # the ray fan of a tilted lidar is in the lidar frame
         self._fan = RayFan(self._first + yaw, self._increment, spec.beams)
+        angles = self._first + self._increment * np.arange(spec.beams)
+        self._directions = np.column_stack((np.cos(angles), np.sin(angles)))  # in the lidar frame
         # Beyond this distance, a range exceeds the maximum in spite of noise and rounding.
         self._cast_range = spec.max_range + MAX_NOISE_STDS * spec.noise + spec.resolution
         self._origin = spec.mount.x, spec.mount.y, spec.mount.z
@@ -53,9 +55,7 @@ class LidarSensor:
     def _tilted_distances(self, lidar: Pose3) -> Array:
         """Return the distances to obstacles or to the floor, whichever is nearer."""
         distances = np.asarray(self._rays.sweep(self._fan, lidar, self._cast_range), dtype=np.float64)
-        angles = self._first + self._increment * np.arange(self._spec.beams)
-        slopes = np.array((np.cos(angles), np.sin(angles))).T @ lidar.rotation()[2, :2]
-        return np.minimum(distances, floor_distances(lidar.z, slopes))
+        return np.minimum(distances, floor_distances(lidar.z, self._directions @ lidar.rotation()[2, :2]))
 
     def _to_ranges(self, distances: Array | Singles) -> Array:
         """Return reported ranges for true distances: with noise, rounded, and limited to the sensor's range."""

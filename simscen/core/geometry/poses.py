@@ -136,6 +136,11 @@ class Pose3(NamedTuple):
         """(x, y, z, w), the order of ROS and PyBullet."""
         return self.qx, self.qy, self.qz, self.qw
 
+    @property
+    def is_level(self) -> bool:
+        """Whether the pose has no roll and pitch."""
+        return self.qx == 0.0 and self.qy == 0.0
+
     def rotation(self) -> Array:
         """Return the 3 x 3 rotation matrix."""
         x, y, z, w = self.quaternion

@@ -13,6 +13,8 @@ MIN_HEIGHT_M = 0.05
 """Hits below this height are the floor; a lidar that is mounted lower uses half its own height."""
 MAX_HEIGHT_M = 2.0
 """Hits above this height are above the robot (`max_obstacle_height` of Nav2's costmap)."""
+AT_BASE = Pose3()
+"""Mount of a sensor in the base frame."""
 
 
 def level_scan(scan: Scan) -> Scan:
@@ -42,14 +44,14 @@ def level_scan(scan: Scan) -> Scan:
 
 def imu_in_base_frame(imu: Imu) -> Imu:
     """Return the reading along the axes of the base; centripetal accelerations at the sensor's place stay in it."""
-    quaternion = imu.mount.quaternion
-    if quaternion == Pose3().quaternion:
+    if imu.mount == AT_BASE:
         return imu
+    quaternion = imu.mount.quaternion
     return replace(
         imu,
         angular_velocity=rotated(quaternion, imu.angular_velocity),
         linear_acceleration=rotated(quaternion, imu.linear_acceleration),
-        mount=Pose3(),
+        mount=AT_BASE,
     )
 
 

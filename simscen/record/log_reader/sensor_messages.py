@@ -58,7 +58,7 @@ class SensorMessages:
         frame = self.frames.stack_frame(scan.frame)
         limits = scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max
         mount = self.mounts.get(frame, Pose3())
-        tilted = mount if mount.qx or mount.qy else None
+        tilted = None if mount.is_level else mount
         return level_scan(Scan(frame, self.time.tick(scan.stamp), scan.ranges, *limits, mount.plane, tilted))
 
     def cloud(self, data: bytes) -> Array:

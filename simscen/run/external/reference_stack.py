@@ -117,7 +117,7 @@ class ReferenceStackPeer(Peer):
                     ranges = np.array(told[7:], dtype=np.float64)
                     limits = angle, step, least, most
                     mount = self._mount(sensor)
-                    tilted = mount if mount.qx or mount.qy else None
+                    tilted = None if mount.is_level else mount
                     yield Scan(sensor, self._tick(scan.stamp), ranges, *limits, Pose2(x, y, yaw), tilted)
                 case topics.ODOMETRY_TYPE:
                     odom = message.content

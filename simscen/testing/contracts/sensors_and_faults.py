@@ -197,7 +197,8 @@ class SensorContract(Contract):
         for reading in self.readings():
             for field in fields(reading):
                 value = getattr(reading, field.name)
-                if value is None or isinstance(value, str | bool) or field.name in MAY_BE_MISSING:
+                is_unset = value is None and field.default is None
+                if is_unset or isinstance(value, str | bool) or field.name in MAY_BE_MISSING:
                     continue
                 require(np.isfinite(np.asarray(value, dtype=np.float64)).all(), f"says {field.name} of {value!r}")
 

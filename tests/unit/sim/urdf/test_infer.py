@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,18 @@ def test_the_lidar_sits_on_its_link_or_on_top(infer):
     )
     mount = infer(text.replace("</robot>", link)).sensors["lidar"].lidar.mount
     assert (mount.x, mount.y, mount.z, mount.yaw) == pytest.approx((0.3, 0.1, 0.25, 0.5))
+
+
+@pytest.mark.parametrize(("rpy", "roll"), [("3.14159 0 0.5", math.pi), ("0 0 0.5", 0.0), ("0 0.2 0.5", 0.0)])
+def test_lidar_is_upside_down_if_its_link_is(infer, rpy, roll):
+    """Other tilts are not taken over, since the frame of a link need not be that of the scan."""
+    link = (
+        '<link name="base_scan"/><joint name="s" type="fixed"><parent link="base_link"/><child link="base_scan"/>'
+        f'<origin xyz="0.3 0.1 0.25" rpy="{rpy}"/></joint></robot>'
+    )
+    mount = infer(to_urdf(build_robot_body(shipped("amr"))).replace("</robot>", link)).sensors["lidar"].lidar.mount
+    assert (mount.roll, mount.pitch) == (roll, 0.0)
+    assert mount.yaw == pytest.approx(0.5, abs=1e-4)
 
 
 def test_wheel_joints_that_know_their_speed_limit_the_robot(infer):
