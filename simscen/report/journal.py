@@ -43,13 +43,17 @@ class Journal:
         self._finished: set[RunKey] = set()
         self._start = time.monotonic()
 
-    def plan(self, runs: Sequence[PlannedRun], version: str, workers: int) -> None:
-        """Start a session with these runs. Previous lines of the journal no longer count."""
+    def plan(self, runs: Sequence[PlannedRun], version: str, workers: int, shard: tuple[int, int] = (1, 1)) -> None:
+        """Start a session with these runs. Previous lines of the journal no longer count.
+
+        `shard` (i, n) says that these are the runs of part i of n.
+        """
         self._numbers, self._finished = {run.key: number for number, run in enumerate(runs)}, set()
         facts = {
             "format": JOURNAL_FORMAT,
             "version": version,
             "workers": workers,
+            "shard": list(shard),
             "pid": os.getpid(),
             "cwd": str(Path.cwd()),
         }

@@ -23,7 +23,7 @@ class PlannedRun:
     """A run of a session that may not have started yet. `path` is the scenario file.
 
     `digest` is a hash of everything that the result depends on, so that a result is reused only if nothing has changed;
-    `question` is one of the scenario without the stack, so that versions of a stack can be compared.
+    `definition` is one of the scenario without its stacks, so that versions of a stack can be compared.
     `again` and `file` have the same meaning as in RunFinished, `stack` as in RunResult.
     """
 
@@ -33,19 +33,19 @@ class PlannedRun:
     again: str = field(default="", compare=False)
     file: str = field(default="", compare=False)
     stack: str = field(default="", compare=False)
-    question: str = field(default="", compare=False)
+    definition: str = field(default="", compare=False)
 
 
 def planned_run_to_data(run: PlannedRun) -> dict[str, Any]:
     """Return a planned run as JSON data."""
-    source = {"path": run.path, "file": run.file, "again": run.again, "stack": run.stack, "question": run.question}
+    source = {"path": run.path, "file": run.file, "again": run.again, "stack": run.stack, "definition": run.definition}
     return {**asdict(run.key), **source, "digest": run.digest}
 
 
 def planned_run_from_data(data: dict[str, Any]) -> PlannedRun:
     """Read the data of `planned_run_to_data`. Raises KeyError or TypeError if they are invalid."""
-    stack, question = data.get("stack", ""), data.get("question", "")
-    return PlannedRun(read_key(data), data["path"], data["digest"], data["again"], data["file"], stack, question)
+    stack, definition = data.get("stack", ""), data.get("definition", "")
+    return PlannedRun(read_key(data), data["path"], data["digest"], data["again"], data["file"], stack, definition)
 
 
 def finished_run_to_data(run: RunFinished, folder: Path) -> dict[str, Any]:
@@ -73,6 +73,7 @@ class JournaledSession:
     """The last session in a journal.
 
     Attributes:
+        shard: Which part (i, n) of the selected scenarios it ran.
         planned: All runs of the session.
         finished: Finished runs by key.
         started: Runs that had at least started.
@@ -82,6 +83,7 @@ class JournaledSession:
 
     version: str
     workers: int
+    shard: tuple[int, int]
     planned: tuple[PlannedRun, ...]
     finished: Mapping[RunKey, RunFinished]
     started: frozenset[RunKey]
@@ -151,6 +153,7 @@ def _parse_session(lines: list[dict[str, Any]], folder: Path) -> JournaledSessio
     return JournaledSession(
         version=first["version"],
         workers=first["workers"],
+        shard=tuple(first.get("shard", (1, 1))),
         planned=planned,
         finished=finished,
         started=frozenset(started),

@@ -13,23 +13,37 @@ from simscen.report.journal import Journal
 from simscen.report.journal_reader import JournaledSession, read_journal
 
 
-def read_shards(folders: Sequence[Path]) -> dict[Path, JournaledSession]:
+def read_shards(folders: Sequence[Path], allow_missing: bool) -> dict[Path, JournaledSession]:
     """Read the journals of shards. Raises InvalidInput if one is missing, or if they do not fit together."""
     sessions = {folder: read_journal(folder) for folder in folders}
     owners: dict[RunKey, Path] = {}
-    problems = []
+    problems = [] if allow_missing else _missing_shards(sessions)
     first = next(iter(sessions.values()))
     for folder, session in sessions.items():
         if session.version != first.version:
             message = f"it was written by simscen {session.version}, the first shard by {first.version}"
-            problems.append(Problem(str(folder), 0, 0, "SC812", message))
+            problems.append(_problem(folder, message))
         for run in session.planned:
             if owners.setdefault(run.key, folder) != folder:
                 message = f"{run.key.test}, seed {run.key.seed} is in {owners[run.key]} as well"
-                problems.append(Problem(str(folder), 0, 0, "SC812", message, "merge each shard once"))
+                problems.append(_problem(folder, message))
     if problems:
         raise InvalidInput(problems)
     return sessions
+
+
+def _missing_shards(sessions: dict[Path, JournaledSession]) -> list[Problem]:
+    """Return a problem for each part of n that no session ran."""
+    count = max(session.shard[1] for session in sessions.values())
+    given = {session.shard[0] for session in sessions.values() if session.shard[1] == count}
+    folder = next(folder for folder, session in sessions.items() if session.shard[1] == count)
+    hint = "add its output folder, or use --allow-missing if it had no scenarios"
+    missing = sorted(set(range(1, count + 1)) - given)
+    return [_problem(folder, f"shard {number}/{count} is missing", hint) for number in missing]
+
+
+def _problem(folder: Path, message: str, hint: str = "") -> Problem:
+    return Problem(str(folder), 0, 0, "SC812", message, hint)
 
 
 def merge_shards(sessions: dict[Path, JournaledSession], folder: Path, runs_folder: str) -> None:

@@ -9,8 +9,8 @@ import platform
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
-from typing import Any
+from pathlib import Path, PurePath
+from typing import Any, NamedTuple
 
 from simscen.core.geometry import Array
 from simscen.core.version import PACKAGE
@@ -156,40 +156,47 @@ def _files(value: str) -> Iterator[tuple[str, Path]]:
             yield path.relative_to(folder).as_posix(), path
 
 
-def scenario_digest(loaded: LoadedScenario) -> str:
-    """Return the SHA-256 of all files, options, versions, and processor features that affect a run.
+class ScenarioDigests(NamedTuple):
+    """SHA-256 digests of a scenario.
+
+    run:         of all files, options, versions, and processor features that affect a run, so that results are reused
+                 only if nothing has changed
+    definition:  of the scenario without the parameters of stacks, and of its world, robots, maps, and meshes, so that
+                 results of two versions of a stack or of simscen can be compared if it is the same
+    """
+
+    run: str
+    definition: str
+
+
+def scenario_digests(loaded: LoadedScenario) -> ScenarioDigests:
+    """Return the digests of a scenario. Raises OSError.
 
     The files are the scenario with `extends`, `defaults.yaml`, world, map, and robot, and all files that these refer
     to, such as map images, SDF and URDF files, meshes, heightmaps, and xacro includes. Moving a file changes the
-    digest, and so does a change of an installed package that the scenario uses. Raises OSError.
+    digest of the run, and so does a change of an installed package that the scenario uses. The definition does not
+    depend on where files are, nor on comments in the scenario.
     """
-    sha = hashlib.sha256(json.dumps(_circumstances(loaded), sort_keys=True).encode())
-    for name, text in sorted(loaded.sources.items()):
-        _take(sha, name, text.encode())
-    for file in sorted({*referenced_files(loaded), *loaded.read}):
-        _take(sha, _name(file, loaded), file.read_bytes())
-    return sha.hexdigest()
+    texts = {name: text.encode() for name, text in sorted(loaded.sources.items())}
+    files = {_name(file, loaded): file.read_bytes() for file in sorted({*referenced_files(loaded), *loaded.read})}
+    run = hashlib.sha256(json.dumps(_circumstances(loaded), sort_keys=True).encode())
+    for name, data in (*texts.items(), *files.items()):
+        _take(run, name, data)
+    defining = {name: data for name, data in texts.items() if name.endswith(WORLD_AND_ROBOT_FILES)} | files
+    # Only the names of files, because the shipped robots are installed elsewhere on another machine.
+    contents = sorted((PurePath(name).name, hashlib.sha256(data).hexdigest()) for name, data in defining.items())
+    definition = json.dumps([_definition(loaded), contents], sort_keys=True, default=str)
+    return ScenarioDigests(run.hexdigest(), hashlib.sha256(definition.encode()).hexdigest())
 
 
-def question_digest(loaded: LoadedScenario) -> str:
-    """Return the SHA-256 of what a scenario asks: itself without the parameters of stacks, and its world and robots.
-
-    Results of two versions of a stack or of simscen can be compared if it is the same. Comments of the scenario and
-    `extends` do not count. Raises OSError.
-    """
+def _definition(loaded: LoadedScenario) -> dict[str, Any]:
+    """Return the scenario without the parameters of its stacks."""
     plain = _without_stack(loaded.tree.plain)
     if isinstance(robots := plain.get("robots"), Mapping):
         plain["robots"] = {
             name: _without_stack(robot) if isinstance(robot, Mapping) else robot for name, robot in robots.items()
         }
-    sha = hashlib.sha256(json.dumps(plain, sort_keys=True, default=str).encode())
-    for name, text in sorted(loaded.sources.items()):
-        if name.endswith(_QUESTION_FILES):
-            _take(sha, name, text.encode())
-    for file in sorted({*referenced_files(loaded), *loaded.read}):
-        if not file.name.endswith(_STACK_FILES):
-            _take(sha, _name(file, loaded), file.read_bytes())
-    return sha.hexdigest()
+    return plain
 
 
 def _without_stack(entry: Mapping[str, Any]) -> dict[str, Any]:
@@ -200,8 +207,8 @@ def _without_stack(entry: Mapping[str, Any]) -> dict[str, Any]:
     return {**{key: value for key, value in entry.items() if key not in ("stack", "extends")}, "stack": common}
 
 
-_QUESTION_FILES = (".world.yaml", ".robot.yaml", ".sdf", ".world")
-_STACK_FILES = (".stack.yaml", "params.yaml")
+WORLD_AND_ROBOT_FILES = (".world.yaml", ".robot.yaml", ".sdf", ".world")
+"""Endings of the files, besides those that they refer to, that define a scenario."""
 
 
 def _circumstances(loaded: LoadedScenario) -> dict[str, object]:

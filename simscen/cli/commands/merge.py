@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from simscen.cli.commands.report import write_reports
-from simscen.cli.session.output_files import JunitFamily
-from simscen.cli.session.terminal import Format
+from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Reports
+from simscen.cli.session.terminal import Format, FormatOption
 from simscen.core.errors import UsageError
 from simscen.report.journal import require_free
 from simscen.report.merge import merge_shards, read_shards
@@ -17,11 +17,12 @@ from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
 def command(
     shards: Annotated[list[Path], typer.Argument(help="Output folders of `simscen run --shard`.")],
     out: Annotated[Path, typer.Option(help="Output folder to create.")],
+    allow_missing: Annotated[
+        bool, typer.Option("--allow-missing", help="Merge although a shard is missing, because it had no scenarios.")
+    ] = False,
     junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
-    junit_family: Annotated[
-        JunitFamily, typer.Option(help="xunit2 omits what the schema of Jenkins forbids.")
-    ] = JunitFamily.SIMSCEN,
-    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
+    junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
+    format_: FormatOption = Format.TEXT,
 ) -> None:
     """Merge the output folders of shards into one.
 
@@ -29,9 +30,9 @@ def command(
     errors, as in `simscen report`. The shards are not changed.
 
     Exit code as for `simscen run`: 0: all passed; 1: a criterion failed; 2: a folder is not an output folder, still in
-    use, or does not fit to the others; 3: a run was not completed.
+    use, or does not fit to the others, or a shard is missing; 3: a run was not completed.
     """
-    sessions = read_shards(shards)
+    sessions = read_shards(shards, allow_missing)
     for shard in shards:
         require_free(shard)
     folder = create_output_folder(out)
@@ -39,4 +40,5 @@ def command(
         merge_shards(sessions, folder, RUNS_FOLDER)
     except OSError as error:
         raise UsageError(f"cannot write {folder}: {error.strerror}") from error
+    Reports(folder, junit, junit_family.value).begin()
     write_reports(folder, junit, junit_family, format_, only_junit=False)

@@ -7,8 +7,8 @@ from typing import Annotated, NoReturn
 import typer
 
 from simscen.cli.diagnostics import print_text
-from simscen.cli.session.output_files import JunitFamily, Reports, exit_code, require_writable
-from simscen.cli.session.terminal import Format, screen
+from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Reports, exit_code, require_writable
+from simscen.cli.session.terminal import Format, FormatOption, screen
 from simscen.core.errors import Exit
 from simscen.judge.metrics.comparison import compare_stacks
 from simscen.judge.metrics.session_summary import session_summary_line, summarize_session
@@ -20,10 +20,8 @@ from simscen.report.results_json import results_by_stack
 def command(
     folder: Annotated[Path, typer.Argument(help="The output folder of `simscen run`.")],
     junit: Annotated[Path | None, typer.Option(help="Write only JUnit XML, to this file.")] = None,
-    junit_family: Annotated[
-        JunitFamily, typer.Option(help="xunit2 omits what the schema of Jenkins forbids.")
-    ] = JunitFamily.SIMSCEN,
-    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
+    junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
+    format_: FormatOption = Format.TEXT,
 ) -> None:
     """Write the reports of an output folder again from its journal.
 
@@ -45,8 +43,6 @@ def write_reports(
     past = read_journal(folder)
     require_writable(junit, folder)
     reports = Reports(folder, junit, junit_family.value, only=only_junit)
-    if not only_junit and not (folder / "run.json").exists():
-        reports.begin()
     answers = past.runs
     with screen(format_) as output:
         output(past.start_event(folder))

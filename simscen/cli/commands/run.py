@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.session.output_files import JunitFamily
+from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
 from simscen.cli.session.run_session import SessionRequest, available_cores, execute_session
 from simscen.cli.session.selection import Selection
 from simscen.cli.session.shards import scenario_times, shard_of
 from simscen.cli.session.stacks import STACK_HELP
-from simscen.cli.session.terminal import Format
+from simscen.cli.session.terminal import Format, FormatOption
 from simscen.cli.session.watch import watch_session
 from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.run.process.jobs import ReplayMode
@@ -56,10 +56,8 @@ def command(
         typer.Option(help="Compare the logs with this output folder of another session or machine."),
     ] = None,
     junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
-    junit_family: Annotated[
-        JunitFamily, typer.Option(help="xunit2 omits what the schema of Jenkins forbids.")
-    ] = JunitFamily.SIMSCEN,
-    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
+    junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
+    format_: FormatOption = Format.TEXT,
     wall_limit: Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")] = 300.0,
     resume: Annotated[
         Path | None, typer.Option(help="Continue in this output folder: run what has no verdict yet or has changed.")

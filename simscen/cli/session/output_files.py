@@ -12,6 +12,9 @@ from datetime import datetime, timezone
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
@@ -43,6 +46,9 @@ class JunitFamily(str, Enum):
 
     SIMSCEN = "simscen"
     XUNIT2 = "xunit2"
+
+
+JunitFamilyOption = Annotated[JunitFamily, typer.Option(help="xunit2 omits what the schema of Jenkins forbids.")]
 
 
 class Reports:

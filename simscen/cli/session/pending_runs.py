@@ -14,7 +14,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun, last_failed, read_journal
 from simscen.run.process.jobs import Job
-from simscen.run.reproducibility import question_digest, scenario_digest
+from simscen.run.reproducibility import ScenarioDigests, scenario_digests
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER
 from simscen.run.sessions.results import repeat_command, shown
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
@@ -42,15 +42,13 @@ class PendingRuns:
         return session_started(__version__, keys, self.workers, folder, self.stacks)
 
 
-def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> PendingRuns:
+def begin(journal: Journal, jobs: Sequence[Job], workers: int, shard: tuple[int, int] = (1, 1)) -> PendingRuns:
     """Write the plan of the session to its journal and return the pending runs. Raises UsageError if that fails.
 
     Results of unchanged scenarios are kept unless they are errors; of two runs to be compared, both or neither.
     """
     scenarios = {_job_identity(job): job.scenario for job in jobs}
-    digests = {
-        identity: (scenario_digest(scenario), question_digest(scenario)) for identity, scenario in scenarios.items()
-    }
+    digests = {identity: scenario_digests(scenario) for identity, scenario in scenarios.items()}
     planned = [_planned(job, digests[_job_identity(job)]) for job in jobs]
     known = _previous_results(journal)
     answers = [known.get(run) for run in planned]
@@ -61,7 +59,7 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> PendingRuns:
             kept.append(replace(answer, resumed=True))
         else:
             left.append(job)
-    journal.plan(planned, __version__, workers)
+    journal.plan(planned, __version__, workers, shard)
     for answer in kept:
         journal(answer)
     if journal.error:
@@ -69,11 +67,11 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> PendingRuns:
     return PendingRuns(journal, left, kept, workers, tuple(dict.fromkeys(run.stack for run in planned if run.stack)))
 
 
-def _planned(job: Job, digests: tuple[str, str]) -> PlannedRun:
+def _planned(job: Job, digests: ScenarioDigests) -> PlannedRun:
     scenario = job.scenario
     again = repeat_command(scenario, job.key.seed)
-    digest, question = digests
-    return PlannedRun(job.key, scenario.path, digest, again, shown(scenario.file), scenario.stack, question)
+    file, stack = shown(scenario.file), scenario.stack
+    return PlannedRun(job.key, scenario.path, digests.run, again, file, stack, digests.definition)
 
 
 def _previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:

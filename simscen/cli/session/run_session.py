@@ -85,7 +85,7 @@ def execute_session(request: SessionRequest, observer: Observer | None = None) -
     used = {"plugins": plugin_packages(plugins_of_all(scenarios)), "stacks": commands_of(scenarios)}
     reports = Reports(folder, request.junit, request.junit_family.value, used=used)
     reports.begin()
-    work = begin(journal, plan_jobs(scenarios, options, folder), options.workers)
+    work = begin(journal, plan_jobs(scenarios, options, folder), options.workers, request.wanted.shard)
     with screen(request.format_, request.durations) as output:
         listeners: list[Listener] = [*([observer] if observer else []), *([LivePage(reports)] if request.open_ else [])]
         code = _run(work, options, reports, output, listeners)

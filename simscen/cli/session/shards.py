@@ -12,15 +12,19 @@ from simscen.loading.loaded import LoadedScenario
 
 
 class _ParallelJob(NamedTuple):
-    """Variables with the number of a job and the number of jobs; `first` is the first number, or its variable."""
+    """Variables of a system with the number of a job, the number of jobs, and, if there is one, the first number.
+
+    `first` is the first number of a system without such a variable.
+    """
 
     index_variable: str
     count_variable: str
-    first: str = "0"
+    first_variable: str = ""
+    first: int = 0
 
 
 PARALLEL_JOBS = (
-    _ParallelJob("CI_NODE_INDEX", "CI_NODE_TOTAL", "1"),  # GitLab
+    _ParallelJob("CI_NODE_INDEX", "CI_NODE_TOTAL", first=1),  # GitLab
     _ParallelJob("CIRCLE_NODE_INDEX", "CIRCLE_NODE_TOTAL"),
     _ParallelJob("BUILDKITE_PARALLEL_JOB", "BUILDKITE_PARALLEL_JOB_COUNT"),
     _ParallelJob("SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "SLURM_ARRAY_TASK_MIN"),
@@ -40,7 +44,7 @@ def shard_of(text: str, environ: Mapping[str, str]) -> tuple[int, int]:
 def _parallel_job(environ: Mapping[str, str]) -> str:
     for job in PARALLEL_JOBS:
         index, count = environ.get(job.index_variable, ""), environ.get(job.count_variable, "")
-        first = environ.get(job.first, job.first)
+        first = environ.get(job.first_variable, str(job.first))
         if index.isdecimal() and count.isdecimal() and first.isdecimal():
             return f"{int(index) - int(first) + 1}/{count}"
     known = ", ".join(job.index_variable for job in PARALLEL_JOBS)

@@ -7,7 +7,9 @@ from contextlib import contextmanager
 from enum import Enum
 from io import StringIO
 from pathlib import Path
-from typing import TextIO
+from typing import Annotated, TextIO
+
+import typer
 
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
@@ -29,6 +31,9 @@ class Format(str, Enum):
     TEXT = "text"
     JSON = "json"
     GITHUB = "github"
+
+
+FormatOption = Annotated[Format, typer.Option("--format", help="Output format.")]
 
 
 class Screen:

@@ -8,7 +8,7 @@ import pytest
 from simscen.cli.process import caller_environment, config_file
 from simscen.cli.session.selection import Selection, load_all
 from simscen.core.errors import UsageError
-from simscen.run.reproducibility import scenario_digest
+from simscen.run.reproducibility import scenario_digests
 
 SHORT = """\
 simscen: 1
@@ -194,7 +194,7 @@ def test_missing_program_is_reported_at_its_line_of_the_configuration(simscen, p
 
 def test_digest_includes_arguments_variables_and_file_contents(project: Path, monkeypatch) -> None:
     def of(*given: str) -> str:
-        return scenario_digest(loaded("mine", *given)[0])
+        return scenario_digests(loaded("mine", *given)[0]).run
 
     before = of("mine=./nav --map map.yaml")
     assert of("mine=./nav --map map.yaml") == before
@@ -219,7 +219,7 @@ def test_digest_includes_modules_next_to_a_python_script(project: Path, command:
     (project / "pkg/venv").mkdir()
 
     def digest() -> str:
-        return scenario_digest(loaded("mine", f"mine={command}")[0])
+        return scenario_digests(loaded("mine", f"mine={command}")[0]).run
 
     before = digest()
     (project / "pkg/notes.txt").write_text("not code")

@@ -73,7 +73,7 @@ def test_unfinished_runs_of_a_shard_are_errors(sessions: Path, tmp_path: Path, m
     killed.mkdir()
     lines = Path("s1/events.jsonl").read_bytes().splitlines(keepends=True)
     (killed / "events.jsonl").write_bytes(b"".join(lines[:3]))  # the plan, and that a run started
-    assert simscen("merge", killed, "s2", "--out", tmp_path / "all") == 3
+    assert simscen("merge", killed, "s2", "s3", "--out", tmp_path / "all") == 3
     kinds = [
         run["error"]["kind"] for run in json.loads((tmp_path / "all/results.json").read_text())["runs"] if run["error"]
     ]
@@ -89,9 +89,19 @@ def test_runs_that_are_in_two_shards_are_refused(sessions: Path, monkeypatch: py
     assert not Path("twice").exists()
 
 
+def test_missing_shard_is_an_error_unless_it_is_allowed(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The merged session would otherwise pass without the scenario that fails."""
+    monkeypatch.chdir(sessions)
+    done = CliRunner().invoke(app, ["merge", "s1", "s2", "--out", "partial"])
+    assert isinstance(done.exception, InvalidInput)
+    assert [problem.message for problem in done.exception.problems] == ["shard 3/3 is missing"]
+    assert not Path("partial").exists()
+    assert simscen("merge", "s1", "s2", "--out", "partial", "--allow-missing") == 0
+
+
 def test_output_folder_must_be_empty(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(sessions)
-    done = CliRunner().invoke(app, ["merge", "s1", "s2", "--out", "whole"])
+    done = CliRunner().invoke(app, ["merge", "s1", "s2", "s3", "--out", "whole"])
     assert isinstance(done.exception, UsageError)
 
 

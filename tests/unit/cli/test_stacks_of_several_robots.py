@@ -6,7 +6,7 @@ import pytest
 
 from simscen.cli.session.selection import Selection, load_all
 from simscen.loading.scenario_text import resolved_text, spec_of_text
-from simscen.run.reproducibility import scenario_digest
+from simscen.run.reproducibility import scenario_digests
 
 HEAD = """\
 simscen: 1
@@ -132,11 +132,11 @@ def test_variation_of_a_replaced_stack_is_reported(simscen, project: Path) -> No
 
 
 def test_digest_includes_the_stack_of_each_robot(project: Path) -> None:
-    before = scenario_digest(loaded("mixed", "mine=./nav")[0])
-    assert scenario_digest(loaded("mixed", "mine=./nav")[0]) == before
-    assert scenario_digest(loaded("mixed", "mine=./nav 2")[0]) != before
+    before = scenario_digests(loaded("mixed", "mine=./nav")[0]).run
+    assert scenario_digests(loaded("mixed", "mine=./nav")[0]).run == before
+    assert scenario_digests(loaded("mixed", "mine=./nav 2")[0]).run != before
     (project / "home/simscen/config.yaml").write_text("stacks: {other: {command: ./nav --else}}\n")
-    assert scenario_digest(loaded("mixed", "mine=./nav")[0]) != before
+    assert scenario_digests(loaded("mixed", "mine=./nav")[0]).run != before
 
 
 def test_list_shows_the_stacks_of_robots(simscen, project: Path) -> None:

@@ -1,5 +1,6 @@
 """An old answer is kept only for the very question it was given to: whatever a run reads is in the digest."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,7 +9,7 @@ from PIL import Image
 
 from simscen.cli.session.selection import Selection, load_all
 from simscen.run import reproducibility as module
-from simscen.run.reproducibility import question_digest, scenario_digest
+from simscen.run.reproducibility import scenario_digests
 
 SCENARIO = """\
 extends: base.yaml
@@ -116,7 +117,7 @@ def of(project: Path) -> Digest:
         folders = [project / folder for folder in world_path or ("models",)]
         file = project / f"p/{name}.scenario.yaml"
         (loaded,), _ = load_all([file], project / "p", folders, lenient, Selection())
-        return scenario_digest(loaded)
+        return scenario_digests(loaded).run
 
     return made
 
@@ -199,7 +200,7 @@ def test_software_and_processor_matter(of: Digest, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize(
-    ("file", "old", "new", "is_other_question"),
+    ("file", "old", "new", "is_other_definition"),
     [
         ("p/a.scenario.yaml", "x: 2", "x: 2.1", True),
         ("p/base.yaml", "simscen: 1", "simscen: 1\nname: other", True),
@@ -215,16 +216,28 @@ def test_software_and_processor_matter(of: Digest, monkeypatch: pytest.MonkeyPat
         ("p/a.scenario.yaml", "goals:", "# a comment\ngoals:", False),
     ],
 )
-def test_question_is_that_of_the_scenario_without_its_stack(
-    project: Path, file: str, old: str, new: str, is_other_question: bool
+def test_definition_is_the_scenario_without_its_stack(
+    project: Path, file: str, old: str, new: str, is_other_definition: bool
 ) -> None:
-    def question() -> str:
+    def definition() -> str:
         (loaded,), _ = load_all(
             [project / "p/a.scenario.yaml"], project / "p", [project / "models"], False, Selection()
         )
-        return question_digest(loaded)
+        return scenario_digests(loaded).definition
 
-    before, text = question(), (project / file).read_text()
+    before, text = definition(), (project / file).read_text()
     assert old in text
     (project / file).write_text(text.replace(old, new, 1))
-    assert (question() != before) == is_other_question
+    assert (definition() != before) == is_other_definition
+
+
+def test_definition_does_not_depend_on_the_folder_of_the_project(
+    project: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    copy = tmp_path_factory.mktemp("elsewhere") / "copy"
+    shutil.copytree(project, copy)
+    digests = []
+    for home in (project, copy):
+        (loaded,), _ = load_all([home / "p/a.scenario.yaml"], home / "p", [home / "models"], False, Selection())
+        digests.append(scenario_digests(loaded))
+    assert digests[0].definition == digests[1].definition
