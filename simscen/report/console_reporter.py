@@ -4,8 +4,7 @@ import os
 from collections.abc import Iterable, Mapping
 from typing import TextIO
 
-from simscen.report.display_text import ascii_only, escape_ci_commands
-from simscen.report.styled_line import StyledLine, TerminalStyle, can_encode, detect_style, plain_text, wrap_line
+from simscen.report.styled_line import StyledLine, TerminalStyle, detect_style
 from simscen.report.text_reporters import PlainReporter, Reporter
 
 
@@ -19,22 +18,21 @@ def text_reporter(
     style = detect_style(out, environ)
     if live is not None:
         style = TerminalStyle(live or style.color, live, style.terminal)
-    if not style.live and not style.color:
-        return PlainReporter(out, style, slow)
-    from simscen.report.live_console import ColorReporter, LiveReporter  # rich is slow to import
+    if style.live:
+        from simscen.report.live_console import LiveReporter  # rich is slow to import
 
-    return LiveReporter(out, style, slow) if style.live else ColorReporter(out, style, slow)
+        return LiveReporter(out, style, slow)
+    return _line_reporter(out, style, slow)
 
 
 def print_lines(lines: Iterable[StyledLine], out: TextIO, environ: Mapping[str, str] = os.environ) -> None:
     """Print lines, with color where it is supported, wrapped to the width of a terminal."""
-    style = detect_style(out, environ)
-    wrapped = [part for line in lines for part in wrap_line(line, style.columns)]
-    if style.color:
-        from simscen.report.live_console import print_colored
+    _line_reporter(out, detect_style(out, environ)).print_lines(lines)
 
-        print_colored(wrapped, out, style)
-        return
-    for line in wrapped:
-        text = escape_ci_commands(plain_text(line))
-        out.write(f"{text if can_encode(out) else ascii_only(text)}\n")
+
+def _line_reporter(out: TextIO, style: TerminalStyle, slow: int | None = None) -> PlainReporter:
+    if not style.color:
+        return PlainReporter(out, style, slow)
+    from simscen.report.live_console import ColorReporter
+
+    return ColorReporter(out, style, slow)

@@ -7,7 +7,7 @@ from urllib.parse import quote
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.finding_text import tightest_margin
-from simscen.report.comparison import as_markdown, markdown_cell
+from simscen.report.comparison_markup import as_markdown, markdown_cell
 from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import relative_to_checkout
 from simscen.report.results_json import relative

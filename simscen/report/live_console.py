@@ -1,6 +1,6 @@
 """Reporters with color and with live progress, based on rich."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -159,13 +159,6 @@ def _console(out: TextIO, style: TerminalStyle) -> Console:
         emoji=False,
         markup=False,
     )
-
-
-def print_colored(lines: Iterable[StyledLine], out: TextIO, style: TerminalStyle) -> None:
-    """Print lines in color."""
-    console = _console(out, style)
-    for line in lines:
-        console.print(_rich_text(line, links=style.terminal))
 
 
 def _rich_text(line: StyledLine, links: bool = False) -> Text:

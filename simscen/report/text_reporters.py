@@ -1,7 +1,7 @@
 """Formatting of session events as console lines, and the reporter for plain text."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Protocol, TextIO
 
@@ -124,7 +124,7 @@ class PlainReporter:
     """Prints lines without color and cursor movement, in ASCII if the stream supports nothing else."""
 
     def __init__(self, out: TextIO, style: TerminalStyle, slow: int | None = None) -> None:
-        self._out = out
+        self._out, self._style = out, style
         self._formatter = SessionFormatter(slow, lambda: style.columns)
         self._ascii = not can_encode(out)
 
@@ -140,6 +140,13 @@ class PlainReporter:
         """Print the lines for an event."""
         for line in self._formatter(event):
             self._print(line)
+        self._out.flush()
+
+    def print_lines(self, lines: Iterable[StyledLine]) -> None:
+        """Print other lines, wrapped to the width of a terminal."""
+        for line in lines:
+            for part in wrap_line(line, self._style.columns):
+                self._print(part)
         self._out.flush()
 
     def _print(self, line: StyledLine) -> None:

@@ -2,7 +2,6 @@
 
 import json
 import sys
-from collections.abc import Iterable
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -11,9 +10,11 @@ import typer
 
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, InvalidInput, Problem
-from simscen.core.records.session_events import BaselineComparison, Comparison, RunFinished
-from simscen.judge.metrics.comparison import Significance, compare_sessions, comparison_data, labeled_key
-from simscen.report.comparison import Links, session_comparison_lines, session_comparison_markdown
+from simscen.core.records.session_events import Comparison, RunFinished
+from simscen.judge.metrics.comparison import compare_sessions, comparison_data, labeled_key
+from simscen.judge.metrics.significance import Significance
+from simscen.report.comparison import Links, session_comparison_lines
+from simscen.report.comparison_markup import session_comparison_markdown
 from simscen.report.console_reporter import print_lines
 from simscen.report.journal import require_free
 from simscen.report.journal_reader import JournaledSession, read_journal
@@ -48,7 +49,7 @@ def command(
         ),
     ] = Gate.WORSE,
     alpha: Annotated[
-        float, typer.Option(min=1e-6, max=0.5, help="Significance level, after correction for the number of scenarios.")
+        float, typer.Option(min=1e-6, max=0.5, help="Highest probability of calling equal versions worse.")
     ] = Significance.alpha,
     min_effect: Annotated[
         float, typer.Option(min=0.0, help="Smallest relative change of a mean that matters: 0.05 is 5 %.")
@@ -82,7 +83,7 @@ def command(
     if not against.pairs + against.broken:
         hint = "run the same scenarios with the same seeds in both"
         raise InvalidInput([Problem(str(candidate), 0, 0, "SC811", f"no run has a partner in {baseline}", hint)])
-    is_worse = _is_significantly_worse(against, alpha)
+    is_worse = any(change.is_worse for change in against.changes)
     _print(comparison, _links(sessions), format_, is_worse)
     incomplete = any(row[CANDIDATE].errors for row in comparison.outcomes.values())
     lost = any(flip.failed == CANDIDATE for flip in against.flips)
@@ -92,25 +93,18 @@ def command(
 
 def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, changed_scenarios: bool) -> None:
     """Raise InvalidInput if a scenario is not the same in both sessions."""
-    before, now = ({run.key.test: run for run in session.planned if run.question} for session in sessions.values())
-    changed = [run for test, run in now.items() if test in before and run.question != before[test].question]
+    before, now = ({run.key.test: run for run in session.planned if run.definition} for session in sessions.values())
+    changed = [run for test, run in now.items() if test in before and run.definition != before[test].definition]
     if changed and not changed_scenarios:
         hint = "compare runs of the same scenario files, or accept it with --changed-scenarios"
         raise InvalidInput([
-            Problem(str(candidate), 0, 0, "SC811", f"{run.key.test} is another scenario than in the baseline", hint)
+            Problem(str(candidate), 0, 0, "SC811", f"{run.key.test} differs from the scenario in the baseline", hint)
             for run in changed
         ])  # fmt: skip
 
 
-def _is_significantly_worse(against: BaselineComparison, alpha: float) -> bool:
-    """Return whether the pass rate over all scenarios, or anything in a single scenario, is significantly worse."""
-    lost = sum(flip.failed == CANDIDATE for flip in against.flips)
-    fails_more = against.p <= alpha and 2 * lost > len(against.flips)
-    return fails_more or any(change.is_worse for change in against.changes)
-
-
 def _links(sessions: dict[str, JournaledSession]) -> Links:
-    """Return the replay of each run that did not pass, or else the command that repeats it."""
+    """Return the replay or log of each run that did not pass, or else the command that repeats it."""
     return {
         (name, labeled_key(run.key, name).test, run.key.seed): _replay(run)
         for name, session in sessions.items()
@@ -120,7 +114,7 @@ def _links(sessions: dict[str, JournaledSession]) -> Links:
 
 
 def _replay(run: RunFinished) -> str:
-    files: Iterable[str] = (run.artifacts.replay, run.artifacts.mcap)
+    files = run.artifacts.replay, run.artifacts.mcap
     return next((file for file in files if file and Path(file).is_file()), run.again)
 
 

@@ -55,9 +55,9 @@ class MetricDifference:
 
 @dataclass(frozen=True)
 class ScenarioChange:
-    """Significant change in one scenario: of the pass rate (`what` is "passed"), or of the mean of a metric.
+    """Significant change of the pass rate or of the mean of a metric, in one scenario or in all.
 
-    `p` is adjusted for the number of scenarios (Holm). `is_worse` is None for a metric that may go either way.
+    `p` is adjusted for the number of tests (Holm). `is_worse` is None for a metric that may go either way.
     """
 
     scenario: str
@@ -76,7 +76,7 @@ class BaselineComparison:
 
     `broken` pairs contain a run that could not be completed, `alone` runs have no partner. `parted` counts the pairs of
     which only one reached the last goal; only their collisions are compared. `p` is the p-value of the sign test of the
-    flips. `changes` are the significant changes of single scenarios.
+    flips. `changes` are the significant changes.
     """
 
     stack: str

@@ -1,8 +1,8 @@
 """Paired comparison of stacks or sessions on the same scenarios and seeds."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
 from simscen.core.random_streams import Streams
@@ -13,13 +13,19 @@ from simscen.core.records.session_events import (
     Flip,
     MetricDifference,
     OutcomeCounts,
-    ScenarioChange,
 )
 from simscen.core.records.verdict import Status
-from simscen.core.statistics import bootstrap_mean_interval, holm, sign_test
+from simscen.core.statistics import bootstrap_mean_interval, sign_test
 from simscen.judge.evaluation import EXPECTED
 from simscen.judge.finding_text import sentence, violations
 from simscen.judge.metrics.catalog import METRICS
+from simscen.judge.metrics.significance import (
+    PASS_RATE,
+    PairedSample,
+    Significance,
+    signed_rank_test,
+    significant_changes,
+)
 
 COMPARED_METRICS = (
     *("time_to_goal", "path_length", "min_clearance", "mean_jerk", "time_not_moving", "replans", "recoveries"),
@@ -30,25 +36,11 @@ HIGHER_IS_BETTER = frozenset({"min_clearance"})
 """Compared metrics of which a lower value is worse; of the others, a higher one is."""
 OUTCOME_INDEPENDENT = frozenset({"collisions"})
 """Metrics that are comparable if a run fails. The others favor stacks that give up early."""
+ALL_SCENARIOS = "all scenarios"
 _SEED = 1
 """Seed of the bootstrap: the same runs give the same intervals."""
 
 Pair = tuple[RunResult, RunResult]
-
-
-@dataclass(frozen=True)
-class Significance:
-    """When a change of one scenario is significant.
-
-    alpha:       largest p-value, after Holm's correction for the number of scenarios
-    min_effect:  smallest change of a mean, relative to that of the baseline; smaller ones do not matter
-    """
-
-    alpha: float = 0.05
-    min_effect: float = 0.05
-
-
-DEFAULT_SIGNIFICANCE = Significance()
 
 
 def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Comparison | None:
@@ -59,7 +51,7 @@ def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Compa
     if len(stacks) < 2:
         return None
     given = {name: value for name, _, value in (text.partition("=") for text in stacks)}
-    return _compare(results, given, DEFAULT_SIGNIFICANCE)
+    return _compare(results, given, Significance())
 
 
 def compare_sessions(
@@ -132,20 +124,9 @@ def _against(
         flips=flips,
         p=sign_test(won, len(flips) - won),
         differences=tuple(
-            found
-            for name in names
-            if (found := _difference(name, whole if _kind(name) in OUTCOME_INDEPENDENT else alike)) is not None
+            found for name in names if (found := _difference(name, _comparable(name, whole, alike))) is not None
         ),
-        changes=(
-            *_pass_rate_changes(whole, significance),
-            *(
-                change
-                for name in names
-                for change in _metric_changes(
-                    name, whole if _kind(name) in OUTCOME_INDEPENDENT else alike, significance
-                )
-            ),
-        ),
+        changes=significant_changes(_samples(whole, alike, names), significance),
     )
 
 
@@ -156,42 +137,27 @@ def _by_scenario(pairs: Iterable[Pair]) -> dict[str, list[Pair]]:
     return found
 
 
-def _pass_rate_changes(pairs: Sequence[Pair], significance: Significance) -> list[ScenarioChange]:
-    """Return the scenarios whose pass rate changed, by McNemar's exact test."""
-    found = []
-    for scenario, own in _by_scenario(pairs).items():
-        passed = [tuple(_came_out(run) is Outcome.PASSED for run in pair) for pair in own]
-        lost, won = passed.count((True, False)), passed.count((False, True))
-        before, after = (sum(pair[side] for pair in passed) / len(own) for side in (0, 1))
-        p = sign_test(won, lost)
-        found.append(ScenarioChange(scenario, "passed", "", len(own), before, after, p, lost > won))
-    return _significant(found, significance)
+def _samples(whole: Sequence[Pair], alike: Sequence[Pair], names: Iterable[str]) -> Iterator[PairedSample]:
+    """Yield what is tested: the pass rate of all runs, and the pass rate and each metric of each scenario."""
+    scenarios = _by_scenario(whole)
+    if len(scenarios) > 1:
+        scenarios = {ALL_SCENARIOS: list(whole), **scenarios}
+    for scenario, own in scenarios.items():
+        passed = [(_passed(one), _passed(two)) for one, two in own]
+        yield PairedSample(scenario, PASS_RATE, "", passed, higher_is_better=True)
+    for name in names:
+        direction = _kind(name) in HIGHER_IS_BETTER if _kind(name) in COMPARED_METRICS else None
+        for scenario, own in _by_scenario(_comparable(name, whole, alike)).items():
+            yield PairedSample(scenario, name, _unit(name), _values(name, own), direction)
 
 
-def _metric_changes(name: str, pairs: Sequence[Pair], significance: Significance) -> list[ScenarioChange]:
-    """Return the scenarios in which a metric changed, by Wilcoxon's signed-rank test."""
-    found = []
-    for scenario, own in _by_scenario(pairs).items():
-        known = _values(name, own)
-        if not known:
-            continue
-        baseline, value = (sum(side) / len(known) for side in zip(*known, strict=True))
-        p = signed_rank_test([two - one for one, two in known])
-        is_worse = (value > baseline) != (_kind(name) in HIGHER_IS_BETTER) if _kind(name) in COMPARED_METRICS else None
-        unit = METRICS[_kind(name)].unit if _kind(name) in METRICS else ""
-        found.append(ScenarioChange(scenario, name, unit, len(known), baseline, value, p, is_worse))
-    return _significant(found, significance)
+def _passed(run: RunResult) -> float:
+    return float(_came_out(run) is Outcome.PASSED)
 
 
-def _significant(changes: Sequence[ScenarioChange], significance: Significance) -> list[ScenarioChange]:
-    """Return the changes that are significant and large enough, with adjusted p-values."""
-    adjusted = [replace(change, p=p) for change, p in zip(changes, holm([each.p for each in changes]), strict=True)]
-    return [
-        change
-        for change in adjusted
-        if change.p <= significance.alpha
-        and abs(change.value - change.baseline) >= significance.min_effect * abs(change.baseline)
-    ]
+def _comparable(name: str, whole: Sequence[Pair], alike: Sequence[Pair]) -> Sequence[Pair]:
+    """Return the pairs in which a metric can be compared: all, or those in which both or no run arrived."""
+    return whole if _kind(name) in OUTCOME_INDEPENDENT else alike
 
 
 def _values(name: str, pairs: Sequence[Pair]) -> list[tuple[float, float]]:
@@ -203,6 +169,10 @@ def _values(name: str, pairs: Sequence[Pair]) -> list[tuple[float, float]]:
 def _kind(name: str) -> str:
     """Return the name of a metric without the robot: `a/collisions` becomes `collisions`."""
     return name.rpartition("/")[2]
+
+
+def _unit(name: str) -> str:
+    return METRICS[_kind(name)].unit if _kind(name) in METRICS else ""
 
 
 def _chosen(pairs: Sequence[Pair]) -> list[str]:
@@ -251,7 +221,7 @@ def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
     lower, higher = sum(value < 0 for value in differences), sum(value > 0 for value in differences)
     return MetricDifference(
         metric=name,
-        unit=METRICS[_kind(name)].unit if _kind(name) in METRICS else "",
+        unit=_unit(name),
         pairs=len(known),
         baseline=sum(one for one, _ in known) / len(known),
         value=sum(two for _, two in known) / len(known),
@@ -262,19 +232,6 @@ def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
         higher=higher,
         p=signed_rank_test(differences),
     )
-
-
-def signed_rank_test(differences: Sequence[float]) -> float:
-    """Return the p-value of Wilcoxon's two-sided signed-rank test of paired differences, by scipy.
-
-    Pairs without a difference do not count; 1 if there is no difference at all. (Wilcoxon: Individual Comparisons by
-    Ranking Methods, 1945.)
-    """
-    if not any(differences):
-        return 1.0
-    from scipy.stats import wilcoxon
-
-    return float(wilcoxon(differences).pvalue)
 
 
 def comparison_data(comparison: Comparison) -> dict[str, Any]:

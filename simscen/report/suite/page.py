@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import Comparison, RunFinished
-from simscen.report.comparison import as_html
+from simscen.report.comparison_markup import as_html
 from simscen.report.picture.palette import css_variables
 from simscen.report.suite import elements
 from simscen.report.suite.elements import SIGNS, anchor, count, html_text, outcome_marks, sparkline

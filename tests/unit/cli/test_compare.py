@@ -14,6 +14,8 @@ from simscen.core.errors import InvalidInput
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.verdict import Finding, Status, Verdict
+from simscen.judge.metrics.comparison import compare_sessions
+from simscen.judge.metrics.significance import Significance
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
 
@@ -35,11 +37,11 @@ def result(
 def folder(tmp_path: Path) -> Callable[..., Path]:
     """Writes an output folder with the journal of finished runs."""
 
-    def write(name: str, results: Sequence[RunResult], question: str = "same") -> Path:
+    def write(name: str, results: Sequence[RunResult], definition: str = "same") -> Path:
         path = tmp_path / name
         path.mkdir()
         journal = Journal(path)
-        journal.plan([PlannedRun(one.key, one.path, question=question) for one in results], "0.1.0", 1)
+        journal.plan([PlannedRun(one.key, one.path, definition=definition) for one in results], "0.1.0", 1)
         for one in results:
             journal(RunFinished(one, again=f"simscen run {one.path} --seed {one.key.seed}"))
         journal.close()
@@ -100,13 +102,15 @@ def test_metrics_have_a_direction_and_a_smallest_effect(
     assert compare(folder("a", first), folder("b", second)).exit_code == is_worse
 
 
-def test_correction_for_many_scenarios(folder: Callable[..., Path]) -> None:
-    """p = 0.031 in one scenario is significant alone, but not as one of two."""
-    rest = [result(PASS, seed, "b") for seed in range(6)]
+def test_correction_for_the_number_of_tests(folder: Callable[..., Path]) -> None:
+    """p = 0.031 is significant alone, also beside values that do not differ, but not as one of two tests."""
+    equal, noise = (
+        [result(PASS, seed, "b", time=10.0 + offset * (-1) ** seed) for seed in range(6)] for offset in (0, 1)
+    )
     before = [result(PASS, seed, time=10.0 + seed) for seed in range(6)]
     after = [result(PASS, seed, time=13.0 + 2 * seed) for seed in range(6)]
-    assert compare(folder("a", before), folder("b", after)).exit_code == 1
-    assert compare(folder("c", before + rest), folder("d", after + rest)).exit_code == 0
+    assert compare(folder("a", before + equal), folder("b", after + equal)).exit_code == 1
+    assert compare(folder("c", before + equal), folder("d", after + noise)).exit_code == 0
 
 
 def test_any_flip_can_be_the_gate(folder: Callable[..., Path]) -> None:
@@ -131,11 +135,11 @@ def test_runs_that_could_not_be_completed_are_not_compared(folder: Callable[...,
 
 
 def test_changed_scenarios_are_refused_unless_allowed(folder: Callable[..., Path]) -> None:
-    before, after = folder("a", [result(PASS, 1)]), folder("b", [result(PASS, 1)], question="other")
+    before, after = folder("a", [result(PASS, 1)]), folder("b", [result(PASS, 1)], definition="other")
     refused = compare(before, after)
     assert isinstance(refused.exception, InvalidInput)
     assert [problem.code for problem in refused.exception.problems] == ["SC811"]
-    assert "a is another scenario than in the baseline" in str(refused.exception)
+    assert "a differs from the scenario in the baseline" in str(refused.exception)
     assert compare(before, after, "--changed-scenarios").exit_code == 0
 
 
@@ -155,24 +159,28 @@ def test_json_and_markdown(folder: Callable[..., Path]) -> None:
     assert "| a | 1/1 | 0/1 |" in lines
 
 
-def test_equal_commits_are_seldom_called_worse(folder: Callable[..., Path]) -> None:
-    """Runs that fail by chance, and a metric with noise: the rate of false alarms of each kind is at most alpha."""
-    from simscen.judge.metrics.comparison import Significance, compare_sessions
+def test_equal_versions_are_called_worse_with_at_most_the_stated_probability() -> None:
+    """Runs of three scenarios that fail by chance, and two metrics with noise; judged as the exit code is."""
+    rng, alarms, trials, alpha = np.random.default_rng(7), 0, 300, 0.1
 
-    rng, alarms, trials = np.random.default_rng(7), {"passed": 0, "time_to_goal": 0}, 300
+    def drawn(scenario: str, seed: int) -> RunResult:
+        outcome = PASS if rng.random() < 0.7 else FAIL
+        return result(outcome, seed, scenario, time=rng.normal(10.0, 2.0), clearance=rng.normal(1.0, 0.2))
+
     for _ in range(trials):
-        sessions = {
-            name: [
-                result(PASS if rng.random() < 0.7 else FAIL, seed, scenario, time=rng.normal(10.0, 2.0))
-                for scenario in "abc"
-                for seed in range(10)
-            ]
-            for name in ("baseline", "candidate")
-        }
-        significance = Significance(alpha=0.1, min_effect=0.0)
+        names = ("baseline", "candidate")
+        sessions = {name: [drawn(scenario, seed) for scenario in "abc" for seed in range(10)] for name in names}
+        significance = Significance(alpha, min_effect=0.0)
         (against,) = compare_sessions(sessions, dict.fromkeys(sessions, ""), significance).against
-        for what in alarms:
-            alarms[what] += any(change.what == what for change in against.changes)
-    # Three standard errors above alpha.
-    assert max(alarms.values()) <= trials * (0.1 + 3 * (0.1 * 0.9 / trials) ** 0.5)
-    assert alarms["time_to_goal"] > 0
+        alarms += any(change.is_worse for change in against.changes)
+    assert 0 < alarms <= trials * (alpha + 3 * (alpha * (1 - alpha) / trials) ** 0.5)
+
+
+def test_a_lower_pass_rate_over_all_scenarios_is_found(folder: Callable[..., Path]) -> None:
+    """One of two runs of each of ten scenarios fails now, which is not significant in any of them."""
+    names = "abcdefghij"
+    before = [result(PASS, seed, name) for name in names for seed in (1, 2)]
+    after = [result(FAIL if seed == 1 else PASS, seed, name) for name in names for seed in (1, 2)]
+    done = compare(folder("a", before), folder("b", after))
+    assert done.exit_code == 1
+    assert "worse  all scenarios: pass rate 100% → 50% (p = 0.021, 20 pairs)" in done.output

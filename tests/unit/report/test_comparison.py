@@ -83,7 +83,7 @@ def test_of_many_flips_the_first_are_told_and_the_rest_counted(comparison) -> No
     many = BaselineComparison("mine", 30, 0, 0, 0, (FLIP,) * 25, 0.0, ())
     told = lines(Comparison(comparison.stacks, comparison.outcomes, (many,)))
     assert sum("worse " in line for line in told) == 11  # ten, and the heading
-    assert "    and 15 more, in results.json" in told
+    assert "    and 15 more, in the JSON results" in told
 
 
 def test_piped_and_in_ascii_it_stands_before_the_last_line(comparison) -> None:

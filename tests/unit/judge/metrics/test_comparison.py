@@ -14,7 +14,8 @@ from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResu
 from simscen.core.records.session_events import OutcomeCounts
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.metrics.catalog import METRICS
-from simscen.judge.metrics.comparison import COMPARED_METRICS, compare_stacks, comparison_data, signed_rank_test
+from simscen.judge.metrics.comparison import COMPARED_METRICS, compare_stacks, comparison_data
+from simscen.judge.metrics.significance import signed_rank_test
 
 STACKS = ("ref=reference", "mine=./nav --fast")
 GOOD = {"time_to_goal": 10.0, "path_length": 5.0, "min_clearance": 0.5, "collisions": 0.0}

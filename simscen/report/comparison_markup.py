@@ -1,0 +1,154 @@
+"""Comparison of stacks or sessions as HTML and as Markdown."""
+
+from dataclasses import replace
+from html import escape
+
+from simscen.core.records.session_events import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
+from simscen.report.comparison import (
+    MAX_CHANGES,
+    MAX_FLIPS,
+    NO_LINKS,
+    Links,
+    change_text,
+    change_verdict,
+    comparison_headline,
+    difference_columns,
+    excluded_text,
+    listed_outcomes,
+    outcome_text,
+    session_verdict,
+    unfinished_text,
+    with_changed_metrics,
+)
+from simscen.report.display_text import one_line
+
+EXPLANATION = (
+    "Runs are paired by scenario and seed. Passed: number of passed and of finished runs. Differences are means over "
+    "pairs with 95 % bootstrap intervals; p is from McNemar's exact test for outcomes and from Wilcoxon's signed-rank "
+    "test for metrics, for significant changes with Holm's correction. -/=/+: pairs with a lower, equal, higher value."
+)
+_HEAD = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "-/=/+", "p")
+
+
+def as_html(comparison: Comparison) -> str:
+    """Return the comparison as a section of the report."""
+    names = "".join(
+        f"<th>{_html_text(name)}<div class='quiet'>{_html_text(given)}</div></th>"
+        for name, given in comparison.stacks.items()
+    )
+    rows = "".join(
+        f"<tr><td>{_html_text(scenario)}</td>{''.join(_cell(row[name]) for name in comparison.stacks)}</tr>"
+        for scenario, row in comparison.outcomes.items()
+    )
+    total = "".join(_cell(comparison.total(name)) for name in comparison.stacks)
+    whole = f"<tr><td><b>all</b></td>{total}</tr>" if len(comparison.outcomes) > 1 else ""
+    return (
+        f'<section class="in"><h2>{_html_text(" and ".join(comparison.stacks))}</h2><p class="quiet">{EXPLANATION}</p>'
+        f"<table><tr><th>passed</th>{names}</tr>{rows}{whole}</table>"
+        f"{''.join(_against_html(comparison.baseline, one) for one in comparison.against)}</section>"
+    )
+
+
+def session_comparison_markdown(comparison: Comparison, links: Links, is_worse: bool) -> list[str]:
+    """Return the comparison of a session with the baseline as lines of Markdown, for a pull request."""
+    (against,) = comparison.against
+    shown = replace(comparison, against=(with_changed_metrics(against),))
+    return [f"### simscen: {session_verdict(against, is_worse)}", *as_markdown(shown, links, changed_only=True)]
+
+
+def as_markdown(comparison: Comparison, links: Links = NO_LINKS, changed_only: bool = False) -> list[str]:
+    """Return the comparison as lines of Markdown; `changed_only` omits scenarios in which as many runs pass."""
+    cell = markdown_cell
+    names = [cell(name) for name in comparison.stacks]
+    lines = ["", f"| passed | {' | '.join(names)} |", f"|---|{'---:|' * len(names)}"]
+    rows = [
+        *listed_outcomes(comparison, changed_only).items(),
+        ("all", {name: comparison.total(name) for name in comparison.stacks}),
+    ]
+    lines += [f"| {cell(name)} | {' | '.join(outcome_text(row[stack]) for stack in row)} |" for name, row in rows]
+    for against in comparison.against:
+        lines += ["", f"**{cell(comparison_headline(comparison.baseline, against))}**", ""]
+        lines += [
+            f"- {cell(flip.scenario)}, seed {flip.seed}: passed with {cell(flip.passed)}, failed with "
+            f"{cell(flip.failed)}: {cell(flip.why)}{_link_markdown(flip, links)}"
+            for flip in against.flips[:MAX_FLIPS]
+        ]
+        more = len(against.flips) - MAX_FLIPS
+        lines += [f"- and {more} more, in the JSON results"] if more > 0 else []
+        heads = [cell(head.format(comparison.baseline, against.stack)) for head in _HEAD]
+        lines += ["", f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
+        lines += [f"| {' | '.join(_cells(one))} |" for one in against.differences]
+        lines += ["", "Significant changes:", ""] if against.changes else []
+        lines += [f"- {change_verdict(one)}: {cell(change_text(one))}" for one in against.changes[:MAX_CHANGES]]
+        more = len(against.changes) - MAX_CHANGES
+        lines += [f"- and {more} more significant changes, in the JSON results"] if more > 0 else []
+        lines += [f"\n{cell(note)}" for note in (unfinished_text(against), excluded_text(against)) if note]
+    return [*lines, "", EXPLANATION]
+
+
+def _link_markdown(flip: Flip, links: Links) -> str:
+    link = links.get((flip.failed, flip.scenario, flip.seed))
+    return f" (`{link}`)" if link else ""
+
+
+_MARKDOWN_ESCAPES = {ord(sign): f"&#{ord(sign)};" for sign in "\\`*_[]|~#@&<>"}
+
+
+def markdown_cell(text: str) -> str:
+    """Escape text for a cell of a Markdown table."""
+    return one_line(text).translate(_MARKDOWN_ESCAPES)
+
+
+def _cell(outcomes: OutcomeCounts) -> str:
+    look = "odd" if outcomes.errors else "bad" if outcomes.failed else "good"
+    return f'<td class="count {look}">{outcome_text(outcomes)}</td>'
+
+
+def _against_html(baseline: str, against: BaselineComparison) -> str:
+    flips = "".join(
+        f'<tr class="{"" if flip.passed == against.stack else "bad"}">'
+        f"<td>{'better' if flip.passed == against.stack else 'worse'}</td><td>{_html_text(flip.scenario)}</td>"
+        f"<td>seed {flip.seed}</td>"
+        f"<td>passed with {_html_text(flip.passed)}, failed with {_html_text(flip.failed)}</td>"
+        f"<td>{_html_text(flip.why)}</td></tr>"
+        for flip in against.flips
+    )
+    _, *named = (_html_text(head.format(baseline, against.stack)) for head in _HEAD)
+    heads = "<th></th>" + "".join(f'<th class="margin">{head}</th>' for head in named)
+    rows = "".join(_difference(one) for one in against.differences)
+    changes = "".join(
+        f'<tr class="{"bad" if one.is_worse else ""}"><td>{change_verdict(one)}</td>'
+        f"<td>{_html_text(change_text(one))}</td></tr>"
+        for one in against.changes
+    )
+    notes = "".join(
+        f'<p class="quiet">{_html_text(note)}</p>'
+        for note in (unfinished_text(against), excluded_text(against))
+        if note
+    )
+    return (
+        f"<h3>{_html_text(comparison_headline(baseline, against))}</h3>"
+        + (f"<table>{flips}</table>" if flips else "")
+        + (f"<table><tr>{heads}</tr>{rows}</table>" if rows else "")
+        + (f"<table><tr><th colspan='2'>significant changes</th></tr>{changes}</table>" if changes else "")
+        + notes
+    )
+
+
+def _difference(one: MetricDifference) -> str:
+    name, *cells = _cells(one)
+    clear = one.interval is not None and not one.interval[0] <= 0.0 <= one.interval[1]
+    listed = "".join(f'<td class="margin">{cell}</td>' for cell in cells)
+    return f"<tr{' class=clear' if clear else ''}><td>{name}</td>{listed}</tr>"
+
+
+def _cells(one: MetricDifference) -> tuple[str, ...]:
+    """Return a row of the table of differences."""
+    before, after, difference, interval = difference_columns(one)
+    name = f"{one.metric}, {one.unit}".removesuffix(", ")
+    signs = f"{one.lower}/{one.equal}/{one.higher}"
+    return name, str(one.pairs), before, after, difference, interval, signs, f"{one.p:.2g}"
+
+
+def _html_text(text: str) -> str:
+    return escape(one_line(text))
