@@ -24,6 +24,7 @@ from simscen.core.errors import Exit, InvalidInput, SimscenError
 
 COMMANDS = {
     "run": "Run scenarios and report what passed.",
+    "study": "Run one scenario many times: how often does it fail, and what makes it fail?",
     "validate": "Check scenario, world, robot, and stack files without running anything.",
     "list": "List the scenarios that a selection matches.",
     "judge": "Evaluate criteria on recorded runs without simulating them.",

@@ -13,6 +13,7 @@ class Exit(IntEnum):
     INCOMPLETE = 3
     INTERNAL = 4
     NOTHING_SELECTED = 5
+    UNDECIDED = 6
     HUNG_UP = 129
     INTERRUPTED = 130
     TERMINATED = 143
@@ -57,18 +58,18 @@ BROKEN_COMPONENT = "broken-component"
 class RunError(SimscenError):
     """A run could not be completed; `kind` is JUnit's error type: crashed, timeout, out-of-memory, invalid, …
 
-    `tail` is the end of the output of an external stack.
+    `tail` is the end of the output of an external stack. `by_stack`: the stack under test is the cause.
     """
 
     exit = Exit.INCOMPLETE
 
-    def __init__(self, kind: str, message: str, tail: str = "") -> None:
-        self.kind, self.tail = kind, tail
+    def __init__(self, kind: str, message: str, tail: str = "", by_stack: bool = False) -> None:
+        self.kind, self.tail, self.by_stack = kind, tail, by_stack
         super().__init__(message)
 
-    def __reduce__(self) -> "tuple[type[RunError], tuple[str, str, str]]":
+    def __reduce__(self) -> "tuple[type[RunError], tuple[str, str, str, bool]]":
         """Pickle all arguments, as in InvalidInput."""
-        return type(self), (self.kind, str(self), self.tail)
+        return type(self), (self.kind, str(self), self.tail, self.by_stack)
 
 
 @dataclass(frozen=True, order=True)

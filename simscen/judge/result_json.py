@@ -42,7 +42,7 @@ def result_data(result: RunResult) -> dict[str, Any]:
         "metrics": {name: number(value) for name, value in result.metrics.items()},
         "undefined": dict(result.undefined),
         "verdicts": [verdict_data(v, line, result.tick_rate) for v, line in zip(result.verdicts, lines, strict=True)],
-        "error": None if error is None else {"kind": error.kind, "message": error.message, "tail": error.tail},
+        "error": None if error is None else _error_data(error),
     }
 
 
@@ -86,6 +86,11 @@ def read_key(data: dict[str, Any]) -> RunKey:
     """Convert plain data to the key of a run. In simscen 0.1, `variation` was the name of the stack."""
     variation, stack_name = (data["variation"], data["stack_name"]) if "stack_name" in data else ("", data["variation"])
     return RunKey(data["scenario"], data["seed"], variation, stack_name)
+
+
+def _error_data(error: RunFailure) -> dict[str, Any]:
+    by_stack = {"by_stack": True} if error.by_stack else {}
+    return {"kind": error.kind, "message": error.message, "tail": error.tail, **by_stack}
 
 
 def _happening_data(one: DisturbanceOutcome, tick_rate: int) -> dict[str, Any]:

@@ -80,7 +80,7 @@ class LoadedScenario:
 
     `choice` is the stack selected on the command line; it is part of the run keys if the session has `several_stacks`.
     `runs` is the command of an external stack, if defined. `variation` is the name of the variation ("" without
-    variations), and `set_by` the path that set a value, by the position of the value.
+    variations), `varied` has its values by path, and `set_by` the path that set a value, by the position of the value.
 
     `robots` are the views of a scenario of several robots: each is a scenario of that robot alone, with its name as
     `robot_name` and the others as `other_robots`. The scenario itself then describes the first robot.
@@ -109,6 +109,7 @@ class LoadedScenario:
     several_stacks: bool = False
     runs: ExternalCommand | None = None
     variation: str = ""
+    varied: Mapping[str, Any] = field(default_factory=dict, repr=False)
     set_by: Mapping[Position, str] = field(default_factory=dict, repr=False)
     robots: Mapping[str, "LoadedScenario"] = field(default_factory=dict)
     robot_name: str = ""

@@ -17,7 +17,7 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.stacks.stackfile import not_a_scenario, recognize_stack_file
-from simscen.loading.variations.expand import Variation, expand_variations
+from simscen.loading.variations.expand import Variation, VariationSpace, expand_variations, variation_space
 from simscen.loading.variations.naming import VariationProblems, merge_problems
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, child, node_at, value_position
@@ -60,14 +60,50 @@ def try_scenario(
 
 
 def try_variations(
-    path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None
+    path: Path,
+    root: Path,
+    world_path: Sequence[Path] = (),
+    choice: StackChoice | None = None,
+    numbers: Sequence[int] | None = None,
 ) -> tuple[LoadedScenario, ...] | list[Problem]:
     """Return all variations of the scenario in a file in order, or all problems of any of them.
 
-    A file without variations yields one scenario whose variation has no name.
+    A file without variations yields one scenario whose variation has no name. `numbers` selects variations by their
+    numbers from 1; those that do not exist, or do not meet the conditions in `require`, are missing.
     """
-    fence = PathSandbox.around(root, world_path)
-    library = Library(fence)
+    library = Library(PathSandbox.around(root, world_path))
+    read = _read(path, library, choice)
+    if isinstance(read, list):
+        return read
+    file, tree = read
+    expanded = expand_variations(tree, numbers)
+    variations = [one for one in expanded if isinstance(one, Variation)]
+    if problems := [one for one in expanded if isinstance(one, Problem)]:
+        return library.with_source(sorted(problems))
+    tried = [(one, _with_choice(one, library, file, choice)) for one in variations]
+    if any(isinstance(found, list) for _, found in tried):
+        return merge_problems(
+            [VariationProblems(one.name, one.set_by, found if isinstance(found, list) else ()) for one, found in tried]
+        )
+    return tuple(found for _, found in tried if isinstance(found, LoadedScenario))
+
+
+def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()) -> VariationSpace | None:
+    """Return the variations of the scenario in a file without loading them; None if it has none.
+
+    Raises InvalidInput.
+    """
+    library = Library(PathSandbox.around(root, world_path))
+    read = _read(path, library, None)
+    space = read if isinstance(read, list) else variation_space(read[1])
+    if isinstance(space, list):
+        raise InvalidInput(library.with_source(sorted(space)))
+    return space
+
+
+def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Path, MappingNode] | list[Problem]:
+    """Read a scenario file and the files that it extends, or return all problems."""
+    fence = library.fence
     file = fence.entered(path)
     if isinstance(file, Problem):
         return [file]
@@ -82,15 +118,7 @@ def try_variations(
     if problems or not isinstance(tree, MappingNode):
         wrong = check(ScenarioSpec, tree, multirobot.missing_in_scenario) if tree is not None and not problems else []
         return library.with_source(sorted([*problems, *(wrong if isinstance(wrong, list) else ())]))
-    variations = expand_variations(tree)
-    if not isinstance(variations[0], Variation):
-        return library.with_source(sorted(variations))
-    tried = [(one, _with_choice(one, library, file, choice)) for one in variations]
-    if any(isinstance(found, list) for _, found in tried):
-        return merge_problems(
-            [VariationProblems(one.name, one.set_by, found if isinstance(found, list) else ()) for one, found in tried]
-        )
-    return tuple(found for _, found in tried if isinstance(found, LoadedScenario))
+    return file, tree
 
 
 def _with_choice(
@@ -113,7 +141,7 @@ def _with_choice(
     if isinstance(loaded, list):
         return loaded
     notes = (*loaded.notes, *library.with_source(taken.notes), *(choice.notes if choice is not None else ()))
-    return replace(loaded, notes=notes).having(choice=choice, variation=one.name, set_by=one.set_by)
+    return replace(loaded, notes=notes).having(choice=choice, variation=one.name, set_by=one.set_by, varied=one.values)
 
 
 def _without_effect(one: Variation, tree: MappingNode, choice: StackChoice) -> Iterator[Problem]:

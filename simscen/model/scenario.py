@@ -39,6 +39,7 @@ from simscen.spec.quantities import (
 
 if TYPE_CHECKING:
     from simscen.criteria.base import AnyMeasure
+    from simscen.model.acceptance import Acceptance
     from simscen.model.disturbances import EventEntry, FaultEntry, SequenceStep
     from simscen.model.variations import Variations
     from simscen.triggers.base import Trigger
@@ -46,6 +47,7 @@ else:
     AnyMeasure = Annotated[Spec, LazySpec("simscen.criteria.base", "AnyMeasure")]
     EventEntry = Annotated[Spec, LazySpec("simscen.model.disturbances", "EventEntry")]
     FaultEntry = Annotated[Spec, LazySpec("simscen.model.disturbances", "FaultEntry")]
+    Acceptance = Annotated[Spec, LazySpec("simscen.model.acceptance", "Acceptance")]
     Variations = Annotated[Spec, LazySpec("simscen.model.variations", "Variations")]
 
 
@@ -266,6 +268,8 @@ class ScenarioSpec(Spec):
     """Reason for not running this scenario. The file must still be valid."""
     variations: Variations | None = None
     """Values by path; each combination is a separate run. Default: the file as it is."""
+    acceptance: Acceptance | None = None
+    """Claim about many random runs, which `simscen study` tests; other commands ignore it."""
 
     @property
     def only_robot(self) -> RobotEntry:

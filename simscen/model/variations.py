@@ -9,7 +9,9 @@ from simscen.spec.choice import Choice
 from simscen.spec.quantities import AnyAmount
 
 MAX_VARIATIONS = 1000
-"""Maximum number of variations of a scenario."""
+"""Maximum number of variations that are listed or run at once; a study draws any number of them one after the other."""
+MAX_DRAWS = 1_000_000
+"""Maximum number of variations of a study."""
 
 ValuePath = Annotated[str, StringConstraints(min_length=1, max_length=500)]
 """Path of a value in the scenario: `robot.pose.x`, `goals[0].pose`, `goals.shelf.pose`."""
@@ -78,13 +80,14 @@ class Sampled(Spec):
     existing values. Numbers are rounded to six digits.
     """
 
-    count: Annotated[int, Field(ge=1, le=MAX_VARIATIONS)]
-    """Number of variations."""
+    count: Annotated[int, Field(ge=1, le=MAX_DRAWS)]
+    """Number of variations; more than 1000 only in `simscen study`."""
     seed: Annotated[int, Field(ge=1, le=2**32 - 1)] = 1
     """Seed of these values; the runs keep the seed of the scenario."""
-    method: Literal["random", "latin_hypercube"] = "random"
+    method: Literal["random", "latin_hypercube", "sobol"] = "random"
     """`latin_hypercube` spreads the values of each path evenly over its range; another `count` then changes all of
-    them."""
+    them. `sobol` spreads all paths together evenly (a Sobol sequence with a random shift); another path then changes
+    existing values. Only `random` values are independent, so that an `acceptance` claim can be made."""
     values: Annotated[dict[ValuePath, Draw], Field(min_length=1, max_length=50)]
     """Distribution of the value of each path."""
 
@@ -97,18 +100,30 @@ class VariationBlock(Spec):
 
     grid: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
     """All combinations of the values of each path."""
+    pairwise: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
+    """Few combinations in which each pair of values of two paths occurs: far fewer than a grid of many paths."""
     pairs: Annotated[dict[ValuePath, Values] | None, Field(min_length=1, max_length=50)] = None
     """The first values of all paths together, then the second ones, and so on; all lists must have the same length."""
     list_: Annotated[list[dict[str, Any]] | None, Field(min_length=1, max_length=MAX_VARIATIONS, alias="list")] = None
     """Each variation as a mapping of paths to values, with an optional `name`."""
     sampled: Sampled | None = None
     """Random values."""
+    require: Annotated[list[Annotated[str, StringConstraints(max_length=1000)]], Field(max_length=50)] = []
+    """Conditions that all variations meet, such as `goals[0].pose.x > robot.pose.x + 1`; other combinations are left
+    out. Paths may also lead to values that are not varied. Numbers count in SI units; quantities are written in quotes:
+    `time_limit < '2 min'`. Random values are drawn again until `count` of them meet the conditions."""
 
     @model_validator(mode="after")
     def _check_not_empty(self) -> "VariationBlock":
-        if self.grid is None and self.pairs is None and self.list_ is None and self.sampled is None:
-            raise ValueError("expected one of: grid, pairs, list, sampled")
+        if all(values is None for values in (self.grid, self.pairwise, self.pairs, self.list_, self.sampled)):
+            raise ValueError("expected one of: grid, pairwise, pairs, list, sampled")
         return self
+
+    @property
+    def is_random(self) -> bool:
+        """Whether its variations are independent random draws."""
+        others = (self.grid, self.pairwise, self.pairs, self.list_)
+        return self.sampled is not None and self.sampled.method == "random" and all(one is None for one in others)
 
 
 class Variations(

@@ -15,6 +15,7 @@ from typing import Any
 from simscen.core.errors import UsageError
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import RunFinished, RunStarted, SessionEvent, SessionFinished
+from simscen.judge.study import StudyPlan
 from simscen.report.journal_reader import (
     JOURNAL_FILE,
     JOURNAL_FORMAT,
@@ -22,6 +23,7 @@ from simscen.report.journal_reader import (
     finished_run_to_data,
     last_session_lines,
     planned_run_to_data,
+    study_plan_to_data,
 )
 
 
@@ -43,10 +45,17 @@ class Journal:
         self._finished: set[RunKey] = set()
         self._start = time.monotonic()
 
-    def plan(self, runs: Sequence[PlannedRun], version: str, workers: int, shard: tuple[int, int] = (1, 1)) -> None:
+    def plan(
+        self,
+        runs: Sequence[PlannedRun],
+        version: str,
+        workers: int,
+        shard: tuple[int, int] = (1, 1),
+        study: StudyPlan | None = None,
+    ) -> None:
         """Start a session with these runs. Previous lines of the journal no longer count.
 
-        `shard` (i, n) says that these are the runs of part i of n.
+        `shard` (i, n) says that these are the runs of part i of n. `study` says that they are a study.
         """
         self._numbers, self._finished = {run.key: number for number, run in enumerate(runs)}, set()
         facts = {
@@ -56,8 +65,16 @@ class Journal:
             "shard": list(shard),
             "pid": os.getpid(),
             "cwd": str(Path.cwd()),
+            **({} if study is None else {"study": study_plan_to_data(study)}),
         }
         self._write({"event": "planned", **facts, "runs": [planned_run_to_data(run) for run in runs]})
+
+    def add(self, runs: Sequence[PlannedRun], study: StudyPlan) -> None:
+        """Add further runs to the session of a study."""
+        first = len(self._numbers)
+        self._numbers |= {run.key: number for number, run in enumerate(runs, start=first)}
+        data = [planned_run_to_data(run) for run in runs]
+        self._write({"event": "added", "runs": data, "study": study_plan_to_data(study)})
 
     def __call__(self, event: SessionEvent) -> None:
         """Write a line for a started or finished run, and for the end of the session."""

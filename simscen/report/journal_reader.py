@@ -1,7 +1,7 @@
 """Reader of events.jsonl, the journal of a session, and the format of its lines."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -11,6 +11,8 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.core.records.run_result import RunFailure, RunKey, error_result
 from simscen.core.records.session_events import Artifacts, RunFinished, SessionStarted, session_started
 from simscen.judge.result_json import from_data, read_key, result_data
+from simscen.judge.study import StudyPlan
+from simscen.model.acceptance import PassRate
 from simscen.report.display_text import relative_to_cwd
 from simscen.report.results_json import relative
 
@@ -24,7 +26,8 @@ class PlannedRun:
 
     `digest` is a hash of everything that the result depends on, so that a result is reused only if nothing has changed;
     `definition` is one of the scenario without its stacks, so that versions of a stack can be compared.
-    `again` and `file` have the same meaning as in RunFinished, `stack` as in RunResult.
+    `again` and `file` have the same meaning as in RunFinished, `stack` as in RunResult. `varied` are the varied values
+    by path.
     """
 
     key: RunKey
@@ -34,18 +37,47 @@ class PlannedRun:
     file: str = field(default="", compare=False)
     stack: str = field(default="", compare=False)
     definition: str = field(default="", compare=False)
+    varied: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
 
 def planned_run_to_data(run: PlannedRun) -> dict[str, Any]:
     """Return a planned run as JSON data."""
     source = {"path": run.path, "file": run.file, "again": run.again, "stack": run.stack, "definition": run.definition}
-    return {**asdict(run.key), **source, "digest": run.digest}
+    varied = {"varied": dict(run.varied)} if run.varied else {}
+    return {**asdict(run.key), **source, "digest": run.digest, **varied}
 
 
 def planned_run_from_data(data: dict[str, Any]) -> PlannedRun:
     """Read the data of `planned_run_to_data`. Raises KeyError or TypeError if they are invalid."""
     stack, definition = data.get("stack", ""), data.get("definition", "")
-    return PlannedRun(read_key(data), data["path"], data["digest"], data["again"], data["file"], stack, definition)
+    return PlannedRun(
+        read_key(data),
+        data["path"],
+        data["digest"],
+        data["again"],
+        data["file"],
+        stack,
+        definition,
+        data.get("varied", {}),
+    )
+
+
+def study_plan_to_data(plan: StudyPlan) -> dict[str, Any]:
+    """Return a plan as JSON data, without the values, which the planned runs have."""
+    claim = None if plan.claim is None else plan.claim.model_dump(exclude_unset=True)
+    return {
+        "scenario": plan.scenario,
+        "is_random": plan.is_random,
+        "claim": claim,
+        "is_designed_in_pairs": plan.is_designed_in_pairs,
+        "drawn": plan.drawn,
+    }
+
+
+def _study_plan_from_data(data: dict[str, Any], planned: Sequence[PlannedRun]) -> StudyPlan:
+    claim = None if data["claim"] is None else PassRate.model_validate(data["claim"])
+    values = {run.key: run.varied for run in planned if run.varied}
+    return StudyPlan(data["scenario"], data["is_random"], claim, values, data["is_designed_in_pairs"], data["drawn"])
 
 
 def finished_run_to_data(run: RunFinished, folder: Path) -> dict[str, Any]:
@@ -79,6 +111,7 @@ class JournaledSession:
         started: Runs that had at least started.
         wall: Seconds from the start of the session to its end, or to the last line if it did not end.
         interrupted: Whether the session ended before all runs were finished.
+        study: Plan of a session of `simscen study`.
     """
 
     version: str
@@ -89,6 +122,7 @@ class JournaledSession:
     started: frozenset[RunKey]
     wall: float
     interrupted: bool
+    study: StudyPlan | None = None
 
     @property
     def runs(self) -> list[RunFinished]:
@@ -140,7 +174,9 @@ def _parse_session(lines: list[dict[str, Any]], folder: Path) -> JournaledSessio
     if first["format"] != JOURNAL_FORMAT:
         raise ValueError(f"it has format {first['format']}; this version reads {JOURNAL_FORMAT}")
     cwd = first.get("cwd", "")
-    planned = tuple(_relocate(planned_run_from_data(run), cwd) for run in first["runs"])
+    added = [line for line in lines[1:] if line["event"] == "added"]
+    planned = tuple(_relocate(planned_run_from_data(run), cwd) for line in (first, *added) for run in line["runs"])
+    study = (added[-1] if added else first).get("study")
     finished: dict[RunKey, RunFinished] = {}
     started: set[RunKey] = set()
     for line in lines[1:]:
@@ -159,6 +195,7 @@ def _parse_session(lines: list[dict[str, Any]], folder: Path) -> JournaledSessio
         started=frozenset(started),
         wall=last.get("wall", last["at"]),
         interrupted=len(finished) < len(planned) or bool(last.get("interrupted")),
+        study=None if study is None else _study_plan_from_data(study, planned),
     )
 
 

@@ -12,8 +12,10 @@ from xml.etree.ElementTree import Element, SubElement
 
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
+from simscen.core.records.study import ClaimResult, ClaimStatus, Study
 from simscen.judge.finding_text import disturbance_line, subject
 from simscen.report.display_text import escape_control, one_line, shell_command_text
+from simscen.report.study import claim_text, claim_title
 from simscen.report.violations import (
     Violation,
     error_details,
@@ -25,19 +27,67 @@ from simscen.report.violations import (
 )
 
 Family = Literal["simscen", "xunit2"]
+MAX_CLAIM_FAILURES = 100
+"""Maximum number of failed runs that the testcase of a claim lists."""
 
 
-def to_xml(runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen") -> bytes:
-    """Return the document in UTF-8, with runs sorted by file, scenario and seed."""
+def to_xml(
+    runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen", study: Study | None = None
+) -> bytes:
+    """Return the document in UTF-8, with runs sorted by file, scenario and seed.
+
+    A `study` with a claim has a single testcase, the claim, and one for each run that could not be completed.
+    """
     root = Element("testsuites", {"name": escape_control(name)})
     ordered = sorted(runs, key=lambda run: (run.result.path, run.key))
+    if study is not None and study.claim is not None and ordered:
+        return _claim_xml(root, study, study.claim, ordered, family)
     for path in sorted({run.result.path for run in ordered}):
         runs_of_file = [run for run in ordered if run.result.path == path]
         _add_suite(root, scenario_file(runs_of_file[0]), runs_of_file, family)
     _count(root, ordered)
+    return _document(root)
+
+
+def _document(root: Element) -> bytes:
     ElementTree.indent(root)
     body: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return body + b"\n"
+
+
+def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[RunFinished], family: Family) -> bytes:
+    """Return the document of a study with a claim. Runs that failed are part of the claim, not failures of their own.
+
+    An undecided claim is an error of the type `simscen.undecided`, since JUnit has no other element for it.
+    """
+    broken = [run for run in runs if run.outcome is Outcome.ERROR]
+    suite = SubElement(root, "testsuite", {"name": escape_control(scenario_file(runs[0]))})
+    name = one_line(f"{study.scenario.rpartition('/')[2]} [{claim_title(claim)}]")
+    seconds = f"{sum(run.wall for run in runs):.3f}"
+    case = SubElement(suite, "testcase", {"classname": _classname(runs[0]), "name": name, "time": seconds})
+    message = one_line(claim_text(claim))
+    failures = [f"{one_line(run.key.test)} seed {run.key.seed}: {first_violation(run)}" for run in runs
+                if run.outcome is Outcome.FAILED]  # fmt: skip
+    details = "\n".join([message, *failures[:MAX_CLAIM_FAILURES]])
+    match claim.status:
+        case ClaimStatus.REFUTED:
+            SubElement(case, "failure", {"type": "simscen.pass-rate", "message": message}).text = details
+        case ClaimStatus.UNDECIDED | ClaimStatus.BLOCKED:
+            kind = f"simscen.{claim.status.value}"
+            SubElement(case, "error", {"type": kind, "message": message}).text = details
+        case ClaimStatus.HELD:
+            SubElement(case, "system-out").text = details
+    used = {name}
+    for run in broken:
+        _add_case(suite, run, _unique(_case_name(run), used), family)
+    for element in (root, suite):
+        element.set("tests", str(1 + len(broken)))
+        element.set("failures", str(int(claim.status is ClaimStatus.REFUTED)))
+        undecided = claim.status in (ClaimStatus.UNDECIDED, ClaimStatus.BLOCKED)
+        element.set("errors", str(int(undecided) + len(broken)))
+        element.set("time", seconds)
+    suite.set("skipped", "0")
+    return _document(root)
 
 
 def _add_suite(root: Element, path: str, runs: list[RunFinished], family: Family) -> None:

@@ -8,22 +8,28 @@ from typing import Any, TextIO
 
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.session_events import Comparison, RunFinished, SessionEvent, SessionFinished
+from simscen.core.records.study import Study
 from simscen.judge.metrics.comparison import comparison_data
 from simscen.judge.metrics.session_summary import session_summary_data, summarize_session
 from simscen.judge.result_json import result_data
+from simscen.judge.study_json import study_data
 from simscen.report.display_text import escape_ci_markers_in_json
 from simscen.report.text_reporters import Reporter
 
 FORMAT = 1
 
 
-def to_json(runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None) -> str:
+def to_json(
+    runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
+) -> str:
     """Return the document with sorted runs. Paths of artifacts are relative to the `folder` of the session."""
-    document = as_document(runs, folder, comparison)
+    document = as_document(runs, folder, comparison, study)
     return json.dumps(document, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def as_document(runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None) -> dict[str, Any]:
+def as_document(
+    runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
+) -> dict[str, Any]:
     """Return the document as data: counts, and one entry per run in the format of its result.json."""
     ordered = in_order(runs)
     counts = {outcome.value: sum(run.outcome is outcome for run in runs) for outcome in Outcome}
@@ -34,6 +40,7 @@ def as_document(runs: Sequence[RunFinished], folder: str = "", comparison: Compa
         "simulated_seconds": sum(run.result.simulated for run in ordered),
         **_summaries(ordered),
         **({} if comparison is None else {"comparison": comparison_data(comparison)}),
+        **({} if study is None else {"study": study_data(study)}),
         "runs": [{**result_data(run.result), "artifacts": _artifacts(run, folder), **_resumed(run)} for run in ordered],
     }
 
@@ -102,5 +109,5 @@ class _JsonReporter:
         if isinstance(event, RunFinished):
             self._runs.append(event)
         if isinstance(event, SessionFinished):
-            self._out.write(escape_ci_markers_in_json(to_json(self._runs, event.folder, event.comparison)))
+            self._out.write(escape_ci_markers_in_json(to_json(self._runs, event.folder, event.comparison, event.study)))
             self._out.flush()

@@ -26,6 +26,7 @@ from simscen.report.session_lines import (
     session_header,
     slowest_runs,
 )
+from simscen.report.study import study_lines
 from simscen.report.styled_line import (
     StyledLine,
     StyledText,
@@ -90,7 +91,9 @@ class SessionFormatter:
         sections = [section for section in (slow, list(failed_runs(done, self._name))) if section]
         for section in sections:
             yield from ((), *section)
-        yield from ((),) if sections else ()
+        if event.study is not None:
+            yield from study_lines(event.study)
+        yield from ((),) if sections or event.study is not None else ()
         yield from log_comparison(done)
         yield from session_footer(event, {"not run": kinds[NOT_RUN]})
 

@@ -176,6 +176,15 @@ def to_common_unit(amounts: tuple[Amount, ...]) -> tuple[tuple[float, ...], str]
     raise ValueError(f"{names} are units of different dimensions")
 
 
+def si_number(value: Any) -> Any:
+    """Return a number as it is, and a text such as "50 cm" in SI units; any other value unchanged."""
+    match = NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
+    if match is None:
+        return value
+    scales = [units[match[2]] for units in UNITS.values() if match[2] in units]
+    return float(match[1]) * scales[0] if scales else value
+
+
 def _parse_amount(value: Any) -> Amount:
     if isinstance(value, int | float) and not isinstance(value, bool):
         if not math.isfinite(value):

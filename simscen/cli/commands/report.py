@@ -12,6 +12,7 @@ from simscen.cli.session.terminal import Format, FormatOption, screen
 from simscen.core.errors import Exit
 from simscen.judge.metrics.comparison import compare_stacks
 from simscen.judge.metrics.session_summary import session_summary_line, summarize_session
+from simscen.judge.study import evaluate_study
 from simscen.report.journal import require_free
 from simscen.report.journal_reader import read_journal
 from simscen.report.results_json import results_by_stack
@@ -49,8 +50,9 @@ def write_reports(
         for answer in answers:
             output(answer)
         comparison = compare_stacks((answer.result for answer in answers), past.stacks)
-        written = reports.write(answers, comparison)
-        output(reports.finished_event(answers, past.wall, past.interrupted, comparison))
+        study = None if past.study is None else evaluate_study(past.study, (answer.result for answer in answers))
+        written = reports.write(answers, comparison, study)
+        output(reports.finished_event(answers, past.wall, past.interrupted, comparison, study))
     if format_ is Format.TEXT:
         for stack, results in results_by_stack(answers).items():
             print_text(
@@ -58,5 +60,5 @@ def write_reports(
                 if stack
                 else session_summary_line(summarize_session(results))
             )
-    code = exit_code(answers) if written else Exit.INCOMPLETE
+    code = exit_code(answers, study) if written else Exit.INCOMPLETE
     sys.exit(output.exit(code))

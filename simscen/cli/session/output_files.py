@@ -28,6 +28,7 @@ from simscen.core.records.session_events import (
     SessionFinished,
     SessionStarted,
 )
+from simscen.core.records.study import ClaimStatus, Study
 from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.report.junit import Family, to_xml
 from simscen.report.results_json import to_json
@@ -78,13 +79,15 @@ class Reports:
         except OSError as error:
             raise UsageError(f"cannot use the output folder {self.folder}: {error.strerror}") from error
 
-    def write(self, answers: Sequence[RunFinished], comparison: Comparison | None = None) -> bool:
+    def write(
+        self, answers: Sequence[RunFinished], comparison: Comparison | None = None, study: Study | None = None
+    ) -> bool:
         """Write the reports and return whether all were written; the old file of a failed one is kept."""
-        junit = to_xml(answers, self._family)
+        junit = to_xml(answers, self._family, study=study)
         whole = {
-            self.folder / "results.json": to_json(answers, str(self.folder), comparison).encode(),
+            self.folder / "results.json": to_json(answers, str(self.folder), comparison, study).encode(),
             self.folder / "junit.xml": junit,
-            self.folder / PAGE: self._page(answers, comparison),
+            self.folder / PAGE: self._page(answers, comparison, study),
         }
         documents = {**({} if self._only else whole), self.junit: junit}
         self._missing = frozenset(path for path, data in documents.items() if not _write(path, data))
@@ -95,9 +98,9 @@ class Reports:
         page = to_html(Session(answers, self._past, folder=str(self.folder), live=live))
         return _write(self.folder / PAGE, page.encode())
 
-    def _page(self, answers: Sequence[RunFinished], comparison: Comparison | None) -> bytes:
+    def _page(self, answers: Sequence[RunFinished], comparison: Comparison | None, study: Study | None) -> bytes:
         files = ("results.json", "junit.xml", "run.json")
-        return to_html(Session(answers, self._past, comparison, str(self.folder), files)).encode()
+        return to_html(Session(answers, self._past, comparison, str(self.folder), files, study=study)).encode()
 
     @cached_property
     def _past(self) -> Sequence[PastSession]:
@@ -108,7 +111,12 @@ class Reports:
         return _write(self.folder / "run.json", session_info_json(self._used, wall))
 
     def finished_event(
-        self, answers: Sequence[RunFinished], wall: float, interrupted: bool, comparison: Comparison | None = None
+        self,
+        answers: Sequence[RunFinished],
+        wall: float,
+        interrupted: bool,
+        comparison: Comparison | None = None,
+        study: Study | None = None,
     ) -> SessionFinished:
         """Return the last event of a session, without reports that could not be written."""
         count = {outcome: sum(answer.outcome is outcome for answer in answers) for outcome in Outcome}
@@ -125,11 +133,22 @@ class Reports:
             expected=count[Outcome.FAILED_AS_EXPECTED],
             skipped=count[Outcome.SKIPPED],
             page="" if self._only or self.folder / PAGE in self._missing else str(self.folder / PAGE),
+            study=study,
         )
 
 
-def exit_code(answers: Sequence[RunFinished]) -> Exit:
-    """Return the exit code of a session that was not interrupted."""
+CLAIM_EXITS = {
+    ClaimStatus.HELD: Exit.PASSED,
+    ClaimStatus.REFUTED: Exit.FAILED,
+    ClaimStatus.UNDECIDED: Exit.UNDECIDED,
+    ClaimStatus.BLOCKED: Exit.INCOMPLETE,
+}
+
+
+def exit_code(answers: Sequence[RunFinished], study: Study | None = None) -> Exit:
+    """Return the exit code of a session that was not interrupted; that of the claim if there is one."""
+    if study is not None and study.claim is not None:
+        return CLAIM_EXITS[study.claim.status]
     outcomes = {answer.outcome for answer in answers}
     if outcomes == {Outcome.SKIPPED}:
         return Exit.NOTHING_SELECTED

@@ -1,7 +1,7 @@
 """Runs that a session has to execute: all, or those that an earlier session in the same folder did not complete."""
 
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -47,10 +47,24 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int, shard: tuple[int,
 
     Results of unchanged scenarios are kept unless they are errors; of two runs to be compared, both or neither.
     """
+    planned = plan_runs(jobs)
+    left, kept = divide_runs(jobs, planned, previous_results(journal))
+    journal.plan(planned, __version__, workers, shard)
+    write_kept(journal, kept)
+    return PendingRuns(journal, left, kept, workers, tuple(dict.fromkeys(run.stack for run in planned if run.stack)))
+
+
+def plan_runs(jobs: Sequence[Job]) -> list[PlannedRun]:
+    """Return the runs of these jobs as the journal lists them."""
     scenarios = {_job_identity(job): job.scenario for job in jobs}
     digests = {identity: scenario_digests(scenario) for identity, scenario in scenarios.items()}
-    planned = [_planned(job, digests[_job_identity(job)]) for job in jobs]
-    known = _previous_results(journal)
+    return [_planned(job, digests[_job_identity(job)]) for job in jobs]
+
+
+def divide_runs(
+    jobs: Sequence[Job], planned: Sequence[PlannedRun], known: Mapping[PlannedRun, RunFinished]
+) -> tuple[list[Job], list[RunFinished]]:
+    """Return the jobs to execute, and the known results of the others."""
     answers = [known.get(run) for run in planned]
     kept: list[RunFinished] = []
     left: list[Job] = []
@@ -59,22 +73,25 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int, shard: tuple[int,
             kept.append(replace(answer, resumed=True))
         else:
             left.append(job)
-    journal.plan(planned, __version__, workers, shard)
+    return left, kept
+
+
+def write_kept(journal: Journal, kept: Sequence[RunFinished]) -> None:
+    """Write kept results to the journal. Raises UsageError if the journal cannot be written."""
     for answer in kept:
         journal(answer)
     if journal.error:
         raise UsageError(f"cannot write the journal in {journal.folder}: {journal.error.strerror}")
-    return PendingRuns(journal, left, kept, workers, tuple(dict.fromkeys(run.stack for run in planned if run.stack)))
 
 
 def _planned(job: Job, digests: ScenarioDigests) -> PlannedRun:
     scenario = job.scenario
     again = repeat_command(scenario, job.key.seed)
     file, stack = shown(scenario.file), scenario.stack
-    return PlannedRun(job.key, scenario.path, digests.run, again, file, stack, digests.definition)
+    return PlannedRun(job.key, scenario.path, digests.run, again, file, stack, digests.definition, scenario.varied)
 
 
-def _previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
+def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
     """Return the results in the folder by planned run, without errors and without runs whose log does not match."""
     try:
         past = read_journal(journal.folder)

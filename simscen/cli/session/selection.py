@@ -21,7 +21,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.stacks.choice import StackChoice
-from simscen.loading.variations.naming import VariationProblems, merge_problems
+from simscen.loading.variations.naming import VariationProblems, merge_problems, number_of
 from simscen.loading.world_cache import WorldCache
 
 
@@ -38,6 +38,12 @@ class Selection:
     shard: tuple[int, int] = (1, 1)
     variations: Sequence[str] = ()
     times: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def numbers(self) -> list[int] | None:
+        """Numbers of the selected variations, if all are selected by number (`variation-7`)."""
+        numbers = [number for name in self.variations if (number := number_of(name)) is not None]
+        return numbers if numbers and len(numbers) == len(self.variations) else None
 
 
 def load_all(
@@ -59,7 +65,7 @@ def load_all(
     problems: dict[Problem, None] = {}
     warnings: dict[str, list[Problem]] = {}
     for file, choice in product(discover(paths, home), choices):
-        variations, found = checks.scenario(file, choice)
+        variations, found = checks.scenario(file, choice, wanted.numbers)
         for scenario in variations:
             loaded.setdefault(scenario.title, []).append(scenario.having(several_stacks=len(choices) > 1))
             warnings.setdefault(scenario.id, []).extend(found)
@@ -76,6 +82,8 @@ def select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> 
     """Return the variations with one of these names; all if there are no names. Raises NothingSelected."""
     known = dict.fromkeys(one.variation for one in scenarios if one.variation)
     if missing := [name for name in names if name not in known]:
+        if number_of(missing[0]) is not None:
+            raise NothingSelected(f"no scenario has a {missing[0]} that meets the conditions in `require`")
         hint = suggestion(missing[0], known) or "no scenario has variations"
         raise NothingSelected(f"no variation is called {quoted(missing[0], 120)}; {hint}")
     return [one for one in scenarios if not names or one.variation in names]
@@ -103,9 +111,14 @@ class Checks:
         """The stacks to check each scenario with; None = the scenario's own."""
         return self.stacks.chosen or (None,)
 
-    def scenario(self, file: Path, choice: StackChoice | None = None) -> tuple[Sequence[LoadedScenario], list[Problem]]:
-        """Return the variations of a scenario, or none if one of them is unusable, and the problems."""
-        loaded = try_variations(file, self.root, self.world_path, choice)
+    def scenario(
+        self, file: Path, choice: StackChoice | None = None, numbers: Sequence[int] | None = None
+    ) -> tuple[Sequence[LoadedScenario], list[Problem]]:
+        """Return the variations of a scenario, or none if one of them is unusable, and the problems.
+
+        `numbers` selects variations by their numbers.
+        """
+        loaded = try_variations(file, self.root, self.world_path, choice, numbers)
         if isinstance(loaded, list):
             return (), loaded
         tried = [self._variation(one) for one in loaded]

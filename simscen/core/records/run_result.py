@@ -91,12 +91,14 @@ class RunFailure:
     """Reason why a run could not be completed.
 
     `kind` is the error type in JUnit: crashed, timeout, out-of-memory, invalid, interrupted, not-run, or internal.
-    `tail` is the end of the worker's output, which must be shown literally.
+    `tail` is the end of the worker's output, which must be shown literally. `by_stack`: the stack under test crashed,
+    did not answer, or answered with something invalid.
     """
 
     kind: str
     message: str
     tail: str = ""
+    by_stack: bool = False
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
+from simscen.core.records.study import Study
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,7 @@ class SessionFinished:
     """Last event of a session: number of runs by outcome, simulated and wall time in s, and paths of the reports.
 
     `expected` counts runs that failed as expected, `skipped` those that were not run. `comparison` compares several
-    stacks. `page` is the report page.
+    stacks. `page` is the report page. `study` is the result of `simscen study`.
     """
 
     passed: int
@@ -219,6 +220,7 @@ class SessionFinished:
     expected: int = 0
     skipped: int = 0
     page: str = ""
+    study: Study | None = None
 
 
 SessionEvent = SessionStarted | RunStarted | RunProgress | RunFinished | SessionFinished

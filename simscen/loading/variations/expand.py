@@ -3,41 +3,24 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, product
-from typing import TYPE_CHECKING
+from typing import Any
 
 from simscen.core.errors import Problem
-from simscen.loading.schema.messages import quoted
 from simscen.loading.schema.validate import check
-from simscen.loading.variations.naming import NAME_HINT, derive_name, make_unique, name_error, short_names
-from simscen.loading.variations.paths import PathError, Target, resolve_path, set_value
-from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, child, node_at
+from simscen.loading.variations.axes import AxisBuilder, Change, Option, typical_options
+from simscen.loading.variations.conditions import Condition, ConditionError
+from simscen.loading.variations.naming import derive_name, make_unique, name_error, numbered_name, short_names
+from simscen.loading.variations.paths import Target, set_value
+from simscen.loading.variations.requirements import all_hold, check_paths, plain_values, read_conditions
+from simscen.loading.yaml.tree import MappingNode, Node, Position, SequenceNode, child
 
-if TYPE_CHECKING:  # most scenarios have no variations
-    from simscen.model.variations import Sampled, VariationBlock
-
-VARIATIONS = "variations"
+VARIATIONS, ACCEPTANCE = "variations", "acceptance"
 MAX_TOTAL_VALUES = 5_000_000
 """Limit on the number of values of all variations of a scenario together."""
+MAX_REJECTED_DRAWS = 10_000
+"""Draws in a row that may miss the conditions of `require` before they count as impossible to meet."""
 _DESCRIPTIVE_KEYS = frozenset({"description", "tags", "expected", "skip"})
 """Keys that do not change the run, and so do not appear in names of variations."""
-
-
-@dataclass(frozen=True)
-class Change:
-    """Value for a path; `number` counts the values of the path from 1."""
-
-    target: Target
-    value: Node
-    number: int
-
-
-@dataclass(frozen=True)
-class Option:
-    """Changes that belong together, and their name if the author gave one."""
-
-    changes: tuple[Change, ...]
-    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -57,195 +40,207 @@ class Variation:
             for place in (*_places(change.value), change.target.place)
         }
 
-
-def expand_variations(tree: MappingNode) -> list[Variation] | list[Problem]:
-    """Return all variations of a scenario in order, or the problems of its `variations`."""
-    entry = tree.entries.get(VARIATIONS)
-    if entry is None:
-        return [Variation("", tree)]
-    from simscen.model.variations import MAX_VARIATIONS, VariationsSection
-
-    own = MappingNode(tree.place, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
-    said = check(VariationsSection, MappingNode(tree.place, {VARIATIONS: entry}))
-    if isinstance(said, list):
-        return said
-    expansion = _Expansion(own)
-    blocks = said.variations.blocks
-    nodes = entry.value.items if isinstance(entry.value, SequenceNode) else [entry.value]
-    axes = [expansion.axes(block, node) for block, node in zip(blocks, nodes, strict=True)]
-    if expansion.problems:
-        return expansion.problems
-    if (number := sum(math.prod(map(len, block)) for block in axes)) > MAX_VARIATIONS:
-        message = f"the scenario has {number} variations; the limit is {MAX_VARIATIONS}"
-        return [Problem(*entry.value.place, "SC017", message, "use `sampled` to draw some of them")]
-    values = _size(own) + max((sum(max(map(_weight, axis)) for axis in block) for block in axes), default=0)
-    if number * values > MAX_TOTAL_VALUES:
-        message = f"{number} variations of up to {values} values exceed the limit of {MAX_TOTAL_VALUES} values in total"
-        return [Problem(*entry.value.place, "SC006", message)]
-    options = [list(chosen) for block in axes for chosen in product(*block)]
-    return expansion.named(options) if options else [Variation("", own)]
+    @property
+    def values(self) -> dict[str, Any]:
+        """The changed values by path."""
+        return {change.target.path: change.value.plain for change in self.changes}
 
 
-@dataclass
-class _Expansion:
-    """Builder of the variations of `tree`; collects problems."""
+@dataclass(frozen=True)
+class Block:
+    """A block of variations: options to combine, and conditions that a combination must meet."""
+
+    axes: Sequence[Sequence[Option]]
+    conditions: Sequence[Condition]
+    is_random: bool
+
+    @property
+    def count(self) -> int:
+        """Number of combinations, whether they meet the conditions or not."""
+        return math.prod(map(len, self.axes))
+
+    def options(self, index: int) -> list[Option]:
+        """Return the combination with this index. The last axis changes fastest."""
+        if self.is_random:
+            return [self.axes[0][index]]
+        chosen = []
+        for axis in reversed(self.axes):
+            index, own = divmod(index, len(axis))
+            chosen.append(axis[own])
+        return chosen[::-1]
+
+
+@dataclass(frozen=True)
+class VariationSpace:
+    """All variations of a scenario, made when they are asked for. Variations are numbered from 1.
+
+    `is_random`: they are independent random draws, of which there are as many as wanted.
+    """
 
     tree: MappingNode
-    problems: list[Problem] = field(default_factory=list)
-    _targets: dict[str, Target] = field(default_factory=dict)
-    _names: dict[str, Position] = field(default_factory=dict)
+    blocks: Sequence[Block]
+    targets: Mapping[str, Target]
+    is_random: bool
 
-    def axes(self, block: "VariationBlock", node: Node) -> list[list[Option]]:
-        """Return the axes whose options are combined: each path of a grid, and each other kind as a whole."""
-        found = [[Option((change,)) for change in changes] for changes in self._columns(child(node, "grid"), True)]
-        if block.pairs is not None:
-            found.append(self._pairs(child(node, "pairs")))
-        if block.list_ is not None:
-            found.append(self._list(child(node, "list")))
-        if block.sampled is not None:
-            found.append(self._sampled(block.sampled, node_at(node, ("sampled", "values"))))
-        self._require_apart(found)
-        return found
+    @property
+    def count(self) -> int:
+        """Number of variations, of which some may not meet the conditions. Random draws are not limited by it."""
+        return sum(block.count for block in self.blocks)
 
-    def named(self, chosen: Sequence[Sequence[Option]]) -> list[Variation] | list[Problem]:
-        """Return the variations with their names."""
+    def variation(self, number: int) -> Variation | None:
+        """Return the variation with this number, named after it; None if it does not meet the conditions.
+
+        Raises ConditionError if a condition cannot be evaluated, and IndexError if there is no such variation.
+        """
+        options = self._options(number)
+        return None if options is None else self._build(numbered_name(number), options)
+
+    def meets_conditions(self, number: int) -> bool:
+        """Return whether the variation with this number meets the conditions. Raises ConditionError and IndexError."""
+        return self._options(number) is not None
+
+    def numbers(self) -> Iterator[int]:
+        """Yield the numbers of the variations that `simscen run` runs. Raises ConditionError.
+
+        Random draws are repeated until `count` of them meet the conditions.
+        """
+        if not self.is_random:
+            yield from (number for number in range(1, self.count + 1) if self._options(number) is not None)
+            return
+        found, number, rejected = 0, 0, 0
+        while found < self.count:
+            number += 1
+            if self._options(number) is not None:
+                found, rejected = found + 1, 0
+                yield number
+            elif (rejected := rejected + 1) == MAX_REJECTED_DRAWS:
+                raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions")
+
+    def named(self) -> list[Variation]:
+        """Return all variations, named after the values that differ. Raises ConditionError."""
+        numbers = list(self.numbers())
+        chosen = [options for number in numbers if (options := self._options(number)) is not None]
         values = [
             {change.target.path: change.value.plain for o in options for change in o.changes} for options in chosen
         ]
-        differ = {path for path in self._targets if any(one.get(path) != values[0].get(path) for one in values)}
-        everything = list(self._targets.values())
+        differ = {path for path in self.targets if any(one.get(path) != values[0].get(path) for one in values)}
+        everything = list(self.targets.values())
         named = [target for target in everything if target.keys[0] not in _DESCRIPTIVE_KEYS] or everything
         keys = short_names([target for target in named if target.path in differ] or named)
-        names = [self._name(options, keys, number) for number, options in enumerate(chosen, start=1)]
+        names = [_name(options, keys, number) for number, options in zip(numbers, chosen, strict=True)]
         given = [len(options) == 1 and bool(options[0].name) for options in chosen]
-        variations = []
-        for options, name in zip(chosen, make_unique(names, given), strict=True):
-            changes = tuple(change for option in options for change in option.changes)
-            tree = self.tree
-            for change in changes:
-                tree = set_value(tree, change.target, change.value)
-            variations.append(Variation(name, tree, changes))
-        return variations
+        return [self._build(name, options) for options, name in zip(chosen, make_unique(names, given), strict=True)]
 
-    def _name(self, options: Sequence[Option], keys: dict[str, str], number: int) -> str:
-        parts = []
-        for option in options:
-            shown = [change for change in option.changes if change.target.path in keys]
-            values = {change.target.path: change.value for change in shown}
-            numbers = {change.target.path: change.number for change in shown}
-            parts.append(option.name or (derive_name(keys, values, numbers, number) if values else ""))
-        name = ",".join(part for part in parts if part)
-        return name if name and name_error(name) is None else f"variation-{number}"
+    def _options(self, number: int) -> list[Option] | None:
+        index = number - 1
+        for block in self.blocks:
+            if index < block.count or self.is_random:
+                options = block.options(index)
+                changes = [change for option in options for change in option.changes]
+                is_allowed = all_hold(block.conditions, plain_values(self.tree, block.conditions, changes))
+                return options if is_allowed else None
+            index -= block.count
+        raise IndexError(number)
 
-    def _columns(self, node: Node | None, distinct: bool) -> list[list[Change]]:
-        """Return the changes of each path."""
-        if not isinstance(node, MappingNode):
-            return []
-        found = []
-        for path, entry in node.entries.items():
-            assert isinstance(entry.value, SequenceNode)
-            if distinct:
-                self._refuse_equal(entry.value)
-            if (target := self._target(path, entry)) is not None:
-                found.append([Change(target, value, n) for n, value in enumerate(entry.value.items, start=1)])
-        return found
+    def _build(self, name: str, options: Sequence[Option]) -> Variation:
+        changes = tuple(change for option in options for change in option.changes)
+        tree = self.tree
+        for change in changes:
+            tree = set_value(tree, change.target, change.value)
+        return Variation(name, tree, changes)
 
-    def _pairs(self, node: Node | None) -> list[Option]:
-        assert isinstance(node, MappingNode)
-        lengths = {
-            path: len(entry.value.items)
-            for path, entry in node.entries.items()
-            if isinstance(entry.value, SequenceNode)
-        }
-        first, *others = lengths
-        for path in others:
-            if lengths[path] != lengths[first]:
-                message = f"{quoted(path)} has {lengths[path]} values, {quoted(first)} has {lengths[first]}"
-                hint = "the lists of `pairs` must have the same length"
-                self._add(node.entries[path].value.place, "SC016", message, hint)
-                return []
-        return [Option(changes) for changes in zip(*self._columns(node, False), strict=True)]
 
-    def _list(self, node: Node | None) -> list[Option]:
-        assert isinstance(node, SequenceNode)
-        found = []
-        for number, item in enumerate(node.items, start=1):
-            assert isinstance(item, MappingNode)
-            name = self._given_name(item)
-            entries = [(path, entry) for path, entry in item.entries.items() if path != "name"]
-            if not entries:
-                self._add(item.place, "SC010", "this variation changes nothing", "add a path and its value")
-            targets = [(self._target(path, entry), entry) for path, entry in entries]
-            changes = [Change(target, entry.value, number) for target, entry in targets if target is not None]
-            self._require_apart([[Option((change,))] for change in changes])
-            found.append(Option(tuple(changes), name))
-        return found
+def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -> list[Variation] | list[Problem]:
+    """Return all variations of a scenario in order, or those with these `numbers`; or the problems of `variations`.
 
-    def _given_name(self, item: MappingNode) -> str:
-        entry = item.entries.get("name")
-        if entry is None:
-            return ""
-        place, value = entry.value.place, entry.value.plain
-        name = value if isinstance(value, str) else str(value) if isinstance(value, int | float) else ""
-        if (flaw := name_error(name)) is not None:
-            self._add(place, "SC017", flaw, NAME_HINT)
-        first = self._names.setdefault(name.casefold(), place)
-        if first != place:
-            self._add(place, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")
-        return name
+    Of the numbered ones, those that do not exist or do not meet the conditions are missing.
+    """
+    space = variation_space(tree)
+    if not isinstance(space, VariationSpace):
+        return space if space is not None else [Variation("", tree)]
+    place = tree.entries[VARIATIONS].value.place
+    try:
+        if numbers is not None:
+            return [one for number in numbers if (one := _numbered(space, number)) is not None]
+        if problem := _too_many(space, place):
+            return [problem]
+        found = space.named()
+    except ConditionError as error:
+        return [Problem(*_require_place(tree), "SC016", str(error), "")]
+    if not found and space.count:
+        return [Problem(*_require_place(tree), "SC016", "no variation meets the conditions", "")]
+    return found or [Variation("", space.tree)]
 
-    def _sampled(self, sampled: "Sampled", node: Node) -> list[Option]:
-        from simscen.loading.variations.sampling import Pick, draw_values
 
-        assert isinstance(node, MappingNode)
-        columns = []
-        for path, entry in node.entries.items():
-            target = self._target(path, entry)
-            drawn = entry.value
-            try:
-                values = draw_values(sampled, path)
-            except ValueError as error:
-                self._add(drawn.place, "SC016", str(error))
-                continue
-            nodes = [
-                node_at(drawn, ("choice", v.number)) if isinstance(v, Pick) else ScalarNode(drawn.place, v)
-                for v in values
-            ]
-            if target is not None:
-                columns.append([Change(target, value, n) for n, value in enumerate(nodes, start=1)])
-        return [Option(changes) for changes in zip(*columns, strict=True)]
+def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
+    """Return the variations of a scenario, None if it has none, or the problems of its `variations`."""
+    entry = tree.entries.get(VARIATIONS)
+    if entry is None:
+        return None
+    from simscen.model.variations import VariationsSection  # most scenarios have no variations
 
-    def _target(self, path: str, entry: Entry) -> Target | None:
-        try:
-            target = resolve_path(path, entry.key, self.tree)
-        except PathError as error:
-            self._add(entry.key, "SC030", str(error), error.hint)
-            return None
-        self._targets.setdefault(path, target)
-        return target
+    own = MappingNode(tree.place, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
+    section = check(VariationsSection, MappingNode(tree.place, {VARIATIONS: entry}))
+    if isinstance(section, list):
+        return section
+    builder, found = AxisBuilder(own), []
+    specs = section.variations.blocks
+    nodes = entry.value.items if isinstance(entry.value, SequenceNode) else [entry.value]
+    is_random = len(specs) == 1 and specs[0].is_random
+    for block, node in zip(specs, nodes, strict=True):
+        conditions = read_conditions(child(node, "require"), builder)
+        axes = [] if builder.problems and block.pairwise else builder.axes(block, node, conditions)
+        check_paths(conditions, child(node, "require"), builder)
+        found.append(Block(axes, conditions, is_random))
+    if specs and not is_random and ACCEPTANCE in tree.entries:
+        message = "these variations are not independent random draws, so no confidence can be stated for a pass rate"
+        hint = "vary with `sampled` and `method: random` alone, or remove `acceptance`"
+        builder.add(tree.entries[ACCEPTANCE].key, "SC016", message, hint)
+    return builder.problems or VariationSpace(own, found, builder.targets, is_random)
 
-    def _refuse_equal(self, items: SequenceNode) -> None:
-        seen: list[object] = []
-        for item in items.items:
-            if item.plain in seen:
-                self._add(item.place, "SC054", "this value is listed twice", "remove one of them")
-            seen.append(item.plain)
 
-    def _require_apart(self, axes: Sequence[Sequence[Option]]) -> None:
-        """Report axes that change the same value, or a part of each other's values."""
-        targets = [{change.target.path: change.target for o in axis for change in o.changes} for axis in axes]
-        for above, below in combinations(targets, 2):
-            for one, other in product(above.values(), below.values()):
-                shorter = min(len(one.keys), len(other.keys))
-                if one.keys[:shorter] == other.keys[:shorter]:
-                    same = len(one.keys) == len(other.keys)
-                    what = "change the same value" if same else "overlap: one is part of the other"
-                    self._add(other.place, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
+def _numbered(space: VariationSpace, number: int) -> Variation | None:
+    try:
+        return space.variation(number)
+    except IndexError:
+        return None
 
-    def _add(self, place: Position, code: str, message: str, hint: str = "") -> None:
-        problem = Problem(*place, code=code, message=message, hint=hint)
-        if problem not in self.problems:
-            self.problems.append(problem)
+
+def _too_many(space: VariationSpace, place: Position) -> Problem | None:
+    from simscen.model.variations import MAX_VARIATIONS
+
+    if space.count > MAX_VARIATIONS:
+        message = f"the scenario has {space.count} variations; the limit is {MAX_VARIATIONS}"
+        return Problem(*place, "SC017", message, "run them with `simscen study`, or use `sampled` to draw some of them")
+    weights = (sum(max(map(_weight, typical_options(axis))) for axis in block.axes) for block in space.blocks)
+    largest = max(weights, default=0)
+    values = _size(space.tree) + largest
+    if space.count * values > MAX_TOTAL_VALUES:
+        message = (
+            f"{space.count} variations of up to {values} values exceed the limit of {MAX_TOTAL_VALUES} values in total"
+        )
+        return Problem(*place, "SC006", message)
+    return None
+
+
+def _require_place(tree: MappingNode) -> Position:
+    """Return the position of the first `require`."""
+    value = tree.entries[VARIATIONS].value
+    for block in value.items if isinstance(value, SequenceNode) else [value]:
+        if isinstance(block, MappingNode) and "require" in block.entries:
+            return block.entries["require"].value.place
+    return value.place
+
+
+def _name(options: Sequence[Option], keys: dict[str, str], number: int) -> str:
+    parts = []
+    for option in options:
+        shown = [change for change in option.changes if change.target.path in keys]
+        values = {change.target.path: change.value for change in shown}
+        numbers = {change.target.path: change.number for change in shown}
+        parts.append(option.name or (derive_name(keys, values, numbers, number) if values else ""))
+    name = ",".join(part for part in parts if part)
+    return name if name and name_error(name) is None else numbered_name(number)
 
 
 def _weight(option: Option) -> int:

@@ -16,6 +16,7 @@ from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, S
 
 MAX_NAME_CHARS, _LONGEST_VALUE = 100, 40
 _GIVEN = re.compile(r"[^\W][\w.,=+%-]*")
+_NUMBERED = re.compile(r"variation-([1-9][0-9]{0,8})")
 _UNSAFE = re.compile(r"[^\w.+%-]+")
 
 
@@ -51,7 +52,18 @@ def derive_name(keys: dict[str, str], values: dict[str, Node], numbers: dict[str
     """
     name = ",".join(f"{keys[path]}={_value(value) or f'no{numbers[path]}'}" for path, value in values.items())
     name = name if name[:1].isalnum() else f"x{name}"
-    return name if len(name) <= MAX_NAME_CHARS else f"variation-{number}"
+    return name if len(name) <= MAX_NAME_CHARS else numbered_name(number)
+
+
+def numbered_name(number: int) -> str:
+    """Return the name of a variation by its number from 1: `variation-7`."""
+    return f"variation-{number}"
+
+
+def number_of(name: str) -> int | None:
+    """Return the number of a variation called `variation-7`; None for another name."""
+    match = _NUMBERED.fullmatch(name)
+    return int(match[1]) if match else None
 
 
 def make_unique(names: Sequence[str], given: Sequence[bool]) -> list[str]:

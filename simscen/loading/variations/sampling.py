@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+from functools import cache
 from typing import Any, NamedTuple
 
 from simscen.model.variations import Draw, Integer, LogUniform, Normal, OneOf, Sampled, Uniform
@@ -21,14 +22,47 @@ def draw_values(sampled: Sampled, path: str) -> list[Any]:
     return [_value(sampled.values[path], u) for u in _chances(sampled, path)]
 
 
+def draw_value(sampled: Sampled, path: str, index: int) -> Any:
+    """Return the random value of one path with this index from 0, which may exceed the count."""
+    return _value(sampled.values[path], _hash(sampled.seed, path, "value", index))
+
+
+def value_at(draw: Draw, u: float) -> Any:
+    """Return the value of a distribution at the cumulative probability `u`, 0 < u < 1. Raises ValueError."""
+    return _value(draw, u)
+
+
 def _chances(sampled: Sampled, path: str) -> list[float]:
     """Return numbers between 0 and 1, both excluded."""
     count = sampled.count
+    if sampled.method == "sobol":
+        return _sobol_chances(sampled, path)
     chances = [_hash(sampled.seed, path, "value", number) for number in range(count)]
     if sampled.method == "random":
         return chances
     order = sorted(range(count), key=lambda number: _hash(sampled.seed, path, "stratum", number))
     return [(stratum + rng) / count for stratum, rng in zip(order, chances, strict=True)]
+
+
+def _sobol_chances(sampled: Sampled, path: str) -> list[float]:
+    """Return the coordinates of a path in a Sobol sequence, shifted by a random number modulo 1.
+
+    (Joe and Kuo: Constructing Sobol Sequences with Better Two-Dimensional Projections, 2008; Cranley and Patterson:
+    Randomization of Number Theoretic Methods for Multiple Integration, 1976.)
+    """
+    coordinate = sorted(sampled.values).index(path)
+    shift = _hash(sampled.seed, path, "shift", 0)
+    points = _sobol_points(len(sampled.values), sampled.count)[:, coordinate]
+    return [min(max(float(u), 2.0**-53), 1 - 2.0**-53) for u in (points + shift) % 1.0]
+
+
+@cache
+def _sobol_points(dimensions: int, count: int) -> Any:
+    """Return the first points (count, dimensions) of the unscrambled sequence."""
+    from scipy.stats.qmc import Sobol  # the import takes half a second
+
+    exponent = max(0, math.ceil(math.log2(count)))
+    return Sobol(dimensions, scramble=False).random_base2(exponent)[:count]
 
 
 def _hash(seed: int, path: str, what: str, number: int) -> float:

@@ -12,8 +12,10 @@ from urllib.parse import quote
 
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import Comparison, RunFinished
+from simscen.core.records.study import Study
 from simscen.report.comparison_markup import as_html
 from simscen.report.picture.palette import css_variables
+from simscen.report.study_markup import study_html
 from simscen.report.suite import elements
 from simscen.report.suite.elements import SIGNS, anchor, count, html_text, outcome_marks, sparkline
 from simscen.report.suite.history import PastSession, outcome_change, past_outcomes
@@ -42,6 +44,7 @@ class Session:
         folder: Output folder of the session, for links.
         files: Names of the other files in the folder.
         live: Progress of a running session.
+        study: Result of `simscen study`.
     """
 
     runs: Sequence[RunFinished]
@@ -50,6 +53,7 @@ class Session:
     folder: str = ""
     files: Sequence[str] = ()
     live: RunningSession | None = None
+    study: Study | None = None
     title: str = "simscen"
 
 
@@ -65,6 +69,8 @@ def to_html(session: Session) -> str:
     style, script = css_variables() + _asset("suite.css"), _asset("suite.js")
     counts = _outcome_counts(session.runs)
     compared = "" if session.comparison is None else as_html(session.comparison)
+    if session.study is not None:
+        compared += study_html(session.study, session.runs, session.folder)
     return (
         f'<!doctype html>\n<html lang="en"{" data-live" if session.live else ""}>\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'

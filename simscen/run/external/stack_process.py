@@ -128,7 +128,7 @@ class StackProcess:
         """Return an error of this stack, with the end of its output."""
         self._pump(lambda: False, 0.0)
         printed = self._log.last(TAIL_BYTES).decode(errors="replace")
-        return RunError(kind, f"stack {self._name}: {message}", output_tail(printed))
+        return RunError(kind, f"stack {self._name}: {message}", output_tail(printed), by_stack=True)
 
     def release(self) -> None:
         """Request the end of the process and its descendants; `close` waits for it."""

@@ -79,7 +79,7 @@ def _end_record(job: Job, report: int, perform: ExecuteJob) -> dict[str, Any]:
         job.folder.mkdir(parents=True, exist_ok=True)
         return perform(job, lambda seconds: _tell(report, seconds))
     except RunError as error:
-        return {"error": error.kind, "message": str(error), "tail": error.tail}
+        return {"error": error.kind, "message": str(error), "tail": error.tail, "by_stack": error.by_stack}
     except InvalidInput as error:
         return {"error": "invalid", "message": str(error)}
     except MemoryError:

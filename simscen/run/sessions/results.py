@@ -106,7 +106,8 @@ def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
         return _fault(end, "exited 0 without a result")
     if "error" in end.last_word:
         printed = end.last_word.get("tail") or output_tail(end.printed)
-        return RunFailure(end.last_word["error"], end.last_word["message"], printed)
+        by_stack = end.last_word.get("by_stack", False)
+        return RunFailure(end.last_word["error"], end.last_word["message"], printed, by_stack)
     if end.left_processes:
         return _fault(end, "left a process behind, which was killed")
     return None

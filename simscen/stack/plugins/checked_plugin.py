@@ -70,11 +70,12 @@ class CheckedPlugin:
             if not isinstance(error.code, ErrorCode):
                 self.broke(f"fails with {error.code!r}, which is no ErrorCode")
             raise error
-        raise RunError("crashed", f"{self.label}: {type(error).__name__}: {error} ({self._place(error)})") from error
+        message = f"{self.label}: {type(error).__name__}: {error} ({self._place(error)})"
+        raise RunError("crashed", message, by_stack=True) from error
 
     def broke(self, what: str) -> NoReturn:
         """End the run, because the component returned an invalid answer."""
-        raise RunError(BROKEN_COMPONENT, f"{self.label} {what}")
+        raise RunError(BROKEN_COMPONENT, f"{self.label} {what}", by_stack=True)
 
     def checked_path(self, path: object, what: str) -> Path:
         """Return the path if it consists of finite poses (n, 3)."""

@@ -126,7 +126,7 @@ def test_derived_names_are_readable_unique_and_safe_as_folders(variations: str, 
         ("  list: [{name: a, tags: [x]}, {name: A, tags: [y]}]", "the variation at line 5 is also called `A`"),
         ("  list: [{name: a}]", "this variation changes nothing"),
         ("  sampled: {count: 3, values: {seed: {uniform: [2, 1]}}}", "the range is empty"),
-        ("  sampled: {count: 1001, values: {seed: {integer: [1, 2]}}}", "must be at most 1000"),
+        ("  sampled: {count: 1001, values: {seed: {integer: [1, 2]}}}", "the scenario has 1001 variations"),
     ],
 )  # fmt: skip
 def test_what_is_said_wrongly_is_told_where_it_is(variations: str, told: str) -> None:

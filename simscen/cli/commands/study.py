@@ -1,0 +1,95 @@
+"""`simscen study`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli import completions
+from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
+from simscen.cli.session.run_session import available_cores
+from simscen.cli.session.stacks import STACK_HELP
+from simscen.cli.session.study_session import StudyRequest, execute_study
+from simscen.cli.session.terminal import Format, FormatOption
+from simscen.run.process.jobs import ReplayMode
+from simscen.run.sessions.run_session import SessionOptions
+
+
+def command(
+    file: Annotated[
+        Path, typer.Argument(help="A *.scenario.yaml or *.study.yaml file.", autocompletion=completions.scenarios)
+    ],
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=1_000_000,
+            help="Number of random runs; default: that of `acceptance`, or `count` of `sampled`. At most so many for a "
+            "sequential claim.",
+        ),
+    ] = None,
+    repeat: Annotated[
+        int, typer.Option(min=1, max=100_000, help="Seeds for each variation, if the values are not random.")
+    ] = 1,
+    seed: Annotated[
+        int | None, typer.Option(min=1, max=2**32 - 1, help="First seed, instead of the scenario's own.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="New or empty output folder; default: simscen-out/<session id>.")
+    ] = None,
+    resume: Annotated[
+        Path | None, typer.Option(help="Continue in this output folder: run what has no verdict yet or has changed.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("-j", "--jobs", min=1, max=256, help="Number of parallel runs; default: one per core.")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
+    junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
+    format_: FormatOption = Format.TEXT,
+    wall_limit: Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")] = 300.0,
+    stack: Annotated[
+        str | None, typer.Option(metavar="NAME=VALUE", autocompletion=completions.stacks, help=STACK_HELP)
+    ] = None,
+    open_: Annotated[
+        bool, typer.Option("--open", help="Open the report in a browser and update it as runs finish.")
+    ] = False,
+    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
+    world_path: Annotated[
+        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
+    ] = None,
+    replay: Annotated[
+        ReplayMode, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")
+    ] = ReplayMode.FAILED,
+    lenient: Annotated[
+        bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")
+    ] = False,
+) -> None:
+    """Run one scenario many times: how often does it fail, and what makes it fail?
+
+    With random seeds and random values (`sampled`), each run has its own seed and its own values, and `acceptance`
+    states which pass rate must be shown. A sequential claim ends the study as soon as it is decided. With chosen values
+    (`grid`, `pairwise`, `list`, `sobol`), the study shows which of them fail. Results do not depend on the number of
+    parallel runs.
+
+    Exit code 0: the claim holds, or all runs passed if there is no claim; 1: the claim is refuted, or a run failed; 2:
+    an invalid scenario; 3: a run could not be completed; 6: the claim is undecided; 129, 130, and 143: interrupted.
+    """
+    options = SessionOptions(workers or available_cores(), seed, wall_limit=wall_limit, replay=replay)
+    request = StudyRequest(
+        file,
+        runs,
+        repeat,
+        options,
+        root,
+        world_path or [],
+        lenient,
+        stack,
+        out,
+        resume,
+        junit,
+        junit_family,
+        format_,
+        open_,
+    )
+    sys.exit(execute_study(request))

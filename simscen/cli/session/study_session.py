@@ -1,0 +1,281 @@
+"""Session of `simscen study`: draw runs one batch after the other until the claim is decided."""
+
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import count, islice
+from pathlib import Path
+from typing import NamedTuple
+
+from simscen.cli.diagnostics import as_text, escaped, print_text
+from simscen.cli.interrupts import signals_interrupt
+from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
+from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_kept
+from simscen.cli.session.run_session import WARM_PROCESS, output_folder
+from simscen.cli.session.selection import Selection, load_all
+from simscen.cli.session.stacks import commands_of
+from simscen.cli.session.terminal import Format, Screen, screen
+from simscen.core.errors import Exit, InvalidInput, NothingSelected, Problem, UsageError
+from simscen.core.random_streams import LARGEST_SEED
+from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
+from simscen.core.records.study import ClaimStatus
+from simscen.core.version import __version__
+from simscen.judge.study import StudyPlan, evaluate_study
+from simscen.loading.files.discovery import default_root
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.plugins import plugins_of_all
+from simscen.loading.scenario import read_variation_space
+from simscen.loading.variations.conditions import ConditionError
+from simscen.loading.variations.expand import MAX_REJECTED_DRAWS, VariationSpace
+from simscen.loading.variations.naming import number_of
+from simscen.model.acceptance import PassRate
+from simscen.report.journal import Journal
+from simscen.report.journal_reader import PlannedRun
+from simscen.run.process.jobs import Job
+from simscen.run.reproducibility import plugin_packages
+from simscen.run.sessions.output_folder import run_folder
+from simscen.run.sessions.run_session import SessionOptions, run_session
+
+SEQUENTIAL_BATCH = 32
+"""Runs between two looks at a sequential claim. Fixed, so that the runs do not depend on the number of workers."""
+BATCH = 256
+"""Runs of which the scenarios are in memory at once, if there is no sequential claim."""
+
+
+@dataclass(frozen=True)
+class StudyRequest:
+    """Options of `simscen study`; each field has the meaning of the option with its name."""
+
+    file: Path
+    runs: int | None = None
+    repeat: int = 1
+    options: SessionOptions = field(default_factory=SessionOptions)
+    root: Path | None = None
+    world_path: Sequence[Path] = ()
+    lenient: bool = False
+    stack: str | None = None
+    out: Path | None = None
+    resume: Path | None = None
+    junit: Path | None = None
+    junit_family: JunitFamily = JunitFamily.SIMSCEN
+    format_: Format = Format.TEXT
+    open_: bool = False
+
+
+class StudyRun(NamedTuple):
+    """A run: the number of its variation (None without variations), its place in the order of the seeds, from 0, and
+    the number of variations that were drawn until then."""
+
+    number: int | None
+    seed_index: int
+    drawn: int
+
+
+def execute_study(request: StudyRequest) -> Exit:
+    """Run a study and write its reports. Raises InvalidInput and UsageError before any run."""
+    study = _StudySession(request)
+    first = study.load_first_batch()
+    require_writable(request.junit, request.out or request.resume, study.inputs)
+    folder, journal = output_folder(request.out, request.resume)
+    used = {"plugins": plugin_packages(plugins_of_all(first)), "stacks": commands_of(first)}
+    reports = Reports(folder, request.junit, request.junit_family.value, used=used)
+    reports.begin()
+    with screen(request.format_) as output:
+        return output.exit(study.execute(journal, reports, output))
+
+
+class _StudySession:
+    """One study: how its runs are chosen, loaded, and executed in batches."""
+
+    def __init__(self, request: StudyRequest) -> None:
+        self._request = request
+        self._home = request.root if request.root is not None else default_root([request.file])
+        space = read_variation_space(request.file, self._home, request.world_path)
+        self._space = space if space is not None and space.blocks else None
+        self._is_random = self._space is None or self._space.is_random
+        self._loaded: dict[int | None, LoadedScenario] = {}
+        self._text = ""
+        self._claim: PassRate | None = None
+        self._runs: Iterator[StudyRun] = iter(())
+        self._waiting: list[StudyRun] = []
+        self._keys: list[PlannedRun] = []
+        self.total = 0
+        self.inputs: set[Path] = set()
+
+    def load_first_batch(self) -> list[LoadedScenario]:
+        """Load the scenarios of the first runs, and find out how many runs there are. Raises InvalidInput."""
+        request = self._request
+        first_number = None if self._space is None else next(_allowed_numbers(self._space, request.file))
+        scenario = self._load([first_number])[0]
+        acceptance = scenario.spec.acceptance
+        if scenario.spec.skip is not None:
+            raise NothingSelected(f"{scenario.title} is marked with `skip`: {escaped(scenario.spec.skip)}")
+        if acceptance is not None:
+            claim = acceptance.pass_rate
+            self._claim = claim if request.runs is None else claim.model_copy(update={"runs": request.runs})
+        self.total = self._count_runs()
+        self._base_seed = request.options.seed if request.options.seed is not None else scenario.spec.seed
+        seeds = self.total if self._is_random else request.repeat
+        if self._base_seed + seeds - 1 > LARGEST_SEED:
+            raise UsageError(f"{seeds} runs from seed {self._base_seed} on exceed the largest seed, {LARGEST_SEED}")
+        self._runs = islice(self._order(), self.total)
+        self._waiting = list(islice(self._runs, self._batch_size))
+        return self._load([run.number for run in self._waiting])
+
+    def execute(self, journal: Journal, reports: Reports, output: Screen) -> Exit:
+        """Run all batches and write the reports. Returns the exit code."""
+        begun, answers, stopped = time.monotonic(), list[RunFinished](), None
+        invalid: InvalidInput | None = None
+        known = previous_results(journal)
+        title = next(iter(self._loaded.values())).id
+        live = LivePage(reports) if self._request.open_ else None
+
+        def show(event: SessionEvent) -> None:
+            output(event)
+            if live is not None:
+                live(event)
+
+        def listen(event: SessionEvent) -> None:
+            journal(event)
+            show(event)
+
+        workers = self._request.options.workers
+        show(SessionStarted(__version__, self.total, 1, workers, str(reports.folder), (title,)))
+        while self._waiting and stopped is None:
+            jobs = self._jobs(len(answers), reports.folder)
+            left, kept = self._plan(journal, jobs, known)
+            write_kept(journal, kept)
+            for answer in kept:
+                show(answer)
+            with signals_interrupt():
+                done, stopped = run_session(left, self._request.options, WARM_PROCESS, listen)
+            answers += [*kept, *done]
+            journal.complete(answers)
+            if self._is_decided(answers):
+                break
+            self._waiting = list(islice(self._runs, self._batch_size))
+            try:
+                self._load([run.number for run in self._waiting])
+            except InvalidInput as error:  # the values of a later run: report the runs before it
+                invalid = error
+                break
+        study = evaluate_study(self._study_plan(), (answer.result for answer in answers))
+        written = reports.write(answers, None, study)
+        wall = time.monotonic() - begun
+        listen(reports.finished_event(answers, wall, stopped is not None, None, study))
+        written = reports.write_duration(wall) and written and journal.error is None
+        if invalid is not None:
+            raise invalid
+        return stopped or (exit_code(answers, study) if written else Exit.INCOMPLETE)
+
+    @property
+    def _batch_size(self) -> int:
+        return BATCH if self._claim is None or self._claim.method == "fixed" else SEQUENTIAL_BATCH
+
+    def _count_runs(self) -> int:
+        """Return the number of runs; at most, for a sequential claim."""
+        request, space = self._request, self._space
+        if not self._is_random:
+            assert space is not None
+            if request.runs is not None:
+                raise UsageError("--runs is for random seeds and values; these variations are run --repeat times each")
+            return request.repeat * sum(1 for _ in _allowed_numbers(space, self._request.file))
+        if request.repeat != 1:
+            raise UsageError("--repeat is for chosen values; say with --runs how many random runs there are")
+        if self._claim is not None:
+            return self._claim.max_runs
+        if request.runs is not None:
+            return request.runs
+        if space is not None:
+            return space.count
+        raise UsageError("say how many runs there are, with --runs or with `acceptance` in the scenario")
+
+    def _order(self) -> Iterator[StudyRun]:
+        """Yield the runs: random ones with a new seed each, chosen values with the same seeds each."""
+        space = self._space
+        if space is None:
+            yield from (StudyRun(None, index, 0) for index in range(self.total))
+        elif self._is_random:
+            numbers = _allowed_numbers(space, self._request.file)
+            has_conditions = bool(space.blocks[0].conditions)
+            yield from (StudyRun(n, index, n if has_conditions else 0) for index, n in enumerate(numbers))
+        else:
+            for number in _allowed_numbers(space, self._request.file):
+                yield from (StudyRun(number, index, 0) for index in range(self._request.repeat))
+
+    def _load(self, numbers: Sequence[int | None]) -> list[LoadedScenario]:
+        """Load the variations with these numbers, in this order. Raises InvalidInput."""
+        request = self._request
+        names = [f"variation-{number}" for number in dict.fromkeys(numbers) if number is not None]
+        missing = [number for number in dict.fromkeys(numbers) if number not in self._loaded]
+        if missing:
+            found, warnings = load_all(
+                [request.file],
+                request.root,
+                request.world_path,
+                request.lenient,
+                Selection(variations=names),
+                [] if request.stack is None else [request.stack],
+            )
+            if warnings and not self._text:
+                print_text(as_text(warnings), sys.stderr)
+            if self._text not in ("", found[0].text):
+                raise UsageError(f"{request.file} has changed since the study began")
+            self._text = found[0].text
+            self._loaded = {number_of(one.variation) if one.variation else None: one for one in found}
+            self.inputs |= {file for each in found for file in (*each.files.values(), *each.read)}
+        return [self._loaded[number] for number in numbers]
+
+    def _jobs(self, first: int, folder: Path) -> list[Job]:
+        options, jobs = self._request.options, []
+        for index, run in enumerate(self._waiting):
+            scenario = self._loaded[run.number]
+            key = scenario.key(self._base_seed + run.seed_index)
+            jobs.append(Job(first + index, scenario, key, run_folder(folder, key), options.wall_limit, options.replay))
+        return jobs
+
+    def _plan(
+        self, journal: Journal, jobs: Sequence[Job], known: Mapping[PlannedRun, RunFinished]
+    ) -> tuple[list[Job], list[RunFinished]]:
+        """Write the runs of a batch to the journal; return the jobs to execute, and the known results of the others."""
+        planned = plan_runs(jobs)
+        left, kept = divide_runs(jobs, planned, known)
+        is_first = not self._keys
+        self._keys += planned
+        plan = self._study_plan()
+        if is_first:
+            journal.plan(planned, __version__, self._request.options.workers, study=plan)
+        else:
+            journal.add(planned, plan)
+        return left, kept
+
+    def _study_plan(self) -> StudyPlan:
+        values = {run.key: run.varied for run in self._keys if run.varied}
+        drawn = self._waiting[-1].drawn if self._waiting else 0
+        scenario = next(iter(self._loaded.values())).id
+        in_pairs = not self._is_random and self._space is not None
+        return StudyPlan(scenario, self._is_random, self._claim, values, in_pairs, drawn)
+
+    def _is_decided(self, answers: Sequence[RunFinished]) -> bool:
+        if self._claim is None or self._claim.method == "fixed":
+            return False
+        study = evaluate_study(self._study_plan(), (answer.result for answer in answers))
+        return study.claim is not None and study.claim.status is not ClaimStatus.UNDECIDED
+
+
+def _allowed_numbers(space: VariationSpace, file: Path) -> Iterator[int]:
+    """Yield the numbers of all variations that meet the conditions; endlessly for random draws. Raises InvalidInput."""
+    numbers = count(1) if space.is_random else range(1, space.count + 1)
+    rejected, found = 0, False
+    try:
+        for number in numbers:
+            if space.meets_conditions(number):
+                rejected, found = 0, True
+                yield number
+            elif (rejected := rejected + 1) == MAX_REJECTED_DRAWS and space.is_random:
+                raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions in `require`")
+        if not found:
+            raise ConditionError("no variation meets the conditions in `require`")
+    except ConditionError as error:
+        raise InvalidInput([Problem(str(file), 0, 0, "SC016", str(error))]) from error

@@ -1,0 +1,209 @@
+"""Evaluation of a study: claim, pass rates by parameter, effects on margins, and coverage."""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+from simscen.core.records.run_result import Outcome, RunKey, RunResult
+from simscen.core.records.study import ParameterEffect, RateRow, Study
+from simscen.core.statistics import CONFIDENCE, holm, wilson_interval
+from simscen.judge.acceptance import anytime_limits, evaluate_claim, is_counted
+from simscen.model.acceptance import PassRate
+from simscen.spec.quantities import si_number
+
+MIN_RUNS_FOR_EFFECTS = 8
+"""Fewest runs for an effect: with fewer, no rank correlation of one of several parameters is significant."""
+RANGES = 4
+"""Number of ranges, with equal numbers of runs, into which many different numbers are divided."""
+MAX_VALUES = 10
+"""Most different values of a parameter that are listed one by one."""
+
+
+@dataclass(frozen=True)
+class StudyPlan:
+    """What a study is about: how its runs were chosen, and the claim.
+
+    `is_random`: each run has its own seed and its own random values. `values` are the varied values by run, `drawn` is
+    the number of values that were drawn to find those that meet `require`; 0 without conditions.
+    """
+
+    scenario: str
+    is_random: bool
+    claim: PassRate | None = None
+    values: Mapping[RunKey, Mapping[str, Any]] = field(default_factory=dict)
+    is_designed_in_pairs: bool = False
+    drawn: int = 0
+
+
+def evaluate_study(plan: StudyPlan, results: Iterable[RunResult]) -> Study:
+    """Return the result of a study. The order of the results does not matter."""
+    ordered = sorted(results, key=lambda result: (result.key.seed, result.key))
+    counted = [result for result in ordered if is_counted(result)]
+    passed = sum(result.outcome is Outcome.PASSED for result in counted)
+    margins = {result.key: _margins(result) for result in counted}
+    is_fixed = plan.claim is None or plan.claim.method == "fixed"
+    limits = None
+    if counted and plan.is_random:  # a study that stops when it is decided needs limits that hold whenever it stops
+        limits = (
+            wilson_interval(passed, len(counted)) if is_fixed else anytime_limits(passed, len(counted), CONFIDENCE)
+        )
+    return Study(
+        scenario=plan.scenario,
+        is_random=plan.is_random,
+        passed=passed,
+        failed=len(counted) - passed,
+        errors=len(ordered) - len(counted),
+        claim=None if plan.claim is None else evaluate_claim(plan.claim, ordered),
+        limits=limits,
+        rates=tuple(_rates(plan, counted)),
+        effects=_effects(plan, counted, margins),
+        worst=_worst(margins),
+        values={result.key: plan.values[result.key] for result in ordered if result.key in plan.values},
+        coverage=_pair_coverage(plan, counted),
+        accepted=len(ordered) / plan.drawn if plan.drawn else None,
+    )
+
+
+def _margins(result: RunResult) -> dict[str, tuple[float, str]]:
+    """Return the smallest margin of each criterion, with its unit, by the id of the criterion."""
+    found: dict[str, tuple[float, str]] = {}
+    for verdict in result.verdicts:
+        margins = [(one.margin, one.unit) for one in verdict.findings if one.margin is not None]
+        if margins:
+            found[verdict.id] = min(margins)
+    return found
+
+
+def _worst(margins: Mapping[RunKey, Mapping[str, tuple[float, str]]]) -> dict[str, tuple[RunKey, float, str]]:
+    worst: dict[str, tuple[RunKey, float, str]] = {}
+    for key, own in margins.items():
+        for criterion, (margin, unit) in own.items():
+            if criterion not in worst or margin < worst[criterion][1]:
+                worst[criterion] = key, margin, unit
+    return dict(sorted(worst.items()))
+
+
+def _rates(plan: StudyPlan, results: Sequence[RunResult]) -> Iterable[RateRow]:
+    """Yield the pass rate for each value, or range of values, of each parameter.
+
+    There are no limits if the runs are not random, or if their number depends on their outcomes.
+    """
+    has_limits = plan.is_random and (plan.claim is None or plan.claim.method == "fixed")
+    for path in _paths(plan):
+        groups: dict[str, list[bool]] = defaultdict(list)
+        labels = _labels([plan.values.get(result.key, {}).get(path) for result in results])
+        for label, result in zip(labels, results, strict=True):
+            groups[label].append(result.outcome is Outcome.PASSED)
+        for label in dict.fromkeys(sorted(labels, key=_label_order(labels, plan, path, results))):
+            outcomes = groups[label]
+            limits = wilson_interval(sum(outcomes), len(outcomes)) if has_limits else None
+            yield RateRow(path, label, sum(outcomes), len(outcomes), limits)
+
+
+def _label_order(labels: Sequence[str], plan: StudyPlan, path: str, results: Sequence[RunResult]) -> Any:
+    """Return a sort key that orders labels by the smallest value that they stand for."""
+    least: dict[str, tuple[int, float, str]] = {}
+    for label, result in zip(labels, results, strict=True):
+        value = si_number(plan.values.get(result.key, {}).get(path))
+        rank = (0, float(value), "") if _is_number(value) else (1, 0.0, label)
+        least[label] = min(least.get(label, rank), rank)
+    return lambda label: least[label]
+
+
+def _labels(values: Sequence[Any]) -> list[str]:
+    """Return for each value its text, or its range if there are many different numbers."""
+    texts = [value_text(value) for value in values]
+    numbers = [si_number(value) for value in values]
+    if len(set(texts)) <= MAX_VALUES or not all(map(_is_number, numbers)):
+        return texts
+    order = sorted(range(len(numbers)), key=numbers.__getitem__)
+    labels = [""] * len(numbers)
+    size = math.ceil(len(numbers) / RANGES)
+    for start in range(0, len(order), size):
+        part = order[start : start + size]
+        for index in part:
+            labels[index] = f"{texts[part[0]]} … {texts[part[-1]]}"
+    return labels
+
+
+def value_text(value: Any) -> str:
+    """Return a value of a parameter in one line."""
+    match value:
+        case None:
+            return "unchanged"
+        case bool():
+            return "true" if value else "false"
+        case float():
+            return f"{value:.6g}"
+        case dict():
+            return ", ".join(f"{key}: {value_text(each)}" for key, each in value.items())
+        case list():
+            return ", ".join(map(value_text, value))
+    return str(value)
+
+
+def _effects(
+    plan: StudyPlan, results: Sequence[RunResult], margins: Mapping[RunKey, Mapping[str, tuple[float, str]]]
+) -> tuple[ParameterEffect, ...]:
+    """Return the effects of all parameters on all margins, strongest first, with corrected p-values."""
+    found = []
+    for path in _paths(plan):
+        for criterion in sorted({criterion for own in margins.values() for criterion in own}):
+            having = [result.key for result in results if criterion in margins[result.key]]
+            values = [plan.values.get(key, {}).get(path) for key in having]
+            effect = _effect(values, [margins[key][criterion][0] for key in having])
+            if effect is not None:
+                found.append(ParameterEffect(path, criterion, *effect[:2], len(having), effect[2]))
+    adjusted = holm([one.p for one in found])
+    effects = [
+        ParameterEffect(one.path, one.criterion, one.effect, p, one.runs, one.is_ordered)
+        for one, p in zip(found, adjusted, strict=True)
+    ]
+    return tuple(sorted(effects, key=lambda one: (one.p, -abs(one.effect), one.path, one.criterion)))
+
+
+def _effect(values: Sequence[Any], margins: Sequence[float]) -> tuple[float, float, bool] | None:
+    """Return effect, p-value, and whether the values are ordered; None if nothing can be said.
+
+    Numbers: Spearman's rank correlation. Other values: the Kruskal-Wallis test, with epsilon squared as its effect.
+    """
+    texts = [value_text(value) for value in values]
+    if len(margins) < MIN_RUNS_FOR_EFFECTS or len(set(texts)) < 2 or len(set(margins)) < 2:
+        return None
+    from scipy import stats  # the import takes half a second
+
+    numbers = [si_number(value) for value in values]
+    if all(map(_is_number, numbers)):
+        found = stats.spearmanr(numbers, margins)
+        return float(found.statistic), float(found.pvalue), True
+    groups: dict[str, list[float]] = defaultdict(list)
+    for text, margin in zip(texts, margins, strict=True):
+        groups[text].append(margin)
+    if len(groups) >= len(margins) / 2:
+        return None
+    statistic, p_value = stats.kruskal(*groups.values())
+    return float(statistic) / (len(margins) - 1), float(p_value), False
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _paths(plan: StudyPlan) -> list[str]:
+    return list(dict.fromkeys(path for values in plan.values.values() for path in values))
+
+
+def _pair_coverage(plan: StudyPlan, results: Sequence[RunResult]) -> float | None:
+    """Return the share of the pairs of values of two parameters that occurred; None for random values."""
+    paths = _paths(plan)
+    if not plan.is_designed_in_pairs or len(paths) < 2:
+        return None
+    rows = [[value_text(plan.values[result.key].get(path)) for path in paths] for result in results]
+    everything = [[value_text(values.get(path)) for path in paths] for values in plan.values.values()]
+    counts = [len({row[index] for row in everything}) for index in range(len(paths))]
+    possible = sum(counts[a] * counts[b] for a, b in combinations(range(len(paths)), 2))
+    seen = {(a, row[a], b, row[b]) for row in rows for a, b in combinations(range(len(paths)), 2)}
+    return len(seen) / possible

@@ -1,0 +1,246 @@
+"""Axes of a block of variations: options that are combined with those of the other axes."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations, product
+from typing import TYPE_CHECKING, overload
+
+from simscen.core.errors import Problem
+from simscen.loading.schema.messages import quoted
+from simscen.loading.variations.conditions import Condition
+from simscen.loading.variations.naming import NAME_HINT, name_error
+from simscen.loading.variations.paths import PathError, Target, resolve_path
+from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, child, node_at
+
+if TYPE_CHECKING:  # most scenarios have no variations
+    from simscen.model.variations import Sampled, VariationBlock
+
+
+@dataclass(frozen=True)
+class Change:
+    """Value for a path; `number` counts the values of the path from 1."""
+
+    target: Target
+    value: Node
+    number: int
+
+
+@dataclass(frozen=True)
+class Option:
+    """Changes that belong together, and their name if the author gave one."""
+
+    changes: tuple[Change, ...]
+    name: str = ""
+
+
+class RandomOptions(Sequence[Option]):
+    """Options of `sampled` with random values, which are drawn when they are asked for.
+
+    Its length is the `count`, but an index may exceed it.
+    """
+
+    def __init__(self, sampled: "Sampled", ranges: MappingNode, targets: Sequence[Target]) -> None:
+        self._sampled, self._ranges, self._targets = sampled, ranges, targets
+
+    def __len__(self) -> int:
+        return self._sampled.count
+
+    @overload
+    def __getitem__(self, index: int) -> Option: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Option]: ...
+    def __getitem__(self, index: int | slice) -> Option | list[Option]:
+        if isinstance(index, slice):
+            return [self[each] for each in range(*index.indices(len(self)))]
+        from simscen.loading.variations.sampling import draw_value
+
+        drawn = [(target, draw_value(self._sampled, target.path, index)) for target in self._targets]
+        return Option(
+            tuple(
+                Change(target, value_node(self._ranges.entries[target.path].value, value), index + 1)
+                for target, value in drawn
+            )
+        )
+
+    def __iter__(self) -> Iterator[Option]:
+        return (self[index] for index in range(len(self)))
+
+
+def value_node(distribution: Node, value: object) -> Node:
+    """Return the node of a drawn value: one of the choices, or a new one at the place of its distribution."""
+    from simscen.loading.variations.sampling import Pick
+
+    if isinstance(value, Pick):
+        chosen = node_at(distribution, ("choice", value.number))
+        assert chosen is not None
+        return chosen
+    assert isinstance(value, str | int | float)
+    return ScalarNode(distribution.place, value)
+
+
+@dataclass
+class AxisBuilder:
+    """Builds the axes of blocks for `tree`; collects problems and the targets of all paths."""
+
+    tree: MappingNode
+    problems: list[Problem] = field(default_factory=list)
+    targets: dict[str, Target] = field(default_factory=dict)
+    _names: dict[str, Position] = field(default_factory=dict)
+
+    def axes(self, block: "VariationBlock", node: Node, conditions: Sequence[Condition]) -> list[Sequence[Option]]:
+        """Return the axes whose options are combined: each path of a grid, and each other kind as a whole."""
+        found: list[Sequence[Option]] = [
+            [Option((change,)) for change in changes] for changes in self._columns(child(node, "grid"), True)
+        ]
+        if block.pairwise is not None:
+            found.append(self._pairwise(child(node, "pairwise"), conditions))
+        if block.pairs is not None:
+            found.append(self._pairs(child(node, "pairs")))
+        if block.list_ is not None:
+            found.append(self._list(child(node, "list")))
+        if block.sampled is not None:
+            found.append(self._sampled(block.sampled, node_at(node, ("sampled", "values"))))
+        self._require_apart(found)
+        return found
+
+    def _columns(self, node: Node | None, distinct: bool) -> list[list[Change]]:
+        """Return the changes of each path."""
+        if not isinstance(node, MappingNode):
+            return []
+        found = []
+        for path, entry in node.entries.items():
+            assert isinstance(entry.value, SequenceNode)
+            if distinct:
+                self._refuse_equal(entry.value)
+            if (target := self._target(path, entry)) is not None:
+                found.append([Change(target, value, n) for n, value in enumerate(entry.value.items, start=1)])
+        return found
+
+    def _pairwise(self, node: Node | None, conditions: Sequence[Condition]) -> list[Option]:
+        from simscen.loading.variations.pairwise import Row, covering_array
+        from simscen.loading.variations.requirements import all_hold, plain_values
+
+        columns = self._columns(node, True)
+        if self.problems or not columns:
+            return []
+
+        def option(row: Row) -> Option:
+            return Option(tuple(column[value] for column, value in zip(columns, row, strict=True)))
+
+        paths = {column[0].target.path for column in columns}
+        own = [one for one in conditions if paths.issuperset(set(one.paths) & set(self.targets))]
+
+        def is_allowed(row: Row) -> bool:
+            return all_hold(own, plain_values(self.tree, own, option(row).changes))
+
+        return [option(row) for row in covering_array([len(column) for column in columns], is_allowed)]
+
+    def _pairs(self, node: Node | None) -> list[Option]:
+        assert isinstance(node, MappingNode)
+        lengths = {
+            path: len(entry.value.items)
+            for path, entry in node.entries.items()
+            if isinstance(entry.value, SequenceNode)
+        }
+        first, *others = lengths
+        for path in others:
+            if lengths[path] != lengths[first]:
+                message = f"{quoted(path)} has {lengths[path]} values, {quoted(first)} has {lengths[first]}"
+                hint = "the lists of `pairs` must have the same length"
+                self.add(node.entries[path].value.place, "SC016", message, hint)
+                return []
+        return [Option(changes) for changes in zip(*self._columns(node, False), strict=True)]
+
+    def _list(self, node: Node | None) -> list[Option]:
+        assert isinstance(node, SequenceNode)
+        found = []
+        for number, item in enumerate(node.items, start=1):
+            assert isinstance(item, MappingNode)
+            name = self._given_name(item)
+            entries = [(path, entry) for path, entry in item.entries.items() if path != "name"]
+            if not entries:
+                self.add(item.place, "SC010", "this variation changes nothing", "add a path and its value")
+            targets = [(self._target(path, entry), entry) for path, entry in entries]
+            changes = [Change(target, entry.value, number) for target, entry in targets if target is not None]
+            self._require_apart([[Option((change,))] for change in changes])
+            found.append(Option(tuple(changes), name))
+        return found
+
+    def _given_name(self, item: MappingNode) -> str:
+        entry = item.entries.get("name")
+        if entry is None:
+            return ""
+        place, value = entry.value.place, entry.value.plain
+        name = value if isinstance(value, str) else str(value) if isinstance(value, int | float) else ""
+        if (flaw := name_error(name)) is not None:
+            self.add(place, "SC017", flaw, NAME_HINT)
+        first = self._names.setdefault(name.casefold(), place)
+        if first != place:
+            self.add(place, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")
+        return name
+
+    def _sampled(self, sampled: "Sampled", node: Node | None) -> Sequence[Option]:
+        from simscen.loading.variations.sampling import draw_value, draw_values
+
+        assert isinstance(node, MappingNode)
+        targets = []
+        for path, entry in node.entries.items():
+            target = self._target(path, entry)
+            try:
+                draw_value(sampled, path, 0)
+            except ValueError as error:
+                self.add(entry.value.place, "SC016", str(error))
+                continue
+            if target is not None:
+                targets.append(target)
+        if sampled.method == "random":
+            return RandomOptions(sampled, node, targets)
+        columns = [
+            [
+                Change(target, value_node(node.entries[target.path].value, value), number)
+                for number, value in enumerate(draw_values(sampled, target.path), start=1)
+            ]
+            for target in targets
+        ]
+        return [Option(changes) for changes in zip(*columns, strict=True)]
+
+    def _target(self, path: str, entry: Entry) -> Target | None:
+        try:
+            target = resolve_path(path, entry.key, self.tree)
+        except PathError as error:
+            self.add(entry.key, "SC030", str(error), error.hint)
+            return None
+        self.targets.setdefault(path, target)
+        return target
+
+    def _refuse_equal(self, items: SequenceNode) -> None:
+        seen: list[object] = []
+        for item in items.items:
+            if item.plain in seen:
+                self.add(item.place, "SC054", "this value is listed twice", "remove one of them")
+            seen.append(item.plain)
+
+    def _require_apart(self, axes: Sequence[Sequence[Option]]) -> None:
+        """Report axes that change the same value, or a part of each other's values."""
+        targets = [
+            {change.target.path: change.target for option in typical_options(axis) for change in option.changes}
+            for axis in axes
+        ]
+        for above, below in combinations(targets, 2):
+            for one, other in product(above.values(), below.values()):
+                shorter = min(len(one.keys), len(other.keys))
+                if one.keys[:shorter] == other.keys[:shorter]:
+                    same = len(one.keys) == len(other.keys)
+                    what = "change the same value" if same else "overlap: one is part of the other"
+                    self.add(other.place, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
+
+    def add(self, place: Position, code: str, message: str, hint: str = "") -> None:
+        """Add a problem once."""
+        problem = Problem(*place, code=code, message=message, hint=hint)
+        if problem not in self.problems:
+            self.problems.append(problem)
+
+
+def typical_options(axis: Sequence[Option]) -> Sequence[Option]:
+    """Return options with all targets of the axis: all, or the first one of random options."""
+    return axis[:1] if isinstance(axis, RandomOptions) else axis

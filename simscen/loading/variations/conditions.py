@@ -1,0 +1,132 @@
+"""Conditions on varied values (`require:`): comparisons of paths, numbers with units, and texts."""
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from simscen.core.geometry import wrap
+from simscen.spec.quantities import si_number
+
+_COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
+    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
+    ast.Eq: operator.eq, ast.NotEq: operator.ne,
+}  # fmt: skip
+_OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+}  # fmt: skip
+_FUNCTIONS: dict[str, Callable[..., float]] = {"abs": abs, "min": min, "max": max, "hypot": math.hypot, "wrap": wrap}
+VALUE = "value"
+"""Function that takes a path as text, for paths that are no names in Python: `value('pass.clearance.min')`."""
+GRAMMAR = (
+    "comparisons such as `goals[0].pose.x > robot.pose.x + 1` with and, or, not, + - * /, abs, min, max, hypot, wrap; "
+    "quantities in quotes: '50 cm'; value('pass.clearance.min') for paths with words of Python"
+)
+
+
+class ConditionError(ValueError):
+    """A condition cannot be read, or cannot be evaluated with the values of a variation."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A condition as written, and the paths that it refers to."""
+
+    text: str
+    expression: ast.expr
+    paths: tuple[str, ...]
+
+    def holds(self, values: Mapping[str, Any]) -> bool:
+        """Return whether it holds for these values, by path. Numbers count in SI units. Raises ConditionError."""
+        try:
+            result = _evaluate(self.expression, values)
+        except (TypeError, ZeroDivisionError, OverflowError) as error:
+            raise ConditionError(f"`{self.text}` cannot be evaluated: {error}") from error
+        if not isinstance(result, bool):
+            raise ConditionError(f"`{self.text}` is {result!r} instead of true or false")
+        return result
+
+
+def parse_condition(text: str) -> Condition:
+    """Read a condition. Raises ConditionError."""
+    try:
+        expression = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        raise ConditionError(f"`{text}` is not a condition") from None
+    paths: dict[str, None] = {}
+    _check(expression, text, paths)
+    return Condition(text, expression, tuple(paths))
+
+
+def _check(node: ast.expr, text: str, paths: dict[str, None]) -> None:
+    """Collect the paths of an expression. Raises ConditionError for anything that conditions do not have."""
+    match node:
+        case ast.BoolOp(values=parts):
+            pass
+        case ast.UnaryOp(op=ast.Not() | ast.USub(), operand=operand):
+            parts = [operand]
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+            parts = [left, right]
+        case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in _COMPARISONS for op in ops):
+            parts = [left, *others]
+        case ast.Constant(value=bool() | int() | float() | str()):
+            parts = []
+        case ast.Call(func=ast.Name(id=name), args=parts, keywords=[]) if name in _FUNCTIONS and parts:
+            pass
+        case ast.Call(func=ast.Name(id="value"), args=[ast.Constant(value=str(path))], keywords=[]):
+            paths[path] = None
+            parts = []
+        case ast.Name() | ast.Attribute() | ast.Subscript():
+            paths[_path(node, text)] = None
+            parts = []
+        case _:
+            raise ConditionError(f"`{ast.unparse(node)}` cannot be used in a condition")
+    for part in parts:
+        _check(part, text, paths)
+
+
+def _path(node: ast.expr, text: str) -> str:
+    """Return the path that an expression such as `goals[0].pose.x` spells."""
+    match node:
+        case ast.Name(id=name):
+            return name
+        case ast.Attribute(value=owner, attr=name):
+            return f"{_path(owner, text)}.{name}"
+        case ast.Subscript(value=owner, slice=ast.Constant(value=int(index))) if index >= 0:
+            return f"{_path(owner, text)}[{index}]"
+        case ast.Subscript(value=owner, slice=ast.Constant(value=str(name))):
+            return f'{_path(owner, text)}["{name}"]'
+    raise ConditionError(f"`{ast.unparse(node)}` in `{text}` is not a path")
+
+
+def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
+    match node:
+        case ast.BoolOp(op=ast.And(), values=parts):
+            return all(_truth(part, values) for part in parts)
+        case ast.BoolOp(values=parts):
+            return any(_truth(part, values) for part in parts)
+        case ast.UnaryOp(op=ast.Not(), operand=operand):
+            return not _truth(operand, values)
+        case ast.UnaryOp(operand=operand):
+            return -_evaluate(operand, values)
+        case ast.BinOp(left=left, op=op, right=right):
+            return _OPERATORS[type(op)](_evaluate(left, values), _evaluate(right, values))
+        case ast.Compare(left=left, ops=ops, comparators=others):
+            numbers = [_evaluate(part, values) for part in (left, *others)]
+            return all(_COMPARISONS[type(op)](a, b) for op, a, b in zip(ops, numbers, numbers[1:], strict=False))
+        case ast.Constant(value=value):
+            return si_number(value)
+        case ast.Call(func=ast.Name(id="value"), args=[ast.Constant(value=str(path))]):
+            return si_number(values[path])
+        case ast.Call(func=ast.Name(id=name), args=parts):
+            return _FUNCTIONS[name](*[_evaluate(part, values) for part in parts])
+    return si_number(values[_path(node, "")])
+
+
+def _truth(node: ast.expr, values: Mapping[str, Any]) -> bool:
+    result = _evaluate(node, values)
+    if not isinstance(result, bool):
+        raise TypeError(f"`{ast.unparse(node)}` is {result!r} instead of true or false")
+    return result

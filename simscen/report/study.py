@@ -1,0 +1,171 @@
+"""Result of a study in words and as console lines."""
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+from simscen.core.records.study import ClaimResult, ClaimStatus, ParameterEffect, RateRow, Study
+from simscen.report.display_text import one_line
+from simscen.report.styled_line import Role, StyledLine, StyledText
+
+MAX_ROWS = 60
+"""Maximum number of rows of pass rates to list."""
+MAX_EFFECTS = 10
+"""Maximum number of significant effects to list."""
+SIGNIFICANCE_LEVEL = 0.05
+CLAIM_ROLES: dict[ClaimStatus, Role] = {
+    ClaimStatus.HELD: "good",
+    ClaimStatus.REFUTED: "bad",
+    ClaimStatus.UNDECIDED: "warning",
+    ClaimStatus.BLOCKED: "bad",
+}
+
+
+def study_lines(study: Study) -> Iterator[StyledLine]:
+    """Yield pass rates by parameter, effects, smallest margins, and at last the pass rate and the claim."""
+    yield from _rate_table(study.rates)
+    yield from _effect_table(study)
+    yield from _worst_margins(study)
+    yield ()
+    yield (StyledText(pass_rate_text(study)),)
+    for text in notes(study):
+        yield (StyledText(text, "quiet"),)
+    if study.claim is not None:
+        yield (StyledText(claim_text(study.claim), CLAIM_ROLES[study.claim.status]),)
+
+
+def pass_rate_text(study: Study) -> str:
+    """Return the pass rate of all runs, with its interval if the runs are random."""
+    runs = study.passed + study.failed
+    text = f"study of {one_line(study.scenario)}: {study.passed} of {runs_text(runs)} passed"
+    if runs:
+        text += f" ({100 * study.passed / runs:.1f} %{interval_text(study.limits)})"
+    return text + (f", {runs_text(study.errors)} could not be completed" if study.errors else "")
+
+
+def notes(study: Study) -> list[str]:
+    """Return what else must be known to read the pass rate."""
+    texts = []
+    if not study.is_random:
+        texts.append(
+            "the values were chosen, not drawn at random: the pass rate is that of these values, and has no interval"
+        )
+    if study.coverage is not None:
+        texts.append(f"{100 * study.coverage:.1f} % of the pairs of values of two parameters occurred in a run")
+    if study.accepted is not None:
+        texts.append(f"{100 * study.accepted:.1f} % of the drawn values meet the conditions in `require`")
+    return texts
+
+
+def claim_title(claim: ClaimResult) -> str:
+    """Return the claim in a few words: "pass rate >= 95 % (confidence 95 %)"."""
+    return f"pass rate >= {claim.min_rate:.6g} (confidence {claim.confidence:.6g})"
+
+
+def claim_text(claim: ClaimResult) -> str:
+    """Return the claim and its result in one sentence."""
+    about = f"claim: pass rate of at least {_percent(claim.min_rate)} with {_percent(claim.confidence)} confidence"
+    runs = f"{claim.passed} of {runs_text(claim.runs)} passed{limits_text(claim)}"
+    match claim.status:
+        case ClaimStatus.HELD:
+            return f"{about}: held, {runs}"
+        case ClaimStatus.REFUTED:
+            return f"{about}: refuted, {runs}"
+        case ClaimStatus.UNDECIDED:
+            return f"{about}: undecided, {runs}; {undecided_hint(claim)}"
+        case ClaimStatus.BLOCKED:
+            return f"{about}: open, because {runs_text(claim.errors)} could not be completed; {runs}"
+
+
+def undecided_hint(claim: ClaimResult) -> str:
+    """Return what can be done about an undecided claim."""
+    if claim.runs < claim.max_runs:
+        return f"{claim.max_runs} are needed"
+    return "more `runs` may decide it"
+
+
+def limits_text(claim: ClaimResult) -> str:
+    """Return the confidence limits of a claim, or ""."""
+    if claim.limits is None:
+        return ""
+    low, high = claim.limits
+    return f", which shows a rate of {100 * low:.2f} … {100 * high:.2f} %"
+
+
+def interval_text(limits: tuple[float, float] | None) -> str:
+    """Return ", 95 % interval 94 … 100 %", or "" without limits."""
+    return "" if limits is None else f", 95 % interval {100 * limits[0]:.1f} … {100 * limits[1]:.1f} %"
+
+
+def runs_text(number: int) -> str:
+    """Return "1 run" or "3 runs"."""
+    return f"{number} run" if number == 1 else f"{number} runs"
+
+
+def effect_text(effect: ParameterEffect) -> str:
+    """Return what a larger value of a parameter does, or that values differ."""
+    if not effect.is_ordered:
+        return "the margin depends on the value"
+    return "a larger value lowers the margin" if effect.effect < 0 else "a larger value raises the margin"
+
+
+def significant_effects(study: Study) -> Sequence[ParameterEffect]:
+    """Return the effects that are significant after the correction for the number of tests."""
+    return [effect for effect in study.effects if effect.p <= SIGNIFICANCE_LEVEL]
+
+
+def _rate_table(rates: Sequence[RateRow]) -> Iterator[StyledLine]:
+    if not rates:
+        return
+    shown = rates[:MAX_ROWS]
+    width = max(len(row.value) for row in shown)
+    yield ()
+    yield (StyledText("pass rate by parameter"),)
+    for path, rows in groupby(shown, key=lambda row: row.path):
+        yield (StyledText(f"  {one_line(path)}", "name"),)
+        for row in rows:
+            rate = f"{row.passed} of {row.runs}"
+            limits = "" if row.limits is None else f"   {100 * row.limits[0]:.0f} … {100 * row.limits[1]:.0f} %"
+            role: Role = "plain" if row.passed == row.runs else "bad"
+            yield StyledText(f"    {one_line(row.value):{width}}   "), StyledText(f"{rate:>12}{limits}", role)
+    if len(rates) > MAX_ROWS:
+        yield (StyledText(f"    … {len(rates) - MAX_ROWS} more in results.json", "quiet"),)
+
+
+def _effect_table(study: Study) -> Iterator[StyledLine]:
+    if not study.effects:
+        return
+    yield ()
+    effects = significant_effects(study)
+    if not effects:
+        tests = f"{len(study.effects)} pairs of parameter and margin"
+        yield (StyledText(f"no parameter has a significant effect on a margin ({tests} tested)", "quiet"),)
+        return
+    yield (StyledText("effects on margins (rank correlation; p corrected for the number of tests)"),)
+    names = [f"{one_line(effect.path)} on {one_line(effect.criterion)}" for effect in effects[:MAX_EFFECTS]]
+    width = max(map(len, names))
+    for name, effect in zip(names, effects, strict=False):
+        size = f"{effect.effect:+.2f}" if effect.is_ordered else f"{effect.effect:.2f} (epsilon squared)"
+        yield (
+            StyledText(f"  {name:{width}}   "),
+            StyledText(f"{size}   p = {effect.p:.1g}   {effect_text(effect)}", "quiet"),
+        )
+
+
+def _worst_margins(study: Study) -> Iterator[StyledLine]:
+    if not study.worst:
+        return
+    yield ()
+    yield (StyledText("smallest margins"),)
+    width = max(map(len, study.worst))
+    for criterion, (key, margin, unit) in study.worst.items():
+        number = f"{margin:+.3g} {unit}".rstrip()
+        run = f"{key.variation}, seed {key.seed}" if key.variation else f"seed {key.seed}"
+        yield (
+            StyledText(f"  {criterion:{width}}   "),
+            StyledText(f"{number:12}", "bad" if margin < 0 else "plain"),
+            StyledText(f" {one_line(run)}", "quiet"),
+        )
+
+
+def _percent(rate: float) -> str:
+    return f"{100 * rate:.6g} %"
