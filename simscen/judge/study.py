@@ -193,7 +193,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _paths(plan: StudyPlan) -> list[str]:
-    return list(dict.fromkeys(path for values in plan.values.values() for path in values))
+    return sorted({path for values in plan.values.values() for path in values})
 
 
 def _pair_coverage(plan: StudyPlan, results: Sequence[RunResult]) -> float | None:

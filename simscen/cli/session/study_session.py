@@ -99,7 +99,8 @@ class _StudySession:
         self._claim: PassRate | None = None
         self._runs: Iterator[StudyRun] = iter(())
         self._waiting: list[StudyRun] = []
-        self._keys: list[PlannedRun] = []
+        self._planned: list[PlannedRun] = []
+        self._drawn = 0
         self.total = 0
         self.inputs: set[Path] = set()
 
@@ -241,8 +242,9 @@ class _StudySession:
         """Write the runs of a batch to the journal; return the jobs to execute, and the known results of the others."""
         planned = plan_runs(jobs)
         left, kept = divide_runs(jobs, planned, known)
-        is_first = not self._keys
-        self._keys += planned
+        is_first = not self._planned
+        self._planned += planned
+        self._drawn = self._waiting[-1].drawn
         plan = self._study_plan()
         if is_first:
             journal.plan(planned, __version__, self._request.options.workers, study=plan)
@@ -251,11 +253,10 @@ class _StudySession:
         return left, kept
 
     def _study_plan(self) -> StudyPlan:
-        values = {run.key: run.varied for run in self._keys if run.varied}
-        drawn = self._waiting[-1].drawn if self._waiting else 0
+        values = {run.key: run.varied for run in self._planned if run.varied}
         scenario = next(iter(self._loaded.values())).id
         in_pairs = not self._is_random and self._space is not None
-        return StudyPlan(scenario, self._is_random, self._claim, values, in_pairs, drawn)
+        return StudyPlan(scenario, self._is_random, self._claim, values, in_pairs, self._drawn)
 
     def _is_decided(self, answers: Sequence[RunFinished]) -> bool:
         if self._claim is None or self._claim.method == "fixed":

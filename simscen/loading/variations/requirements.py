@@ -22,8 +22,8 @@ def read_conditions(node: Node | None, builder: AxisBuilder) -> list[Condition]:
 
 
 def check_paths(conditions: Sequence[Condition], node: Node | None, builder: AxisBuilder) -> None:
-    """Report paths of conditions that are neither varied nor written in the scenario."""
-    if not isinstance(node, SequenceNode):
+    """Report paths of conditions that are neither varied nor written in the scenario, if all could be read."""
+    if not isinstance(node, SequenceNode) or len(conditions) < len(node.items):
         return
     for condition, item in zip(conditions, node.items, strict=True):
         for path in condition.paths:

@@ -1,0 +1,185 @@
+"""`simscen study`: claims and parameters of a scenario whose margin is known in closed form.
+
+The robot stands `x` from the wall behind it, and the criterion needs 1 m of clearance.
+"""
+
+import json
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+WORLD = "{simscen: 1, walls: [{points: [[0, 0], [20, 0], [20, 20], [0, 20], [0, 0]]}]}"
+SCENARIO = f"""\
+simscen: 1
+world: {WORLD}
+robot: {{pose: {{x: 1, y: 10}}}}
+goals: []
+time_limit: 50 ms
+pass: [{{clearance: {{min: 1 m}}}}]
+"""
+RANDOM = """\
+variations:
+  sampled:
+    count: 40
+    values:
+      robot.pose.x: {uniform: [0.8 m, 2 m]}
+      robot.motor_torque: {uniform: [0.5, 1]}
+"""
+
+
+def study(folder: Path, text: str, *options: object) -> subprocess.CompletedProcess[str]:
+    """Run a study of this scenario in a process of its own, because a session locks its folder."""
+    (folder / "s.study.yaml").write_text(text)
+    command = [sys.executable, "-m", "simscen", "study", "s.study.yaml", *map(str, options)]
+    return subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
+
+
+def results(folder: Path, name: str = "out") -> Any:
+    return json.loads((folder / name / "results.json").read_text())
+
+
+def case(folder: Path) -> ET.Element:
+    found = ET.parse(folder / "out/junit.xml").find("testsuite/testcase")
+    assert found is not None
+    return found
+
+
+def test_a_study_finds_what_lowers_the_margin(tmp_path: Path) -> None:
+    done = study(tmp_path, SCENARIO + RANDOM, "--out", "out")
+    assert done.returncode == 1, done.stderr
+    found = results(tmp_path)["study"]
+    xs = [float(each["values"]["robot.pose.x"].removesuffix(" m")) for each in found["values"]]
+    radius = 0.22 + 0.05  # of the robot, and half of the wall
+    assert found["passed"] == pytest.approx(sum(x - radius >= 1.0 for x in xs), abs=1)  # it moves while it settles
+    assert found["passed"] + found["failed"] == 40
+    assert [each["seed"] for each in found["values"]] == [
+        int(each["variation"].removeprefix("variation-")) for each in found["values"]
+    ]
+    strongest, *others = found["effects"]
+    assert (strongest["path"], strongest["criterion"]) == ("robot.pose.x", "clearance")
+    assert strongest["effect"] == pytest.approx(1.0)
+    assert strongest["p"] < 1e-6
+    assert all(other["p"] > 0.05 for other in others)
+    rates = [row["passed"] / row["runs"] for row in found["rates"] if row["path"] == "robot.pose.x"]
+    assert rates == sorted(rates)
+    assert rates[-1] == 1.0
+    worst = found["worst"]["clearance"]
+    assert worst["margin"] == pytest.approx(min(xs) - radius - 1.0, abs=2e-3)
+    assert "robot.pose.x on clearance   +1.00" in done.stdout
+    page = (tmp_path / "out/report.html").read_text()
+    assert "margin of clearance against robot.pose.x" in page
+    assert page.count('<circle class="bad"') == 2 * found["failed"]
+    assert 'href="runs/s/' in page
+
+
+def test_results_do_not_depend_on_the_number_of_workers_or_on_batches(tmp_path: Path) -> None:
+    text = SCENARIO + RANDOM + "acceptance: {pass_rate: {min: 50 %, method: anytime, runs: 70}}\n"
+    for workers in (1, 2):
+        study(tmp_path, text, "--out", f"out{workers}", "-j", workers)
+    assert (tmp_path / "out1/results.json").read_bytes() == (tmp_path / "out2/results.json").read_bytes()
+    reported = subprocess.run(
+        [sys.executable, "-m", "simscen", "report", "out1"], cwd=tmp_path, check=False, capture_output=True
+    )
+    assert reported.returncode in (0, 6)
+    assert (tmp_path / "out1/results.json").read_bytes() == (tmp_path / "out2/results.json").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("x", "claim", "code", "status", "element"),
+    [
+        ("2 m", "{min: 80 %}", 0, "held", "system-out"),
+        ("1 m", "{min: 80 %}", 1, "refuted", "failure"),
+        ("1 m", "{min: 80 %, method: sprt, target: 90 %}", 1, "refuted", "failure"),
+        ("2 m", "{min: 80 %, runs: 5}", 6, "undecided", "error"),
+    ],
+)
+def test_a_claim_has_its_own_exit_code_and_testcase(
+    tmp_path: Path, x: str, claim: str, code: int, status: str, element: str
+) -> None:
+    text = SCENARIO.replace("{x: 1,", f"{{x: {x},") + f"acceptance: {{pass_rate: {claim}}}\n"
+    done = study(tmp_path, text, "--out", "out")
+    assert done.returncode == code, done.stderr
+    assert results(tmp_path)["study"]["claim"]["status"] == status
+    told = case(tmp_path)
+    assert told.get("name", "").startswith("s [pass rate >= 0.8 (confidence 0.95)]")
+    assert [child.tag for child in told] == [element]
+    if element == "error":
+        assert told[0].get("type") == "simscen.undecided"
+    assert f"claim: pass rate of at least 80 % with 95 % confidence: {status}" in done.stdout
+
+
+def test_a_sequential_claim_stops_early_and_can_be_resumed(tmp_path: Path) -> None:
+    text = SCENARIO.replace("{x: 1,", "{x: 2,") + "acceptance: {pass_rate: {min: 80 %, method: anytime, runs: 500}}\n"
+    assert study(tmp_path, text, "--out", "out").returncode == 0
+    found = results(tmp_path)
+    assert found["total"] == 32
+    assert found["study"]["claim"]["runs"] < 32
+    again = study(tmp_path, text, "--resume", "out")
+    assert again.returncode == 0
+    assert all(run["resumed"] for run in results(tmp_path)["runs"])
+    assert results(tmp_path)["study"] == found["study"]
+
+
+def test_chosen_values_have_no_interval_and_carry_no_claim(tmp_path: Path) -> None:
+    pairwise = (
+        "variations: {pairwise: {robot.pose.x: [1 m, 2 m, 3 m], robot.pose.y: [9, 10, 11], "
+        "robot.motor_torque: [0.8, 0.9, 1]}}\n"
+    )
+    done = study(tmp_path, SCENARIO + pairwise, "--out", "out", "--repeat", 2)
+    assert done.returncode == 1, done.stderr
+    found = results(tmp_path)["study"]
+    assert found["sampling"] == "designed"
+    assert found["interval"] is None
+    assert found["pair_coverage"] == 1.0
+    assert found["passed"] + found["failed"] == 20
+    assert "the values were chosen" in done.stdout
+    claimed = study(tmp_path, SCENARIO + pairwise + "acceptance: {pass_rate: {min: 80 %}}\n")
+    assert claimed.returncode == 2
+    assert "not independent random draws" in claimed.stderr
+
+
+def test_conditions_are_met_and_their_share_is_reported(tmp_path: Path) -> None:
+    text = SCENARIO + RANDOM + "  require: ['robot.pose.x > 1.4']\n"
+    done = study(tmp_path, text, "--out", "out")
+    assert done.returncode == 0, done.stderr
+    found = results(tmp_path)["study"]
+    assert found["passed"] == 40
+    assert 0.3 < found["accepted"] < 0.7
+    last = max(int(each["variation"].removeprefix("variation-")) for each in found["values"])
+    assert found["accepted"] == pytest.approx(40 / last)
+    impossible = study(tmp_path, SCENARIO + RANDOM + "  require: ['robot.pose.x > 9']\n")
+    assert impossible.returncode == 2
+    assert "none of 10000 draws in a row meets the conditions" in impossible.stderr
+
+
+def test_a_failed_run_is_repeated_by_its_command(tmp_path: Path) -> None:
+    study(tmp_path, SCENARIO + RANDOM.replace("count: 40", "count: 2000"), "--out", "out", "--runs", 8)
+    runs = results(tmp_path)["runs"]
+    failed = next(run for run in runs if run["outcome"] == "failed")
+    command = [sys.executable, "-m", *failed["again"].split(), "--out", "again"]
+    assert subprocess.run(command, cwd=tmp_path, check=False, capture_output=True).returncode == 1
+    (run,) = results(tmp_path, "again")["runs"]
+    assert run["verdicts"] == failed["verdicts"]
+
+
+@pytest.mark.parametrize(
+    ("more", "options", "told"),
+    [
+        ("", [], "say how many runs there are"),
+        ("variations: {grid: {seed: [1, 2]}}\n", ["--runs", 3], "--runs is for random seeds"),
+        ("", ["--runs", 3, "--repeat", 2], "--repeat is for chosen values"),
+        ("skip: later\n", ["--runs", 3], "is marked with `skip`"),
+        ("variations: {grid: {seed: [1, 2]}, require: ['nothing.here > 1']}\n", [], "neither varied nor written"),
+        ("variations: {grid: {seed: [1, 2]}, require: ['seed >']}\n", [], "is not a condition"),
+        ("variations: {grid: {seed: [1, 2]}, require: ['seed > 2']}\n", [], "no variation meets the conditions"),
+    ],
+)
+def test_studies_that_make_no_sense_are_refused(tmp_path: Path, more: str, options: list[object], told: str) -> None:
+    done = study(tmp_path, SCENARIO + more, *options)
+    assert done.returncode in (2, 5)
+    assert told in done.stderr
+    assert "Traceback" not in done.stderr
