@@ -30,6 +30,7 @@ COMMANDS = {
     "judge": "Evaluate criteria on recorded runs without simulating them.",
     "report": "Write the reports of an output folder again.",
     "merge": "Merge the output folders of shards into one.",
+    "shrink": "Find the smallest scenario that still fails in the same way.",
     "compare": "Compare the runs of two output folders, such as of two commits.",
     "plot": "Draw a recorded run as a picture.",
     "replay": "Write a page that plays a recorded run, or two runs side by side.",

@@ -47,9 +47,7 @@ def evaluate_study(plan: StudyPlan, results: Iterable[RunResult]) -> Study:
     is_fixed = plan.claim is None or plan.claim.method == "fixed"
     limits = None
     if counted and plan.is_random:  # a study that stops when it is decided needs limits that hold whenever it stops
-        limits = (
-            wilson_interval(passed, len(counted)) if is_fixed else anytime_limits(passed, len(counted), CONFIDENCE)
-        )
+        limits = wilson_interval(passed, len(counted)) if is_fixed else anytime_limits(passed, len(counted), CONFIDENCE)
     return Study(
         scenario=plan.scenario,
         is_random=plan.is_random,

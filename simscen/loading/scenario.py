@@ -17,8 +17,9 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.stacks.stackfile import not_a_scenario, recognize_stack_file
-from simscen.loading.variations.expand import Variation, VariationSpace, expand_variations, variation_space
-from simscen.loading.variations.naming import VariationProblems, merge_problems
+from simscen.loading.variations.axes import Change
+from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSpace, expand_variations, variation_space
+from simscen.loading.variations.naming import VariationProblems, merge_problems, number_of
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec
@@ -39,7 +40,8 @@ def load_scenario(
     `choice` replaces its stack. `variation` selects one of its variations. Raises InvalidInput with all problems of the
     scenario and of the files it names, and UsageError if the variation is unknown or missing.
     """
-    loaded = try_variations(path, root, world_path, choice)
+    number = number_of(variation)
+    loaded = try_variations(path, root, world_path, choice, None if number is None else [number])
     if isinstance(loaded, list):
         raise InvalidInput(loaded)
     if (found := next((one for one in loaded if one.variation == variation), None)) is not None:
@@ -99,6 +101,53 @@ def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()
     if isinstance(space, list):
         raise InvalidInput(library.with_source(sorted(space)))
     return space
+
+
+class ChangedScenario:
+    """A scenario file whose content is changed in memory, for example to find a smaller scenario.
+
+    `whole_tree` is the content of the file, of what it extends, and of `defaults.yaml`. `tree` is the same without
+    `variations`, as one of the variations sets it. `unvaried` lacks the values of the variation, which `changes` has.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        root: Path,
+        world_path: Sequence[Path] = (),
+        choice: StackChoice | None = None,
+        variation: str | None = "",
+    ) -> None:
+        """Read the file. `variation` None stands for the scenario without its variations.
+
+        Raises InvalidInput, and UsageError for an unknown variation.
+        """
+        self._library, self._choice = Library(PathSandbox.around(root, world_path)), choice
+        if variation is not None:
+            load_scenario(path, root, world_path, choice, variation)
+        read = _read(path, self._library, choice)
+        if isinstance(read, list):
+            raise InvalidInput(read)
+        self.file, self.whole_tree = read
+        self.path = self._library.fence.shown(self.file)
+        self.text = self._library.texts[self.path]
+        entries = {key: one for key, one in self.whole_tree.entries.items() if key != VARIATIONS}
+        self.unvaried = self.tree = replace(self.whole_tree, entries=entries)
+        self.changes: tuple[Change, ...] = ()
+        if variation:
+            number = number_of(variation)
+            found = expand_variations(self.whole_tree, None if number is None else [number])
+            varied = next(one for one in found if isinstance(one, Variation) and one.name == variation)
+            self.tree, self.changes = varied.tree, varied.changes
+
+    def load(self, tree: MappingNode) -> LoadedScenario | list[Problem]:
+        """Load the scenario with this content in place of that of the file; or return all its problems."""
+        merged, problems = self._library.with_defaults(self.file, tree, [])
+        if problems or not isinstance(merged, MappingNode):
+            return problems
+        entries = {key: entry for key, entry in merged.entries.items() if key != VARIATIONS}
+        merged = MappingNode(merged.place, entries)
+        return _with_choice(Variation("", merged), self._library, self.file, self._choice)
 
 
 def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Path, MappingNode] | list[Problem]:

@@ -121,14 +121,15 @@ class Checks:
         loaded = try_variations(file, self.root, self.world_path, choice, numbers)
         if isinstance(loaded, list):
             return (), loaded
-        tried = [self._variation(one) for one in loaded]
+        tried = [self.variation(one) for one in loaded]
         problems = merge_problems(
             [VariationProblems(one.variation, one.set_by, found) for one, (_, found) in zip(loaded, tried, strict=True)]
         )
         usable = [one for one, _ in tried if one is not None]
         return (usable if len(usable) == len(tried) else ()), problems
 
-    def _variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
+    def variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
+        """Return a loaded variation with all its checks passed, or None, and the problems."""
         loaded, undefined = self.stacks.with_command(loaded.having(lenient=self.lenient))
         if undefined and self.runs:
             return None, [*loaded.notes, *undefined]

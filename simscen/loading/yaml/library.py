@@ -34,15 +34,22 @@ class Library:
     def read(self, path: Path, defaults: bool = False) -> tuple[Node | None, list[Problem]]:
         """Return the tree of `path` merged with what it extends and, with `defaults`, the `defaults.yaml` beside it."""
         tree, problems = self._with_base(path, ())
+        return self.with_defaults(path, tree, problems) if defaults else (tree, problems)
+
+    def with_defaults(
+        self, path: Path, tree: Node | None, problems: list[Problem]
+    ) -> tuple[Node | None, list[Problem]]:
+        """Return a tree in the place of the file `path` merged with the `defaults.yaml` beside it."""
         beside = path.parent / DEFAULTS_FILE
         # A defaults.yaml that cannot be read is a problem; ignoring it would change the scenario silently.
-        if defaults and isinstance(tree, MappingNode) and os.path.lexists(beside) and path.name != DEFAULTS_FILE:
+        if isinstance(tree, MappingNode) and os.path.lexists(beside) and path.name != DEFAULTS_FILE:
             below, more = self._defaults(beside)
-            problems += more
+            problems = [*problems, *more]
             if isinstance(below, MappingNode):
                 tree = extend_mapping(tree, below)
             elif not more and below is not None:
-                problems.append(Problem(self.fence.shown(beside), 0, 0, "SC004", "expected a mapping at top level"))
+                message = "expected a mapping at top level"
+                problems = [*problems, Problem(self.fence.shown(beside), 0, 0, "SC004", message)]
         return tree, problems
 
     def add(self, texts: Mapping[str, str], files: Mapping[str, Path]) -> None:

@@ -1,0 +1,215 @@
+"""`simscen shrink`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli import completions
+from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.session.candidates import CandidateRuns, Stopped
+from simscen.cli.session.output_files import save
+from simscen.cli.session.run_session import available_cores
+from simscen.cli.session.selection import Checks
+from simscen.cli.session.shrinking import Failure, Shrinking, failure_of, only_failing, with_inline_world
+from simscen.cli.session.stacks import stacks_of
+from simscen.core.errors import Exit, UsageError
+from simscen.core.records.run_result import RunKey, RunResult
+from simscen.loading.files.discovery import SCENARIO, default_root
+from simscen.loading.reduced_text import changed_text
+from simscen.loading.reduction import Keys, changed_values, removed_parts
+from simscen.loading.scenario import ChangedScenario
+from simscen.loading.yaml.tree import MappingNode, Node, child
+from simscen.report.journal_reader import JOURNAL_FILE, PlannedRun, read_journal
+from simscen.run.sessions.output_folder import RUNS_FOLDER, write_atomically
+from simscen.run.sessions.results import shown
+from simscen.run.sessions.run_session import SessionOptions
+
+
+def command(
+    run: Annotated[
+        Path,
+        typer.Argument(
+            help="Folder of a failed run in an output folder, or a scenario file.", autocompletion=completions.scenarios
+        ),
+    ],
+    seed: Annotated[
+        int | None, typer.Option(min=1, max=2**32 - 1, help="Seed of the failed run of a scenario file.")
+    ] = None,
+    variation: Annotated[str, typer.Option(help="Variation of the failed run of a scenario file.")] = "",
+    stack: Annotated[
+        str | None,
+        typer.Option(metavar="NAME=VALUE", autocompletion=completions.stacks, help="Stack, as for `simscen run`."),
+    ] = None,
+    criterion: Annotated[
+        str, typer.Option(help="Id of the criterion that must still fail; default: the first one that failed.")
+    ] = "",
+    keep: Annotated[
+        float,
+        typer.Option(min=0, max=1, help="Share of the violation that must be left: 0.5 is half of it."),
+    ] = 0.5,
+    out: Annotated[
+        Path | None, typer.Option(help="File to write; default: NAME.minimal.scenario.yaml beside the scenario.")
+    ] = None,
+    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Largest number of runs.")] = 500,
+    workers: Annotated[
+        int | None, typer.Option("-j", "--jobs", min=1, max=256, help="Number of parallel runs; default: one per core.")
+    ] = None,
+    keep_world: Annotated[
+        bool, typer.Option("--keep-world", help="Keep the world file instead of writing what is needed of it inline.")
+    ] = False,
+    wall_limit: Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")] = 300.0,
+    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
+    world_path: Annotated[
+        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
+    ] = None,
+    lenient: Annotated[
+        bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")
+    ] = False,
+) -> None:
+    """Find the smallest scenario that still fails in the same way.
+
+    Leaves out events, faults, people, obstacles, goals, and all other parts, one after the other and in groups, as long
+    as the same criterion still fails by enough. Then it rounds numbers. The result is a normal scenario file in which
+    unchanged parts keep their comments. It does not depend on the number of parallel runs.
+
+    Exit code 0: the file was written; 1: it was written, but --runs did not suffice; 2: invalid options, or the run did
+    not fail; 3: the run could not be completed.
+    """
+    chosen = _chosen_run(run, seed, variation, stack)
+    home = root if root is not None else default_root([chosen.file])
+    stacks = stacks_of([] if chosen.stack is None else [chosen.stack], home, world_path or ())
+    scenario = ChangedScenario(chosen.file, home, world_path or (), next(iter(stacks.chosen), None), chosen.variation)
+    target = out or _default_target(chosen.file)
+    if target.exists():
+        raise UsageError(f"{target} exists already; choose another file with --out")
+    options = SessionOptions(workers or available_cores(), wall_limit=wall_limit)
+    checks = Checks(home, world_path or (), lenient, stacks=stacks)
+    own_seed = child(scenario.tree, "seed")
+    first_seed = chosen.seed or (own_seed.plain if own_seed is not None and isinstance(own_seed.plain, int) else 1)
+    candidates = CandidateRuns(scenario, checks, options, first_seed, runs)
+    try:
+        shrinking, before = _shrink(candidates, criterion, keep, keep_world)
+    except Stopped as stopped:
+        sys.exit(stopped.exit)
+    comment = _comment(chosen, shrinking, first_seed)
+    text = changed_text(scenario.text, scenario.path, shrinking.tree.plain, comment)
+    save(target, lambda file: write_atomically(file, text.encode()))
+    _print_summary(shrinking, before, target, chosen.stack)
+    sys.exit(Exit.PASSED if shrinking.is_complete else Exit.FAILED)
+
+
+class ChosenRun:
+    """The run to reproduce: scenario file, seed, variation, and --stack."""
+
+    def __init__(self, file: Path, seed: int | None, variation: str, stack: str | None) -> None:
+        self.file, self.seed, self.variation, self.stack = file, seed, variation, stack
+
+
+def _chosen_run(run: Path, seed: int | None, variation: str, stack: str | None) -> ChosenRun:
+    """Return the run in a folder, or of a scenario file. Raises UsageError and InvalidInput."""
+    if not run.is_dir():
+        return ChosenRun(run, seed, variation, stack)
+    if seed is not None or variation or stack is not None:
+        raise UsageError("--seed, --variation, and --stack are for a scenario file; the folder of a run has its own")
+    planned = _planned_run(run.absolute())
+    return ChosenRun(Path(planned.file or planned.path), planned.key.seed, planned.key.variation, planned.stack or None)
+
+
+def _planned_run(folder: Path) -> PlannedRun:
+    for session in folder.parents:
+        if (session / JOURNAL_FILE).is_file():
+            inside = folder.relative_to(session / RUNS_FOLDER).as_posix()
+            found = [one for one in read_journal(session).planned if _folder_name(one.key) == inside]
+            if found:
+                return found[0]
+    raise UsageError(f"{folder} is not the folder of a run, such as simscen-out/latest/runs/NAME/seed-1")
+
+
+def _folder_name(key: RunKey) -> str:
+    return f"{key.scenario}/{key.folder}"
+
+
+def _default_target(file: Path) -> Path:
+    name = next((file.name.removesuffix(suffix) for suffix in SCENARIO if file.name.endswith(suffix)), file.stem)
+    return file.with_name(f"{name}.minimal{SCENARIO[0]}")
+
+
+def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinking, MappingNode]:
+    """Run the scenario, and make it smaller; return also what it was before. Raises UsageError if it does not fail."""
+    scenario = candidates.scenario
+    (first,) = candidates.results([scenario.tree])
+    if first is None:
+        raise UsageError(f"{scenario.file} is not valid; see simscen validate")
+    failure = failure_of(first, criterion, keep)
+    print_text(f"the run fails: {_failure_text(first, failure)}")
+    tree = only_failing(scenario.tree, failure, candidates.seed)
+    if not keep_world and (loaded := candidates.load(tree)) is not None:
+        inline = with_inline_world(tree, loaded.world.tree)
+        if inline is not None and candidates.first([inline], failure.is_in) is not None:
+            tree = inline
+    shrinking = Shrinking(candidates, failure, tree)
+    if sys.stderr.isatty():
+        candidates.report = lambda: _show_progress(candidates.runs, _size(shrinking.tree))
+    if candidates.first([tree], failure.is_in) is None:
+        raise UsageError("the run does not fail any more with this criterion alone; this is a bug in simscen")
+    nominal = {change.target.keys: _value_at(scenario.unvaried, change.target.keys) for change in scenario.changes}
+    shrinking.shrink({keys: value for keys, value in nominal.items() if keys[0] in tree.entries})
+    if sys.stderr.isatty():
+        print_text("", sys.stderr)
+    return shrinking, tree
+
+
+def _show_progress(runs: int, size: int) -> None:
+    """Show the progress in one line of a terminal, which the next call replaces."""
+    sys.stderr.write(f"\r{runs} runs, {size} values left \x1b[K")
+    sys.stderr.flush()
+
+
+def _value_at(tree: MappingNode, keys: Keys) -> Node | None:
+    node: Node | None = tree
+    for key in keys:
+        node = None if node is None else child(node, key)
+    return node
+
+
+def _size(node: Node) -> int:
+    """Return the number of values in a scenario."""
+    plain, count = [node.plain], 0
+    while plain:
+        value = plain.pop()
+        if isinstance(value, dict):
+            plain += value.values()
+        elif isinstance(value, list):
+            plain += value
+        else:
+            count += 1
+    return count
+
+
+def _failure_text(result: RunResult, failure: Failure) -> str:
+    if result.error is not None:
+        return result.error.message
+    verdict = next(one for one in result.verdicts if one.id == failure.verdict_id)
+    finding = verdict.tightest
+    return verdict.id if finding is None else f"{verdict.id}: {finding.measured} (limit {finding.limit})"
+
+
+def _comment(chosen: ChosenRun, shrinking: Shrinking, seed: int) -> str:
+    source = f"{chosen.file.name}, seed {seed}" + (f", {chosen.variation}" if chosen.variation else "")
+    what = shrinking.failure.verdict_id or "an error of the stack"
+    return f"The smallest scenario that simscen shrink found to fail in {what}, from {source}."
+
+
+def _print_summary(shrinking: Shrinking, before: MappingNode, target: Path, stack: str | None) -> None:
+    for title, texts in (
+        ("not needed:", removed_parts(before, shrinking.tree)),
+        ("simplified:", changed_values(before, shrinking.tree)),
+    ):
+        if texts:
+            print_text("\n".join([title, *(f"  {escaped(text)}" for text in texts)]))
+    spent = "" if shrinking.is_complete else ", which did not suffice to try everything; see --runs"
+    print_text(f"{_size(shrinking.tree)} values left after {shrinking.runs.runs} runs{spent}")
+    option = "" if stack is None else f" --stack {escaped(stack)}"
+    print_text(f"wrote {escaped(str(target))}; try: simscen run {escaped(shown(target))}{option}")

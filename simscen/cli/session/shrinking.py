@@ -1,0 +1,166 @@
+"""`simscen shrink`: the smallest scenario that still fails in the same criterion."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from simscen.cli.session.candidates import BudgetSpent, CandidateRuns
+from simscen.core.delta_debugging import minimize
+from simscen.core.errors import UsageError
+from simscen.core.records.run_result import Outcome, RunResult
+from simscen.core.records.verdict import Status, Verdict
+from simscen.loading.reduction import (
+    MAX_DIGITS,
+    NOT_RUN,
+    Keys,
+    Rounding,
+    deepest,
+    removable_parts,
+    rounded_tree,
+    roundings,
+    with_values,
+    without,
+)
+from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child
+
+MAX_ROUNDS = 3
+"""Most repetitions of the reduction: rounded numbers may make further parts unnecessary."""
+
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What must stay as it is: the failed criterion, or the error of the stack under test.
+
+    `max_margin` is the largest margin, below 0, that counts as the same failure; None if the criterion has no margins.
+    """
+
+    criterion: str
+    verdict_id: str
+    max_margin: float | None = None
+
+    def is_in(self, result: RunResult) -> bool:
+        """Return whether a run fails in this way."""
+        if not self.criterion:
+            return result.error is not None and result.error.by_stack
+        if result.outcome is not Outcome.FAILED:
+            return False
+        failed = [one for one in result.verdicts if one.criterion == self.criterion and one.status is Status.FAIL]
+        margins = [smallest_margin(one) for one in failed]
+        if self.max_margin is None:
+            return bool(failed)
+        return any(margin is not None and margin <= self.max_margin for margin in margins)
+
+
+@dataclass
+class Shrinking:
+    """The smallest scenario so far, `tree`. `is_complete` is False if the budget of runs was spent too early."""
+
+    runs: CandidateRuns
+    failure: Failure
+    tree: MappingNode
+    is_complete: bool = True
+
+    def shrink(self, nominal: Mapping[Keys, Node | None]) -> None:
+        """Make the scenario as small as possible.
+
+        `nominal` are the values, in the scenario without its variation, of the parts that the variation sets; None for
+        parts that are not there. Stops early if the budget of runs is spent.
+        """
+        try:
+            self._restore_nominal(nominal)
+            for _ in range(MAX_ROUNDS):
+                before = self.tree
+                self._leave_out()
+                self._round()
+                if self.tree.plain == before.plain:
+                    break
+        except BudgetSpent:
+            self.is_complete = False
+
+    def _restore_nominal(self, nominal: Mapping[Keys, Node | None]) -> None:
+        parts = list(nominal)
+
+        def build(varied: Sequence[Keys]) -> MappingNode:
+            return with_values(self.tree, {keys: nominal[keys] for keys in parts if keys not in varied})
+
+        self.tree = build(self._minimize(parts, build))
+
+    def _leave_out(self) -> None:
+        """Leave out parts, those near the top first, because they may be large."""
+        depth = 1
+        while depth <= deepest(self.tree):
+            before, parts = self.tree, removable_parts(self.tree, depth)
+
+            def build(kept: Sequence[Keys], parts: Sequence[Keys] = parts, tree: MappingNode = before) -> MappingNode:
+                return without(tree, [keys for keys in parts if keys not in kept])
+
+            self.tree = build(self._minimize(parts, build))
+            depth += 1
+
+    def _round(self) -> None:
+        """Round numbers to as few digits as possible."""
+        for digits in range(1, MAX_DIGITS + 1):
+            before, changes = self.tree, roundings(self.tree, digits)
+
+            def build(
+                exact: Sequence[Keys], changes: Sequence[Rounding] = tuple(changes), tree: MappingNode = before
+            ) -> MappingNode:
+                return rounded_tree(tree, [one for one in changes if one.keys not in exact])
+
+            self.tree = build(self._minimize([one.keys for one in changes], build))
+
+    def _minimize(self, parts: Sequence[Part], build: Callable[[Sequence[Part]], MappingNode]) -> list[Part]:
+        """Return the parts that must stay. `build` makes the scenario with only some of them."""
+        if not parts:
+            return []
+        return minimize(
+            parts, lambda candidates: self.runs.first([build(kept) for kept in candidates], self.failure.is_in)
+        )
+
+
+def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
+    """Return the failure of a run in the criterion with this id, or in the first one that failed if "".
+
+    `share` is the part of the violation that must be left. Raises UsageError if the run did not fail in it.
+    """
+    if result.error is not None and result.error.by_stack and not criterion:
+        return Failure("", "")
+    failed = [one for one in result.verdicts if one.status is Status.FAIL]
+    chosen = next((one for one in failed if criterion in ("", one.id, one.criterion)), None)
+    if result.outcome is not Outcome.FAILED or chosen is None:
+        names = ", ".join(one.id for one in failed)
+        told = f"did not fail in {criterion}, but in {names}" if failed else f"did not fail: {result.outcome.value}"
+        raise UsageError(f"the run {told}")
+    margin = smallest_margin(chosen)
+    return Failure(chosen.criterion, chosen.id, None if margin is None or margin >= 0.0 else share * margin)
+
+
+def smallest_margin(verdict: Verdict) -> float | None:
+    """Return the smallest margin of the findings that failed; None if they have none."""
+    margins = [one.margin for one in verdict.findings if one.status is Status.FAIL and one.margin is not None]
+    return min(margins, default=None)
+
+
+def only_failing(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
+    """Return the scenario with this seed, only the failing criterion, and without what does not change the run."""
+    entries = {key: entry for key, entry in tree.entries.items() if key not in NOT_RUN}
+    criteria = tree.entries.get("pass")
+    if failure.criterion and criteria is not None and isinstance(criteria.value, SequenceNode):
+        items = [item for item in criteria.value.items if child(item, failure.criterion) is not None]
+        named = [item for item in items if (name := child(item, "id")) and name.plain == failure.verdict_id]
+        kept = named or items
+        if kept:
+            entries["pass"] = Entry(criteria.key, replace(criteria.value, items=tuple(kept)))
+    place = tree.entries["seed"].key if "seed" in tree.entries else tree.place
+    entries["seed"] = Entry(place, ScalarNode(place, seed))
+    return MappingNode(tree.place, entries)
+
+
+def with_inline_world(tree: MappingNode, world: MappingNode | None) -> MappingNode | None:
+    """Return the scenario with its world file written inline, so that it can be reduced; None if that is impossible."""
+    entry = tree.entries.get("world")
+    if world is None or entry is None or not isinstance(entry.value, ScalarNode):
+        return None
+    return MappingNode(tree.place, {**tree.entries, "world": Entry(entry.key, world)})

@@ -1,0 +1,197 @@
+"""Parts of a scenario that can be left out or simplified, and trees without them."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from simscen.loading.yaml.tree import (
+    Entry,
+    Key,
+    MappingNode,
+    Node,
+    Position,
+    ScalarNode,
+    SequenceNode,
+    dotted_path,
+    node_at,
+)
+from simscen.spec.quantities import NUMBER_AND_UNIT
+
+Keys = tuple[Key, ...]
+"""Keys from the top of a scenario to a part of it."""
+KEPT = frozenset({"simscen", "world", "robot", "robots", "seed", "pass"})
+"""Top-level keys that are never left out as a whole."""
+FIXED = frozenset({"simscen", "seed", "pass"})
+"""Top-level keys of which no part is left out or simplified: they say what fails."""
+STRUCTURE = frozenset({("world", "walls"), ("world", "map"), ("world", "sdf")})
+"""Parts of a world that are never left out: without them, another test would fail in the same criterion."""
+NOT_RUN = frozenset({"acceptance", "description", "expected", "metrics", "skip", "tags", "variations"})
+"""Top-level keys that a minimal scenario does not need, whatever fails."""
+MAX_DIGITS = 3
+
+
+class Rounding(NamedTuple):
+    """A number in a scenario, and a simpler value of it."""
+
+    keys: Keys
+    value: str | float | int
+
+
+def removable_parts(tree: MappingNode, depth: int) -> list[Keys]:
+    """Return the parts with so many keys that can be left out, in the order of the file."""
+    return [
+        keys
+        for keys, _ in _parts(tree)
+        if len(keys) == depth
+        and keys[0] not in FIXED
+        and keys[:2] not in STRUCTURE
+        and not (depth == 1 and keys[0] in KEPT)
+    ]
+
+
+def deepest(tree: MappingNode) -> int:
+    """Return the largest number of keys of a part."""
+    return max(len(keys) for keys, _ in _parts(tree))
+
+
+def without(tree: MappingNode, parts: Collection[Keys]) -> MappingNode:
+    """Return the scenario without these parts. Mappings and lists that become empty are left out, too."""
+    left = _without(tree, frozenset(parts), ())
+    return left if isinstance(left, MappingNode) else replace(tree, entries={})
+
+
+def with_values(tree: MappingNode, values: Mapping[Keys, Node | None]) -> MappingNode:
+    """Return the scenario with other values at these keys; None leaves the part out."""
+    removed = [keys for keys, value in values.items() if value is None]
+    changed = tree
+    for keys, value in values.items():
+        if value is not None:
+            put = _with_value(changed, keys, value)
+            assert isinstance(put, MappingNode)
+            changed = put
+    return without(changed, removed) if removed else changed
+
+
+def roundings(tree: MappingNode, digits: int) -> list[Rounding]:
+    """Return the numbers that become simpler when they are rounded to so many significant digits."""
+    found = []
+    for keys, node in _parts(tree):
+        if isinstance(node, ScalarNode) and keys[0] not in FIXED and keys[:2] not in STRUCTURE:
+            rounded = _rounded(node.value, digits)
+            if rounded is not None:
+                found.append(Rounding(keys, rounded))
+    return found
+
+
+def rounded_tree(tree: MappingNode, changes: Sequence[Rounding]) -> MappingNode:
+    """Return the scenario with these rounded numbers."""
+    return with_values(tree, {one.keys: ScalarNode(node_at(tree, one.keys).place, one.value) for one in changes})
+
+
+def removed_parts(before: MappingNode, after: MappingNode) -> list[str]:
+    """Return the parts of a scenario that are not in a reduced version of it; not the parts of these parts."""
+    left = {node.place for _, node in _parts(after)}
+    found: list[Keys] = []
+    for keys, node in _parts(before):
+        is_part_of_found = bool(found) and keys[: len(found[-1])] == found[-1]
+        if not is_part_of_found and not any(each.place in left for each in (node, *(n for _, n in _parts(node)))):
+            found.append(keys)
+    return [part_text(before, keys) for keys in found]
+
+
+def changed_values(before: MappingNode, after: MappingNode) -> list[str]:
+    """Return the values that a reduced version of a scenario has changed: `time_limit: 61.7 s -> 60 s`."""
+    values = {node.place: (keys, node.value) for keys, node in _parts(before) if isinstance(node, ScalarNode)}
+    return [
+        f"{dotted_path(values[node.place][0])}: {values[node.place][1]} -> {node.value}"
+        for _, node in _parts(after)
+        if isinstance(node, ScalarNode) and node.place in values and node.value != values[node.place][1]
+    ]
+
+
+def part_text(tree: MappingNode, keys: Keys) -> str:
+    """Return a part as messages show it: its keys, and its name or type if it has one."""
+    node: Node | None = tree
+    for key in keys:
+        node = _below(node, key)
+    text = dotted_path(keys)
+    if isinstance(node, MappingNode) and isinstance(keys[-1], int):
+        named = [
+            entry.value.value
+            for name in ("name", "id", "sensor", "pose")
+            if (entry := node.entries.get(name)) is not None and isinstance(entry.value, ScalarNode)
+        ]
+        label = named[0] if named else next(iter(node.entries), "")
+        return f"{text} ({label})"
+    return text
+
+
+def _parts(node: Node, above: Keys = ()) -> Iterator[tuple[Keys, Node]]:
+    if above:
+        yield above, node
+    if isinstance(node, MappingNode):
+        for key, entry in node.entries.items():
+            yield from _parts(entry.value, (*above, key))
+    elif isinstance(node, SequenceNode):
+        for index, item in enumerate(node.items):
+            yield from _parts(item, (*above, index))
+
+
+def _below(node: Node | None, key: Key) -> Node | None:
+    if isinstance(node, MappingNode):
+        entry = node.entries.get(str(key))
+        return None if entry is None else entry.value
+    if isinstance(node, SequenceNode) and isinstance(key, int) and key < len(node.items):
+        return node.items[key]
+    return None
+
+
+def _without(node: Node, parts: frozenset[Keys], above: Keys) -> Node | None:
+    """Return the node without the parts, None if nothing of a mapping or list is left."""
+    if isinstance(node, MappingNode):
+        entries = {}
+        for key, entry in node.entries.items():
+            if (*above, key) in parts:
+                continue
+            left = _without(entry.value, parts, (*above, key))
+            if left is not None:
+                entries[key] = Entry(entry.key, left)
+        return replace(node, entries=entries) if entries or not node.entries else None
+    if isinstance(node, SequenceNode):
+        items = [
+            left
+            for index, item in enumerate(node.items)
+            if (*above, index) not in parts and (left := _without(item, parts, (*above, index))) is not None
+        ]
+        return replace(node, items=tuple(items)) if items or not node.items else None
+    return node
+
+
+def _with_value(node: Node | None, keys: Keys, value: Node) -> Node:
+    if not keys:
+        return value
+    key, rest = keys[0], keys[1:]
+    if isinstance(node, SequenceNode) and isinstance(key, int):
+        items = list(node.items)
+        items[key] = _with_value(items[key], rest, value)
+        return replace(node, items=tuple(items))
+    owner = node if isinstance(node, MappingNode) else MappingNode(value.place, {})
+    below = owner.entries.get(str(key))
+    place: Position = below.key if below is not None else value.place
+    entry = Entry(place, _with_value(below.value if below is not None else None, rest, value))
+    return replace(owner, entries={**owner.entries, str(key): entry})
+
+
+def _rounded(value: object, digits: int) -> str | float | int | None:
+    """Return a number or quantity with so many significant digits, None if that is not shorter."""
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, int | float):
+        short = float(f"{value:.{digits}g}")
+        return None if short == value else int(short) if isinstance(value, int) else short
+    match = NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
+    if match is None:
+        return None
+    number = float(match[1])
+    short = float(f"{number:.{digits}g}")
+    return None if short == number else f"{short:g} {match[2]}"
