@@ -30,6 +30,7 @@ COMMANDS = {
     "judge": "Evaluate criteria on recorded runs without simulating them.",
     "report": "Write the reports of an output folder again.",
     "merge": "Merge the output folders of shards into one.",
+    "falsify": "Search the ranges of a scenario for values with which it fails.",
     "shrink": "Find the smallest scenario that still fails in the same way.",
     "compare": "Compare the runs of two output folders, such as of two commits.",
     "plot": "Draw a recorded run as a picture.",

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from math import isfinite
 
 from simscen.core.records.events import DisturbanceOutcome
+from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
 
 DISTURBANCE = "disturbance"
@@ -81,13 +82,31 @@ def tightest_margin(verdicts: Sequence[Verdict]) -> str:
     Counts of events are left out because they are trivial. So are the distance from a goal and the time at it: a robot
     stops as soon as it is close enough, so that both are always near their limits.
     """
+    tightest = _tightest_finding(verdicts)
+    if tightest is None:
+        return ""
+    verdict, finding = tightest
+    margin = f"{subject(verdict, finding)} {finding.margin:+.2f} {finding.unit}".rstrip()
+    return f"{margin}, {100 * relative_margin(finding):.0f} % of its limit" if _limit(finding) else margin
+
+
+def run_margin(result: RunResult) -> float:
+    """Return how far a run is from failing, relative to the limit of its tightest criterion: negative if it failed.
+
+    -1 for a failure without a margin, 1 for a run that passed without any.
+    """
+    if result.outcome is Outcome.PASSED:
+        tightest = _tightest_finding(result.verdicts)
+        return 1.0 if tightest is None else max(0.0, relative_margin(tightest[1]))
+    failed = [finding for verdict in result.verdicts for finding in verdict.findings if finding.status is Status.FAIL]
+    margins = [relative_margin(one) for one in failed if one.margin is not None and isfinite(one.margin)]
+    return max(-1.0, min(margins)) if margins and min(margins) < 0 else -1.0
+
+
+def _tightest_finding(verdicts: Sequence[Verdict]) -> tuple[Verdict, Finding] | None:
     findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS and not _stopping(v, f)]
     measured = [(v, f) for v, f in findings if f.unit and f.margin is not None and isfinite(f.margin)]
-    if not measured:
-        return ""
-    verdict, finding = min(measured, key=lambda pair: _slack(pair[1]))
-    margin = f"{subject(verdict, finding)} {finding.margin:+.2f} {finding.unit}".rstrip()
-    return f"{margin}, {100 * _slack(finding):.0f} % of its limit" if _limit(finding) else margin
+    return min(measured, key=lambda pair: relative_margin(pair[1]), default=None)
 
 
 def _stopping(verdict: Verdict, finding: Finding) -> bool:
@@ -95,8 +114,8 @@ def _stopping(verdict: Verdict, finding: Finding) -> bool:
     return verdict.criterion == ARRIVAL and not (finding.unit == "s" and finding.limit.startswith("≤"))
 
 
-def _slack(finding: Finding) -> float:
-    """Return the margin relative to the limit."""
+def relative_margin(finding: Finding) -> float:
+    """Return the margin relative to the limit, or the margin itself if the limit is 0 or unknown."""
     margin, limit = finding.margin or 0.0, _limit(finding)
     return margin / abs(limit) if limit else margin
 

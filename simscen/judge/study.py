@@ -27,7 +27,8 @@ class StudyPlan:
     """What a study is about: how its runs were chosen, and the claim.
 
     `is_random`: each run has its own seed and its own random values. `values` are the varied values by run, `drawn` is
-    the number of values that were drawn to find those that meet `require`; 0 without conditions.
+    the number of values that were drawn to find those that meet `require`; 0 without conditions. `stops_early`: a
+    search ended when it had found enough failures.
     """
 
     scenario: str
@@ -36,6 +37,12 @@ class StudyPlan:
     values: Mapping[RunKey, Mapping[str, Any]] = field(default_factory=dict)
     is_designed_in_pairs: bool = False
     drawn: int = 0
+    stops_early: bool = False
+
+    @property
+    def has_fixed_runs(self) -> bool:
+        """Whether the number of runs does not depend on their outcomes."""
+        return not self.stops_early and (self.claim is None or self.claim.method == "fixed")
 
 
 def evaluate_study(plan: StudyPlan, results: Iterable[RunResult]) -> Study:
@@ -44,10 +51,13 @@ def evaluate_study(plan: StudyPlan, results: Iterable[RunResult]) -> Study:
     counted = [result for result in ordered if is_counted(result)]
     passed = sum(result.outcome is Outcome.PASSED for result in counted)
     margins = {result.key: _margins(result) for result in counted}
-    is_fixed = plan.claim is None or plan.claim.method == "fixed"
     limits = None
     if counted and plan.is_random:  # a study that stops when it is decided needs limits that hold whenever it stops
-        limits = wilson_interval(passed, len(counted)) if is_fixed else anytime_limits(passed, len(counted), CONFIDENCE)
+        limits = (
+            wilson_interval(passed, len(counted))
+            if plan.has_fixed_runs
+            else anytime_limits(passed, len(counted), CONFIDENCE)
+        )
     return Study(
         scenario=plan.scenario,
         is_random=plan.is_random,
@@ -89,7 +99,7 @@ def _rates(plan: StudyPlan, results: Sequence[RunResult]) -> Iterable[RateRow]:
 
     There are no limits if the runs are not random, or if their number depends on their outcomes.
     """
-    has_limits = plan.is_random and (plan.claim is None or plan.claim.method == "fixed")
+    has_limits = plan.is_random and plan.has_fixed_runs
     for path in _paths(plan):
         groups: dict[str, list[bool]] = defaultdict(list)
         labels = _labels([plan.values.get(result.key, {}).get(path) for result in results])

@@ -88,6 +88,14 @@ def rounded_tree(tree: MappingNode, changes: Sequence[Rounding]) -> MappingNode:
     return with_values(tree, {one.keys: ScalarNode(node_at(tree, one.keys).place, one.value) for one in changes})
 
 
+def with_seed(tree: MappingNode, seed: int) -> MappingNode:
+    """Return the scenario with this seed, without keys that `simscen run` does not need for a single run."""
+    entries = {key: entry for key, entry in tree.entries.items() if key not in ("acceptance", "expected", "variations")}
+    place = entries["seed"].key if "seed" in entries else tree.place
+    entries["seed"] = Entry(place, ScalarNode(place, seed))
+    return replace(tree, entries=entries)
+
+
 def removed_parts(before: MappingNode, after: MappingNode) -> list[str]:
     """Return the parts of a scenario that are not in a reduced version of it; not the parts of these parts."""
     left = {node.place for _, node in _parts(after)}

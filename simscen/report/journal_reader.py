@@ -71,13 +71,22 @@ def study_plan_to_data(plan: StudyPlan) -> dict[str, Any]:
         "claim": claim,
         "is_designed_in_pairs": plan.is_designed_in_pairs,
         "drawn": plan.drawn,
+        "stops_early": plan.stops_early,
     }
 
 
 def _study_plan_from_data(data: dict[str, Any], planned: Sequence[PlannedRun]) -> StudyPlan:
     claim = None if data["claim"] is None else PassRate.model_validate(data["claim"])
     values = {run.key: run.varied for run in planned if run.varied}
-    return StudyPlan(data["scenario"], data["is_random"], claim, values, data["is_designed_in_pairs"], data["drawn"])
+    return StudyPlan(
+        data["scenario"],
+        data["is_random"],
+        claim,
+        values,
+        data["is_designed_in_pairs"],
+        data["drawn"],
+        data["stops_early"],
+    )
 
 
 def finished_run_to_data(run: RunFinished, folder: Path) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from simscen.cli.session.shrinking import Failure, Shrinking, failure_of, only_f
 from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.run_result import RunKey, RunResult
-from simscen.loading.files.discovery import SCENARIO, default_root
+from simscen.loading.files.discovery import default_root, sibling
 from simscen.loading.reduced_text import changed_text
 from simscen.loading.reduction import Keys, changed_values, removed_parts
 from simscen.loading.scenario import ChangedScenario
@@ -81,7 +81,7 @@ def command(
     home = root if root is not None else default_root([chosen.file])
     stacks = stacks_of([] if chosen.stack is None else [chosen.stack], home, world_path or ())
     scenario = ChangedScenario(chosen.file, home, world_path or (), next(iter(stacks.chosen), None), chosen.variation)
-    target = out or _default_target(chosen.file)
+    target = out or sibling(chosen.file, "minimal")
     if target.exists():
         raise UsageError(f"{target} exists already; choose another file with --out")
     options = SessionOptions(workers or available_cores(), wall_limit=wall_limit)
@@ -129,11 +129,6 @@ def _planned_run(folder: Path) -> PlannedRun:
 
 def _folder_name(key: RunKey) -> str:
     return f"{key.scenario}/{key.folder}"
-
-
-def _default_target(file: Path) -> Path:
-    name = next((file.name.removesuffix(suffix) for suffix in SCENARIO if file.name.endswith(suffix)), file.stem)
-    return file.with_name(f"{name}.minimal{SCENARIO[0]}")
 
 
 def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinking, MappingNode]:

@@ -18,6 +18,7 @@ from simscen.loading.reduction import (
     removable_parts,
     rounded_tree,
     roundings,
+    with_seed,
     with_values,
     without,
 )
@@ -153,9 +154,7 @@ def only_failing(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
         kept = named or items
         if kept:
             entries["pass"] = Entry(criteria.key, replace(criteria.value, items=tuple(kept)))
-    place = tree.entries["seed"].key if "seed" in tree.entries else tree.place
-    entries["seed"] = Entry(place, ScalarNode(place, seed))
-    return MappingNode(tree.place, entries)
+    return with_seed(MappingNode(tree.place, entries), seed)
 
 
 def with_inline_world(tree: MappingNode, world: MappingNode | None) -> MappingNode | None:

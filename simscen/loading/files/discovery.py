@@ -13,6 +13,7 @@ from simscen.loading.yaml.textfile import os_error_reason
 SCENARIO = (".scenario.yaml", ".scenario.yml")
 WORLD = (".world.yaml", ".world.yml")
 ROBOT = (".robot.yaml", ".robot.yml")
+STUDY = (".study.yaml", ".study.yml")
 STACK = (".stack.yaml", ".stack.yml")
 BASE = (".base.yaml", ".base.yml")
 
@@ -40,6 +41,13 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
     if problems := [*_folder_conflicts(files, home), *_same_ids(files, home)]:
         raise InvalidInput(sorted(problems))
     return files
+
+
+def sibling(file: Path, label: str) -> Path:
+    """Return a scenario file beside another, such as `goal.minimal.scenario.yaml` beside `goal.scenario.yaml`."""
+    suffixes = (*SCENARIO, *STUDY)
+    name = next((file.name.removesuffix(end) for end in suffixes if file.name.endswith(end)), file.stem)
+    return file.with_name(f"{name}.{label}{SCENARIO[0]}")
 
 
 def default_root(paths: Iterable[Path]) -> Path:

@@ -1,0 +1,102 @@
+"""`simscen falsify`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli import completions
+from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.session.falsification import FalsifyRequest, execute_search, summary_lines
+from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
+from simscen.cli.session.run_session import available_cores
+from simscen.cli.session.stacks import STACK_HELP
+from simscen.cli.session.terminal import Format, FormatOption
+from simscen.core.errors import UsageError
+from simscen.run.process.jobs import ReplayMode
+from simscen.run.sessions.run_session import SessionOptions
+from simscen.run.sessions.search import SearchMethod
+
+
+def command(
+    file: Annotated[
+        Path, typer.Argument(help="A scenario with `sampled` variations.", autocompletion=completions.scenarios)
+    ],
+    method: Annotated[
+        SearchMethod,
+        typer.Option(
+            help="tpe: learns where margins are small (needs Optuna: pip install 'simscen[search]'); sobol: covers the "
+            "ranges evenly; random: independent draws; auto: tpe if Optuna is installed, otherwise sobol."
+        ),
+    ] = SearchMethod.AUTO,
+    failures: Annotated[int, typer.Option(min=1, max=1000, help="Stop after so many different failures.")] = 1,
+    runs: Annotated[int, typer.Option(min=1, max=1_000_000, help="Largest number of runs.")] = 200,
+    probability: Annotated[
+        float | None,
+        typer.Option(
+            min=1e-6,
+            max=0.5,
+            help="With --method random: stop when a larger rate of failures is ruled out with 95 % confidence.",
+        ),
+    ] = None,
+    search_seed: Annotated[
+        int, typer.Option(min=1, max=2**32 - 1, help="Seed of the search; the runs keep the seed of the scenario.")
+    ] = 1,
+    seed: Annotated[
+        int | None, typer.Option(min=1, max=2**32 - 1, help="Use this seed instead of the scenario's own.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="New or empty output folder; default: simscen-out/<session id>.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("-j", "--jobs", min=1, max=256, help="Number of parallel runs; default: one per core.")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
+    junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
+    format_: FormatOption = Format.TEXT,
+    wall_limit: Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")] = 300.0,
+    stack: Annotated[
+        str | None, typer.Option(metavar="NAME=VALUE", autocompletion=completions.stacks, help=STACK_HELP)
+    ] = None,
+    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
+    world_path: Annotated[
+        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
+    ] = None,
+    lenient: Annotated[
+        bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")
+    ] = False,
+) -> None:
+    """Search the ranges of a scenario for values with which it fails.
+
+    The search looks for small margins of the criteria. Each failure that differs from the others, in its criterion,
+    the events and faults that happened, or its place, is written as a scenario NAME.failure-N.scenario.yaml beside the
+    file. The result does not depend on the number of parallel runs.
+
+    Exit code 0: no failure was found; 1: a failure was found; 2: an invalid scenario; 3: a run could not be completed;
+    129, 130, and 143: interrupted.
+    """
+    if probability is not None and method is not SearchMethod.RANDOM:
+        raise UsageError("--probability needs --method random: only random values show a rate")
+    options = SessionOptions(workers or available_cores(), seed, wall_limit=wall_limit, replay=ReplayMode.FAILED)
+    request = FalsifyRequest(
+        file,
+        method,
+        failures,
+        runs,
+        probability,
+        search_seed,
+        options,
+        root,
+        world_path or [],
+        lenient,
+        stack,
+        out,
+        junit,
+        junit_family,
+        format_,
+    )
+    code, falsification = execute_search(request)
+    if format_ is not Format.JSON:
+        print_text("\n".join(escaped(line) for line in summary_lines(falsification)))
+    sys.exit(code)

@@ -1,0 +1,285 @@
+"""`simscen falsify`: search the ranges of a scenario for values with which it fails."""
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+
+from simscen.cli.interrupts import signals_interrupt
+from simscen.cli.session.output_files import JunitFamily, Reports, require_writable
+from simscen.cli.session.pending_runs import plan_runs
+from simscen.cli.session.run_session import WARM_PROCESS, output_folder
+from simscen.cli.session.selection import Checks
+from simscen.cli.session.stacks import stacks_of
+from simscen.cli.session.terminal import Format, Screen, screen
+from simscen.core.errors import Exit, InvalidInput, Problem
+from simscen.core.records.run_result import Outcome, RunResult
+from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
+from simscen.core.records.verdict import Status
+from simscen.core.version import __version__
+from simscen.judge.acceptance import clopper_pearson_limits, is_counted
+from simscen.judge.finding_text import run_margin
+from simscen.judge.study import StudyPlan, evaluate_study, value_text
+from simscen.loading.files.discovery import default_root, sibling
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.reduced_text import changed_text
+from simscen.loading.reduction import with_seed
+from simscen.loading.scenario import ChangedScenario
+from simscen.loading.variations.conditions import ConditionError
+from simscen.loading.variations.expand import Variation
+from simscen.loading.variations.search_space import SearchSpace, search_space
+from simscen.report.journal import Journal
+from simscen.report.journal_reader import PlannedRun
+from simscen.run.process.jobs import Job
+from simscen.run.sessions.output_folder import run_folder, write_atomically
+from simscen.run.sessions.results import shown
+from simscen.run.sessions.run_session import SessionOptions, run_session
+from simscen.run.sessions.search import Point, Search, SearchMethod, make_search
+
+BATCH = 8
+"""Runs between two updates of the search. Fixed, so that a search does not depend on the number of workers."""
+MAX_EMPTY_BATCHES = 50
+"""Batches in a row without a valid point after which the search gives up."""
+PLACE_M = 1.0
+"""Failures in the same criterion are different if they are in different squares of this size."""
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class FalsifyRequest:
+    """Options of `simscen falsify`; each field has the meaning of the option with its name."""
+
+    file: Path
+    method: SearchMethod = SearchMethod.AUTO
+    failures: int = 1
+    runs: int = 200
+    probability: float | None = None
+    search_seed: int = 1
+    options: SessionOptions = field(default_factory=SessionOptions)
+    root: Path | None = None
+    world_path: Sequence[Path] = ()
+    lenient: bool = False
+    stack: str | None = None
+    out: Path | None = None
+    junit: Path | None = None
+    junit_family: JunitFamily = JunitFamily.SIMSCEN
+    format_: Format = Format.TEXT
+
+
+@dataclass(frozen=True)
+class FoundFailure:
+    """A failure that differs from the others, and the scenario file that reproduces it."""
+
+    file: Path
+    run: RunFinished
+    values: dict[str, object]
+
+
+Signature = tuple[tuple[str, ...], frozenset[str], tuple[int, int] | None]
+"""Failed criteria, events and faults that had happened, and the square in which the first criterion failed."""
+
+
+def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
+    """Run a search and write its reports and the failures it finds. Raises InvalidInput and UsageError."""
+    falsification = Falsification(request)
+    require_writable(request.junit, request.out, [request.file])
+    folder, journal = output_folder(request.out, None)
+    reports = Reports(folder, request.junit, request.junit_family.value)
+    reports.begin()
+    with screen(request.format_) as output:
+        return output.exit(falsification.execute(journal, reports, output)), falsification
+
+
+class Falsification:
+    """One search: proposes values, runs them, and keeps the failures that differ."""
+
+    def __init__(self, request: FalsifyRequest) -> None:
+        """Read the scenario and its ranges. Raises InvalidInput and UsageError."""
+        self._request = request
+        home = request.root if request.root is not None else default_root([request.file])
+        stacks = stacks_of([] if request.stack is None else [request.stack], home, request.world_path)
+        choice = next(iter(stacks.chosen), None)
+        self._scenario = ChangedScenario(request.file, home, request.world_path, choice, None)
+        space = search_space(self._scenario.whole_tree)
+        if not isinstance(space, SearchSpace):
+            raise InvalidInput(space)
+        self._space = space
+        self._checks = Checks(home, request.world_path, request.lenient, stacks=stacks)
+        self._search: Search = make_search(request.method, space.choices, request.search_seed)
+        self._variations: dict[str, Variation] = {}
+        self._planned: list[PlannedRun] = []
+        self._signatures: set[Signature] = set()
+        self._proposed = 0
+        self._problems: list[Problem] = []  # of the last values that make no valid scenario
+        self.answers: list[RunFinished] = []
+        self.found: list[FoundFailure] = []
+
+    def execute(self, journal: Journal, reports: Reports, output: Screen) -> Exit:
+        """Search until enough failures are found or the budget is spent. Returns the exit code."""
+        begun, stopped, empty = time.monotonic(), None, 0
+
+        def listen(event: SessionEvent) -> None:
+            journal(event)
+            output(event)
+
+        workers = self._request.options.workers
+        output(SessionStarted(__version__, self._request.runs, 1, workers, str(reports.folder)))
+        while stopped is None and not self._is_done() and empty < MAX_EMPTY_BATCHES:
+            points = self._search.ask(min(BATCH, self._request.runs - len(self.answers)))
+            jobs = self._jobs(points, reports.folder)
+            valid = [job for job in jobs if job is not None]
+            empty = 0 if valid else empty + 1
+            self._plan(journal, valid)
+            with signals_interrupt():
+                answers, stopped = run_session(valid, self._request.options, WARM_PROCESS, listen)
+            by_key = {answer.key: answer for answer in answers}
+            ordered = [None if job is None else by_key[job.key] for job in jobs]
+            self.answers += [answer for answer in ordered if answer is not None]
+            self._search.tell(points, [_margin(answer) for answer in ordered])
+            for answer in ordered:
+                if answer is not None and stopped is None:
+                    self._keep(answer)
+        if not self.answers and stopped is None:
+            raise InvalidInput(self._problems or [self._no_valid_values()])
+        study = evaluate_study(self._study_plan(), (answer.result for answer in self.answers))
+        written = reports.write(self.answers, None, study) if self.answers else True
+        wall = time.monotonic() - begun
+        listen(reports.finished_event(self.answers, wall, stopped is not None, None, study))
+        written = reports.write_duration(wall) and written and journal.error is None
+        if stopped is not None or not written:
+            return stopped or Exit.INCOMPLETE
+        if study.errors:
+            return Exit.INCOMPLETE
+        return Exit.FAILED if self.found else Exit.PASSED
+
+    @property
+    def is_random(self) -> bool:
+        """Whether the runs are independent random draws."""
+        return self._request.method is SearchMethod.RANDOM
+
+    def largest_probability(self) -> float | None:
+        """Return the rate of failures that is ruled out with 95 % confidence; None unless the values are random."""
+        counted = [answer for answer in self.answers if is_counted(answer.result)]
+        if not self.is_random or not counted:
+            return None
+        passed = sum(answer.outcome is Outcome.PASSED for answer in counted)
+        return 1.0 - clopper_pearson_limits(passed, len(counted), CONFIDENCE)[0]
+
+    def _is_done(self) -> bool:
+        request, bound = self._request, self._request.probability
+        if len(self.found) >= request.failures or len(self.answers) >= request.runs:
+            return True
+        largest = self.largest_probability() if bound is not None else None
+        return bound is not None and largest is not None and largest <= bound
+
+    def _jobs(self, points: Sequence[Point], folder: Path) -> list[Job | None]:
+        """Return a job for each point; None for values that do not meet the conditions or make no valid scenario."""
+        jobs: list[Job | None] = []
+        options = self._request.options
+        for point in points:
+            self._proposed += 1
+            scenario = self._load(f"search-{self._proposed}", point)
+            if scenario is None:
+                jobs.append(None)
+                continue
+            key = scenario.key(options.seed if options.seed is not None else scenario.spec.seed)
+            jobs.append(Job(len(jobs), scenario, key, run_folder(folder, key), options.wall_limit, options.replay))
+        return jobs
+
+    def _load(self, name: str, point: Point) -> LoadedScenario | None:
+        try:
+            variation = self._space.variation(name, point)
+        except ConditionError as error:
+            raise InvalidInput([Problem(str(self._request.file), 0, 0, "SC016", str(error))]) from error
+        if variation is None:
+            return None
+        self._variations[name] = variation
+        loaded = self._scenario.load(variation.tree)
+        if isinstance(loaded, list):
+            self._problems = loaded
+            return None
+        checked, problems = self._checks.variation(loaded.having(variation=name, varied=variation.values))
+        if checked is None:
+            self._problems = problems
+        return checked
+
+    def _plan(self, journal: Journal, jobs: Sequence[Job]) -> None:
+        planned = plan_runs(jobs)
+        is_first = not self._planned
+        self._planned += planned
+        if is_first:
+            journal.plan(planned, __version__, self._request.options.workers, study=self._study_plan())
+        else:
+            journal.add(planned, self._study_plan())
+
+    def _study_plan(self) -> StudyPlan:
+        values = {run.key: run.varied for run in self._planned if run.varied}
+        name = self._planned[0].key.scenario if self._planned else self._request.file.stem
+        return StudyPlan(name, self.is_random, None, values, stops_early=True)
+
+    def _keep(self, answer: RunFinished) -> None:
+        """Write the scenario of a run that failed in a way that was not found before."""
+        result = answer.result
+        if run_has_passed(result) or not is_counted(result) or (mark := signature(result)) in self._signatures:
+            return
+        if len(self.found) >= self._request.failures:
+            return
+        self._signatures.add(mark)
+        variation = self._variations[result.key.variation]
+        tree = with_seed(variation.tree, result.key.seed)
+        comment = f"Found by simscen falsify: {self._request.file.name} fails with these values."
+        text = changed_text(self._scenario.text, self._scenario.path, tree.plain, comment)
+        file = free_file(self._request.file)
+        write_atomically(file, text.encode())
+        self.found.append(FoundFailure(file, answer, variation.values))
+
+    def _no_valid_values(self) -> Problem:
+        message = f"none of {self._proposed} proposed values meets the conditions in `require`"
+        return Problem(str(self._request.file), 0, 0, "SC016", message)
+
+
+def run_has_passed(result: RunResult) -> bool:
+    """Return whether a run passed, or failed as expected."""
+    return result.outcome in (Outcome.PASSED, Outcome.FAILED_AS_EXPECTED)
+
+
+def signature(result: RunResult) -> Signature:
+    """Return what tells failures apart: criteria, events and faults that happened, and the place."""
+    failed = [verdict for verdict in result.verdicts if verdict.status is Status.FAIL]
+    finding = failed[0].tightest if failed else None
+    place = None if finding is None or finding.place is None else finding.place
+    square = None if place is None else (math.floor(place[0] / PLACE_M), math.floor(place[1] / PLACE_M))
+    kinds = tuple(sorted({verdict.id for verdict in failed})) or ((result.error.kind,) if result.error else ())
+    happened = frozenset(one.ordered.name for one in result.disturbances if one.fired)
+    return kinds, happened, square
+
+
+def free_file(scenario: Path) -> Path:
+    """Return a file NAME.failure-N.scenario.yaml beside the scenario that does not exist yet."""
+    return next(file for number in count(1) if not (file := sibling(scenario, f"failure-{number}")).exists())
+
+
+def summary_lines(falsification: Falsification) -> list[str]:
+    """Return what was found, in words."""
+    runs = len(falsification.answers)
+    lines = []
+    for one in falsification.found:
+        values = ", ".join(f"{path} = {value_text(value)}" for path, value in one.values.items())
+        lines += [f"failure: {shown(one.file)}", f"with {values}"]
+        lines += [f"replay: {one.run.artifacts.replay}"] if one.run.artifacts.replay else []
+        lines += [f"smaller: simscen shrink {shown(one.file)}", ""]
+    number = len(falsification.found)
+    if number:
+        lines.append(f"found {number} {'failure' if number == 1 else 'different failures'} in {runs} runs")
+        return lines
+    lines.append(f"found no failure in {runs} runs")
+    largest = falsification.largest_probability()
+    if largest is not None:
+        lines.append(f"with {CONFIDENCE:.0%} confidence, at most {100 * largest:.3g} % of random values fail")
+    return lines
+
+
+def _margin(answer: RunFinished | None) -> float:
+    return math.nan if answer is None or not is_counted(answer.result) else run_margin(answer.result)

@@ -1,0 +1,136 @@
+"""Search methods for failures: each proposes points of the unit cube, and learns from the margins of their runs.
+
+Points are asked for and answered in batches of a fixed size, so that a search does not depend on the number of workers.
+"""
+
+import math
+from collections.abc import Sequence
+from enum import Enum
+from typing import Any, Protocol
+
+import numpy as np
+
+from simscen.core.errors import UsageError
+
+Point = tuple[float, ...]
+"""Cumulative probability of each parameter in its distribution, between 0 and 1, both excluded."""
+STARTUP_POINTS = 16
+"""Random points before TPE uses what it has learned; its authors use 10 to 20."""
+
+
+class SearchMethod(str, Enum):
+    """How `simscen falsify` chooses values."""
+
+    AUTO = "auto"
+    TPE = "tpe"
+    SOBOL = "sobol"
+    RANDOM = "random"
+
+
+class Search(Protocol):
+    """A search for the smallest margin."""
+
+    def ask(self, count: int) -> list[Point]:
+        """Return the next points to run."""
+        ...
+
+    def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
+        """Learn from the margins of points that were asked for, in the same order. nan: nothing is known."""
+        ...
+
+
+def make_search(method: SearchMethod, choices: Sequence[int], seed: int) -> Search:
+    """Return a search. `choices` are the numbers of values of the parameters to choose from, 0 for other parameters.
+
+    Raises UsageError if the method needs a package that is not installed.
+    """
+    if method is SearchMethod.RANDOM:
+        return RandomSearch(len(choices), seed)
+    if method is SearchMethod.SOBOL:
+        return SobolSearch(len(choices), seed)
+    try:
+        return TpeSearch(choices, seed)
+    except ImportError:
+        if method is SearchMethod.AUTO:
+            return SobolSearch(len(choices), seed)
+        raise UsageError("--method tpe needs Optuna; install it with: pip install 'simscen[search]'") from None
+
+
+class RandomSearch:
+    """Independent uniform points."""
+
+    def __init__(self, dimensions: int, seed: int) -> None:
+        self._dimensions, self._rng = dimensions, np.random.default_rng(seed)
+
+    def ask(self, count: int) -> list[Point]:
+        """Return random points."""
+        return [tuple(_inside(u) for u in row) for row in self._rng.random((count, self._dimensions)).tolist()]
+
+    def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
+        """Ignore the margins."""
+
+
+class SobolSearch:
+    """Points of a Sobol sequence with a random shift, which cover the space more evenly than random ones."""
+
+    def __init__(self, dimensions: int, seed: int) -> None:
+        from scipy.stats.qmc import Sobol  # the import takes half a second
+
+        self._sequence = Sobol(dimensions, scramble=False)
+        self._shift = np.random.default_rng(seed).random(dimensions)
+
+    def ask(self, count: int) -> list[Point]:
+        """Return the next points of the sequence."""
+        rows = (np.concatenate([self._sequence.random(1) for _ in range(count)]) + self._shift) % 1.0
+        return [tuple(_inside(u) for u in row) for row in rows.tolist()]
+
+    def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
+        """Ignore the margins."""
+
+
+class TpeSearch:
+    """Optuna's multivariate tree-structured Parzen estimator.
+
+    (Bergstra et al.: Algorithms for Hyper-Parameter Optimization, 2011.)
+    """
+
+    def __init__(self, choices: Sequence[int], seed: int) -> None:
+        """Make an empty study. Raises ImportError if Optuna is not installed."""
+        import optuna
+
+        optuna.logging.set_verbosity(optuna.logging.WARNING)
+        sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=STARTUP_POINTS)
+        self._choices, self._study = choices, optuna.create_study(sampler=sampler)
+        self._failed = optuna.trial.TrialState.FAIL
+        self._distributions: dict[str, Any] = {
+            f"x{index}": optuna.distributions.CategoricalDistribution(tuple(range(count)))
+            if count
+            else optuna.distributions.FloatDistribution(0.0, 1.0)
+            for index, count in enumerate(choices)
+        }
+        self._trials: list[Any] = []
+
+    def ask(self, count: int) -> list[Point]:
+        """Return points where small margins are likely."""
+        self._trials = [self._study.ask(self._distributions) for _ in range(count)]
+        return [self._point(trial.params) for trial in self._trials]
+
+    def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
+        """Learn from the margins."""
+        for trial, margin in zip(self._trials, margins, strict=True):
+            if math.isnan(margin):
+                self._study.tell(trial, state=self._failed)
+            else:
+                self._study.tell(trial, margin)
+
+    def _point(self, parameters: dict[str, Any]) -> Point:
+        values = (parameters[f"x{index}"] for index in range(len(self._choices)))
+        return tuple(
+            (value + 0.5) / count if count else _inside(value)
+            for value, count in zip(values, self._choices, strict=True)
+        )
+
+
+def _inside(u: float) -> float:
+    """Return a number that is neither 0 nor 1."""
+    return min(max(u, 2.0**-53), 1 - 2.0**-53)

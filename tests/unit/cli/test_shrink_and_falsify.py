@@ -1,0 +1,176 @@
+"""`simscen shrink` and `simscen falsify` on scenarios whose cause of failure is known.
+
+The robot stands still, and the clearance to crate-3 is too small. Nothing else matters.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+SCENARIO = """\
+# Many things that do not matter, and one that does.
+simscen: 1
+description: A robot between crates.
+world:
+  simscen: 1
+  walls: [{points: [[0, 0], [20, 0], [20, 20], [0, 20], [0, 0]]}]
+  obstacles:
+    - {name: crate-1, box: [1, 1, 1], pose: {x: 3, y: 3}}
+    - {name: crate-2, box: [1, 1, 1], pose: {x: 16, y: 4}}
+    - {name: crate-3, box: [1, 1, 1], pose: {x: 11.43, y: 10}}
+    - {name: crate-4, box: [1, 1, 1], pose: {x: 4, y: 16}}
+robot:
+  pose: {x: 10, y: 10}
+  motor_torque: 83.5 %
+stack: {controller: {desired_linear_vel: 0.4}}
+faults:
+  - {sensor: lidar, noise: {std: 1.5 cm}}
+  - {sensor: lidar, name: late, delay: {latency: 10 ms}}
+events:
+  - {name: new crate, when: {time: 10 ms}, do: {spawn: {name: box, box: [1, 1, 1], pose: {x: 10, y: 17}}}}
+time_limit: 61.7 ms
+pass:
+  - collisions: {max: 0}
+  # There must be space to turn.
+  - clearance: {min: 1 m}
+"""
+
+
+def simscen(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run a process of its own, because a session locks its folder until the process ends."""
+    command = [sys.executable, "-m", "simscen", *map(str, arguments)]
+    return subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
+
+
+def content(file: Path) -> Any:
+    return yaml.safe_load(file.read_text())
+
+
+def runs_of(folder: Path) -> list[Any]:
+    found: list[Any] = json.loads((folder / "results.json").read_text())["runs"]
+    return found
+
+
+def measured(run: Any) -> list[Any]:
+    return [[verdict["id"], verdict["status"], verdict["findings"]] for verdict in run["verdicts"]]
+
+
+def test_only_what_causes_the_failure_is_left(tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    done = simscen(tmp_path, "shrink", "a.scenario.yaml", "-j", 2)
+    assert done.returncode == 0, done.stderr
+    file = tmp_path / "a.minimal.scenario.yaml"
+    left = content(file)
+    assert [item["name"] for item in left["world"]["obstacles"]] == ["crate-3"]
+    assert set(left) == {"simscen", "world", "robot", "time_limit", "pass", "seed"} - ({"time_limit"} - set(left))
+    assert left["pass"] == [{"clearance": {"min": "1 m"}}]
+    assert set(left["robot"]) == {"pose"}
+    assert "# There must be space to turn." in file.read_text()
+    for text in ("world.obstacles[0] (crate-1)", "events", "faults", "stack", "robot.motor_torque"):
+        assert f"  {text}\n" in done.stdout, done.stdout
+    assert "-> " in done.stdout
+    assert simscen(tmp_path, "run", file.name).returncode == 1
+    again = simscen(tmp_path, "shrink", "a.scenario.yaml", "-j", 1, "--out", "one.scenario.yaml")
+    assert again.returncode == 0
+    assert (tmp_path / "one.scenario.yaml").read_bytes() == file.read_bytes()
+
+
+def test_a_run_in_an_output_folder_is_shrunk_with_its_variation(tmp_path: Path) -> None:
+    varied = SCENARIO + "variations: {grid: {robot.pose.x: [8, 10], robot.motor_torque: [90 %, 100 %]}}\n"
+    (tmp_path / "a.scenario.yaml").write_text(varied)
+    assert simscen(tmp_path, "run", ".", "--out", "out").returncode == 1
+    run = next(one for one in runs_of(tmp_path / "out") if one["outcome"] == "failed")
+    folder = Path("out", run["artifacts"]["mcap"]).parent
+    done = simscen(tmp_path, "shrink", folder, "--keep-world", "--runs", 200)
+    assert done.returncode == 0, done.stderr
+    left = content(tmp_path / "a.minimal.scenario.yaml")
+    assert left["robot"]["pose"]["x"] == 10
+    assert "variations" not in left
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["a.scenario.yaml", "--criterion", "collisions"], "the run did not fail in collisions, but in clearance"),
+        (["good.scenario.yaml"], "the run did not fail: passed"),
+        (["nothing.scenario.yaml"], "no such file"),
+        (["a.scenario.yaml", "--out", "a.scenario.yaml"], "exists already"),
+        ([".", "--seed", "3"], "are for a scenario file"),
+        (["."], "is not the folder of a run"),
+        (["a.scenario.yaml", "--variation", "x"], "has no variations"),
+    ],
+)
+def test_what_cannot_be_shrunk_is_an_error(tmp_path: Path, options: list[str], told: str) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    (tmp_path / "good.scenario.yaml").write_text(SCENARIO.replace("min: 1 m", "min: 10 cm"))
+    done = simscen(tmp_path, "shrink", *options)
+    assert done.returncode == 2
+    assert told in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_spent_budget_still_writes_a_smaller_scenario(tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    done = simscen(tmp_path, "shrink", "a.scenario.yaml", "--runs", 6)
+    assert done.returncode == 1, done.stderr
+    assert "see --runs" in done.stdout
+    assert simscen(tmp_path, "run", "a.minimal.scenario.yaml").returncode == 1
+
+
+RANGES = """\
+variations:
+  sampled:
+    count: 10
+    values:
+      robot.pose.x: {uniform: [4, 10]}
+      robot.motor_torque: {uniform: [50 %, 100 %]}
+"""
+
+
+@pytest.mark.parametrize("method", ["tpe", "sobol", "random"])
+def test_a_found_failure_is_written_as_a_scenario_that_fails(tmp_path: Path, method: str) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES)
+    done = simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", method, "--out", "out", "-j", 2)
+    assert done.returncode == 1, done.stderr
+    file = tmp_path / "a.failure-1.scenario.yaml"
+    assert 9.2 < content(file)["robot"]["pose"]["x"] < 10.0  # crate-3 begins at 10.93, and the robot's radius is 0.22
+    assert "variations" not in content(file)
+    assert simscen(tmp_path, "run", file.name, "--out", "again").returncode == 1
+    (again,) = runs_of(tmp_path / "again")
+    assert measured(again) in [measured(run) for run in runs_of(tmp_path / "out")]
+    assert "smaller: simscen shrink a.failure-1.scenario.yaml" in done.stdout
+    repeated = simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", method, "--out", "out1", "-j", 1)
+    assert repeated.returncode == 1
+    assert (tmp_path / "out/results.json").read_bytes() == (tmp_path / "out1/results.json").read_bytes()
+
+
+def test_no_failure_is_a_bound_on_the_rate_of_failures_for_random_values(tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES.replace("[4, 10]", "[4, 8]"))
+    done = simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", "random", "--probability", "0.1")
+    assert done.returncode == 0, done.stderr
+    assert "found no failure in 32 runs" in done.stdout  # 29 are needed, in batches of 8
+    assert "with 95% confidence, at most 8.94 % of random values fail" in done.stdout  # 1 - 0.05 ** (1 / 32)
+    assert not list(tmp_path.glob("*.failure-*"))
+
+
+@pytest.mark.parametrize(
+    ("ranges", "options", "told"),
+    [
+        ("", [], "has no `variations` to search"),
+        ("variations: {grid: {seed: [1, 2]}}\n", [], "only the ranges of `sampled` can be searched"),
+        (RANGES + "  require: ['robot.pose.x > 11']\n", [], "meets the conditions in `require`"),
+        (RANGES.replace("[4, 10]", "[-5, -4]"), [], "error[SC301]"),
+        (RANGES, ["--method", "sobol", "--probability", "0.1"], "--probability needs --method random"),
+    ],
+)
+def test_what_cannot_be_searched_is_an_error(tmp_path: Path, ranges: str, options: list[str], told: str) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO + ranges)
+    done = simscen(tmp_path, "falsify", "a.scenario.yaml", *options)
+    assert done.returncode == 2
+    assert told in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,39 @@
+"""Delta debugging against properties of random failures."""
+
+from collections.abc import Sequence
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simscen.core.delta_debugging import minimize
+
+
+@given(st.sets(st.integers(0, 30)), st.integers(1, 31))
+def test_exactly_the_needed_parts_are_left(needed: set[int], count: int) -> None:
+    needed = {part for part in needed if part < count}
+    tried: list[frozenset[int]] = []
+
+    def first_failing(candidates: Sequence[Sequence[int]]) -> int | None:
+        for index, candidate in enumerate(candidates):
+            tried.append(frozenset(candidate))
+            if needed <= set(candidate):
+                return index
+        return None
+
+    assert minimize(range(count), first_failing) == sorted(needed)
+    assert len(set(tried)) <= 2 * count * count + 4  # the bound of Zeller and Hildebrandt is quadratic
+
+
+@given(st.sets(st.frozensets(st.integers(0, 9), min_size=1, max_size=4), min_size=1, max_size=5))
+def test_no_single_part_can_be_removed_from_the_result(causes: set[frozenset[int]]) -> None:
+    def fails(parts: Sequence[int]) -> bool:
+        return any(cause <= set(parts) for cause in causes)
+
+    def first_failing(candidates: Sequence[Sequence[int]]) -> int | None:
+        return next((index for index, candidate in enumerate(candidates) if fails(candidate)), None)
+
+    if not fails(range(10)):
+        return
+    left = minimize(range(10), first_failing)
+    assert fails(left)
+    assert not any(fails([part for part in left if part != one]) for one in left)

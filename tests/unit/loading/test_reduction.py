@@ -1,0 +1,115 @@
+"""Reduced scenarios: trees without parts, rounded numbers, and their text."""
+
+from typing import Any
+
+import pytest
+
+from simscen.loading.reduced_text import changed_text
+from simscen.loading.reduction import (
+    changed_values,
+    removable_parts,
+    removed_parts,
+    rounded_tree,
+    roundings,
+    with_seed,
+    with_values,
+    without,
+)
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.tree import MappingNode, Position, ScalarNode
+
+TEXT = """\
+# What this tests.
+simscen: 1
+world: house.world.yaml
+
+robot: {pose: dock, motor_torque: 93.1234 %}
+goals:
+  # the first
+  - {pose: sofa, timeout: 61.7 s}
+  - pose: kitchen  # the second
+    timeout: 100 s
+# disturbances
+events:
+  - {name: crate, when: {time: 30 s}, do: {remove: box}}
+pass:
+  - collisions: {max: 0}
+"""
+
+
+def parsed(text: str) -> MappingNode:
+    tree, problems = parse_yaml(text, "a.yaml")
+    assert not problems
+    assert isinstance(tree, MappingNode)
+    return tree
+
+
+def test_parts_of_each_depth_can_be_left_out_but_not_what_fails() -> None:
+    tree = parsed(TEXT)
+    assert removable_parts(tree, 1) == [("goals",), ("events",)]
+    assert ("goals", 0) in removable_parts(tree, 2)
+    assert ("robot", "motor_torque") in removable_parts(tree, 2)
+    assert not any(keys[0] in ("pass", "simscen") for depth in (1, 2, 3) for keys in removable_parts(tree, depth))
+
+
+def test_parts_are_left_out_with_what_becomes_empty() -> None:
+    tree = parsed(TEXT)
+    left = without(tree, [("goals", 0), ("events", 0), ("robot", "motor_torque")])
+    assert left.plain["goals"] == [{"pose": "kitchen", "timeout": "100 s"}]
+    assert "events" not in left.plain
+    assert left.plain["robot"] == {"pose": "dock"}
+    assert removed_parts(tree, left) == ["robot.motor_torque", "goals[0] (sofa)", "events"]
+
+
+def test_values_are_changed_at_their_places() -> None:
+    tree = parsed(TEXT)
+    place = Position("a.yaml", 1, 1)
+    changed = with_values(tree, {("goals", 1, "timeout"): ScalarNode(place, "5 s"), ("robot", "motor_torque"): None})
+    assert changed.plain["goals"][1] == {"pose": "kitchen", "timeout": "5 s"}
+    assert changed.plain["robot"] == {"pose": "dock"}
+    assert with_values(tree, {("stack", "type"): ScalarNode(place, "x")}).plain["stack"] == {"type": "x"}
+    assert with_seed(tree, 7).plain["seed"] == 7
+
+
+@pytest.mark.parametrize(("digits", "values"), [(1, {"90 %", "60 s"}), (2, {"93 %", "62 s"}), (3, {"93.1 %"})])
+def test_numbers_are_rounded_with_their_units(digits: int, values: set[str]) -> None:
+    tree = parsed(TEXT)
+    found = roundings(tree, digits)
+    assert {one.value for one in found} == values
+    rounded = rounded_tree(tree, found)
+    assert len(changed_values(tree, rounded)) == len(values)
+    assert not removed_parts(tree, rounded)
+
+
+def written(content: dict[str, Any]) -> str:
+    text = changed_text(TEXT, "a.yaml", content)
+    assert parsed(text).plain == content
+    return text
+
+
+def test_unchanged_parts_keep_their_text() -> None:
+    content = parsed(TEXT).plain
+    assert written(content) == TEXT.replace("\n\n", "\n")
+    without_second = {**content, "goals": content["goals"][:1]}
+    assert "  # the first\n  - {pose: sofa, timeout: 61.7 s}\n# disturbances\n" in written(without_second)
+    without_first = {**content, "goals": content["goals"][1:]}
+    assert "goals:\n  - pose: kitchen  # the second\n    timeout: 100 s\n# disturbances\n" in written(without_first)
+    changed = {**content, "robot": {"pose": "sofa"}, "seed": 3}
+    assert "robot: {pose: sofa}\n" in written(changed)
+    assert written(changed).endswith("pass:\n  - collisions: {max: 0}\nseed: 3\n")
+    assert written({key: value for key, value in content.items() if key != "events"}).count("disturbances") == 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{simscen: 1, goals: [{pose: a}, {pose: b}]}",
+        "simscen: 1\ngoals: [{pose: a}, {pose: b}]\n",
+        "simscen: 1\ngoals:\n- &one\n  pose: a\n- *one\n",
+        "simscen: 1\ngoals:\n- {pose: a}\n-\n  pose: b\nnote: |\n  - one\n  # two\n",
+    ],
+)
+def test_any_layout_is_written_with_the_right_content(text: str) -> None:
+    content = parsed(text).plain
+    for changed in (content, {**content, "goals": content["goals"][1:]}, {**content, "goals": [{"pose": "c"}]}):
+        assert parsed(changed_text(text, "a.yaml", changed, "a comment\nof two lines")).plain == changed

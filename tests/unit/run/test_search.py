@@ -1,0 +1,67 @@
+"""Searches for failures, on plants of eight parameters of which 0.4 % of the values fail."""
+
+import math
+import statistics
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+from simscen.core.geometry import Array
+from simscen.run.sessions.search import Search, SearchMethod, make_search
+
+WEIGHTS = np.array([1, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02])
+CENTER = np.array([0.3, 0.6, 0.2])
+PLANTS: dict[str, Callable[[Array], Array]] = {
+    "linear": lambda points: points @ WEIGHTS,
+    "region": lambda points: -np.linalg.norm(points[..., :3] - CENTER, axis=-1),
+    "product": lambda points: points[..., :4].prod(axis=-1),
+}
+
+
+def runs_to_failure(search: Search, plant: Callable[[Array], Array], threshold: float, limit: int) -> int:
+    runs = 0
+    while runs < limit:
+        points = search.ask(8)
+        margins = [threshold - float(plant(np.array(point))) for point in points]
+        failed = [number for number, margin in enumerate(margins, start=1) if margin < 0]
+        if failed:
+            return runs + failed[0]
+        search.tell(points, margins)
+        runs += 8
+    return limit
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_tpe_finds_rare_failures_in_sixty_runs(name: str) -> None:
+    plant = PLANTS[name]
+    threshold = float(np.quantile(plant(np.random.default_rng(0).random((200_000, 8))), 0.996))
+    runs = [
+        runs_to_failure(make_search(SearchMethod.TPE, [0] * 8, seed), plant, threshold, 400) for seed in range(1, 21)
+    ]
+    assert statistics.median(runs) <= 60  # random values: a median of 173, by ln 0.5 / ln 0.996
+
+
+@pytest.mark.parametrize("method", [SearchMethod.TPE, SearchMethod.SOBOL, SearchMethod.RANDOM])
+def test_a_search_is_repeatable_and_stays_inside(method: SearchMethod) -> None:
+    def points() -> list[tuple[float, ...]]:
+        search, found = make_search(method, [0, 3, 0], 7), []
+        for _ in range(6):
+            batch = search.ask(8)
+            search.tell(batch, [math.nan, *(sum(point) for point in batch[1:])])
+            found += batch
+        return found
+
+    first = points()
+    assert first == points()
+    assert all(0.0 < u < 1.0 for point in first for u in point)
+    if method is SearchMethod.TPE:
+        assert {round(point[1] * 3 - 0.5, 9) for point in first} == {0.0, 1.0, 2.0}
+
+
+def test_sobol_points_are_more_even_than_random_ones() -> None:
+    sobol, random = (
+        np.array(make_search(method, [0, 0, 0], 1).ask(256)) for method in (SearchMethod.SOBOL, SearchMethod.RANDOM)
+    )
+    assert qmc.discrepancy(sobol) < qmc.discrepancy(random) / 5
