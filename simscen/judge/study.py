@@ -12,7 +12,7 @@ from simscen.core.records.study import ParameterEffect, RateRow, Study
 from simscen.core.statistics import CONFIDENCE, holm, wilson_interval
 from simscen.judge.acceptance import anytime_limits, evaluate_claim, is_counted
 from simscen.model.acceptance import PassRate
-from simscen.spec.quantities import si_number
+from simscen.spec.quantities import NUMBER_AND_UNIT, si_number
 
 MIN_RUNS_FOR_EFFECTS = 8
 """Fewest runs for an effect: with fewer, no rank correlation of one of several parameters is significant."""
@@ -133,8 +133,14 @@ def _labels(values: Sequence[Any]) -> list[str]:
     for start in range(0, len(order), size):
         part = order[start : start + size]
         for index in part:
-            labels[index] = f"{texts[part[0]]} … {texts[part[-1]]}"
+            labels[index] = f"{_short(values[part[0]])} … {_short(values[part[-1]])}"
     return labels
+
+
+def _short(value: Any) -> str:
+    """Return a number or quantity with three significant digits."""
+    match = NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
+    return f"{value:.3g}" if match is None else f"{float(match[1]):.3g} {match[2]}"
 
 
 def value_text(value: Any) -> str:

@@ -25,7 +25,7 @@ from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, child,
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import WorldSpec
 
-SUFFIXES = (".scenario.yaml", ".scenario.yml", ".study.yaml", ".study.yml", ".yaml", ".yml")
+SUFFIXES = (".scenario.yaml", ".scenario.yml", ".yaml", ".yml")
 
 
 def load_scenario(

@@ -38,14 +38,15 @@ def study_html(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
 def _rates(study: Study) -> str:
     if not study.rates:
         return ""
+    has_limits = any(row.limits is not None for row in study.rates)
     rows = "".join(
         f"<tr><td>{html_text(row.path)}</td><td>{html_text(row.value)}</td><td>{row.passed} of {row.runs}</td>"
-        f"<td>{'' if row.limits is None else f'{row.limits[0]:.0%} … {row.limits[1]:.0%}'}</td></tr>"
+        f"{'' if row.limits is None else f'<td>{100 * row.limits[0]:.0f} … {100 * row.limits[1]:.0f} %</td>'}</tr>"
         for row in study.rates
     )
     return (
         "<h3>Pass rate by parameter</h3><table><thead><tr><th>parameter</th><th>value</th><th>passed</th>"
-        f"<th>95 % interval</th></tr></thead><tbody>{rows}</tbody></table>"
+        f"{'<th>95 % interval</th>' if has_limits else ''}</tr></thead><tbody>{rows}</tbody></table>"
     )
 
 

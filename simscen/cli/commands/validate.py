@@ -14,8 +14,8 @@ from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, prin
 from simscen.cli.session.selection import Checks
 from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import Exit, Problem
-from simscen.loading.checks.files import STACKS, check_file, file_kind
-from simscen.loading.files.discovery import BASE, ROBOT, SCENARIO, STACK, WORLD, default_root, discover
+from simscen.loading.checks.files import CHECKED_DRAWS, STACKS, check_file, file_kind
+from simscen.loading.files.discovery import BASE, ROBOT, SCENARIO, STACK, STUDY, WORLD, default_root, discover
 
 
 class Format(str, Enum):
@@ -47,8 +47,8 @@ def command(
 ) -> None:
     """Check scenario, world, robot, and stack files without running anything.
 
-    Lists every problem with file, line, and column. Folders are searched for *.scenario.yaml, *.world.yaml,
-    *.robot.yaml, *.stack.yaml, and *.base.yaml. A Nav2 parameter file is checked as a stack; parameters without meaning
+    Lists every problem with file, line, and column. Folders are searched for *.scenario.yaml, *.study.yaml,
+    *.world.yaml, *.robot.yaml, *.stack.yaml, and *.base.yaml. A Nav2 parameter file is checked as a stack; parameters without meaning
     here are listed. Base files and defaults.yaml may be incomplete. Scenarios are also checked in their worlds: whether
     the robot is free at its start and goals, can arrive in time, and whether all events can take place and all criteria
     can hold and fail.
@@ -59,7 +59,7 @@ def command(
     stacks = stacks_of(stack or [], home, world_path or [])
     checks = Checks(home, world_path or [], lenient, fast, picture, stacks=stacks, runs=bool(stack))
     checked = _Checked()
-    for file in discover(paths, home, SCENARIO + WORLD + ROBOT + STACK + BASE):
+    for file in discover(paths, home, SCENARIO + STUDY + WORLD + ROBOT + STACK + BASE):
         kind = file_kind(file, home)
         checked.add(kind, from_here(_problems(kind, file, checks), home))
     _PRINT[format_](checked)
@@ -69,8 +69,9 @@ def command(
 
 def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
     """Return the problems of the text; if there are no errors, also those of building the world or robot."""
-    if kind == "scenario":
-        found = [problem for choice in checks.choices for problem in checks.scenario(file, choice)[1]]
+    if kind in ("scenario", "study"):
+        numbers = CHECKED_DRAWS if kind == "study" else None
+        found = [problem for choice in checks.choices for problem in checks.scenario(file, choice, numbers)[1]]
         return list(dict.fromkeys(found))
     found = check_file(kind, file, checks.root, checks.world_path)
     if kind in (*STACKS, "base") or any(problem.severity == "error" for problem in found):
@@ -104,7 +105,8 @@ class _Checked:
 
 def _count(number: int, what: str) -> str:
     noun, of, rest = what.partition(" of ")  # a parameter file of Nav2
-    return f"{number} {noun}{'' if number == 1 else 's'}{of}{rest}"
+    plural = "studies" if noun == "study" else f"{noun}s"
+    return f"{number} {noun if number == 1 else plural}{of}{rest}"
 
 
 def _text(checked: _Checked) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from simscen.core.errors import Problem
 from simscen.loading.checks.runner import check_world_file
 from simscen.loading.files.assets import GAZEBO, URDF, Assets, is_ros_map
-from simscen.loading.files.discovery import BASE, ROBOT, SCENARIO, STACK, WORLD
+from simscen.loading.files.discovery import BASE, ROBOT, SCENARIO, STACK, STUDY, WORLD
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.validate import check_partial
@@ -16,6 +16,8 @@ from simscen.loading.yaml.library import APPEND_SUFFIX, DEFAULTS_FILE, Library
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec
 
+CHECKED_DRAWS = range(1, 21)
+"""Numbers of the variations of a study that are checked; the others are checked before they run."""
 STACKS = ("stack", NAV2_FILE_KIND)
 """Kinds of files with the parameters of a stack."""
 _ONLY_ROBOTS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
@@ -23,6 +25,7 @@ _ONLY_WORLDS = frozenset({"walls", "obstacles", "objects", "doors", "places", "r
 _ONLY_SCENARIOS = frozenset({"world", "robot", "goals", "pass", "events", "faults", "stack"})
 _SUFFIXES = (
     ("scenario", SCENARIO),
+    ("study", STUDY),
     ("base", BASE),
     ("world", (*WORLD, *GAZEBO)),
     ("robot", (*ROBOT, *URDF)),
@@ -35,8 +38,8 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
 
     Some problems are warnings.
     """
-    if kind == "scenario":
-        loaded = try_variations(file, root, world_path)
+    if kind in ("scenario", "study"):
+        loaded = try_variations(file, root, world_path, numbers=CHECKED_DRAWS if kind == "study" else None)
         if isinstance(loaded, list):
             return loaded
         return merge_problems([VariationProblems(one.variation, one.set_by, one.notes) for one in loaded])
@@ -64,7 +67,7 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
 def file_kind(file: Path, root: Path) -> str:
     """Return the kind of a file by its suffix, else by keys that only one kind has.
 
-    The kinds are "scenario", "world", "robot", "stack", "base", "map" and NAV2_FILE_KIND.
+    The kinds are "scenario", "study", "world", "robot", "stack", "base", "map" and NAV2_FILE_KIND.
     """
     if file.name == DEFAULTS_FILE:
         return "base"

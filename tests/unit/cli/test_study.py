@@ -73,7 +73,7 @@ def test_a_study_finds_what_lowers_the_margin(tmp_path: Path) -> None:
     page = (tmp_path / "out/report.html").read_text()
     assert "margin of clearance against robot.pose.x" in page
     assert page.count('<circle class="bad"') == 2 * found["failed"]
-    assert 'href="runs/s/' in page
+    assert 'href="runs/s.study/' in page
 
 
 def test_results_do_not_depend_on_the_number_of_workers_or_on_batches(tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_a_claim_has_its_own_exit_code_and_testcase(
     assert done.returncode == code, done.stderr
     assert results(tmp_path)["study"]["claim"]["status"] == status
     told = case(tmp_path)
-    assert told.get("name", "").startswith("s [pass rate >= 0.8 (confidence 0.95)]")
+    assert told.get("name", "").startswith("s.study [pass rate >= 0.8 (confidence 0.95)]")
     assert [child.tag for child in told] == [element]
     if element == "error":
         assert told[0].get("type") == "simscen.undecided"
