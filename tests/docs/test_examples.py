@@ -28,12 +28,17 @@ def project(tmp_path_factory):
     shutil.copytree(ROOT / "worlds", root / "worlds")
     (root / "scenarios" / "theme").mkdir(parents=True)
     (root / "scenarios" / "jackal.urdf").write_text("<robot name='jackal'/>")
+    for file in (ROOT / "scenarios").rglob("*.scenario.yaml"):  # what the studies of the documentation extend
+        text = file.read_text(encoding="utf-8").replace("../../worlds", "../worlds")
+        (root / "scenarios" / file.name).write_text(text, encoding="utf-8")
+    tutorial = (ROOT / "docs/tutorials/flaky-to-fixed.md").read_text(encoding="utf-8")
+    (root / "scenarios" / "crossing.scenario.yaml").write_text(BLOCK.search(tutorial)[1], encoding="utf-8")
     return root
 
 
 @pytest.mark.parametrize("block", blocks())
 def test_a_complete_example_is_valid(block, project):
-    told = {"\npass:": "scenario", "\ndrive:": "robot", "\nstack:": "stack"}
+    told = {"\nextends:": "study", "\npass:": "scenario", "\ndrive:": "robot", "\nstack:": "stack"}
     kind = next((kind for key, kind in told.items() if key in block), "world")
     folder = "scenarios/theme" if "../../worlds" in block else "scenarios"
     file = project / folder / f"example.{kind}.yaml"

@@ -26,7 +26,7 @@ def command(
     method: Annotated[
         SearchMethod,
         typer.Option(
-            help="tpe: learns where margins are small (needs Optuna: pip install 'simscen[search]'); sobol: covers the "
+            help="tpe: learns where margins are small (needs Optuna: pip install optuna); sobol: covers the "
             "ranges evenly; random: independent draws; auto: tpe if Optuna is installed, otherwise sobol."
         ),
     ] = SearchMethod.AUTO,

@@ -53,7 +53,7 @@ def make_search(method: SearchMethod, choices: Sequence[int], seed: int) -> Sear
     except ImportError:
         if method is SearchMethod.AUTO:
             return SobolSearch(len(choices), seed)
-        raise UsageError("--method tpe needs Optuna; install it with: pip install 'simscen[search]'") from None
+        raise UsageError("--method tpe needs Optuna; install it with: pip install optuna") from None
 
 
 class RandomSearch:
