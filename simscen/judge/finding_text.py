@@ -122,7 +122,7 @@ def relative_margin(finding: Finding) -> float:
 
 def _limit(finding: Finding) -> float:
     """Return the limit, or 0 if it is unknown."""
-    if finding.value is None:
+    if finding.value is None or finding.margin is None:
         return 0.0
-    margin, value = finding.margin or 0.0, finding.value
-    return value - margin if finding.limit.startswith(("≥", ">")) else value + margin
+    is_lower = finding.limit.startswith(("≥", ">"))
+    return finding.value - finding.margin if is_lower else finding.value + finding.margin

@@ -174,7 +174,7 @@ class ResponseRobustness(Robustness):
     window: SampleWindow
     condition: Condition
     reach: slice
-    required: bool = True
+    required: bool
 
     @property
     def tested(self) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.geometry import Array, wrap_array
+from simscen.core.geometry import Array
 from simscen.core.geometry.polygons import separation
 from simscen.core.records.events import EventKind
 from simscen.criteria.trace_signals.ground_truth import check_samples
@@ -176,5 +176,5 @@ def _gap(poses: Array, places: Array, case: Case) -> Array:
         circle: Array = np.hypot(off[:, 0], off[:, 1]) - case.inscribed_radius
         return circle
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    seen = np.stack((c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], wrap_array(-poses[:, 2])), axis=1)
+    seen = np.stack((c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], np.zeros_like(c)), axis=1)
     return separation(seen, POINT, case.footprint)

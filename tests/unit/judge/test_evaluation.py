@@ -105,3 +105,30 @@ def test_nothing_passes_in_a_log_with_nothing_in_it_but_one_signal_or_event_is_s
     assert spoken.status is Status.PASS
     (seen,) = judge(few, replace(without_signals(TRACE), truth=TRACE.truth), CASE)
     assert seen.status is Status.PASS
+
+
+GOOD = Finding(Status.PASS, "value", "1 m", "≥ 0 m", 1.0, "m", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("findings", "defect"),
+    [
+        (None, "it checked nothing"),
+        ([], "it checked nothing"),
+        ({GOOD}, "it checked nothing"),
+        ((GOOD for _ in range(1)), "it checked nothing"),
+        ([GOOD, "fine"], "its finding is str, which is none"),
+        ([replace(GOOD, status="pass?")], "its finding is Finding, which is none"),
+        ([replace(GOOD, what=1)], "its finding says something that is no text"),
+        ([replace(GOOD, measured=None)], "its finding says something that is no text"),
+        ([replace(GOOD, limit=2)], "its finding says something that is no text"),
+        ([replace(GOOD, unit=3)], "its finding says something that is no text"),
+        ([replace(GOOD, margin="1")], "the margin of value is no number: '1'"),
+        ([replace(GOOD, margin=math.nan)], "the margin of value is no number: nan"),
+        ([replace(GOOD, value=math.nan)], "the value of value is no number: nan"),
+        ([replace(GOOD, what="", value="x")], "the value of its finding is no number: 'x'"),
+        ([GOOD, replace(GOOD, margin=None, value=None)], ""),
+    ],
+)
+def test_findings_of_plug_ins_are_checked(findings: object, defect: str) -> None:
+    assert findings_defect(findings) == defect

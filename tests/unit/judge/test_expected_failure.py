@@ -69,3 +69,13 @@ def test_a_warning_is_no_failure_to_expect() -> None:
 
 def test_a_log_that_was_cut_off_is_never_as_expected() -> None:
     assert judged(KNOWN, verdict("speed", FAIL), verdict("clearance", UNCLEAR), whole=False) == (Outcome.FAILED, "")
+
+
+@pytest.mark.parametrize(
+    ("ids", "name"), [((), "expected"), (("speed",), "expected"), (("expected", "speed"), "expected#2")]
+)
+def test_the_verdict_about_the_expectation_has_a_name_of_its_own(ids: tuple[str, ...], name: str) -> None:
+    verdicts = [verdict(each, FAIL) for each in ids]
+    _, about_it = apply_expectation(KNOWN, verdicts, Outcome.FAILED, True)
+    assert about_it is not None
+    assert about_it.id == name

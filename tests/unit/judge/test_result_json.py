@@ -9,7 +9,7 @@ import pytest
 from simscen.core.records.events import Disturbance, DisturbanceOutcome
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.judge.result_json import from_json, result_data, to_json
+from simscen.judge.result_json import from_json, read_key, result_data, to_json
 
 PLACED = Finding(Status.FAIL, "speed", "2.00 m/s", "≤ 1.00 m/s", -1.0, "m/s", 2.0, 600, (1.0, 2.0), ("why: gust",))
 GUST = DisturbanceOutcome(Disturbance("gust", "event", "time: 2 s"), (480, 600), True, "pushed it", 480)
@@ -66,3 +66,9 @@ def test_a_time_that_is_no_number_is_not_written():
 def test_lines_are_those_of_the_verdicts_one_each():
     with pytest.raises(ValueError, match="shorter"):
         result_data(replace(FAILED, lines=(3,)))
+
+
+def test_keys_are_read_also_from_before_variations_existed():
+    now = {"scenario": "a", "seed": 3, "variation": "speed=1", "stack_name": "dwb"}
+    assert read_key(now) == RunKey("a", 3, "speed=1", "dwb")
+    assert read_key({"scenario": "a", "seed": 3, "variation": "dwb"}) == RunKey("a", 3, "", "dwb")

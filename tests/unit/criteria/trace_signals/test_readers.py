@@ -14,7 +14,7 @@ from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Samples, Trace
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_signal
-from simscen.criteria.trace_signals.readers import points_in_polygon
+from simscen.criteria.trace_signals.readers import evenly_sampled_speed, points_in_polygon
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
@@ -447,3 +447,23 @@ def test_events_are_counted_in_whatever_order_they_were_written():
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0]], "events": events})
     values = read_signal("recovery_count", replace(trace, events=trace.events[::-1]), synthetic_case({}), {})
     assert [at(values, t) for t in (0, 1, 2, 3, 4)] == [0, 1, 2, 3, 3]
+
+
+def test_an_accepted_goal_counts_under_the_name_that_its_number_was_added_to():
+    events = [[1, "goal.accepted", "shelf-2"], [2, "goal.reached", "shelf-2"], [3, "recovery.started", "spin-2"]]
+    words = {"seconds": 4, "truth": [[0, 0, 0]], "events": events}
+    assert at(signal("goal_active", words, goal="shelf-2"), 1.5) == 1
+    assert not signal("recovery_active", words, recovery="spin").any()
+
+
+@pytest.mark.parametrize(("rate", "is_known"), [(18, True), (17, False)])
+def test_smoothness_needs_samples_at_its_lowest_rate(rate: int, is_known: bool) -> None:
+    trace = replace(synthetic_trace({"seconds": 2, "truth": [[0, 0, 0], [2, 1, 0]]}), tick_rate=rate * 10)
+    ticks = np.arange(0, 200, 10)
+    velocity = Samples(ticks, np.column_stack((np.linspace(0, 1, 20), np.zeros(20), np.zeros(20))))
+    moved = replace(trace, truth=Samples(ticks, np.zeros((20, 3))), velocity=velocity, end=190)
+    if is_known:
+        assert evenly_sampled_speed(moved)[1] == rate
+    else:
+        with pytest.raises(SignalUnavailable, match="too few"):
+            evenly_sampled_speed(moved)

@@ -14,8 +14,15 @@ from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResu
 from simscen.core.records.session_events import OutcomeCounts
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.metrics.catalog import METRICS
-from simscen.judge.metrics.comparison import COMPARED_METRICS, compare_stacks, comparison_data
-from simscen.judge.metrics.significance import signed_rank_test
+from simscen.judge.metrics.comparison import (
+    ALL_SCENARIOS,
+    COMPARED_METRICS,
+    compare_sessions,
+    compare_stacks,
+    comparison_data,
+    labeled_key,
+)
+from simscen.judge.metrics.significance import PASS_RATE, Significance, signed_rank_test
 
 STACKS = ("ref=reference", "mine=./nav --fast")
 GOOD = {"time_to_goal": 10.0, "path_length": 5.0, "min_clearance": 0.5, "collisions": 0.0}
@@ -189,3 +196,80 @@ def test_the_signed_rank_test_is_the_share_of_all_signs_that_are_as_extreme(diff
 
 def test_pairs_without_any_difference_have_p_1() -> None:
     assert signed_rank_test([0.0, 0.0, 0.0]) == 1.0
+
+
+def test_keys_of_sessions_keep_the_stack_in_the_name_of_the_scenario() -> None:
+    assert labeled_key(RunKey("a", 1, "slow"), "now") == RunKey("a", 1, "slow", "now")
+    assert labeled_key(RunKey("a", 1, "slow", "dwb"), "now") == RunKey("a (dwb)", 1, "slow", "now")
+    second = RunKey("a", 1).twin
+    assert labeled_key(second, "now") == second
+
+
+def test_scenarios_are_in_order_whatever_the_order_of_the_runs() -> None:
+    runs = [run(stack, scenario=name) for name in "ecadbf" for stack in ("mine", "ref")]
+    comparison = compare_stacks(runs, STACKS)
+    assert comparison is not None
+    assert list(comparison.outcomes) == list("abcdef")
+
+
+def sessions(worse: dict[str, float], seeds: int = 12, failing: int = 0, scenarios: str = "ab"):
+    before = [run("", seed, name) for name in scenarios for seed in range(seeds)]
+    now = [
+        run("", seed, name, Outcome.FAILED if seed < failing else Outcome.PASSED, **worse)
+        for name in scenarios
+        for seed in range(seeds)
+    ]
+    comparison = compare_sessions({"before": before, "now": now}, {"before": "b", "now": "n"}, Significance())
+    (one,) = comparison.against
+    return one
+
+
+def test_changes_say_which_direction_is_worse() -> None:
+    found = {(change.scenario, change.what): change for change in sessions({"min_clearance": 0.3}).changes}
+    assert found.keys() == {("a", "min_clearance"), ("b", "min_clearance")}
+    assert all(change.is_worse for change in found.values())
+    better = sessions({"time_to_goal": 8.0, "added": 3.0}).changes
+    assert {(change.what, change.is_worse) for change in better} == {("time_to_goal", False)}
+
+
+def test_a_metric_of_a_package_may_change_either_way() -> None:
+    before = [run("", seed, added=1.0, another=1.0) for seed in range(12)]
+    now = [run("", seed, added=2.0, another=2.0) for seed in range(12)]
+    comparison = compare_sessions({"before": before, "now": now}, {"before": "b", "now": "n"}, Significance())
+    (one,) = comparison.against
+    assert [(change.what, change.is_worse) for change in one.changes] == [("added", None), ("another", None)]
+    assert [found.metric for found in one.differences][-2:] == ["added", "another"]
+
+
+def test_the_pass_rate_over_all_scenarios_is_tested_if_there_are_several() -> None:
+    changes = {change.scenario: change for change in sessions({}, failing=9).changes if change.what == PASS_RATE}
+    assert changes.keys() == {ALL_SCENARIOS, "a", "b"}
+    assert (changes[ALL_SCENARIOS].baseline, changes[ALL_SCENARIOS].value) == (1.0, 0.25)
+    assert changes[ALL_SCENARIOS].is_worse
+    assert changes[ALL_SCENARIOS].pairs == 24
+    single = sessions({}, failing=9, scenarios="a")
+    assert {change.scenario for change in single.changes if change.what == PASS_RATE} == {"a"}
+
+
+def test_a_metric_is_compared_where_both_runs_have_it() -> None:
+    runs = [run("ref", 1, recoveries=1.0), run("mine", 1, recoveries=None), run("ref", 2, recoveries=2.0)]
+    one = against(*runs, run("mine", 2, recoveries=2.0), run("ref", 3, recoveries=5.0), run("mine", 3, recoveries=4.5))
+    found = of(one, "recoveries")
+    assert (found.pairs, found.lower, found.equal, found.higher) == (2, 1, 1, 0)
+    assert (found.baseline, found.value, found.difference) == (3.5, 3.25, -0.25)
+
+
+def test_each_robot_that_arrives_in_one_run_only_sets_the_pair_apart() -> None:
+    both = {"a/time_to_goal": 5.0, "b/time_to_goal": 6.0}
+    one = against(
+        run("ref", 1, **both), run("mine", 1, **{**both, "b/time_to_goal": None}), run("ref", 2), run("mine", 2)
+    )
+    assert (one.pairs, one.parted) == (2, 1)
+
+
+@pytest.mark.parametrize(("count", "more"), [(1, ""), (2, " (and 1 more)"), (3, " (and 2 more)")])
+def test_a_flip_has_the_first_reason_and_the_number_of_others(count: int, more: str) -> None:
+    bad = run("mine", outcome=Outcome.FAILED)
+    warning = replace(bad.verdicts[0], severity="warn")
+    (flip,) = against(run("ref"), replace(bad, verdicts=(warning, *bad.verdicts * count))).flips
+    assert flip.why == f"clearance: 0.03 m < 0.05 m, at t = 1.00 s, (1.00, 2.00){more}"

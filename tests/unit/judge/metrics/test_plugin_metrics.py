@@ -1,0 +1,107 @@
+"""Metrics of installed packages, and the zones around people at their limits."""
+
+import math
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import COMPLETE_COVERAGE, Evidence, LogCoverage
+from simscen.criteria.base import AnyMeasure
+from simscen.criteria.findings import InvalidTrace, MissingEvidence
+from simscen.judge.metrics import compute
+from simscen.judge.metrics.compute import ZONES, MetricValues, add_plugin_metrics, person_metrics
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
+
+TRACE = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]})
+CASE = synthetic_case({})
+BEFORE = MetricValues({"spl": 1.0}, {"ldlj": "no motion"})
+
+
+class Measured:
+    """A metric that returns or raises something."""
+
+    kind, added_by = "mine", " (my-package 1.0)"
+
+    def __init__(self, answer: object, evidence: frozenset[Evidence] | None = frozenset()) -> None:
+        self.answer, self.evidence = answer, evidence
+
+    @property
+    def measure(self) -> Any:
+        outer = self
+
+        class Own:
+            evidence = outer.evidence
+
+            @staticmethod
+            def measure(trace: object, case: object) -> object:
+                assert (trace, case) == (TRACE, CASE)
+                if isinstance(outer.answer, Exception):
+                    raise outer.answer
+                return outer.answer
+
+        return Own
+
+
+def added(measured: Measured, coverage: LogCoverage = COMPLETE_COVERAGE) -> MetricValues:
+    return add_plugin_metrics(BEFORE, [cast("AnyMeasure", measured)], TRACE, CASE, coverage)
+
+
+@pytest.mark.parametrize("number", [2, 2.5, -1.0, 0.0])
+def test_a_number_is_added(number: float) -> None:
+    assert added(Measured(number)) == MetricValues({"spl": 1.0, "mine": float(number)}, {"ldlj": "no motion"})
+
+
+@pytest.mark.parametrize("answer", ["nothing to measure", MissingEvidence("nothing to measure")])
+def test_a_reason_is_added_where_there_is_no_number(answer: object) -> None:
+    found = added(Measured(answer))
+    assert found.values == {"spl": 1.0, "mine": None}
+    assert found.undefined == {"ldlj": "no motion", "mine": "nothing to measure"}
+
+
+@pytest.mark.parametrize("answer", [True, math.nan, math.inf, -math.inf, None, "", [1.0], 1j])
+def test_anything_else_makes_the_run_an_error(answer: object) -> None:
+    with pytest.raises(InvalidTrace, match=r"metric mine is no number: .*\(my-package 1\.0\)"):
+        added(Measured(answer))
+
+
+def test_an_exception_makes_the_run_an_error() -> None:
+    with pytest.raises(InvalidTrace, match=r"metric mine: KeyError: 'x' \(my-package 1\.0\)"):
+        added(Measured(KeyError("x")))
+
+
+def test_missing_evidence_is_a_reason_if_the_metric_needs_it() -> None:
+    coverage = LogCoverage({Evidence.SCANS: "", Evidence.TRUTH: ""})
+    reason = "the log does not say where the robot truly was nor when scans came"
+    assert added(Measured(1.0, None), coverage).undefined["mine"] == reason
+    assert added(Measured(1.0, frozenset({Evidence.COMMANDS})), coverage).values["mine"] == 1.0
+    only = added(Measured(1.0, frozenset({Evidence.SCANS})), coverage).undefined["mine"]
+    assert only == "the log does not say when scans came"
+
+
+def zones(monkeypatch: pytest.MonkeyPatch, gaps: list[float], trace: Trace = TRACE) -> dict[str, float | str]:
+    whole = np.full(len(trace.truth.ticks), gaps[-1])
+    whole[: len(gaps)] = gaps
+    monkeypatch.setattr(compute, "pedestrian_gap", lambda *_: whole)
+    return dict(person_metrics(trace, CASE))
+
+
+@pytest.mark.parametrize("zone", ZONES)
+def test_a_zone_begins_with_its_first_distance_and_ends_before_its_last(monkeypatch: Any, zone: str) -> None:
+    low, high = ZONES[zone]
+    assert zones(monkeypatch, [low])[f"intrusion_{zone}"] == 1.0
+    assert zones(monkeypatch, [high])[f"intrusion_{zone}"] == 0.0
+    assert zones(monkeypatch, [math.nextafter(high, 0.0)])[f"intrusion_{zone}"] == 1.0
+
+
+def test_touching_a_person_is_a_distance_of_zero_and_nobody_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert zones(monkeypatch, [0.0])["min_person_distance"] == 0.0
+    assert zones(monkeypatch, [math.inf])["min_person_distance"] == "no pedestrian was there at a sample of the truth"
+
+
+def test_a_run_of_one_tick_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = TRACE.truth
+    short = replace(TRACE, truth=replace(first, ticks=first.ticks[:1], values=first.values[:1]), end=1)
+    assert zones(monkeypatch, [0.1], short)["intrusion_intimate"] == 1.0
