@@ -6,15 +6,16 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from simscen.cli.diagnostics import print_text
+from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Reports, exit_code, require_writable
 from simscen.cli.session.terminal import Format, FormatOption, screen
-from simscen.core.errors import Exit
+from simscen.core.errors import Exit, UsageError
 from simscen.judge.metrics.comparison import compare_stacks
 from simscen.judge.metrics.session_summary import session_summary_line, summarize_session
 from simscen.judge.study import evaluate_study
 from simscen.report.journal import require_free
 from simscen.report.journal_reader import read_journal
+from simscen.report.parquet import write_parquet
 from simscen.report.results_json import results_by_stack
 
 
@@ -23,6 +24,9 @@ def command(
     junit: Annotated[Path | None, typer.Option(help="Write only JUnit XML, to this file.")] = None,
     junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
     format_: FormatOption = Format.TEXT,
+    parquet: Annotated[
+        Path | None, typer.Option(help="Also write runs.parquet and verdicts.parquet into this folder; needs pyarrow.")
+    ] = None,
 ) -> None:
     """Write the reports of an output folder again from its journal.
 
@@ -34,7 +38,20 @@ def command(
     run was not completed.
     """
     require_free(folder)
+    if parquet is not None:
+        _write_tables(folder, parquet)
     write_reports(folder, junit, junit_family, format_, only_junit=junit is not None)
+
+
+def _write_tables(folder: Path, target: Path) -> None:
+    """Write the results as Parquet tables. Raises UsageError if that fails."""
+    past = read_journal(folder)
+    try:
+        files = write_parquet(target, past.runs, {run.key: run.varied for run in past.planned})
+    except OSError as error:
+        raise UsageError(f"cannot write to {target}: {error.strerror or error}") from error
+    for file in files:
+        print_text(f"wrote {escaped(str(file))}", sys.stderr)  # stdout may be JSON
 
 
 def write_reports(

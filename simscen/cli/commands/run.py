@@ -15,8 +15,9 @@ from simscen.cli.session.shards import scenario_times, shard_of
 from simscen.cli.session.stacks import STACK_HELP
 from simscen.cli.session.terminal import Format, FormatOption
 from simscen.cli.session.watch import watch_session
+from simscen.core.errors import UsageError
 from simscen.report.journal_reader import JOURNAL_FILE
-from simscen.run.process.jobs import ReplayMode
+from simscen.run.process.jobs import KeptLogs, ReplayMode
 from simscen.run.sessions.run_session import SessionOptions
 
 
@@ -108,6 +109,10 @@ def command(
     replay: Annotated[
         ReplayMode, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")
     ] = ReplayMode.FAILED,
+    keep_logs: Annotated[
+        KeptLogs,
+        typer.Option(help="failed: delete logs and pictures of runs that pass, for sessions of thousands of runs."),
+    ] = KeptLogs.ALL,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")
     ] = False,
@@ -122,6 +127,8 @@ def command(
     2: an invalid scenario or an unusable output folder (nothing was run); 3: a run could not be completed; 5: nothing
     selected, or everything skipped; 129, 130, and 143: interrupted.
     """
+    if keep_logs is KeptLogs.FAILED and (check_determinism or check_against is not None):
+        raise UsageError("--keep-logs failed excludes --check-determinism and --check-against, which compare logs")
     if check_determinism and (earlier := [path for path in paths if (path / JOURNAL_FILE).is_file()]):
         paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]
     request = SessionRequest(
@@ -136,6 +143,7 @@ def command(
             wall_limit,
             check_against,
             replay=replay,
+            keep_logs=keep_logs,
         ),
         root,
         world_path or [],

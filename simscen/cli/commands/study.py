@@ -12,7 +12,7 @@ from simscen.cli.session.run_session import available_cores
 from simscen.cli.session.stacks import STACK_HELP
 from simscen.cli.session.study_session import StudyRequest, execute_study
 from simscen.cli.session.terminal import Format, FormatOption
-from simscen.run.process.jobs import ReplayMode
+from simscen.run.process.jobs import KeptLogs, ReplayMode
 from simscen.run.sessions.run_session import SessionOptions
 
 
@@ -61,6 +61,10 @@ def command(
     replay: Annotated[
         ReplayMode, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")
     ] = ReplayMode.FAILED,
+    keep_logs: Annotated[
+        KeptLogs,
+        typer.Option(help="failed: delete logs and pictures of runs that pass, for sessions of thousands of runs."),
+    ] = KeptLogs.ALL,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")
     ] = False,
@@ -75,7 +79,9 @@ def command(
     Exit code 0: the claim holds, or all runs passed if there is no claim; 1: the claim is refuted, or a run failed; 2:
     an invalid scenario; 3: a run could not be completed; 6: the claim is undecided; 129, 130, and 143: interrupted.
     """
-    options = SessionOptions(workers or available_cores(), seed, wall_limit=wall_limit, replay=replay)
+    options = SessionOptions(
+        workers or available_cores(), seed, wall_limit=wall_limit, replay=replay, keep_logs=keep_logs
+    )
     request = StudyRequest(
         file,
         runs,

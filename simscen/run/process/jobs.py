@@ -15,6 +15,13 @@ from simscen.loading.loaded import LoadedScenario
 _LENGTH = struct.Struct("<I")
 
 
+class KeptLogs(str, Enum):
+    """Which runs keep their log, picture, and other files besides result.json."""
+
+    ALL = "all"
+    FAILED = "failed"
+
+
 class ReplayMode(str, Enum):
     """Which runs get a replay page."""
 

@@ -14,7 +14,7 @@ from simscen.judge.result_json import from_json
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.run.process.isolation import plugin_path_arguments
-from simscen.run.process.jobs import Job, ReplayMode
+from simscen.run.process.jobs import Job, KeptLogs, ReplayMode
 from simscen.run.process.supervisor import Ended, Interrupted, Progressed, Started, supervise
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.results import finished_run, skipped_run, unfinished_run
@@ -27,7 +27,7 @@ class SessionOptions:
     `seed` None stands for each scenario's own seed; `repeat` runs use consecutive seeds. `twice` runs everything a
     second time with the same seed and compares. `against` is the output folder of an earlier session to compare with.
     `wall_limit` limits each run, in seconds. `only` restricts the session to these keys. `replay` selects the runs
-    that get a replay page.
+    that get a replay page, `keep_logs` those that keep their logs and pictures.
     """
 
     workers: int = 1
@@ -39,6 +39,7 @@ class SessionOptions:
     against: Path | None = None
     replay: ReplayMode = ReplayMode.NONE
     only: frozenset[RunKey] | None = None
+    keep_logs: KeptLogs = KeptLogs.ALL
 
 
 def scenario_seeds(scenario: LoadedScenario, options: SessionOptions) -> range:
@@ -115,6 +116,8 @@ def run_session(
                     answers[job.number] = (
                         answer if options.against is None else compare_with_session(answer, options.against)
                     )
+                    if options.keep_logs is KeptLogs.FAILED and answers[job.number].outcome.good:
+                        answers[job.number] = without_log(answers[job.number])
                     listen(answers[job.number])
     except Interrupted as interrupted:
         stopped = Exit(128 + interrupted.number)
@@ -123,6 +126,15 @@ def run_session(
             answers[job.number] = unfinished_run(job, _why_not_done(job.number in begun, stopped))
             listen(answers[job.number])
     return list(answers.values()), stopped
+
+
+def without_log(run: RunFinished) -> RunFinished:
+    """Delete the log, the picture, and all other files of a run but its result."""
+    kept = Path(run.artifacts.result)
+    for file in Path(run.artifacts.folder).iterdir():
+        if file.is_file() and file != kept:
+            file.unlink()
+    return replace(run, artifacts=replace(run.artifacts, mcap="", picture="", replay=""))
 
 
 def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:

@@ -183,3 +183,18 @@ def test_studies_that_make_no_sense_are_refused(tmp_path: Path, more: str, optio
     assert done.returncode in (2, 5)
     assert told in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_logs_of_runs_that_pass_are_deleted_if_wanted(tmp_path: Path) -> None:
+    study(tmp_path, SCENARIO + RANDOM, "--out", "out", "--runs", 12, "--keep-logs", "failed")
+    runs = results(tmp_path)["runs"]
+    assert {run["outcome"] for run in runs} == {"passed", "failed"}
+    for run in runs:
+        folder = tmp_path / "out" / Path(run["artifacts"]["result"]).parent
+        assert ("mcap" in run["artifacts"]) == (run["outcome"] == "failed")
+        assert (folder / "run.mcap").exists() == (run["outcome"] == "failed")
+        assert [file.name for file in folder.iterdir()] == ["result.json"] or run["outcome"] == "failed"
+    before = (tmp_path / "out/results.json").read_bytes()
+    command = [sys.executable, "-m", "simscen", "report", "out"]
+    assert subprocess.run(command, cwd=tmp_path, check=False, capture_output=True).returncode == 1
+    assert (tmp_path / "out/results.json").read_bytes() == before
