@@ -47,7 +47,7 @@ class StudyPlan:
 
 def evaluate_study(plan: StudyPlan, results: Iterable[RunResult]) -> Study:
     """Return the result of a study. The order of the results does not matter."""
-    ordered = sorted(results, key=lambda result: (result.key.seed, result.key))
+    ordered = in_seed_order(results)
     counted = [result for result in ordered if is_counted(result)]
     passed = sum(result.outcome is Outcome.PASSED for result in counted)
     margins = {result.key: _margins(result) for result in counted}
@@ -73,6 +73,11 @@ def evaluate_study(plan: StudyPlan, results: Iterable[RunResult]) -> Study:
         coverage=_pair_coverage(plan, counted),
         accepted=len(ordered) / plan.drawn if plan.drawn else None,
     )
+
+
+def in_seed_order(results: Iterable[RunResult]) -> list[RunResult]:
+    """Return results in the order in which a study made its runs."""
+    return sorted(results, key=lambda result: (result.key.seed, result.key))
 
 
 def _margins(result: RunResult) -> dict[str, tuple[float, str]]:

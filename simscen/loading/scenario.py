@@ -17,9 +17,9 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.stacks.stackfile import not_a_scenario, recognize_stack_file
-from simscen.loading.variations.axes import Change
 from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSpace, expand_variations, variation_space
 from simscen.loading.variations.naming import VariationProblems, merge_problems, number_of
+from simscen.loading.variations.options import Change
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec

@@ -21,7 +21,8 @@ from simscen.core.random_streams import LARGEST_SEED
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
 from simscen.core.records.study import ClaimStatus
 from simscen.core.version import __version__
-from simscen.judge.study import StudyPlan, evaluate_study
+from simscen.judge.acceptance import evaluate_claim
+from simscen.judge.study import StudyPlan, evaluate_study, in_seed_order
 from simscen.loading.files.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
@@ -261,8 +262,8 @@ class _StudySession:
     def _is_decided(self, answers: Sequence[RunFinished]) -> bool:
         if self._claim is None or self._claim.method == "fixed":
             return False
-        study = evaluate_study(self._study_plan(), (answer.result for answer in answers))
-        return study.claim is not None and study.claim.status is not ClaimStatus.UNDECIDED
+        claim = evaluate_claim(self._claim, in_seed_order(answer.result for answer in answers))
+        return claim.status is not ClaimStatus.UNDECIDED
 
 
 def _allowed_numbers(space: VariationSpace, file: Path) -> Iterator[int]:

@@ -1,81 +1,21 @@
 """Axes of a block of variations: options that are combined with those of the other axes."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, product
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING
 
 from simscen.core.errors import Problem
 from simscen.loading.schema.messages import quoted
-from simscen.loading.variations.conditions import Condition
+from simscen.loading.variations.conditions import GRAMMAR, Condition, ConditionError, parse_condition
 from simscen.loading.variations.naming import NAME_HINT, name_error
+from simscen.loading.variations.options import Change, Option, RandomOptions, typical_options, value_node
 from simscen.loading.variations.paths import PathError, Target, resolve_path
+from simscen.loading.variations.requirements import all_hold, plain_values, written_value
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, child, node_at
 
 if TYPE_CHECKING:  # most scenarios have no variations
     from simscen.model.variations import Sampled, VariationBlock
-
-
-@dataclass(frozen=True)
-class Change:
-    """Value for a path; `number` counts the values of the path from 1."""
-
-    target: Target
-    value: Node
-    number: int
-
-
-@dataclass(frozen=True)
-class Option:
-    """Changes that belong together, and their name if the author gave one."""
-
-    changes: tuple[Change, ...]
-    name: str = ""
-
-
-class RandomOptions(Sequence[Option]):
-    """Options of `sampled` with random values, which are drawn when they are asked for.
-
-    Its length is the `count`, but an index may exceed it.
-    """
-
-    def __init__(self, sampled: "Sampled", ranges: MappingNode, targets: Sequence[Target]) -> None:
-        self._sampled, self._ranges, self._targets = sampled, ranges, targets
-
-    def __len__(self) -> int:
-        return self._sampled.count
-
-    @overload
-    def __getitem__(self, index: int) -> Option: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Option]: ...
-    def __getitem__(self, index: int | slice) -> Option | list[Option]:
-        if isinstance(index, slice):
-            return [self[each] for each in range(*index.indices(len(self)))]
-        from simscen.loading.variations.sampling import draw_value
-
-        drawn = [(target, draw_value(self._sampled, target.path, index)) for target in self._targets]
-        return Option(
-            tuple(
-                Change(target, value_node(self._ranges.entries[target.path].value, value), index + 1)
-                for target, value in drawn
-            )
-        )
-
-    def __iter__(self) -> Iterator[Option]:
-        return (self[index] for index in range(len(self)))
-
-
-def value_node(distribution: Node, value: object) -> Node:
-    """Return the node of a drawn value: one of the choices, or a new one at the place of its distribution."""
-    from simscen.loading.variations.sampling import Pick
-
-    if isinstance(value, Pick):
-        chosen = node_at(distribution, ("choice", value.number))
-        assert chosen is not None
-        return chosen
-    assert isinstance(value, str | int | float)
-    return ScalarNode(distribution.place, value)
 
 
 @dataclass
@@ -118,7 +58,6 @@ class AxisBuilder:
 
     def _pairwise(self, node: Node | None, conditions: Sequence[Condition]) -> list[Option]:
         from simscen.loading.variations.pairwise import Row, covering_array
-        from simscen.loading.variations.requirements import all_hold, plain_values
 
         columns = self._columns(node, True)
         if self.problems or not columns:
@@ -234,13 +173,30 @@ class AxisBuilder:
                     what = "change the same value" if same else "overlap: one is part of the other"
                     self.add(other.place, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
 
+    def conditions(self, block: Node) -> list[Condition]:
+        """Return the conditions in the `require` of a block; reports those that cannot be read."""
+        node, found = child(block, "require"), list[Condition]()
+        for item in node.items if isinstance(node, SequenceNode) else ():
+            assert isinstance(item, ScalarNode)
+            try:
+                found.append(parse_condition(str(item.value)))
+            except ConditionError as error:
+                self.add(item.place, "SC017", str(error), GRAMMAR)
+        return found
+
+    def check_paths(self, conditions: Sequence[Condition], block: Node) -> None:
+        """Report paths of conditions that are neither varied nor written in the scenario, if all could be read."""
+        node = child(block, "require")
+        if not isinstance(node, SequenceNode) or len(conditions) < len(node.items):
+            return
+        for condition, item in zip(conditions, node.items, strict=True):
+            for path in condition.paths:
+                if path not in self.targets and written_value(self.tree, path) is None:
+                    message = f"`{path}` is neither varied nor written in the scenario"
+                    self.add(item.place, "SC030", message, "write its value, or vary it")
+
     def add(self, place: Position, code: str, message: str, hint: str = "") -> None:
         """Add a problem once."""
         problem = Problem(*place, code=code, message=message, hint=hint)
         if problem not in self.problems:
             self.problems.append(problem)
-
-
-def typical_options(axis: Sequence[Option]) -> Sequence[Option]:
-    """Return options with all targets of the axis: all, or the first one of random options."""
-    return axis[:1] if isinstance(axis, RandomOptions) else axis

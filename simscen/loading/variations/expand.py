@@ -7,12 +7,13 @@ from typing import Any
 
 from simscen.core.errors import Problem
 from simscen.loading.schema.validate import check
-from simscen.loading.variations.axes import AxisBuilder, Change, Option, typical_options
+from simscen.loading.variations.axes import AxisBuilder
 from simscen.loading.variations.conditions import Condition, ConditionError
 from simscen.loading.variations.naming import derive_name, make_unique, name_error, numbered_name, short_names
+from simscen.loading.variations.options import Change, Option, typical_options
 from simscen.loading.variations.paths import Target, set_value
-from simscen.loading.variations.requirements import all_hold, check_paths, plain_values, read_conditions
-from simscen.loading.yaml.tree import MappingNode, Node, Position, SequenceNode, child
+from simscen.loading.variations.requirements import all_hold, plain_values
+from simscen.loading.yaml.tree import MappingNode, Node, Position, SequenceNode
 
 VARIATIONS, ACCEPTANCE = "variations", "acceptance"
 MAX_TOTAL_VALUES = 5_000_000
@@ -188,9 +189,9 @@ def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
     nodes = entry.value.items if isinstance(entry.value, SequenceNode) else [entry.value]
     is_random = len(specs) == 1 and specs[0].is_random
     for block, node in zip(specs, nodes, strict=True):
-        conditions = read_conditions(child(node, "require"), builder)
+        conditions = builder.conditions(node)
         axes = [] if builder.problems and block.pairwise else builder.axes(block, node, conditions)
-        check_paths(conditions, child(node, "require"), builder)
+        builder.check_paths(conditions, node)
         found.append(Block(axes, conditions, is_random))
     if specs and not is_random and ACCEPTANCE in tree.entries:
         message = "these variations are not independent random draws, so no confidence can be stated for a pass rate"

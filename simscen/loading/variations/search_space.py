@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 from simscen.core.errors import Problem
 from simscen.loading.schema.validate import check
-from simscen.loading.variations.axes import AxisBuilder, Change, value_node
+from simscen.loading.variations.axes import AxisBuilder
 from simscen.loading.variations.conditions import Condition
 from simscen.loading.variations.expand import VARIATIONS, Variation
+from simscen.loading.variations.options import Change, value_node
 from simscen.loading.variations.paths import Target, set_value
-from simscen.loading.variations.requirements import all_hold, check_paths, plain_values, read_conditions
+from simscen.loading.variations.requirements import all_hold, plain_values
 from simscen.loading.variations.sampling import value_at
-from simscen.loading.yaml.tree import MappingNode, SequenceNode, child, node_at
+from simscen.loading.yaml.tree import MappingNode, SequenceNode, node_at
 from simscen.model.variations import OneOf, Sampled, VariationsSection
 
 
@@ -64,10 +65,9 @@ def search_space(tree: MappingNode) -> SearchSpace | list[Problem]:
         message, hint = "only the ranges of `sampled` can be searched", "write one block with `sampled` alone"
         return [Problem(*entry.value.place, "SC016", message, hint)]
     builder, block = AxisBuilder(own), blocks[0]
-    require = child(node, "require")
-    conditions = read_conditions(require, builder)
+    conditions = builder.conditions(node)
     builder.axes(block, node, conditions)
-    check_paths(conditions, require, builder)
+    builder.check_paths(conditions, node)
     if builder.problems:
         return builder.problems
     ranges = node_at(node, ("sampled", "values"))

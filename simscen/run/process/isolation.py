@@ -7,7 +7,7 @@ import resource
 import signal
 import site
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from pathlib import Path
 
@@ -99,7 +99,7 @@ def kill_children_except(known: Iterable[int]) -> bool:
     Returns whether there were any.
     """
     found, spared = False, set(known)
-    while strangers := [pid for pid in _children() if pid not in spared]:
+    while strangers := _children_except(spared):
         found = True
         for pid in strangers:
             os.kill(pid, signal.SIGKILL)
@@ -107,14 +107,19 @@ def kill_children_except(known: Iterable[int]) -> bool:
     return found
 
 
-def _children() -> list[int]:
-    """Return the children of this process, including zombies."""
+def _children_except(spared: Collection[int]) -> list[int]:
+    """Return the children of this process that are not `spared`, including zombies.
+
+    The kernel's list of children may lack some while others exit (proc(5)). An empty answer is therefore confirmed by
+    the list of all processes.
+    """
     own = os.getpid()
-    try:
-        return [int(pid) for pid in Path(f"/proc/{own}/task/{own}/children").read_text().split()]
-    except FileNotFoundError:  # a kernel without CONFIG_PROC_CHILDREN
-        everything = [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
-        return [pid for pid in everything if _parent(pid) == own]
+    with suppress(FileNotFoundError):  # a kernel without CONFIG_PROC_CHILDREN
+        listed = map(int, Path(f"/proc/{own}/task/{own}/children").read_text().split())
+        if found := [pid for pid in listed if pid not in spared]:
+            return found
+    everything = (int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit())
+    return [pid for pid in everything if pid not in spared and _parent(pid) == own]
 
 
 def _parent(pid: int) -> int:
