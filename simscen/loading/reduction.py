@@ -19,10 +19,10 @@ from simscen.spec.quantities import NUMBER_AND_UNIT
 
 Keys = tuple[Key, ...]
 """Keys from the top of a scenario to a part of it."""
-KEPT = frozenset({"simscen", "world", "robot", "robots", "seed", "pass"})
+KEPT = frozenset({"simscen", "world", "robot", "robots", "seed", "pass", "time_limit"})
 """Top-level keys that are never left out as a whole."""
-FIXED = frozenset({"simscen", "seed", "pass"})
-"""Top-level keys of which no part is left out or simplified: they say what fails."""
+FIXED = frozenset({"simscen", "seed", "pass", "time_limit"})
+"""Top-level keys of which no part is left out or simplified: they say what fails, and how long a run may take."""
 STRUCTURE = frozenset({("world", "walls"), ("world", "map"), ("world", "sdf")})
 """Parts of a world that are never left out: without them, another test would fail in the same criterion."""
 NOT_RUN = frozenset({"acceptance", "description", "expected", "metrics", "skip", "tags", "variations"})

@@ -77,7 +77,7 @@ def test_a_study_finds_what_lowers_the_margin(tmp_path: Path) -> None:
 
 
 def test_results_do_not_depend_on_the_number_of_workers_or_on_batches(tmp_path: Path) -> None:
-    text = SCENARIO + RANDOM + "acceptance: {pass_rate: {min: 50 %, method: anytime, runs: 70}}\n"
+    text = SCENARIO + RANDOM + "acceptance: {pass_rate: {min: 50 %, method: anytime, runs: 36}}\n"
     for workers in (1, 2):
         study(tmp_path, text, "--out", f"out{workers}", "-j", workers)
     assert (tmp_path / "out1/results.json").read_bytes() == (tmp_path / "out2/results.json").read_bytes()
