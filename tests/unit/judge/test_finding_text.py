@@ -1,8 +1,20 @@
+import math
+from dataclasses import replace
+
 import pytest
 
 from simscen.core.records.events import Disturbance, DisturbanceOutcome
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.judge.finding_text import disturbance_line, disturbance_times, sentence, tightest_margin, violations
+from simscen.judge.finding_text import (
+    disturbance_line,
+    disturbance_times,
+    relative_margin,
+    run_margin,
+    sentence,
+    tightest_margin,
+    violations,
+)
 
 
 def verdict(finding, kind="stopped_within", name="stopped_within"):
@@ -119,3 +131,43 @@ def test_of_times_the_first_five_are_told(ticks, text):
 )
 def test_a_disturbance_is_told_in_a_line(ticks, happened, text):
     assert disturbance_line(DisturbanceOutcome(Disturbance("gust", "event"), ticks, happened, "pushed it"), 240) == text
+
+
+def margins(outcome: Outcome, *findings: Finding) -> float:
+    verdicts = tuple(Verdict(finding.what, finding.what, "fail", (finding,)) for finding in findings)
+    error = RunFailure("stack-crashed", "gone", by_stack=True) if outcome is Outcome.ERROR else None
+    return run_margin(RunResult(RunKey("a", 1), "a", outcome, verdicts, error=error))
+
+
+def measured(status: Status, value: float, limit: float, relation: str = "≥", what: str = "clearance") -> Finding:
+    margin = value - limit if relation == "≥" else limit - value
+    return Finding(status, what, "", f"{relation} {limit}", margin, "m", value)
+
+
+def test_the_margin_of_a_run_is_that_of_its_tightest_criterion_relative_to_the_limit() -> None:
+    near, far = measured(Status.PASS, 0.6, 0.4), measured(Status.PASS, 1.0, 4.0, "≤", "speed")
+    assert margins(Outcome.PASSED, far, near) == pytest.approx(0.5)
+    assert margins(Outcome.PASSED, far) == pytest.approx(0.75)
+    assert margins(Outcome.PASSED) == 1.0
+    assert margins(Outcome.PASSED, replace(near, margin=None)) == 1.0
+    assert margins(Outcome.PASSED, replace(near, margin=-1e-12)) == 0.0
+    assert margins(Outcome.PASSED, replace(near, margin=math.inf), far) == pytest.approx(0.75)
+
+
+def test_the_margin_of_a_failed_run_is_negative_and_at_least_minus_one() -> None:
+    held = measured(Status.PASS, 0.6, 0.5)
+    assert margins(Outcome.FAILED, held, measured(Status.FAIL, 0.3, 0.4)) == pytest.approx(-0.25)
+    two = measured(Status.FAIL, 0.3, 0.4), measured(Status.FAIL, 3.0, 2.0, "≤", "speed")
+    assert margins(Outcome.FAILED, *two) == pytest.approx(-0.5)
+    assert margins(Outcome.FAILED, measured(Status.FAIL, 9.0, 2.0, "≤", "speed")) == -1.0
+    assert margins(Outcome.FAILED, Finding(Status.FAIL, "result", "failed", "reached")) == -1.0
+    assert margins(Outcome.FAILED, replace(two[0], margin=-math.inf)) == -1.0
+    assert margins(Outcome.FAILED, replace(two[0], margin=0.0)) == -1.0
+    assert margins(Outcome.FAILED) == -1.0
+    assert margins(Outcome.ERROR) == -1.0
+
+
+def test_a_margin_without_a_known_limit_counts_as_it_is() -> None:
+    assert relative_margin(Finding(Status.PASS, "x", "", "", 0.3, "m")) == 0.3
+    assert relative_margin(Finding(Status.PASS, "x", "", "≥ 0 m", 0.3, "m", 0.3)) == 0.3
+    assert relative_margin(Finding(Status.PASS, "x", "", "> -2 m", 0.5, "m", -1.5)) == 0.25

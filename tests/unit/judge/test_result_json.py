@@ -72,3 +72,11 @@ def test_keys_are_read_also_from_before_variations_existed():
     now = {"scenario": "a", "seed": 3, "variation": "speed=1", "stack_name": "dwb"}
     assert read_key(now) == RunKey("a", 3, "speed=1", "dwb")
     assert read_key({"scenario": "a", "seed": 3, "variation": "dwb"}) == RunKey("a", 3, "", "dwb")
+
+
+@pytest.mark.parametrize("by_stack", [True, False])
+def test_an_error_says_whether_the_stack_is_its_cause(by_stack):
+    failure = RunFailure("crashed", "gone", "the end", by_stack)
+    result = RunResult(RunKey("a", 1), "a", Outcome.ERROR, error=failure)
+    assert from_json(to_json(result)).error == failure
+    assert ("by_stack" in result_data(result)["error"]) == by_stack
