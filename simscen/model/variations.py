@@ -122,8 +122,13 @@ class VariationBlock(Spec):
     @property
     def is_random(self) -> bool:
         """Whether its variations are independent random draws."""
+        return self.is_sampled_alone and self.sampled is not None and self.sampled.method == "random"
+
+    @property
+    def is_sampled_alone(self) -> bool:
+        """Whether it has `sampled` and no other kind of values."""
         others = (self.grid, self.pairwise, self.pairs, self.list_)
-        return self.sampled is not None and self.sampled.method == "random" and all(one is None for one in others)
+        return self.sampled is not None and all(one is None for one in others)
 
 
 class Variations(

@@ -10,8 +10,17 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.falsification import FalsifyRequest, execute_search, summary_lines
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
+from simscen.cli.session.run_options import (
+    JobsOption,
+    JunitOption,
+    LenientOption,
+    OutOption,
+    RootOption,
+    StackOption,
+    WallLimitOption,
+    WorldPathOption,
+)
 from simscen.cli.session.run_session import available_cores
-from simscen.cli.session.stacks import STACK_HELP
 from simscen.cli.session.terminal import Format, FormatOption
 from simscen.core.errors import UsageError
 from simscen.run.process.jobs import ReplayMode
@@ -46,26 +55,16 @@ def command(
     seed: Annotated[
         int | None, typer.Option(min=1, max=2**32 - 1, help="Use this seed instead of the scenario's own.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="New or empty output folder; default: simscen-out/<session id>.")
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option("-j", "--jobs", min=1, max=256, help="Number of parallel runs; default: one per core.")
-    ] = None,
-    junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
+    out: OutOption = None,
+    workers: JobsOption = None,
+    junit: JunitOption = None,
     junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
     format_: FormatOption = Format.TEXT,
-    wall_limit: Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")] = 300.0,
-    stack: Annotated[
-        str | None, typer.Option(metavar="NAME=VALUE", autocompletion=completions.stacks, help=STACK_HELP)
-    ] = None,
-    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
-    world_path: Annotated[
-        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
-    ] = None,
-    lenient: Annotated[
-        bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")
-    ] = False,
+    wall_limit: WallLimitOption = 300.0,
+    stack: StackOption = None,
+    root: RootOption = None,
+    world_path: WorldPathOption = None,
+    lenient: LenientOption = False,
 ) -> None:
     """Search the ranges of a scenario for values with which it fails.
 

@@ -9,6 +9,15 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
+from simscen.cli.session.run_options import (
+    JobsOption,
+    JunitOption,
+    LenientOption,
+    OutOption,
+    RootOption,
+    WallLimitOption,
+    WorldPathOption,
+)
 from simscen.cli.session.run_session import SessionRequest, available_cores, execute_session
 from simscen.cli.session.selection import Selection
 from simscen.cli.session.shards import scenario_times, shard_of
@@ -25,12 +34,8 @@ def command(
     paths: Annotated[
         list[Path], typer.Argument(help="Scenario files, or folders to search.", autocompletion=completions.scenarios)
     ],
-    out: Annotated[
-        Path | None, typer.Option(help="New or empty output folder; default: simscen-out/<session id>.")
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option("-j", "--jobs", min=1, max=256, help="Number of parallel runs; default: one per core.")
-    ] = None,
+    out: OutOption = None,
+    workers: JobsOption = None,
     seed: Annotated[
         int | None, typer.Option(min=1, max=2**32 - 1, help="Use this seed instead of each scenario's own.")
     ] = None,
@@ -56,10 +61,10 @@ def command(
         Path | None,
         typer.Option(help="Compare the logs with this output folder of another session or machine."),
     ] = None,
-    junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
+    junit: JunitOption = None,
     junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
     format_: FormatOption = Format.TEXT,
-    wall_limit: Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")] = 300.0,
+    wall_limit: WallLimitOption = 300.0,
     resume: Annotated[
         Path | None, typer.Option(help="Continue in this output folder: run what has no verdict yet or has changed.")
     ] = None,
@@ -102,10 +107,8 @@ def command(
     variation: Annotated[
         list[str] | None, typer.Option(help="Select the variation with exactly this name; repeatable.")
     ] = None,
-    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
-    world_path: Annotated[
-        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
-    ] = None,
+    root: RootOption = None,
+    world_path: WorldPathOption = None,
     replay: Annotated[
         ReplayMode, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")
     ] = ReplayMode.FAILED,
@@ -113,9 +116,7 @@ def command(
         KeptLogs,
         typer.Option(help="failed: delete logs and pictures of runs that pass, for sessions of thousands of runs."),
     ] = KeptLogs.ALL,
-    lenient: Annotated[
-        bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")
-    ] = False,
+    lenient: LenientOption = False,
 ) -> None:
     """Run scenarios and report what passed.
 

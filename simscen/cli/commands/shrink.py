@@ -10,6 +10,13 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.candidates import CandidateRuns, Stopped
 from simscen.cli.session.output_files import save
+from simscen.cli.session.run_options import (
+    JobsOption,
+    LenientOption,
+    RootOption,
+    WallLimitOption,
+    WorldPathOption,
+)
 from simscen.cli.session.run_session import available_cores
 from simscen.cli.session.selection import Checks
 from simscen.cli.session.shrinking import Failure, Shrinking, failure_of, only_failing, with_inline_world
@@ -53,20 +60,14 @@ def command(
         Path | None, typer.Option(help="File to write; default: NAME.minimal.scenario.yaml beside the scenario.")
     ] = None,
     runs: Annotated[int, typer.Option(min=1, max=100_000, help="Largest number of runs.")] = 500,
-    workers: Annotated[
-        int | None, typer.Option("-j", "--jobs", min=1, max=256, help="Number of parallel runs; default: one per core.")
-    ] = None,
+    workers: JobsOption = None,
     keep_world: Annotated[
         bool, typer.Option("--keep-world", help="Keep the world file instead of writing what is needed of it inline.")
     ] = False,
-    wall_limit: Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")] = 300.0,
-    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
-    world_path: Annotated[
-        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
-    ] = None,
-    lenient: Annotated[
-        bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")
-    ] = False,
+    wall_limit: WallLimitOption = 300.0,
+    root: RootOption = None,
+    world_path: WorldPathOption = None,
+    lenient: LenientOption = False,
 ) -> None:
     """Find the smallest scenario that still fails in the same way.
 

@@ -8,8 +8,17 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
+from simscen.cli.session.run_options import (
+    JobsOption,
+    JunitOption,
+    LenientOption,
+    OutOption,
+    RootOption,
+    StackOption,
+    WallLimitOption,
+    WorldPathOption,
+)
 from simscen.cli.session.run_session import available_cores
-from simscen.cli.session.stacks import STACK_HELP
 from simscen.cli.session.study_session import StudyRequest, execute_study
 from simscen.cli.session.terminal import Format, FormatOption
 from simscen.run.process.jobs import KeptLogs, ReplayMode
@@ -35,29 +44,21 @@ def command(
     seed: Annotated[
         int | None, typer.Option(min=1, max=2**32 - 1, help="First seed, instead of the scenario's own.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="New or empty output folder; default: simscen-out/<session id>.")
-    ] = None,
+    out: OutOption = None,
     resume: Annotated[
         Path | None, typer.Option(help="Continue in this output folder: run what has no verdict yet or has changed.")
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option("-j", "--jobs", min=1, max=256, help="Number of parallel runs; default: one per core.")
-    ] = None,
-    junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
+    workers: JobsOption = None,
+    junit: JunitOption = None,
     junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
     format_: FormatOption = Format.TEXT,
-    wall_limit: Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")] = 300.0,
-    stack: Annotated[
-        str | None, typer.Option(metavar="NAME=VALUE", autocompletion=completions.stacks, help=STACK_HELP)
-    ] = None,
+    wall_limit: WallLimitOption = 300.0,
+    stack: StackOption = None,
     open_: Annotated[
         bool, typer.Option("--open", help="Open the report in a browser and update it as runs finish.")
     ] = False,
-    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
-    world_path: Annotated[
-        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
-    ] = None,
+    root: RootOption = None,
+    world_path: WorldPathOption = None,
     replay: Annotated[
         ReplayMode, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")
     ] = ReplayMode.FAILED,
@@ -65,9 +66,7 @@ def command(
         KeptLogs,
         typer.Option(help="failed: delete logs and pictures of runs that pass, for sessions of thousands of runs."),
     ] = KeptLogs.ALL,
-    lenient: Annotated[
-        bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")
-    ] = False,
+    lenient: LenientOption = False,
 ) -> None:
     """Run one scenario many times: how often does it fail, and what makes it fail?
 

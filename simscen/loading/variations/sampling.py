@@ -19,17 +19,12 @@ class Pick(NamedTuple):
 
 def draw_values(sampled: Sampled, path: str) -> list[Any]:
     """Return the values of one path, in the order of the variations. Raises ValueError for an invalid range."""
-    return [_value(sampled.values[path], u) for u in _chances(sampled, path)]
+    return [value_at(sampled.values[path], u) for u in _chances(sampled, path)]
 
 
 def draw_value(sampled: Sampled, path: str, index: int) -> Any:
     """Return the random value of one path with this index from 0, which may exceed the count."""
-    return _value(sampled.values[path], _hash(sampled.seed, path, "value", index))
-
-
-def value_at(draw: Draw, u: float) -> Any:
-    """Return the value of a distribution at the cumulative probability `u`, 0 < u < 1. Raises ValueError."""
-    return _value(draw, u)
+    return value_at(sampled.values[path], _hash(sampled.seed, path, "value", index))
 
 
 def _chances(sampled: Sampled, path: str) -> list[float]:
@@ -70,7 +65,8 @@ def _hash(seed: int, path: str, what: str, number: int) -> float:
     return ((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / 2**52
 
 
-def _value(draw: Draw, u: float) -> Any:
+def value_at(draw: Draw, u: float) -> Any:
+    """Return the value of a distribution at the cumulative probability `u`, 0 < u < 1. Raises ValueError."""
     match draw.chosen:
         case Uniform(root=ends):
             (low, high), unit = _ordered(ends)

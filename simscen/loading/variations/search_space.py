@@ -61,7 +61,7 @@ def search_space(tree: MappingNode) -> SearchSpace | list[Problem]:
         return section
     blocks = section.variations.blocks
     node = entry.value.items[0] if isinstance(entry.value, SequenceNode) and entry.value.items else entry.value
-    if len(blocks) != 1 or blocks[0].sampled is None or any((blocks[0].grid, blocks[0].pairs, blocks[0].list_)):
+    if len(blocks) != 1 or not blocks[0].is_sampled_alone:
         message, hint = "only the ranges of `sampled` can be searched", "write one block with `sampled` alone"
         return [Problem(*entry.value.place, "SC016", message, hint)]
     builder, block = AxisBuilder(own), blocks[0]

@@ -160,6 +160,7 @@ def test_no_failure_is_a_bound_on_the_rate_of_failures_for_random_values(tmp_pat
     [
         ("", [], "has no `variations` to search"),
         ("variations: {grid: {seed: [1, 2]}}\n", [], "only the ranges of `sampled` can be searched"),
+        (RANGES + "  pairwise: {seed: [1, 2]}\n", [], "only the ranges of `sampled` can be searched"),
         (RANGES + "  require: ['robot.pose.x > 7']\n", [], "meets the conditions in `require`"),
         (RANGES.replace("[3, 6]", "[-5, -4]"), [], "error[SC301]"),
         (RANGES, ["--method", "sobol", "--probability", "0.1"], "--probability needs --method random"),
