@@ -8,7 +8,14 @@ from textwrap import dedent
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.judge.finding_text import comparison, disturbance_times, subject, tightest_margin, time_and_place
+from simscen.judge.finding_text import (
+    comparison,
+    disturbance_times,
+    relative_margin,
+    subject,
+    tightest_margin,
+    time_and_place,
+)
 from simscen.report.display_text import escape_control, shell_command_text
 from simscen.report.session_lines import violation_lines
 from simscen.report.styled_line import plain_text
@@ -55,7 +62,7 @@ def _data_attributes(run: RunFinished, before: Sequence[PastOutcome | None]) -> 
         "variation": run.key.variation,
         "simulated": f"{run.result.simulated:.3f}",
         "wall": f"{run.wall:.3f}",
-        "margin": "" if (share := relative_margin(run)) is None else f"{share:.4f}",
+        "margin": "" if (share := smallest_margin(run)) is None else f"{share:.4f}",
         "changed": "1" if known and known[-1] != run.outcome.good else "",
     }
     return " ".join(f'data-{name}="{html_text(value)}"' for name, value in values.items() if value)
@@ -66,7 +73,7 @@ def theme(key: RunKey) -> str:
     return key.scenario.rpartition("/")[0].rpartition("/")[2]
 
 
-def relative_margin(run: RunFinished) -> float | None:
+def smallest_margin(run: RunFinished) -> float | None:
     """Return the smallest margin of all criteria relative to the limit, negative if violated; None without margins."""
     findings = [finding for verdict in run.result.verdicts for finding in verdict.findings]
     return min((share for finding in findings if (share := _share(finding)) is not None), default=None)
@@ -75,9 +82,7 @@ def relative_margin(run: RunFinished) -> float | None:
 def _share(finding: Finding) -> float | None:
     if finding.margin is None or finding.value is None or not finding.unit:
         return None
-    is_lower_limit = finding.limit.startswith(("≥", ">"))
-    limit = abs(finding.value - finding.margin if is_lower_limit else finding.value + finding.margin)
-    return finding.margin / limit if limit else finding.margin
+    return relative_margin(finding)
 
 
 def _headline(run: RunFinished) -> str:

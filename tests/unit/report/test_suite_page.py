@@ -14,7 +14,7 @@ from simscen.report.results_json import to_json
 from simscen.report.suite import RunningSession, Session, elements, to_html
 from simscen.report.suite.elements import anchor
 from simscen.report.suite.history import past_sessions
-from simscen.report.suite.run_entry import relative_margin, theme
+from simscen.report.suite.run_entry import smallest_margin, theme
 
 VOID = ("meta", "img", "input", "rect", "polyline", "circle")
 
@@ -137,8 +137,8 @@ def test_runs_tell_what_they_are_filtered_and_sorted_by(failed):
 
 
 def test_the_least_margin_is_a_share_of_its_limit(passed, failed):
-    assert relative_margin(passed) == pytest.approx(0.014)
-    assert relative_margin(failed) == pytest.approx(-0.68)
+    assert smallest_margin(passed) == pytest.approx(0.014)
+    assert smallest_margin(failed) == pytest.approx(-0.68)
     assert theme(RunKey("navigation/goal", 1)) == "navigation"
     assert theme(RunKey("goal", 1)) == ""
 
