@@ -1,7 +1,6 @@
 """Runner of scenarios for pytest: one warm process per worker, and one output folder per session."""
 
 import secrets
-from contextlib import ExitStack
 from datetime import datetime, timezone
 from itertools import count
 from pathlib import Path
@@ -14,9 +13,9 @@ from simscen.core.records.session_events import RunFinished
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
 from simscen.pytesting import OUT_OPTION
-from simscen.run.process.isolation import plugin_path_arguments
+from simscen.run.process.backend import Ended
 from simscen.run.process.jobs import Job, ReplayMode
-from simscen.run.process.supervisor import OnDemandRunner
+from simscen.run.process.supervisor import Supervisor
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER, run_folder
 from simscen.run.sessions.results import finished_run
 
@@ -32,21 +31,18 @@ class Runner:
         """Create a runner that writes to a folder."""
         self.folder = folder
         self._numbers = count()
-        self._standbys: dict[tuple[str, ...], OnDemandRunner] = {}
-        self._closing = ExitStack()
+        self._supervisor = Supervisor(1, WARM_PROCESS)
 
     def run(self, scenario: LoadedScenario, seed: int) -> RunFinished:
         """Run a scenario and return its result."""
         key = scenario.key(seed)
         job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT_S, ReplayMode.FAILED)
-        told = plugin_path_arguments(plugins_of(scenario))
-        if told not in self._standbys:
-            self._standbys[told] = self._closing.enter_context(OnDemandRunner((*WARM_PROCESS, *told)))
-        return finished_run(job, self._standbys[told].run(job))
+        ends = [one.end for one in self._supervisor.run([job], plugins_of(scenario)) if isinstance(one, Ended)]
+        return finished_run(job, ends[0])
 
     def close(self) -> None:
-        """End the warm processes."""
-        self._closing.close()
+        """End the warm process."""
+        self._supervisor.close()
 
 
 _RUNNER: pytest.StashKey[Runner] = pytest.StashKey()

@@ -17,9 +17,9 @@ from junitparser import JUnitXml
 
 TELLING = Path(__file__).parents[1] / "conformance" / "telling_zygote.py"
 SIMSCEN = f"""
-import simscen.cli.session.run_session
+import simscen.cli.session.backends
 from simscen.cli.main import main
-simscen.cli.session.run_session.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.session.backends.WARM_PROCESS = ({str(TELLING)!r},)
 main()
 """
 FAULTS = {

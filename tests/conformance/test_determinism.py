@@ -83,7 +83,7 @@ def test_86_87_order_folder_hash_seed_neighbors_and_load_change_nothing(referenc
 
 
 def test_88_a_run_after_one_that_crashed_is_as_if_alone(reference, pair: Path, simscen, monkeypatch) -> None:
-    monkeypatch.setattr("simscen.cli.session.run_session.WARM_PROCESS", (TELLING,))
+    monkeypatch.setattr("simscen.cli.session.backends.WARM_PROCESS", (TELLING,))
     text = (pair / "a.scenario.yaml").read_text()
     (pair / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [crash]"))
     assert simscen("run", ".", "-j", 1, "--out", "out").code == 3
@@ -93,7 +93,7 @@ def test_88_a_run_after_one_that_crashed_is_as_if_alone(reference, pair: Path, s
 
 
 def test_a_world_that_takes_forever_to_prepare_is_a_timeout_of_its_own_run(pair: Path, simscen, monkeypatch) -> None:
-    monkeypatch.setattr("simscen.cli.session.run_session.WARM_PROCESS", (TELLING,))
+    monkeypatch.setattr("simscen.cli.session.backends.WARM_PROCESS", (TELLING,))
     text = (pair / "a.scenario.yaml").read_text()
     (pair / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [slow-to-prepare]"))
     assert simscen("run", ".", "-j", 1, "--out", "out", "--wall-limit", 3).code == 3
@@ -122,7 +122,7 @@ def test_90_without_fused_multiply_add_the_verdicts_are_the_same(reference, pair
     monkeypatch.setattr(fork_server_process, "clean_environment", lambda: {**environment, **plain})
     assert simscen("run", ".", "--out", "out").code == 0
     assert simscen("run", ".", "--out", "again", "--check-against", "out").code == 0
-    assert {"libm", "numpy", "numpy_dispatch"} == set(json.loads((pair / "out/run.json").read_text())["arithmetic"])
+    assert {"blas", "libm", "numpy", "numpy_dispatch"} == set(json.loads((pair / "out/run.json").read_text())["arithmetic"])
     verdicts = {
         name: [verdict["status"] for verdict in json.loads(result)["verdicts"]]
         for name, (result, _) in results(pair / "out").items()

@@ -16,9 +16,9 @@ from simscen.record.trace_difference import first_difference
 TELLING = Path(__file__).with_name("telling_zygote.py")
 WITH_FAULTS = f"""
 import sys
-import simscen.cli.session.run_session
+import simscen.cli.session.backends
 from simscen.cli.main import main
-simscen.cli.session.run_session.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.session.backends.WARM_PROCESS = ({str(TELLING)!r},)
 main()
 """
 LIMIT = 10.0

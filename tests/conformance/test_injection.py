@@ -180,7 +180,7 @@ def test_81_names_that_no_report_could_show_are_refused(refused, simscen, folder
 
 
 def test_82_what_a_worker_prints_is_quoted_where_it_died(simscen, folder: Path, monkeypatch) -> None:
-    monkeypatch.setattr("simscen.cli.session.run_session.WARM_PROCESS", (TELLING,))
+    monkeypatch.setattr("simscen.cli.session.backends.WARM_PROCESS", (TELLING,))
     text = (folder / "a.scenario.yaml").read_text()
     (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [chatter]"))
     for kind in ("text", "github"):
@@ -215,7 +215,7 @@ def test_84_code_beside_scenarios_is_not_run(folder: Path) -> None:
 
 
 def test_85_a_secret_is_not_in_the_environment_of_a_worker(simscen, folder: Path, monkeypatch) -> None:
-    monkeypatch.setattr("simscen.cli.session.run_session.WARM_PROCESS", (TELLING,))
+    monkeypatch.setattr("simscen.cli.session.backends.WARM_PROCESS", (TELLING,))
     for name in ("GITHUB_TOKEN", "AWS_SECRET_ACCESS_KEY", "LD_PRELOAD_SECRET", "PYTHONPATH_SECRET"):
         monkeypatch.setenv(name, "hunter2")
     text = (folder / "a.scenario.yaml").read_text()

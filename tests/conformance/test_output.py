@@ -16,10 +16,10 @@ from simscen.record.log_reader.read import read_log
 SIMSCEN = str(Path(sys.executable).with_name("simscen"))
 TELLING = Path(__file__).with_name("telling_zygote.py")
 IMPATIENT = f"""
-import simscen.cli.session.run_session
+import simscen.cli.session.backends
 from simscen.cli.main import main
 from simscen.run.process import supervisor
-simscen.cli.session.run_session.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.session.backends.WARM_PROCESS = ({str(TELLING)!r},)
 supervisor.MAX_SILENCE_S = 5.0
 main()
 """

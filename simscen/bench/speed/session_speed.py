@@ -23,9 +23,9 @@ from simscen.record.recorder import MomentSink
 from simscen.run.external.build import with_external_reference
 from simscen.run.lockstep import RunSetup
 from simscen.run.preparation import PreparedScenario, prepare
-from simscen.run.process.isolation import plugin_path_arguments
+from simscen.run.process.backend import Ended
 from simscen.run.process.jobs import Job, ProcessEnd
-from simscen.run.process.supervisor import Ended, supervise
+from simscen.run.process.supervisor import Supervisor
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.results import finished_run
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs
@@ -112,11 +112,12 @@ def measure_overhead(rounds: int, entry: Sequence[str], tell: ProgressCallback =
         each = [(_cpu(run), timer.duration) for _ in range(rounds)]
         keys = [RunKey(loaded.id, seed + 1) for seed in range(rounds + 1)]
         jobs = [Job(n, loaded, key, run_folder(Path(folder), key), WALL_LIMIT_S) for n, key in enumerate(keys)]
-        ends = [
-            end
-            for happening in supervise(jobs, 1, entry, lambda: True)
-            if isinstance(happening, Ended) and isinstance(end := happening.end, ProcessEnd)
-        ]
+        with Supervisor(1, entry) as supervisor:
+            ends = [
+                end
+                for update in supervisor.run(jobs)
+                if isinstance(update, Ended) and isinstance(end := update.end, ProcessEnd)
+            ]
         others = ends[1:]  # the first run includes the import of the engines
         return Overhead(
             run=tuple(whole for whole, _ in each),
@@ -210,14 +211,14 @@ def measure_suite(
     bares = [bare_patrol(patrol, BARE_SECONDS)]
     begun = time.perf_counter()
     jobs = plan_jobs(scenarios, SessionOptions(workers=workers), out)
-    told = plugin_path_arguments(plugins_of_all(scenarios))
     answers, ends = list[RunFinished](), list[ProcessEnd]()
-    for happening in supervise(jobs, workers, (*entry, *told), lambda: True):
-        if isinstance(happening, Ended):
-            answers.append(finished_run(happening.job, happening.end))
-            if isinstance(happening.end, ProcessEnd):
-                ends.append(happening.end)
-            tell(f"{len(answers)} of {len(jobs)} runs")
+    with Supervisor(workers, entry) as supervisor:
+        for happening in supervisor.run(jobs, plugins_of_all(scenarios)):
+            if isinstance(happening, Ended):
+                answers.append(finished_run(happening.job, happening.end))
+                if isinstance(happening.end, ProcessEnd):
+                    ends.append(happening.end)
+                tell(f"{len(answers)} of {len(jobs)} runs")
     wall = time.perf_counter() - begun
     bares.append(bare_patrol(patrol, BARE_SECONDS))
     return Suite(

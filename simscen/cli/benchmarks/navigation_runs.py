@@ -12,8 +12,8 @@ from simscen.bench.navigation.summary import Row, Trial, mean, summarize
 from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
 from simscen.cli.interrupts import signals_interrupt
+from simscen.cli.session.backends import backend_of
 from simscen.cli.session.pending_runs import begin
-from simscen.cli.session.run_session import WARM_PROCESS
 from simscen.cli.session.selection import checked
 from simscen.core.errors import Exit, InvalidInput
 from simscen.core.records.run_result import Outcome, RunKey
@@ -69,10 +69,9 @@ def drive(experiments: Sequence[Experiment], journal: Journal, workers: int) -> 
         journal(event)
         progress(event)
 
-    with signals_interrupt():
-        answers, stopped = run_session(
-            work.jobs, SessionOptions(workers=workers, wall_limit=WALL_LIMIT_S), WARM_PROCESS, listen
-        )
+    options = SessionOptions(workers=workers, wall_limit=WALL_LIMIT_S)
+    with signals_interrupt(), backend_of(options) as backend:
+        answers, stopped = run_session(work.jobs, options, backend, listen)
     print_progress("")
     finished = {answer.key: answer for answer in (*work.kept, *answers)}
     trials: list[list[Trial]] = [[] for _ in experiments]

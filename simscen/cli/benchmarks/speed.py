@@ -105,7 +105,7 @@ def suite_command(
     after), and the memory of the workers. Exit code 0; 3: a run was aborted.
     """
     from simscen.cli.process import engine_output_on_stderr
-    from simscen.cli.session.run_session import WARM_PROCESS
+    from simscen.cli.session.backends import WARM_PROCESS
     from simscen.cli.session.selection import Selection, load_all
 
     before = load_baseline(compare)

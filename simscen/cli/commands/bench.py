@@ -45,7 +45,7 @@ def command(
     if ctx.invoked_subcommand is not None:
         return
     from simscen.cli.process import engine_output_on_stderr
-    from simscen.cli.session.run_session import WARM_PROCESS
+    from simscen.cli.session.backends import WARM_PROCESS
 
     before = load_baseline(compare)
     with engine_output_on_stderr():

@@ -131,7 +131,7 @@ def speed() -> str:
 
 def run_twice() -> str:
     """Check that one simulated second passes twice with equal logs."""
-    from simscen.cli.session.run_session import WARM_PROCESS
+    from simscen.cli.session.backends import backend_of
     from simscen.core.records.run_result import Outcome
     from simscen.loading.scenario import load_scenario
     from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
@@ -142,7 +142,8 @@ def run_twice() -> str:
         options = SessionOptions(workers=2, twice=True, wall_limit=60.0)
         try:
             jobs = plan_jobs([load_scenario(folder / "doctor.scenario.yaml", folder)], options, folder / "out")
-            answers, _ = run_session(jobs, options, WARM_PROCESS, lambda _: None)
+            with backend_of(options) as backend:
+                answers, _ = run_session(jobs, options, backend, lambda _: None)
         except SimscenError as error:
             raise CheckFailed(str(error)) from error
         for answer in answers:

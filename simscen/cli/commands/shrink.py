@@ -8,6 +8,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.session.backends import backend_of
 from simscen.cli.session.candidates import CandidateRuns, Stopped
 from simscen.cli.session.output_files import save
 from simscen.cli.session.run_options import (
@@ -89,9 +90,10 @@ def command(
     checks = Checks(home, world_path or (), lenient, stacks=stacks)
     own_seed = child(scenario.tree, "seed")
     first_seed = chosen.seed or (own_seed.plain if own_seed is not None and isinstance(own_seed.plain, int) else 1)
-    candidates = CandidateRuns(scenario, checks, options, first_seed, runs)
     try:
-        shrinking, before = _shrink(candidates, criterion, keep, keep_world)
+        with backend_of(options) as backend:
+            candidates = CandidateRuns(scenario, checks, options, backend, first_seed, runs)
+            shrinking, before = _shrink(candidates, criterion, keep, keep_world)
     except Stopped as stopped:
         sys.exit(stopped.exit)
     comment = _comment(chosen, shrinking, first_seed)

@@ -8,13 +8,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from simscen.cli.interrupts import signals_interrupt
-from simscen.cli.session.run_session import WARM_PROCESS
 from simscen.cli.session.selection import Checks
 from simscen.core.errors import Exit
 from simscen.core.records.run_result import RunResult
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import ChangedScenario
 from simscen.loading.yaml.tree import MappingNode
+from simscen.run.process.backend import Backend
 from simscen.run.process.jobs import Job
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
@@ -44,6 +44,7 @@ class CandidateRuns:
     scenario: ChangedScenario
     checks: Checks
     options: SessionOptions
+    backend: Backend
     seed: int
     max_runs: int
     report: Callable[[], None] = lambda: None
@@ -90,7 +91,7 @@ class CandidateRuns:
                 for number, scenario in enumerate(named)
             ]
             with signals_interrupt():
-                answers, stopped = run_session(jobs, self.options, WARM_PROCESS, lambda _: None)
+                answers, stopped = run_session(jobs, self.options, self.backend, lambda _: None)
         if stopped is not None:
             raise Stopped(stopped)
         results = {answer.key: answer.result for answer in answers}

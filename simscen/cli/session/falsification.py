@@ -8,9 +8,10 @@ from itertools import count
 from pathlib import Path
 
 from simscen.cli.interrupts import signals_interrupt
+from simscen.cli.session.backends import backend_of
 from simscen.cli.session.output_files import JunitFamily, Reports, require_writable
 from simscen.cli.session.pending_runs import plan_runs
-from simscen.cli.session.run_session import WARM_PROCESS, output_folder
+from simscen.cli.session.run_session import output_folder
 from simscen.cli.session.selection import Checks
 from simscen.cli.session.stacks import stacks_of
 from simscen.cli.session.terminal import Format, Screen, screen
@@ -32,6 +33,7 @@ from simscen.loading.variations.expand import Variation
 from simscen.loading.variations.search_space import SearchSpace, search_space
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
+from simscen.run.process.backend import Backend
 from simscen.run.process.jobs import Job
 from simscen.run.sessions.output_folder import run_folder, write_atomically
 from simscen.run.sessions.results import shown
@@ -88,8 +90,8 @@ def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
     folder, journal = output_folder(request.out, None)
     reports = Reports(folder, request.junit, request.junit_family.value)
     reports.begin()
-    with screen(request.format_) as output:
-        return output.exit(falsification.execute(journal, reports, output)), falsification
+    with screen(request.format_) as output, backend_of(request.options) as backend:
+        return output.exit(falsification.execute(backend, journal, reports, output)), falsification
 
 
 class Falsification:
@@ -116,7 +118,7 @@ class Falsification:
         self.answers: list[RunFinished] = []
         self.found: list[FoundFailure] = []
 
-    def execute(self, journal: Journal, reports: Reports, output: Screen) -> Exit:
+    def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
         """Search until enough failures are found or the budget is spent. Returns the exit code."""
         begun, stopped, empty = time.monotonic(), None, 0
 
@@ -133,7 +135,7 @@ class Falsification:
             empty = 0 if valid else empty + 1
             self._plan(journal, valid)
             with signals_interrupt():
-                answers, stopped = run_session(valid, self._request.options, WARM_PROCESS, listen)
+                answers, stopped = run_session(valid, self._request.options, backend, listen)
             by_key = {answer.key: answer for answer in answers}
             ordered = [None if job is None else by_key[job.key] for job in jobs]
             self.answers += [answer for answer in ordered if answer is not None]

@@ -10,6 +10,7 @@ from typing import Protocol
 
 from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.interrupts import signals_interrupt
+from simscen.cli.session.backends import backend_of
 from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
 from simscen.cli.session.pending_runs import PendingRuns, begin, failed_runs
 from simscen.cli.session.selection import Selection, load_all
@@ -26,8 +27,6 @@ from simscen.report.journal_reader import read_journal
 from simscen.run.reproducibility import plugin_packages
 from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session, scenario_seeds
-
-WARM_PROCESS = ("-m", "simscen.cli.session.warm_process")
 
 
 class Observer(Protocol):
@@ -118,8 +117,8 @@ def _run(
     show(work.started(reports.folder))
     for answer in work.kept:
         show(answer)
-    with signals_interrupt():
-        answers, stopped = run_session(work.jobs, options, WARM_PROCESS, listen)
+    with signals_interrupt(), backend_of(options) as backend:
+        answers, stopped = run_session(work.jobs, options, backend, listen)
     answers = [*work.kept, *answers]
     work.journal.complete(answers)
     comparison = compare_stacks((answer.result for answer in answers), work.stacks)

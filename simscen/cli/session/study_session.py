@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 from simscen.cli.diagnostics import as_text, escaped, print_text
 from simscen.cli.interrupts import signals_interrupt
+from simscen.cli.session.backends import backend_of
 from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
 from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_kept
-from simscen.cli.session.run_session import WARM_PROCESS, output_folder
+from simscen.cli.session.run_session import output_folder
 from simscen.cli.session.selection import Selection, load_all
 from simscen.cli.session.stacks import commands_of
 from simscen.cli.session.terminal import Format, Screen, screen
@@ -33,6 +34,7 @@ from simscen.loading.variations.naming import number_of
 from simscen.model.acceptance import PassRate
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
+from simscen.run.process.backend import Backend
 from simscen.run.process.jobs import Job
 from simscen.run.reproducibility import plugin_packages
 from simscen.run.sessions.output_folder import run_folder
@@ -82,8 +84,8 @@ def execute_study(request: StudyRequest) -> Exit:
     used = {"plugins": plugin_packages(plugins_of_all(first)), "stacks": commands_of(first)}
     reports = Reports(folder, request.junit, request.junit_family.value, used=used)
     reports.begin()
-    with screen(request.format_) as output:
-        return output.exit(study.execute(journal, reports, output))
+    with screen(request.format_) as output, backend_of(request.options) as backend:
+        return output.exit(study.execute(backend, journal, reports, output))
 
 
 class _StudySession:
@@ -125,7 +127,7 @@ class _StudySession:
         self._waiting = list(islice(self._runs, self._batch_size))
         return self._load([run.number for run in self._waiting])
 
-    def execute(self, journal: Journal, reports: Reports, output: Screen) -> Exit:
+    def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
         """Run all batches and write the reports. Returns the exit code."""
         begun, answers, stopped = time.monotonic(), list[RunFinished](), None
         invalid: InvalidInput | None = None
@@ -151,7 +153,7 @@ class _StudySession:
             for answer in kept:
                 show(answer)
             with signals_interrupt():
-                done, stopped = run_session(left, self._request.options, WARM_PROCESS, listen)
+                done, stopped = run_session(left, self._request.options, backend, listen)
             answers += [*kept, *done]
             journal.complete(answers)
             if self._is_decided(answers):

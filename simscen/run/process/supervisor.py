@@ -6,38 +6,17 @@ The supervisor never imports PyBullet or OMPL, so that a crash in these cannot e
 import json
 import signal
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
+from simscen.run.process.backend import Ended, JobUpdate, Progressed, Started, always
 from simscen.run.process.fork_server_process import ForkServerProcess, ProcessDeath, Unresponsive
+from simscen.run.process.isolation import plugin_path_arguments
 from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd, pack_job
+from simscen.spec.registry import Entry
 
 MAX_SILENCE_S = 30.0
 """Time without a message after which the fork server counts as dead. It sends a heartbeat each second."""
-
-
-@dataclass(frozen=True)
-class Started:
-    """A job has started."""
-
-    job: Job
-
-
-@dataclass(frozen=True)
-class Progressed:
-    """A job has reached a simulated time in seconds."""
-
-    job: Job
-    seconds: float
-
-
-@dataclass(frozen=True)
-class Ended:
-    """The worker process of a job has ended, or the fork server has died."""
-
-    job: Job
-    end: ProcessEnd | ForkServerDeath
 
 
 class Interrupted(BaseException):
@@ -48,75 +27,101 @@ class Interrupted(BaseException):
         super().__init__(signal.Signals(number).name)
 
 
-JobUpdate = Started | Progressed | Ended
-
-
-def supervise(
-    jobs: Iterable[Job], workers: int, entry: Sequence[str], go_on: Callable[[], bool]
-) -> Iterator[JobUpdate]:
-    """Run all jobs, `workers` at a time, and yield their updates.
-
-    `entry` are the Python arguments that start the fork server, e.g. `-m module`. `go_on` is called before each job.
-    If the consumer stops early or an exception passes through, all running processes are killed.
-    """
-    return Supervisor(jobs, workers, entry, go_on).happenings()
-
-
 class Supervisor:
-    """Runs jobs in worker processes of a fork server, which is restarted if it dies.
+    """Runs jobs in worker processes of a fork server on this machine, `workers` at a time.
+
+    `entry` are the Python arguments that start the fork server, e.g. `-m module`. It starts with the first job, is kept
+    until the context is left, and is restarted if it dies.
 
     If the fork server dies while it prepares a job, this job fails, and the others that were running are repeated.
     Otherwise any running job may be the cause: these are suspects, each of which is repeated alone and fails if the
     fork server dies again.
     """
 
-    def __init__(self, jobs: Iterable[Job], workers: int, entry: Sequence[str], go_on: Callable[[], bool]) -> None:
-        self._waiting, self._suspects = deque(jobs), deque[Job]()
-        self._workers, self._entry, self._go_on = workers, entry, go_on
+    def __init__(self, workers: int, entry: Sequence[str]) -> None:
+        self._workers, self._entry = workers, tuple(entry)
+        self._plugins: frozenset[Entry] = frozenset()
+        self._server: ForkServerProcess | None = None
+        self._jobs: Iterator[Job] = iter(())
+        self._go_on: Callable[[], bool] = always
+        self._again, self._suspects = deque[Job](), deque[Job]()
         self._running: dict[int, Job] = {}
         self._preparing: Job | None = None
         self._begun: set[int] = set()
         self._tried: set[int] = set()
         self._alive = False
 
-    def add(self, job: Job) -> None:
-        """Add a job at the end of the queue. An iterator of `happenings` that has ended does not resume."""
-        self._waiting.append(job)
+    def __enter__(self) -> "Supervisor":
+        return self
 
-    def happenings(self) -> Generator[JobUpdate, None, None]:
-        """Yield updates until all jobs have ended. Closing the generator kills all processes."""
-        while (self._waiting or self._suspects) and self._go_on():
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def run(
+        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), go_on: Callable[[], bool] = always
+    ) -> Iterator[JobUpdate]:
+        """Run jobs and yield their updates, as described in Backend. Takes a job only when it can start."""
+        if not self._plugins.issuperset(plugins):
+            self.close()
+            self._plugins |= frozenset(plugins)
+        self._jobs, self._go_on = iter(jobs), go_on
+        self._begun, self._tried = set(), set()
+        try:
+            while (job := self._next()) is not None:
+                yield from self._converse(self._started(), job)
+        finally:
+            if self._running:
+                self.close()
+
+    def close(self) -> None:
+        """Kill all workers and end the fork server."""
+        if self._server is not None:
+            self._server.leave()
+        self._server, self._preparing = None, None
+        for jobs in (self._running, self._again, self._suspects):
+            jobs.clear()
+
+    def _started(self) -> ForkServerProcess:
+        """Return the fork server; start it if it does not run."""
+        if self._server is None:
             self._alive = False
-            warm = ForkServerProcess(self._entry)
-            try:
-                yield from self._converse(warm)
-            except EOFError:
-                yield from self._after_death(warm.autopsy(), silent=False)
-            except Unresponsive:
-                warm.abort()
-                yield from self._after_death(warm.autopsy(), silent=True)
-            finally:
-                warm.leave()
+            self._server = ForkServerProcess((*self._entry, *plugin_path_arguments(self._plugins)))
+        return self._server
 
-    def _converse(self, warm: ForkServerProcess) -> Iterator[JobUpdate]:
-        while True:
-            while self._go_on() and (job := self._next()):
-                self._running[job.number] = job
-                warm.send(pack_job(job))
-            if not self._running:
-                return
-            happening = self._understood(warm.hear(self._patience()))
-            if happening is not None:
-                yield happening
+    def _converse(self, server: ForkServerProcess, first: Job) -> Iterator[JobUpdate]:
+        """Run `first` and further jobs until none runs, or until the fork server dies."""
+        job: Job | None = first
+        try:
+            while True:
+                while job is not None:
+                    self._running[job.number] = job
+                    server.send(pack_job(job))
+                    job = self._next()
+                if not self._running:
+                    return
+                update = self._understood(server.hear(self._patience()))
+                if update is not None:
+                    yield update
+                job = self._next()
+        except (EOFError, Unresponsive) as error:
+            silent = isinstance(error, Unresponsive)
+            if silent:
+                server.abort()
+            death = server.autopsy()
+            self._server = None
+            server.leave()
+        yield from self._after_death(death, silent)
 
     def _next(self) -> Job | None:
         """Return the job to start now, or None. A suspect runs alone."""
+        if not self._go_on():
+            return None
         suspected = self._tried & self._running.keys()
         if self._suspects and not self._running:
             return self._suspects.popleft()
-        if self._suspects or suspected or not self._waiting or len(self._running) >= self._workers:
+        if self._suspects or suspected or len(self._running) >= self._workers:
             return None
-        return self._waiting.popleft()
+        return self._again.popleft() if self._again else next(self._jobs, None)
 
     def _patience(self) -> float:
         """Return how long to wait for a message. Preparing a job may take its wall limit, without heartbeats."""
@@ -150,48 +155,14 @@ class Supervisor:
         culprit = prepared if silent or death.code != -signal.SIGKILL or len(under_way) == 1 else None
         how = f"did not answer and {death.how}" if silent else death.how
         if not self._alive:  # it cannot even start
-            under_way += [*self._suspects, *self._waiting]
+            under_way += [*self._suspects, *self._again, *self._jobs]
             self._suspects.clear()
-            self._waiting.clear()
+            self._again.clear()
         for job in under_way:
             if job is culprit or job.number in self._tried or not self._alive:
                 yield Ended(job, ForkServerDeath(how, job is prepared, silent and job is culprit, death.printed))
             elif culprit is not None:
-                self._waiting.appendleft(job)
+                self._again.appendleft(job)
             else:
                 self._tried.add(job.number)
                 self._suspects.append(job)
-
-
-class OnDemandRunner:
-    """Runs single jobs on demand, each in a worker process; imports and built worlds are reused.
-
-    `entry` are the Python arguments that start the fork server. Use as a context manager, which ends it.
-    """
-
-    def __init__(self, entry: Sequence[str]) -> None:
-        self._supervisor = Supervisor((), 1, entry, lambda: True)
-        self._happenings: Generator[JobUpdate, None, None] | None = None
-
-    def __enter__(self) -> "OnDemandRunner":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def run(self, job: Job) -> ProcessEnd | ForkServerDeath:
-        """Run a job and return how its process ended. An exception, such as Ctrl-C, ends the fork server."""
-        self._supervisor.add(job)
-        if self._happenings is None:
-            self._happenings = self._supervisor.happenings()
-        try:
-            return next(one.end for one in self._happenings if isinstance(one, Ended) and one.job is job)
-        except BaseException:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """End the fork server if it runs."""
-        if self._happenings is not None:
-            self._happenings.close()
-            self._happenings = None

@@ -13,9 +13,9 @@ from simscen.core.records.session_events import Listener, RunFinished, RunProgre
 from simscen.judge.result_json import from_json
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
-from simscen.run.process.isolation import plugin_path_arguments
+from simscen.run.process.backend import Backend, Ended, Progressed, Started
 from simscen.run.process.jobs import Job, KeptLogs, ReplayMode
-from simscen.run.process.supervisor import Ended, Interrupted, Progressed, Started, supervise
+from simscen.run.process.supervisor import Interrupted
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.results import finished_run, skipped_run, unfinished_run
 
@@ -82,7 +82,7 @@ def _seeds(title: str, scenario: LoadedScenario, options: SessionOptions) -> Seq
 
 
 def run_session(
-    jobs: Sequence[Job], options: SessionOptions, entry: Sequence[str], listen: Listener
+    jobs: Sequence[Job], options: SessionOptions, backend: Backend, listen: Listener
 ) -> tuple[list[RunFinished], Exit | None]:
     """Run all jobs and report exactly one result for each, in the order in which they finish.
 
@@ -101,8 +101,8 @@ def run_session(
             listen(answers[job.number])
     jobs_to_do = [job for job in jobs if job.number not in answers]
     try:
-        told = plugin_path_arguments(plugins_of_all([job.scenario for job in jobs_to_do]))
-        for happening in supervise(jobs_to_do, options.workers, (*entry, *told), go_on):
+        plugins = plugins_of_all([job.scenario for job in jobs_to_do])
+        for happening in backend.run(jobs_to_do, plugins, go_on):
             job = happening.job
             match happening:
                 case Started():

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from stack_programs import DRIVE
 
-from simscen.cli.session.run_session import WARM_PROCESS
+from simscen.cli.session.backends import backend_of
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunStarted
 from simscen.report.junit import to_xml
@@ -42,7 +42,8 @@ def session(load, tmp_path: Path):
         limits = {name: 1.0 if KINDS.get(name) == "stack-timeout" else 30.0 for name in programs}
         scenarios = [load(text, name, answer_limit=limits[name]) for name, text in programs.items()]
         options = SessionOptions(workers=2, wall_limit=60.0)
-        answers, _ = run_session(plan_jobs(scenarios, options, tmp_path / out), options, WARM_PROCESS, listen)
+        with backend_of(options) as backend:
+            answers, _ = run_session(plan_jobs(scenarios, options, tmp_path / out), options, backend, listen)
         return {answer.key.scenario: answer for answer in answers}
 
     return run
@@ -118,7 +119,7 @@ def test_a_supervisor_that_is_killed_takes_every_stack_along(load, processes, tm
     pid = os.fork()
     if pid == 0:
         options = SessionOptions()
-        run_session(plan_jobs([loaded], options, tmp_path / "out"), options, WARM_PROCESS, lambda event: None)
+        run_session(plan_jobs([loaded], options, tmp_path / "out"), options, backend_of(options), lambda event: None)
         os._exit(0)
     _until(lambda: len(processes()) >= 2)
     os.kill(pid, signal.SIGKILL)
@@ -144,7 +145,8 @@ def test_an_interrupted_session_leaves_no_stack_behind(load, processes, tmp_path
             raise Interrupted(signal.SIGINT)
 
     options = SessionOptions()
-    answers, stopped = run_session(plan_jobs([loaded], options, tmp_path / "out"), options, WARM_PROCESS, interrupt)
+    with backend_of(options) as backend:
+        answers, stopped = run_session(plan_jobs([loaded], options, tmp_path / "out"), options, backend, interrupt)
     assert stopped is not None
     assert [answer.result.error.kind for answer in answers] == ["interrupted"]
     assert not processes()

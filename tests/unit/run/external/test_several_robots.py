@@ -8,7 +8,7 @@ import pytest
 from mcap.reader import make_reader
 from stack_programs import DRIVE
 
-from simscen.cli.session.run_session import WARM_PROCESS
+from simscen.cli.session.backends import backend_of
 from simscen.core.errors import RunError
 from simscen.core.records.run_result import Outcome
 from simscen.loading.scenario import load_scenario
@@ -118,7 +118,8 @@ def test_a_worker_that_is_killed_takes_the_stacks_of_all_robots_along(load_fleet
     told = f"{HELLO}for step in peer:\n    if peer.robot_name == 'right': {kill}    step.drive(0, 0)\n"
     options = SessionOptions(wall_limit=60.0)
     jobs = plan_jobs([load_fleet(told, answer_limit=30.0)], options, tmp_path / "out")
-    ((answer,), _) = run_session(jobs, options, WARM_PROCESS, lambda event: None)
+    with backend_of(options) as backend:
+        ((answer,), _) = run_session(jobs, options, backend, lambda event: None)
     assert answer.result.error is not None
     assert answer.result.error.kind == "crashed"
     assert_gone(tmp_path)

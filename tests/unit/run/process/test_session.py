@@ -15,7 +15,7 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished, RunProgress, RunStarted
 from simscen.loading.scenario import load_scenario
 from simscen.run.process import supervisor
-from simscen.run.process.supervisor import Interrupted
+from simscen.run.process.supervisor import Interrupted, Supervisor
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
 
 ENTRY = (str(Path(__file__).with_name("faulty_zygote.py")),)
@@ -38,7 +38,9 @@ def session(tmp_path):
             scenarios.append(load_scenario(file, tmp_path))
         chosen = SessionOptions(**{"wall_limit": 20.0, **options})
         heard = [] if events is None else events
-        answers, stopped = run_session(plan_jobs(scenarios, chosen, tmp_path / "out"), chosen, entry, heard.append)
+        jobs = plan_jobs(scenarios, chosen, tmp_path / "out")
+        with Supervisor(chosen.workers, entry) as backend:
+            answers, stopped = run_session(jobs, chosen, backend, heard.append)
         return {answer.key.scenario.partition("-")[2]: answer for answer in answers}, stopped
 
     return run
@@ -219,3 +221,43 @@ def test_an_interrupted_session_answers_every_run(session):
     assert stopped is Exit.INTERRUPTED
     assert answers["hang"].result.error.kind == "interrupted"
     assert answers["fine"].result.error.kind == "not-run"
+
+
+def test_a_supervisor_keeps_its_processes_between_two_sessions_until_it_is_closed(tmp_path):
+    file = tmp_path / "fine.scenario.yaml"
+    file.write_text(SCENARIO.format(fault="fine"))
+    options = SessionOptions(wall_limit=20.0)
+    servers = []
+    with Supervisor(1, ENTRY) as backend:
+        for number in range(2):
+            jobs = plan_jobs([load_scenario(file, tmp_path)], options, tmp_path / str(number))
+            answers, _ = run_session(jobs, options, backend, lambda event: None)
+            assert [answer.outcome for answer in answers] == [Outcome.PASSED]
+            servers += _children()
+    assert len(servers) == 2
+    assert servers[0] == servers[1]
+    assert servers[0] not in _children()
+
+
+def test_a_fork_server_that_dies_between_two_sessions_is_started_again(tmp_path):
+    file = tmp_path / "fine.scenario.yaml"
+    file.write_text(SCENARIO.format(fault="fine"))
+    options = SessionOptions(wall_limit=20.0)
+    with Supervisor(1, ENTRY) as backend:
+        for number in range(2):
+            jobs = plan_jobs([load_scenario(file, tmp_path)], options, tmp_path / str(number))
+            answers, _ = run_session(jobs, options, backend, lambda event: None)
+            assert [answer.outcome for answer in answers] == [Outcome.PASSED]
+            if number == 0:
+                (server,) = _children()
+                os.kill(server, signal.SIGKILL)
+
+
+def _children():
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            state, parent = stat.read_text().rsplit(")", 1)[1].split()[:2]
+            if int(parent) == os.getpid() and state != "Z":
+                found.append(int(stat.parent.name))
+    return found
