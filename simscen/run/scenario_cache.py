@@ -138,11 +138,12 @@ class ScenarioCache:
     def prepared(self, loaded: LoadedScenario) -> PreparedScenario:
         """Return the prepared scenario. Raises InvalidInput."""
         name = loaded.id, loaded.variation, loaded.stack_name
-        if name not in self._scenarios:
-            if len(self._scenarios) == MAX_SCENARIOS:
+        known = self._scenarios.get(name)
+        if known is None or known.loaded != loaded:
+            if known is None and len(self._scenarios) == MAX_SCENARIOS:
                 del self._scenarios[next(iter(self._scenarios))]
-            self._scenarios[name] = prepare(loaded, self._world, self._kept.legs)
-        return self._scenarios[name]
+            known = self._scenarios[name] = prepare(loaded, self._world, self._kept.legs)
+        return known
 
     def clear(self) -> None:
         """Remove all entries."""

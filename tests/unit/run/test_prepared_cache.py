@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from simscen.loading.scenario import try_variations
+from simscen.loading.scenario import load_scenario, try_variations
 from simscen.run import scenario_cache
 from simscen.run.disk_cache import DiskCache
 from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
@@ -28,3 +28,13 @@ def test_variations_of_one_world_build_it_once_and_keep_only_the_last(tmp_path: 
     assert [one.start.x for one in prepared] == [1, 2, 3]
     assert cache.prepared(variations[2]) is prepared[2]
     assert cache.prepared(variations[0]) is not prepared[0]
+
+
+def test_a_scenario_with_the_same_name_but_other_content_is_prepared_again(tmp_path: Path) -> None:
+    cache = ScenarioCache(CachedWorldBuilder(DiskCache(None)))
+    starts = []
+    for x in (1, 2):
+        (tmp_path / "a.scenario.yaml").write_text(TEXT.replace("{x: 1, y: 1}", f"{{x: {x}, y: 1}}").split("var")[0])
+        loaded = load_scenario(tmp_path / "a.scenario.yaml", tmp_path)
+        starts.append(cache.prepared(loaded).start.x)
+    assert starts == [1, 2]
