@@ -122,7 +122,9 @@ def test_90_without_fused_multiply_add_the_verdicts_are_the_same(reference, pair
     monkeypatch.setattr(fork_server_process, "clean_environment", lambda: {**environment, **plain})
     assert simscen("run", ".", "--out", "out").code == 0
     assert simscen("run", ".", "--out", "again", "--check-against", "out").code == 0
-    assert {"blas", "libm", "numpy", "numpy_dispatch"} == set(json.loads((pair / "out/run.json").read_text())["arithmetic"])
+    assert {"blas", "libm", "numpy", "numpy_dispatch"} == set(
+        json.loads((pair / "out/run.json").read_text())["arithmetic"]
+    )
     verdicts = {
         name: [verdict["status"] for verdict in json.loads(result)["verdicts"]]
         for name, (result, _) in results(pair / "out").items()

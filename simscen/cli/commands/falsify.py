@@ -8,6 +8,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
 from simscen.cli.session.falsification import FalsifyRequest, execute_search, summary_lines
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
 from simscen.cli.session.run_options import (
@@ -20,7 +21,6 @@ from simscen.cli.session.run_options import (
     WallLimitOption,
     WorldPathOption,
 )
-from simscen.cli.session.run_session import available_cores
 from simscen.cli.session.terminal import Format, FormatOption
 from simscen.core.errors import UsageError
 from simscen.run.process.jobs import ReplayMode
@@ -57,6 +57,8 @@ def command(
     ] = None,
     out: OutOption = None,
     workers: JobsOption = None,
+    backend: BackendOption = BackendName.LOCAL,
+    address: AddressOption = None,
     junit: JunitOption = None,
     junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
     format_: FormatOption = Format.TEXT,
@@ -77,7 +79,8 @@ def command(
     """
     if probability is not None and method is not SearchMethod.RANDOM:
         raise UsageError("--probability needs --method random: only random values show a rate")
-    options = SessionOptions(workers or available_cores(), seed, wall_limit=wall_limit, replay=ReplayMode.FAILED)
+    workers, cluster = workers_and_cluster(workers, backend, address)
+    options = SessionOptions(workers, seed, wall_limit=wall_limit, replay=ReplayMode.FAILED, cluster=cluster)
     request = FalsifyRequest(
         file,
         method,

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
+from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
 from simscen.cli.session.run_options import (
     JobsOption,
@@ -18,7 +19,7 @@ from simscen.cli.session.run_options import (
     WallLimitOption,
     WorldPathOption,
 )
-from simscen.cli.session.run_session import SessionRequest, available_cores, execute_session
+from simscen.cli.session.run_session import SessionRequest, execute_session
 from simscen.cli.session.selection import Selection
 from simscen.cli.session.shards import scenario_times, shard_of
 from simscen.cli.session.stacks import STACK_HELP
@@ -36,6 +37,8 @@ def command(
     ],
     out: OutOption = None,
     workers: JobsOption = None,
+    backend: BackendOption = BackendName.LOCAL,
+    address: AddressOption = None,
     seed: Annotated[
         int | None, typer.Option(min=1, max=2**32 - 1, help="Use this seed instead of each scenario's own.")
     ] = None,
@@ -132,11 +135,12 @@ def command(
         raise UsageError("--keep-logs failed excludes --check-determinism and --check-against, which compare logs")
     if check_determinism and (earlier := [path for path in paths if (path / JOURNAL_FILE).is_file()]):
         paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]
+    workers, cluster = workers_and_cluster(workers, backend, address)
     request = SessionRequest(
         paths,
         Selection(keyword, tag or [], shard_of(shard, os.environ), variation or [], scenario_times(shard_by or [])),
         SessionOptions(
-            workers or available_cores(),
+            workers,
             seed,
             repeat,
             check_determinism,
@@ -145,6 +149,7 @@ def command(
             check_against,
             replay=replay,
             keep_logs=keep_logs,
+            cluster=cluster,
         ),
         root,
         world_path or [],

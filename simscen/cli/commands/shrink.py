@@ -8,7 +8,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.backends import backend_of
+from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, backend_of, workers_and_cluster
 from simscen.cli.session.candidates import CandidateRuns, Stopped
 from simscen.cli.session.output_files import save
 from simscen.cli.session.run_options import (
@@ -18,7 +18,6 @@ from simscen.cli.session.run_options import (
     WallLimitOption,
     WorldPathOption,
 )
-from simscen.cli.session.run_session import available_cores
 from simscen.cli.session.selection import Checks
 from simscen.cli.session.shrinking import Failure, Shrinking, failure_of, only_failing, with_inline_world
 from simscen.cli.session.stacks import stacks_of
@@ -62,6 +61,8 @@ def command(
     ] = None,
     runs: Annotated[int, typer.Option(min=1, max=100_000, help="Largest number of runs.")] = 500,
     workers: JobsOption = None,
+    backend: BackendOption = BackendName.LOCAL,
+    address: AddressOption = None,
     keep_world: Annotated[
         bool, typer.Option("--keep-world", help="Keep the world file instead of writing what is needed of it inline.")
     ] = False,
@@ -86,13 +87,14 @@ def command(
     target = out or sibling(chosen.file, "minimal")
     if target.exists():
         raise UsageError(f"{target} exists already; choose another file with --out")
-    options = SessionOptions(workers or available_cores(), wall_limit=wall_limit)
+    workers, cluster = workers_and_cluster(workers, backend, address)
+    options = SessionOptions(workers, wall_limit=wall_limit, cluster=cluster)
     checks = Checks(home, world_path or (), lenient, stacks=stacks)
     own_seed = child(scenario.tree, "seed")
     first_seed = chosen.seed or (own_seed.plain if own_seed is not None and isinstance(own_seed.plain, int) else 1)
     try:
-        with backend_of(options) as backend:
-            candidates = CandidateRuns(scenario, checks, options, backend, first_seed, runs)
+        with backend_of(options) as processes:
+            candidates = CandidateRuns(scenario, checks, options, processes, first_seed, runs)
             shrinking, before = _shrink(candidates, criterion, keep, keep_world)
     except Stopped as stopped:
         sys.exit(stopped.exit)

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
+from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
 from simscen.cli.session.run_options import (
     JobsOption,
@@ -18,7 +19,6 @@ from simscen.cli.session.run_options import (
     WallLimitOption,
     WorldPathOption,
 )
-from simscen.cli.session.run_session import available_cores
 from simscen.cli.session.study_session import StudyRequest, execute_study
 from simscen.cli.session.terminal import Format, FormatOption
 from simscen.run.process.jobs import KeptLogs, ReplayMode
@@ -49,6 +49,8 @@ def command(
         Path | None, typer.Option(help="Continue in this output folder: run what has no verdict yet or has changed.")
     ] = None,
     workers: JobsOption = None,
+    backend: BackendOption = BackendName.LOCAL,
+    address: AddressOption = None,
     junit: JunitOption = None,
     junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
     format_: FormatOption = Format.TEXT,
@@ -78,9 +80,8 @@ def command(
     Exit code 0: the claim holds, or all runs passed if there is no claim; 1: the claim is refuted, or a run failed; 2:
     an invalid scenario; 3: a run could not be completed; 6: the claim is undecided; 129, 130, and 143: interrupted.
     """
-    options = SessionOptions(
-        workers or available_cores(), seed, wall_limit=wall_limit, replay=replay, keep_logs=keep_logs
-    )
+    workers, cluster = workers_and_cluster(workers, backend, address)
+    options = SessionOptions(workers, seed, wall_limit=wall_limit, replay=replay, keep_logs=keep_logs, cluster=cluster)
     request = StudyRequest(
         file,
         runs,

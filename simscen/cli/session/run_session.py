@@ -1,6 +1,5 @@
 """Session of `simscen run`, from its options to its exit code."""
 
-import os
 import sys
 import time
 from collections.abc import Sequence
@@ -153,8 +152,3 @@ def output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]
         return folder, Journal(folder, resume=resume is not None)
     except OSError as error:
         raise UsageError(f"cannot use the output folder {folder}: {error.strerror}") from error
-
-
-def available_cores() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0))

@@ -27,7 +27,8 @@ class SessionOptions:
     `seed` None stands for each scenario's own seed; `repeat` runs use consecutive seeds. `twice` runs everything a
     second time with the same seed and compares. `against` is the output folder of an earlier session to compare with.
     `wall_limit` limits each run, in seconds. `only` restricts the session to these keys. `replay` selects the runs
-    that get a replay page, `keep_logs` those that keep their logs and pictures.
+    that get a replay page, `keep_logs` those that keep their logs and pictures. `cluster` is the address of the Ray
+    cluster on which the runs are executed; "" is this machine.
     """
 
     workers: int = 1
@@ -40,6 +41,7 @@ class SessionOptions:
     replay: ReplayMode = ReplayMode.NONE
     only: frozenset[RunKey] | None = None
     keep_logs: KeptLogs = KeptLogs.ALL
+    cluster: str = ""
 
 
 def scenario_seeds(scenario: LoadedScenario, options: SessionOptions) -> range:

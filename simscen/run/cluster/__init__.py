@@ -1,0 +1,1 @@
+"""Run sessions on a Ray cluster."""

@@ -1,0 +1,160 @@
+"""What runs on the nodes of a cluster: the runner of a node, and the queue from which all runners take their jobs.
+
+Both are plain classes; the backend makes Ray actors of them.
+"""
+
+import shutil
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from simscen.core.errors import UsageError
+from simscen.core.version import __version__
+from simscen.loading.plugins import requirement_of
+from simscen.run.cluster.packing import PackedJob, Unpacker
+from simscen.run.process.backend import Ended, Progressed, Started
+from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd
+from simscen.run.process.supervisor import Supervisor
+from simscen.run.reproducibility import source_digest
+from simscen.spec.registry import Entry, find
+
+PIECE_BYTES = 8 << 20
+"""Largest part of a file that is sent at once."""
+
+
+@dataclass(frozen=True)
+class JobStarted:
+    """A job has started."""
+
+    number: int
+
+
+@dataclass(frozen=True)
+class JobProgressed:
+    """A job has reached a simulated time in seconds."""
+
+    number: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class FilePiece:
+    """The next part of a file in the output folder of a job; `name` is relative to the folder."""
+
+    number: int
+    name: str
+    data: bytes
+
+
+@dataclass(frozen=True)
+class JobEnded:
+    """A job has ended, and all of its files were sent."""
+
+    number: int
+    end: ProcessEnd | ForkServerDeath
+
+
+NodeUpdate = JobStarted | JobProgressed | FilePiece | JobEnded
+
+
+class JobQueue:
+    """Jobs that wait for a node, and the numbers of those that each node took."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[PackedJob] = deque()
+        self._taken: dict[str, list[int]] = {}
+
+    def add(self, job: PackedJob) -> None:
+        """Add a job at the end."""
+        self._waiting.append(job)
+
+    def take(self, runner: str) -> PackedJob | None:
+        """Return the next job for a runner, or None if no job waits."""
+        if not self._waiting:
+            return None
+        job = self._waiting.popleft()
+        self._taken.setdefault(runner, []).append(job.number)
+        return job
+
+    def taken_by(self, runner: str) -> list[int]:
+        """Return the numbers of the jobs that a runner took since the last call of `clear`."""
+        return self._taken.get(runner, [])
+
+    def clear(self) -> None:
+        """Remove all jobs."""
+        self._waiting.clear()
+        self._taken.clear()
+
+
+class NodeRunner:
+    """Runs jobs on one node, `workers` at a time, as processes below a supervisor of its own."""
+
+    def __init__(self, workers: int, entry: Sequence[str], receive: Callable[[Any], Any]) -> None:
+        """`entry` are the Python arguments that start the fork server; `receive` returns the value of a handle."""
+        self._temporary = TemporaryDirectory(prefix="simscen-")
+        self._folder = Path(self._temporary.name)
+        self._supervisor = Supervisor(workers, entry)
+        self._unpacker = Unpacker(self._folder / "inputs", receive)
+        self._receive = receive
+
+    def software(self) -> tuple[str, str]:
+        """Return the version of simscen on this node, and a digest of its code."""
+        return __version__, source_digest()
+
+    def run(self, queue: Any, runner: str, plugins: Sequence[Entry]) -> Iterator[NodeUpdate]:
+        """Run jobs from the queue until it is empty, and yield their updates and files. Raises UsageError."""
+        jobs = _JobsOfQueue(lambda: self._receive(queue.take.remote(runner)), self._job)
+        for update in self._supervisor.run(jobs, [_same_plugin(entry) for entry in plugins]):
+            job = update.job
+            match update:
+                case Started():
+                    yield JobStarted(job.number)
+                case Progressed(seconds=seconds):
+                    yield JobProgressed(job.number, seconds)
+                case Ended(end=end):
+                    yield from _files(job)
+                    shutil.rmtree(job.folder, ignore_errors=True)
+                    yield JobEnded(job.number, end)
+
+    def _job(self, packed: PackedJob) -> Job:
+        return self._unpacker.unpack(packed, self._folder / f"run-{packed.number}")
+
+
+class _JobsOfQueue:
+    """Iterator over the jobs of the queue. At its end, it may go on later, with jobs that were added meanwhile."""
+
+    def __init__(self, take: Callable[[], PackedJob | None], unpack: Callable[[PackedJob], Job]) -> None:
+        self._take, self._unpack = take, unpack
+
+    def __iter__(self) -> "_JobsOfQueue":
+        return self
+
+    def __next__(self) -> Job:
+        packed = self._take()
+        if packed is None:
+            raise StopIteration
+        return self._unpack(packed)
+
+
+def _files(job: Job) -> Iterator[FilePiece]:
+    """Yield all files in the output folder of a job."""
+    for path in sorted(job.folder.rglob("*")):
+        if path.is_file():
+            name = path.relative_to(job.folder).as_posix()
+            with path.open("rb") as file:
+                yield FilePiece(job.number, name, file.read(PIECE_BYTES))
+                while data := file.read(PIECE_BYTES):
+                    yield FilePiece(job.number, name, data)
+
+
+def _same_plugin(entry: Entry) -> Entry:
+    """Return the same plug-in as installed on this node. Raises UsageError if it is missing or another version."""
+    here = find(entry.group, entry.name)
+    wanted = requirement_of(entry)
+    if here is None or requirement_of(here) != wanted:
+        found = "it is not installed" if here is None else f"{requirement_of(here)} is installed"
+        raise UsageError(f"the scenarios need {entry.group} `{entry.name}` of {wanted}, but {found}")
+    return here

@@ -1,0 +1,301 @@
+"""Backend that runs jobs on a Ray cluster: one runner for each node, which supervises processes on it."""
+
+import logging
+import shutil
+import socket
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import ray
+from ray._private import services
+from ray._private import worker as ray_worker
+from ray.exceptions import RayActorError, RayTaskError
+from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+from simscen.core.errors import UsageError
+from simscen.core.version import __version__
+from simscen.run.cluster.node import FilePiece, JobEnded, JobProgressed, JobQueue, JobStarted, NodeRunner, NodeUpdate
+from simscen.run.cluster.packing import PACKAGE_FOLDER, SentFile, digest_of, pack
+from simscen.run.process.backend import Ended, JobUpdate, Progressed, Started, always
+from simscen.run.process.jobs import ForkServerDeath, Job
+from simscen.run.reproducibility import source_digest
+from simscen.spec.registry import Entry
+
+MAX_ATTEMPTS = 2
+"""A job whose runner or node is lost is tried once more."""
+
+WAITING_PER_WORKER = 2
+"""Jobs that wait in the queue for each worker, so that no node waits for a job to be packed."""
+
+LOOK_FOR_NODES_S = 5.0
+"""Time between two looks for nodes that have joined the cluster."""
+
+CONNECT_S = 5.0
+POLL_S = 0.5
+UNSENT_UPDATES = 64
+"""Updates of a runner that wait to be read before the runner pauses."""
+
+
+@dataclass
+class _Runner:
+    """A runner: its id, the node, its actor, its workers, and its current call, which returns what `is_ready` says."""
+
+    name: str
+    node: str
+    address: str
+    actor: Any
+    workers: int
+    call: Any
+    is_ready: bool = False
+
+
+class RayBackend:
+    """Runs jobs on all nodes of a running Ray cluster, at most `workers` at a time.
+
+    Each node needs the same simscen, and the plug-ins of the scenarios. Input files travel by content. A job whose node
+    or runner is lost is tried once more. Results do not depend on the number of nodes.
+    """
+
+    def __init__(self, address: str, workers: int, entry: Sequence[str]) -> None:
+        """`entry` are the Python arguments that start the fork server on a node."""
+        self._address, self._workers, self._entry = address, workers, tuple(entry)
+        self._runners: list[_Runner] = []
+        self._files: dict[Path, SentFile] = {}
+        self._contents: dict[str, SentFile] = {}
+        self._queue: Any = None
+        self._next_name = 0
+        self._last_look = 0.0
+
+    def __enter__(self) -> "RayBackend":
+        """Connect to the cluster. Raises UsageError."""
+        connect(self._address)
+        here = ray.get_runtime_context().get_node_id()
+        self._queue = (
+            ray.remote(JobQueue)
+            .options(num_cpus=0, scheduling_strategy=NodeAffinitySchedulingStrategy(here, soft=True))
+            .remote()
+        )
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for runner in self._runners:
+            ray.kill(runner.actor)
+        ray.shutdown()
+
+    def run(
+        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), go_on: Callable[[], bool] = always
+    ) -> Iterator[JobUpdate]:
+        """Run jobs and yield their updates, as described in Backend. Raises UsageError for an unusable cluster."""
+        batch = _Batch(jobs, go_on)
+        try:
+            while batch.is_going_on():
+                self._look_for_nodes()
+                self._send(batch)
+                calls = {runner.call: runner for runner in self._runners if runner.call is not None}
+                ready, _ = ray.wait(list(calls), timeout=POLL_S) if calls else ([], [])
+                for call in ready:
+                    yield from self._hear(calls[call], batch, plugins)
+                for runner in self._runners:
+                    if runner.is_ready and runner.call is None and batch.is_going_on():
+                        self._start(runner, plugins)
+        except SystemError as error:  # what Ray makes of an exception that a signal handler raised
+            raise error.__cause__ or error from None
+        finally:
+            if batch.running or batch.sent:
+                self._abandon()
+            ray.get(self._queue.clear.remote())
+        self._finish_calls()
+
+    def _look_for_nodes(self) -> None:
+        """Start a runner on each node that has none. Raises UsageError if there is no node."""
+        if self._runners and time.monotonic() < self._last_look + LOOK_FOR_NODES_S:
+            return
+        self._last_look = time.monotonic()
+        nodes = [node for node in _nodes() if node["Alive"] and node["Resources"].get("CPU", 0) >= 1]
+        if not nodes:
+            raise UsageError(f"no node of the Ray cluster at {self._address} has a CPU")
+        used = {runner.node for runner in self._runners}
+        for node in sorted(nodes, key=lambda node: str(node["NodeID"])):
+            left = self._workers - sum(one.workers for one in self._runners)
+            workers = min(int(node["Resources"]["CPU"]), left)
+            if node["NodeID"] not in used and workers > 0:
+                self._runners.append(self._new_runner(node["NodeID"], node["NodeManagerAddress"], workers))
+
+    def _new_runner(self, node: str, address: str, workers: int) -> _Runner:
+        self._next_name += 1
+        place = NodeAffinitySchedulingStrategy(node, soft=False)
+        actor: Any = ray.remote(NodeRunner).options(num_cpus=workers, scheduling_strategy=place)
+        actor = actor.remote(workers, self._entry, ray.get)
+        return _Runner(f"runner-{self._next_name}", node, address, actor, workers, actor.software.remote())
+
+    def _start(self, runner: _Runner, plugins: Sequence[Entry]) -> None:
+        call = runner.actor.run.options(num_returns="streaming", _generator_backpressure_num_objects=UNSENT_UPDATES)
+        runner.call = call.remote(self._queue, runner.name, list(plugins))
+
+    def _send(self, batch: "_Batch") -> None:
+        """Put jobs into the queue until enough of them wait."""
+        most = WAITING_PER_WORKER * sum(runner.workers for runner in self._runners)
+        while len(batch.sent) < most and (job := batch.next()) is not None:
+            batch.sent[job.number] = job
+            ray.get(self._queue.add.remote(pack(job, self._sent_file)))
+
+    def _sent_file(self, path: Path) -> SentFile:
+        """Put the content of a file into the cluster, once for all files with the same content."""
+        if path not in self._files:
+            data = path.read_bytes()
+            digest = digest_of(data)
+            if digest not in self._contents:
+                self._contents[digest] = SentFile(digest, ray.put(data))
+            self._files[path] = self._contents[digest]
+        return self._files[path]
+
+    def _hear(self, runner: _Runner, batch: "_Batch", plugins: Sequence[Entry]) -> Iterator[JobUpdate]:
+        """Handle what a runner answers. Raises UsageError."""
+        try:
+            if not runner.is_ready:
+                self._require_same_software(runner, ray.get(runner.call))
+                runner.is_ready = True
+                self._start(runner, plugins)
+                return
+            update = ray.get(next(runner.call))
+        except StopIteration:  # it found no job in the queue
+            runner.call = None
+        except RayActorError:
+            yield from self._lost(runner, batch)
+        except RayTaskError as error:
+            if isinstance(error.cause, UsageError):
+                raise UsageError(f"node {runner.address}: {error.cause}") from error
+            raise
+        else:
+            yield from batch.updates(update)
+
+    def _require_same_software(self, runner: _Runner, found: tuple[str, str]) -> None:
+        if found != (__version__, source_digest()):
+            raise UsageError(
+                f"node {runner.address} has simscen {found[0]} with other code than simscen {__version__} in "
+                f"{PACKAGE_FOLDER}; install the same version on all nodes"
+            )
+
+    def _lost(self, runner: _Runner, batch: "_Batch") -> Iterator[JobUpdate]:
+        """Forget a runner that has died, and repeat its jobs, once each."""
+        self._runners.remove(runner)
+        self._last_look = 0.0
+        for number in ray.get(self._queue.taken_by.remote(runner.name)):
+            yield from batch.lost(number, runner.address)
+
+    def _finish_calls(self) -> None:
+        """Read the calls of all runners to their ends, which come at once, because the queue is empty."""
+        for runner in [runner for runner in self._runners if runner.is_ready and runner.call is not None]:
+            try:
+                ray.get(list(runner.call))
+                runner.call = None
+            except RayActorError:
+                self._runners.remove(runner)
+
+    def _abandon(self) -> None:
+        """Kill all runners with their processes."""
+        for runner in self._runners:
+            ray.kill(runner.actor)
+        self._runners.clear()
+
+
+def connect(address: str) -> None:
+    """Connect to a running Ray cluster, unless that is done. Raises UsageError."""
+    if ray.is_initialized():
+        return
+    # Ray prints the end of nodes to standard output, which is for results.
+    ray_worker.print_to_stdstream = lambda *_, **__: None
+    try:
+        _require_answer(address)
+        ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+    except (OSError, ValueError, RuntimeError) as error:
+        reason = str(error).partition("\n")[0].rstrip(".")
+        raise UsageError(
+            f"cannot connect to a Ray cluster at {address}: {reason}; `ray start --head` starts one"
+        ) from error
+
+
+def _require_answer(address: str) -> None:
+    """Raise OSError if nothing listens at the address, for which Ray would wait for minutes."""
+    known = services.canonicalize_bootstrap_address(address)
+    host, colon, port = (known or "").rpartition(":")
+    if colon and port.isdigit() and "//" not in host:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=CONNECT_S).close()
+
+
+def cluster_cpus(address: str) -> int:
+    """Return the number of CPUs of a running Ray cluster. Raises UsageError."""
+    connect(address)
+    return sum(int(node["Resources"].get("CPU", 0)) for node in _nodes() if node["Alive"])
+
+
+def _nodes() -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = ray.nodes()  # type: ignore[no-untyped-call]
+    return found
+
+
+class _Batch:
+    """The jobs of one call of `run`: those that are `sent` to the cluster and those that are `running`, by number."""
+
+    def __init__(self, jobs: Iterable[Job], go_on: Callable[[], bool]) -> None:
+        self._jobs, self._go_on = iter(jobs), go_on
+        self._again = deque[Job]()
+        self._attempts: dict[int, int] = {}
+        self._ahead: Job | None = None
+        self.sent: dict[int, Job] = {}
+        self.running: dict[int, Job] = {}
+
+    def next(self) -> Job | None:
+        """Return the next job to send, or None."""
+        if not self._go_on():
+            return None
+        job, self._ahead = self._ahead, None
+        if job is None:
+            job = self._again.popleft() if self._again else next(self._jobs, None)
+        return job
+
+    def is_going_on(self) -> bool:
+        """Return whether a job runs or has yet to start."""
+        if self.running:
+            return True
+        if not self._go_on():
+            return False
+        if not self.sent and self._ahead is None:
+            self._ahead = self.next()
+        return bool(self.sent) or self._ahead is not None
+
+    def updates(self, update: NodeUpdate) -> Iterator[JobUpdate]:
+        """Write the files of a job, and yield its updates."""
+        match update:
+            case JobStarted(number):
+                if (job := self.sent.pop(number, None)) is not None:
+                    self.running[number] = job
+                    shutil.rmtree(job.folder, ignore_errors=True)
+                    if number not in self._attempts:
+                        yield Started(job)
+            case JobProgressed(number, seconds):
+                yield Progressed(self.running[number], seconds)
+            case FilePiece(number, name, data):
+                file = (self.running.get(number) or self.sent[number]).folder / name
+                file.parent.mkdir(parents=True, exist_ok=True)
+                with file.open("ab") as output:
+                    output.write(data)
+            case JobEnded(number, end):
+                job = self.running.pop(number, None) or self.sent.pop(number)
+                yield Ended(job, end)
+
+    def lost(self, number: int, address: str) -> Iterator[JobUpdate]:
+        """Queue a job of a lost runner again, or report it as ended if it was lost too often."""
+        job = self.running.pop(number, None) or self.sent.pop(number, None)
+        if job is None:
+            return
+        self._attempts[number] = self._attempts.get(number, 1) + 1
+        if self._attempts[number] <= MAX_ATTEMPTS:
+            self._again.append(job)
+            return
+        how = f"was lost with its node {address}, as before on another node"
+        yield Ended(job, ForkServerDeath(how, False, False, ""))

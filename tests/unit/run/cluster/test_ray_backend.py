@@ -1,0 +1,159 @@
+"""Sessions on a Ray cluster of three nodes on this machine."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from simscen.core.errors import UsageError
+from simscen.loading.scenario import load_scenario
+from simscen.run.process.backend import Ended, Started
+from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd
+
+pytest.importorskip("ray")
+pytestmark = pytest.mark.slow
+
+from ray.cluster_utils import Cluster  # noqa: E402
+
+from simscen.run.cluster.ray_backend import RayBackend, connect  # noqa: E402
+
+ENTRY = (str(Path(__file__).parents[1] / "process/faulty_zygote.py"),)
+SCENARIO = """
+simscen: 1
+tags: [{fault}]
+world: {{simscen: 1, walls: [{{points: [[0, 0], [9, 0]]}}]}}
+robot: {{pose: {{x: 1, y: 1}}}}
+pass: [{{collisions: {{max: 0}}}}]
+"""
+DRIVE = """
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [9, 0], [9, 9], [0, 9], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 2, y: 1}}]
+pass: [{goals_reached: {}}]
+"""
+
+
+@pytest.fixture
+def cluster() -> Iterator[Any]:
+    made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    made.add_node(num_cpus=1)
+    made.last = made.add_node(num_cpus=1)
+    yield made
+    made.shutdown()
+
+
+@pytest.fixture
+def jobs(tmp_path: Path) -> Callable[..., list[Job]]:
+    def make(*faults: str) -> list[Job]:
+        made = []
+        for number, fault in enumerate(faults):
+            file = tmp_path / f"{number}.scenario.yaml"
+            file.write_text(SCENARIO.format(fault=fault))
+            loaded = load_scenario(file, tmp_path)
+            made.append(Job(number, loaded, loaded.key(1), tmp_path / f"out-{number}", 60.0))
+        return made
+
+    return make
+
+
+def processes(word: str) -> list[int]:
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            command = (process / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if word.encode() in command:
+            found.append(int(process.name))
+    return found
+
+
+def test_every_job_is_run_once_and_its_files_arrive(cluster, jobs) -> None:
+    made = jobs(*["fine"] * 12, "segfault", "exit-0")
+    with RayBackend(cluster.address, 3, ENTRY) as backend:
+        for _ in range(2):  # the second time, the runners exist already
+            updates = list(backend.run(made))
+            assert sorted(one.job.number for one in updates if isinstance(one, Started)) == list(range(14))
+            ends = {one.job.number: one.end for one in updates if isinstance(one, Ended)}
+            assert [isinstance(ends[n], ProcessEnd) and ends[n].code for n in range(12)] == [0] * 12
+            assert ends[12].signal == signal.SIGSEGV
+            assert all((job.folder / "result.json").is_file() for job in made[:12])
+    assert not processes(ENTRY[0])
+
+
+def test_jobs_of_a_killed_node_are_run_again_on_another_one(cluster, jobs) -> None:
+    made = jobs(*["fine"] * 30)
+    with RayBackend(cluster.address, 3, ENTRY) as backend:
+        updates = []
+        for update in backend.run(made):
+            updates.append(update)
+            if len(updates) == 10:
+                cluster.remove_node(cluster.last, allow_graceful=False)
+    ends = [one for one in updates if isinstance(one, Ended)]
+    assert sorted(one.job.number for one in ends) == list(range(30))
+    assert all(isinstance(one.end, ProcessEnd) and one.end.code == 0 for one in ends)
+
+
+def test_a_job_that_is_lost_twice_is_an_error(cluster, jobs) -> None:
+    """Kill each runner as soon as it has the job, which never ends."""
+    (job,) = jobs("hang")
+    done = threading.Event()
+
+    def kill_runners() -> None:
+        while not done.wait(0.1):
+            for server in processes(ENTRY[0]):
+                parent = int(Path(f"/proc/{server}/stat").read_text().rsplit(")", 1)[1].split()[1])
+                if b"ray::" in Path(f"/proc/{parent}/cmdline").read_bytes():
+                    time.sleep(1.0)
+                    os.kill(parent, signal.SIGKILL)
+
+    killer = threading.Thread(target=kill_runners)
+    killer.start()
+    try:
+        with RayBackend(cluster.address, 1, ENTRY) as backend:
+            (end,) = (one.end for one in backend.run([job]) if isinstance(one, Ended))
+    finally:
+        done.set()
+        killer.join()
+    assert isinstance(end, ForkServerDeath)
+    assert "was lost with its node" in end.how
+
+
+def test_a_session_on_a_cluster_writes_the_same_results(cluster, tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(DRIVE)
+    for out, options in (("here", ["-j", "2"]), ("there", ["--backend", "ray", "--address", cluster.address])):
+        command = [sys.executable, "-m", "simscen", "run", "a.scenario.yaml", "--repeat", "6", "--out", out, *options]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        assert "3 workers" in done.stdout or out == "here"
+    for name in ("results.json", "runs/a/seed-4/run.mcap", "runs/a/seed-6/result.json"):
+        assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
+
+
+def test_an_interrupt_ends_the_processes_on_all_nodes(cluster, tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(DRIVE)
+    command = [sys.executable, "-m", "simscen", "run", ".", "--repeat", "500", "--out", "out", "--backend", "ray"]
+    session = subprocess.Popen([*command, "--address", cluster.address], cwd=tmp_path, stdout=subprocess.PIPE)
+    assert session.stdout is not None
+    while b"\xe2\x9c\x93" not in session.stdout.readline():  # until a run has passed
+        assert session.poll() is None
+    session.send_signal(signal.SIGINT)
+    session.communicate(timeout=60)
+    assert session.returncode == 130
+    end = time.monotonic() + 20
+    while processes("simscen.cli.session.warm_process") and time.monotonic() < end:
+        time.sleep(0.1)
+    assert not processes("simscen.cli.session.warm_process")
+
+
+def test_a_cluster_that_is_not_there_is_an_error() -> None:
+    with pytest.raises(UsageError, match=r"cannot connect to a Ray cluster at 127\.0\.0\.1:1: .*refused"):
+        connect("127.0.0.1:1")
