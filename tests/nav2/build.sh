@@ -5,6 +5,7 @@
 # Environment: J = number of parallel compilers (2). About 25 minutes on two cores; a second call builds what is missing.
 # Debian packages: libtinyxml2-dev libconsole-bridge-dev libeigen3-dev libyaml-cpp-dev liborocos-kdl-dev libzmq3-dev
 #   libgraphicsmagick++1-dev libsqlite3-dev nlohmann-json3-dev libboost-dev liblttng-ust-dev libpython3.11 pkg-config
+#   libompl-dev (Smac) libxtensor-dev libxsimd-dev (MPPI)
 set -eu
 PREFIX=$(mkdir -p "$1" && cd "$1" && pwd)
 SOURCES=$2
@@ -41,7 +42,10 @@ export LD_LIBRARY_PATH PYTHONPATH=$INSTALL/lib/python3.11/site-packages
 vendor() { mkdir -p "$INSTALL/share/$1/cmake"; printf '%s\n' "$2" > "$INSTALL/share/$1/cmake/$1Config.cmake"; }
 vendor console_bridge_vendor 'find_package(console_bridge REQUIRED)'
 vendor orocos_kdl_vendor 'find_package(orocos_kdl REQUIRED)'
-vendor yaml_cpp_vendor 'find_package(yaml-cpp REQUIRED)'
+vendor yaml_cpp_vendor 'find_package(yaml-cpp REQUIRED)
+if(NOT TARGET yaml-cpp::yaml-cpp)
+  add_library(yaml-cpp::yaml-cpp ALIAS yaml-cpp)
+endif()'
 tinyxml2='find_package(PkgConfig REQUIRED)
 pkg_check_modules(TINYXML2 REQUIRED IMPORTED_TARGET tinyxml2)
 if(NOT TARGET tinyxml2::tinyxml2)
@@ -63,7 +67,7 @@ export_source() { # OWNER+NAME BRANCH FOLDER [PATH...]
   local repo branch=$2 to=$3
   repo=$(repository "$1"); shift 3
   mkdir -p "$SRC/$to"
-  git --git-dir="$repo" archive "$branch" "$@" | tar x -C "$SRC/$to"
+  git --git-dir="$repo" archive "$branch" "$@" ':(exclude,glob)**/doc/**' ':(exclude,glob)**/media/**' | tar x -C "$SRC/$to"
 }
 for name in rcl_interfaces rclcpp eigen3_cmake_module message_filters geometry2; do
   export_source "ros2+$name" jazzy "$name"
@@ -77,7 +81,9 @@ export_source BehaviorTree+BehaviorTree.CPP 4.7.3 behaviortree_cpp
 NAV2='nav2_common nav2_msgs nav2_util nav2_lifecycle_manager nav2_voxel_grid nav2_costmap_2d nav2_behavior_tree
   nav2_core nav2_navfn_planner nav2_planner nav2_regulated_pure_pursuit_controller nav2_dwb_controller/nav_2d_msgs
   nav2_dwb_controller/nav_2d_utils nav2_controller nav2_behaviors nav2_smoother nav2_velocity_smoother
-  nav2_bt_navigator nav2_amcl'
+  nav2_bt_navigator nav2_amcl nav2_map_server nav2_collision_monitor nav2_dwb_controller/dwb_msgs
+  nav2_dwb_controller/costmap_queue nav2_dwb_controller/dwb_core nav2_dwb_controller/dwb_critics
+  nav2_dwb_controller/dwb_plugins nav2_mppi_controller nav2_smac_planner'
 for package in $NAV2; do export_source ros-navigation+navigation2 jazzy "nav2/$package" "$package"; done
 export_source ros-navigation+navigation2 jazzy nav2/nav2_bringup nav2_bringup/params
 
@@ -89,7 +95,7 @@ build() { # PATH [CMAKE OPTION...]
   mkdir -p "$BUILD/$name"
   (cd "$BUILD/$name" &&
     cmake "$source" -DCMAKE_INSTALL_PREFIX="$INSTALL" -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=None \
-      -DCMAKE_CXX_FLAGS="-O1 -w" -DCMAKE_EXE_LINKER_FLAGS="-Wl,--unresolved-symbols=ignore-in-shared-libs" \
+      -DCMAKE_CXX_FLAGS="-O1 -w -isystem /usr/include/eigen3" -DCMAKE_EXE_LINKER_FLAGS="-Wl,--unresolved-symbols=ignore-in-shared-libs" \
       -DPython3_EXECUTABLE="$VENV/bin/python" -DPYTHON_EXECUTABLE="$VENV/bin/python" "$@" > cmake.log 2>&1 &&
     make -j"${J:-2}" install > make.log 2>&1) || { echo "$name failed, see $BUILD/$name/*.log" >&2; exit 1; }
   touch "$BUILD/$name/.done"
