@@ -1,10 +1,13 @@
 """Reporter for GitHub Actions: annotations at the lines of violated criteria, and a job summary in Markdown."""
 
+from collections.abc import Sequence
+from heapq import nsmallest
 from types import TracebackType
 from typing import TextIO
 from urllib.parse import quote
 
 from simscen.core.records.run_result import Outcome
+from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.finding_text import tightest_margin
 from simscen.report.comparison_markup import as_markdown, markdown_cell
@@ -15,6 +18,8 @@ from simscen.report.text_reporters import Reporter
 from simscen.report.violations import error_summary, excuse_text, reported_violations, scenario_file, short_run_name
 
 MAX_PICTURES = 10
+MAX_ROWS = 1000
+"""Maximum number of runs in the summary; GitHub refuses a summary of more than 1 MiB."""
 
 
 def github_reporter(
@@ -32,7 +37,7 @@ class _GitHub:
     def __init__(self, out: TextIO, summary: TextIO | None, slow: int | None, pictures: str) -> None:
         self._out, self._summary, self._pictures = out, summary, pictures
         self._plain = text_reporter(out, live=False, slow=slow)
-        self._runs: list[RunFinished] = []
+        self._runs = RunStore()
 
     def __enter__(self) -> "_GitHub":
         self._plain.__enter__()
@@ -71,8 +76,8 @@ def annotations(run: RunFinished) -> list[str]:
     return lines
 
 
-def markdown(runs: list[RunFinished], session: SessionFinished, pictures: str = "") -> str:
-    """Return a table of all runs, failures first, and with a URL the pictures of failures."""
+def markdown(runs: Sequence[RunFinished], session: SessionFinished, pictures: str = "") -> str:
+    """Return a table of at most MAX_ROWS runs, failures first, and with a URL the pictures of failures."""
     symbols = {
         Outcome.ERROR: "⚠️",
         Outcome.FAILED: "❌",
@@ -81,7 +86,7 @@ def markdown(runs: list[RunFinished], session: SessionFinished, pictures: str = 
         Outcome.PASSED: "✅",
     }
     order = list(symbols)
-    ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.result.path, run.key))
+    first = nsmallest(MAX_ROWS, runs, key=lambda run: (order.index(run.outcome), run.result.path, run.key))
     errors = "error" if session.errors == 1 else "errors"
     more = f", {session.expected} failed as expected" if session.expected else ""
     more += f", {session.skipped} skipped" if session.skipped else ""
@@ -90,9 +95,11 @@ def markdown(runs: list[RunFinished], session: SessionFinished, pictures: str = 
     rows = [
         f"| {symbols[run.outcome]} | {markdown_cell(short_run_name(run.key))} "
         f"| {run.result.simulated:.1f} s | {_reason_cell(run)} |"
-        for run in ordered
+        for run in first
     ]
-    shown = _picture_lines(ordered, session.folder, pictures) if pictures else []
+    if len(first) < len(runs):
+        rows.append(f"| | and {len(runs) - len(first)} more | | |")
+    shown = _picture_lines(first, session.folder, pictures) if pictures else []
     table = ["| | scenario | simulated | |", "|---|---|---:|---|", *rows]
     return "\n".join([head, "", *table, *compared, "", *shown, ""])
 

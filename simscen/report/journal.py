@@ -21,22 +21,26 @@ from simscen.report.journal_reader import (
     JOURNAL_FORMAT,
     PlannedRun,
     finished_run_to_data,
-    last_session_lines,
     planned_run_to_data,
+    session_process,
     study_plan_to_data,
 )
+
+BLOCK_BYTES = 1 << 20
 
 
 class Journal:
     """Writes the events of a session in `folder`, and locks the folder until the process ends.
 
-    With `resume`, the folder may contain a journal. Raises UsageError if the folder belongs to another session, OSError
+    With `resume`, the folder may contain a journal. With `sync`, each line is on the disk before the session
+    continues. Raises UsageError if the folder belongs to another session, OSError
     if the file cannot be opened. If a line cannot be written later, sets `error` and lets the session continue.
     """
 
-    def __init__(self, folder: Path, resume: bool = False) -> None:
+    def __init__(self, folder: Path, resume: bool = False, sync: bool = True) -> None:
         self.folder = folder
         self.error: OSError | None = None
+        self._sync = sync
         self._file = os.open(folder / JOURNAL_FILE, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         _lock(self._file, folder)
         if _truncate_to_complete_lines(self._file) and not resume:
@@ -108,7 +112,8 @@ class Journal:
             written = os.write(self._file, data)
             if written < len(data):  # the disk is full: writing the rest raises the error
                 os.write(self._file, data[written:])
-            os.fdatasync(self._file)
+            if self._sync:
+                os.fdatasync(self._file)
         except OSError as error:
             self.error = error
             os.ftruncate(self._file, size)
@@ -118,9 +123,14 @@ class Journal:
 
 def _truncate_to_complete_lines(file: int) -> int:
     """Remove an incomplete last line, which a killed process left, and return the remaining size."""
-    data = os.pread(file, os.fstat(file).st_size, 0)
-    size = data.rfind(b"\n") + 1
-    if size < len(data):
+    whole = size = os.fstat(file).st_size
+    while size:
+        start = max(0, size - BLOCK_BYTES)
+        end = os.pread(file, size - start, start).rfind(b"\n") + 1
+        size = start + end
+        if end:
+            break
+    if size < whole:
         os.ftruncate(file, size)
     return size
 
@@ -139,6 +149,6 @@ def _lock(file: int, folder: Path) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        lines = last_session_lines(folder)
-        process = f" by pid {lines[0]['pid']}" if lines else ""
+        pid = session_process(folder)
+        process = "" if pid is None else f" by pid {pid}"
         raise UsageError(f"the output folder {folder} is in use{process}") from None

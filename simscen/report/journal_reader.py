@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.records.run_result import RunFailure, RunKey, error_result
+from simscen.core.records.run_store import FinishedRuns, RunStore
 from simscen.core.records.session_events import Artifacts, RunFinished, SessionStarted, session_started
 from simscen.judge.result_json import from_data, read_key, result_data
 from simscen.judge.study import StudyPlan
@@ -127,16 +128,19 @@ class JournaledSession:
     workers: int
     shard: tuple[int, int]
     planned: tuple[PlannedRun, ...]
-    finished: Mapping[RunKey, RunFinished]
+    finished: FinishedRuns
     started: frozenset[RunKey]
     wall: float
     interrupted: bool
     study: StudyPlan | None = None
 
     @property
-    def runs(self) -> list[RunFinished]:
+    def runs(self) -> RunStore:
         """All planned runs; those that were not finished have an error."""
-        return [self.finished.get(run.key) or self._unfinished(run) for run in self.planned]
+        if len(self.finished) == len(self.planned):
+            indices = (self.finished.index(run.key) for run in self.planned)
+            return self.finished.store.picked(index for index in indices if index is not None)
+        return RunStore(self.finished.get(run.key) or self._unfinished(run) for run in self.planned)
 
     def start_event(self, folder: Path) -> SessionStarted:
         """Return the event at the start of the session."""
@@ -160,52 +164,79 @@ def read_journal(folder: Path) -> JournaledSession:
         hint = "name the folder that `simscen run` wrote, e.g. simscen-out/latest"
         raise _invalid(folder, f"the folder has no {JOURNAL_FILE}", hint)
     try:
-        lines = last_session_lines(folder)
-        if not lines:
+        session = None
+        for line in _complete_lines(folder):
+            if line["event"] == "planned":
+                session = _SessionReader(line, folder)
+            elif session is not None:
+                session.read(line)
+        if session is None:
             raise _invalid(folder / JOURNAL_FILE, "the session ended before it listed its runs")
-        return _parse_session(lines, folder)
+        return session.result()
     except OSError as error:
         raise _invalid(folder / JOURNAL_FILE, f"cannot read the journal: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise _invalid(folder / JOURNAL_FILE, f"the journal is damaged: {error}") from error
 
 
-def last_session_lines(folder: Path) -> list[dict[str, Any]]:
-    """Return the complete lines of the last session. Raises OSError or ValueError."""
-    complete = (folder / JOURNAL_FILE).read_bytes().split(b"\n")[:-1]
-    lines = [json.loads(line) for line in complete]
-    starts = [number for number, line in enumerate(lines) if line["event"] == "planned"]
-    return lines[starts[-1] :] if starts else []
+def _complete_lines(folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield the complete lines of a journal. Raises OSError or ValueError."""
+    with (folder / JOURNAL_FILE).open("rb") as file:
+        for line in file:
+            if line.endswith(b"\n"):
+                yield json.loads(line)
 
 
-def _parse_session(lines: list[dict[str, Any]], folder: Path) -> JournaledSession:
-    first = lines[0]
-    if first["format"] != JOURNAL_FORMAT:
-        raise ValueError(f"it has format {first['format']}; this version reads {JOURNAL_FORMAT}")
-    cwd = first.get("cwd", "")
-    added = [line for line in lines[1:] if line["event"] == "added"]
-    planned = tuple(_relocate(planned_run_from_data(run), cwd) for line in (first, *added) for run in line["runs"])
-    study = (added[-1] if added else first).get("study")
-    finished: dict[RunKey, RunFinished] = {}
-    started: set[RunKey] = set()
-    for line in lines[1:]:
-        if line["event"] == "started":
-            started.add(planned[line["run"]].key)
-        elif line["event"] == "finished":
-            key = planned[line["run"]].key
-            finished[key] = _relocate(finished_run_from_data(line, folder), cwd)
-    last = lines[-1]
-    return JournaledSession(
-        version=first["version"],
-        workers=first["workers"],
-        shard=tuple(first.get("shard", (1, 1))),
-        planned=planned,
-        finished=finished,
-        started=frozenset(started),
-        wall=last.get("wall", last["at"]),
-        interrupted=len(finished) < len(planned) or bool(last.get("interrupted")),
-        study=None if study is None else _study_plan_from_data(study, planned),
-    )
+def session_process(folder: Path) -> int | None:
+    """Return the id of the process that wrote the last session, or None. Raises OSError or ValueError."""
+    starts = [int(line["pid"]) for line in _complete_lines(folder) if line["event"] == "planned"]
+    return starts[-1] if starts else None
+
+
+class _SessionReader:
+    """Reads the lines of one session."""
+
+    def __init__(self, first: dict[str, Any], folder: Path) -> None:
+        if first["format"] != JOURNAL_FORMAT:
+            raise ValueError(f"it has format {first['format']}; this version reads {JOURNAL_FORMAT}")
+        self._first, self._last, self._folder = {**first, "runs": None}, first, folder
+        self._cwd = first.get("cwd", "")
+        self._study = first.get("study")
+        self._planned: list[PlannedRun] = []
+        self._plan(first["runs"])
+        self._finished = FinishedRuns()
+        self._started: set[RunKey] = set()
+
+    def read(self, line: dict[str, Any]) -> None:
+        """Read a line after the first one."""
+        match line["event"]:
+            case "added":
+                self._plan(line["runs"])
+                self._study = line.get("study")
+            case "started":
+                self._started.add(self._planned[line["run"]].key)
+            case "finished":
+                run = _relocate(finished_run_from_data(line, self._folder), self._cwd)
+                self._finished.add(self._planned[line["run"]].key, run)
+        self._last = {key: line[key] for key in ("wall", "at", "interrupted") if key in line}
+
+    def _plan(self, runs: list[dict[str, Any]]) -> None:
+        self._planned += [_relocate(planned_run_from_data(run), self._cwd) for run in runs]
+
+    def result(self) -> JournaledSession:
+        """Return the session."""
+        planned, first, last = tuple(self._planned), self._first, self._last
+        return JournaledSession(
+            version=first["version"],
+            workers=first["workers"],
+            shard=tuple(first.get("shard", (1, 1))),
+            planned=planned,
+            finished=self._finished,
+            started=frozenset(self._started),
+            wall=last.get("wall", last["at"]),
+            interrupted=len(self._finished) < len(planned) or bool(last.get("interrupted")),
+            study=None if self._study is None else _study_plan_from_data(self._study, planned),
+        )
 
 
 def _relocate(run: Run, cwd: str) -> Run:

@@ -5,7 +5,9 @@ Jenkins forbids: `file`, `line` and properties of a testcase.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
 from typing import Literal
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -15,6 +17,7 @@ from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import ClaimResult, ClaimStatus, Study
 from simscen.judge.finding_text import disturbance_line, subject
 from simscen.report.display_text import escape_control, one_line, shell_command_text
+from simscen.report.results_json import in_order
 from simscen.report.study import claim_text, claim_title
 from simscen.report.violations import (
     Violation,
@@ -38,15 +41,89 @@ def to_xml(
 
     A `study` with a claim has a single testcase, the claim, and one for each run that could not be completed.
     """
+    return b"".join(xml_parts(runs, family, name, study))
+
+
+def xml_parts(
+    runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen", study: Study | None = None
+) -> Iterator[bytes]:
+    """Yield the parts of the document, one for each run."""
     root = Element("testsuites", {"name": escape_control(name)})
-    ordered = sorted(runs, key=lambda run: (run.result.path, run.key))
+    ordered = in_order(runs)
     if study is not None and study.claim is not None and ordered:
-        return _claim_xml(root, study, study.claim, ordered, family)
-    for path in sorted({run.result.path for run in ordered}):
-        runs_of_file = [run for run in ordered if run.result.path == path]
-        _add_suite(root, scenario_file(runs_of_file[0]), runs_of_file, family)
-    _count(root, ordered)
-    return _document(root)
+        yield _claim_xml(root, study, study.claim, ordered, family)
+        return
+    counts = _counts_by_file(ordered)
+    everything = SuiteCounts()
+    for suite in counts.values():
+        everything.add(suite)
+    everything.write(root)
+    yield b"<?xml version='1.0' encoding='utf-8'?>\n"
+    if not counts:
+        yield ElementTree.tostring(root) + b"\n"
+        return
+    yield _opening_tag(root)
+    path, used = None, set[str]()
+    for run in ordered:
+        if run.result.path != path:
+            yield b"" if path is None else b"\n  </testsuite>"
+            path, used = run.result.path, set()
+            element = Element("testsuite", {"name": escape_control(scenario_file(run))})
+            counts[path].write(element)
+            element.set("skipped", str(counts[path].skipped))
+            yield b"\n  " + _opening_tag(element)
+        holder = Element("testsuite")
+        _add_case(holder, run, _unique(_case_name(run), used), family)
+        ElementTree.indent(holder[0], level=2)
+        holder[0].tail = None
+        yield b"\n    " + ElementTree.tostring(holder[0], encoding="utf-8")
+    yield b"\n  </testsuite>\n</testsuites>\n"
+
+
+@dataclass
+class SuiteCounts:
+    """Numbers of runs, and their wall time in s."""
+
+    tests: int = 0
+    failures: int = 0
+    errors: int = 0
+    skipped: int = 0
+    seconds: float = 0.0
+
+    def count(self, run: RunFinished) -> None:
+        """Add a run."""
+        self.tests += 1
+        self.failures += run.outcome is Outcome.FAILED
+        self.errors += run.outcome is Outcome.ERROR
+        self.skipped += bool(excuse_text(run))
+        self.seconds += run.wall
+
+    def add(self, other: "SuiteCounts") -> None:
+        """Add the runs of another suite."""
+        self.tests += other.tests
+        self.failures += other.failures
+        self.errors += other.errors
+        self.seconds += other.seconds
+
+    def write(self, element: Element) -> None:
+        """Set the attributes of a suite."""
+        element.set("tests", str(self.tests))
+        element.set("failures", str(self.failures))
+        element.set("errors", str(self.errors))
+        element.set("time", f"{self.seconds:.3f}")
+
+
+def _counts_by_file(runs: Iterable[RunFinished]) -> dict[str, SuiteCounts]:
+    counts: dict[str, SuiteCounts] = {}
+    for run in runs:
+        counts.setdefault(run.result.path, SuiteCounts()).count(run)
+    return counts
+
+
+def _opening_tag(element: Element) -> bytes:
+    """Return the start tag of an element without content."""
+    text: bytes = ElementTree.tostring(element, encoding="utf-8")
+    return text.removesuffix(b" />") + b">"
 
 
 def _document(root: Element) -> bytes:
@@ -66,9 +143,9 @@ def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[R
     seconds = f"{sum(run.wall for run in runs):.3f}"
     case = SubElement(suite, "testcase", {"classname": _classname(runs[0]), "name": name, "time": seconds})
     message = one_line(claim_text(claim))
-    failures = [f"{one_line(run.key.test)} seed {run.key.seed}: {first_violation(run)}" for run in runs
-                if run.outcome is Outcome.FAILED]  # fmt: skip
-    details = "\n".join([message, *failures[:MAX_CLAIM_FAILURES]])
+    failed = islice((run for run in runs if run.outcome is Outcome.FAILED), MAX_CLAIM_FAILURES)
+    failures = (f"{one_line(run.key.test)} seed {run.key.seed}: {first_violation(run)}" for run in failed)
+    details = "\n".join([message, *failures])
     match claim.status:
         case ClaimStatus.REFUTED:
             SubElement(case, "failure", {"type": "simscen.pass-rate", "message": message}).text = details
@@ -88,22 +165,6 @@ def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[R
         element.set("time", seconds)
     suite.set("skipped", "0")
     return _document(root)
-
-
-def _add_suite(root: Element, path: str, runs: list[RunFinished], family: Family) -> None:
-    suite = SubElement(root, "testsuite", {"name": escape_control(path)})
-    _count(suite, runs)
-    suite.set("skipped", str(sum(bool(excuse_text(run)) for run in runs)))
-    used: set[str] = set()
-    for run in runs:
-        _add_case(suite, run, _unique(_case_name(run), used), family)
-
-
-def _count(element: Element, runs: Sequence[RunFinished]) -> None:
-    element.set("tests", str(len(runs)))
-    element.set("failures", str(sum(run.outcome is Outcome.FAILED for run in runs)))
-    element.set("errors", str(sum(run.outcome is Outcome.ERROR for run in runs)))
-    element.set("time", f"{sum(run.wall for run in runs):.3f}")
 
 
 def _add_case(suite: Element, run: RunFinished, name: str, family: Family) -> None:

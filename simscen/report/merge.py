@@ -52,7 +52,7 @@ def merge_shards(sessions: dict[Path, JournaledSession], folder: Path, runs_fold
     Files are hard links if the file system supports them. The session took as long as the longest shard.
     """
     planned = sorted((run for session in sessions.values() for run in session.planned), key=lambda run: run.key)
-    journal = Journal(folder)
+    journal = Journal(folder, sync=False)
     try:
         journal.plan(
             planned, next(iter(sessions.values())).version, sum(session.workers for session in sessions.values())

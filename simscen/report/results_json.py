@@ -1,16 +1,17 @@
 """Writer of results.json, without wall-clock times so that two sessions can be compared."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
 from types import TracebackType
 from typing import Any, TextIO
 
-from simscen.core.records.run_result import Outcome, RunResult
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import Comparison, RunFinished, SessionEvent, SessionFinished
 from simscen.core.records.study import Study
 from simscen.judge.metrics.comparison import comparison_data
-from simscen.judge.metrics.session_summary import session_summary_data, summarize_session
+from simscen.judge.metrics.session_summary import SessionFigures, SessionSummary, session_summary_data
 from simscen.judge.result_json import result_data
 from simscen.judge.study_json import study_data
 from simscen.report.display_text import escape_ci_markers_in_json
@@ -23,8 +24,28 @@ def to_json(
     runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
 ) -> str:
     """Return the document with sorted runs. Paths of artifacts are relative to the `folder` of the session."""
-    document = as_document(runs, folder, comparison, study)
-    return json.dumps(document, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return "".join(json_parts(runs, folder, comparison, study))
+
+
+def json_parts(
+    runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
+) -> Iterator[str]:
+    """Yield the parts of the document, one for each run."""
+    ordered = in_order(runs)
+    head, tail = _dumped(_document(ordered, comparison, study)).split(_NO_RUNS)
+    yield head + _NO_RUNS[:-1]
+    separator = "\n    "
+    for run in ordered:
+        yield separator + _dumped(_run_data(run, folder)).replace("\n", "\n    ")
+        separator = ",\n    "
+    yield f"{'' if not ordered else chr(10) + '  '}]{tail}\n"
+
+
+_NO_RUNS = '\n  "runs": []'
+
+
+def _dumped(data: dict[str, Any]) -> str:
+    return json.dumps(data, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def as_document(
@@ -32,41 +53,54 @@ def as_document(
 ) -> dict[str, Any]:
     """Return the document as data: counts, and one entry per run in the format of its result.json."""
     ordered = in_order(runs)
-    counts = {outcome.value: sum(run.outcome is outcome for run in runs) for outcome in Outcome}
+    return {**_document(ordered, comparison, study), "runs": [_run_data(run, folder) for run in ordered]}
+
+
+def _document(ordered: RunStore, comparison: Comparison | None, study: Study | None) -> dict[str, Any]:
+    """Return the document without its runs."""
+    counts = dict.fromkeys((outcome.value for outcome in Outcome), 0)
+    simulated, summaries = 0.0, dict[str, SessionFigures]()
+    for run in ordered:
+        counts[run.outcome.value] += 1
+        simulated += run.result.simulated
+        if not run.key.repeats:
+            summaries.setdefault(run.key.stack_name, SessionFigures()).add(run.result)
     return {
         "format": FORMAT,
-        "total": len(runs),
+        "total": len(ordered),
         **counts,
-        "simulated_seconds": sum(run.result.simulated for run in ordered),
-        **_summaries(ordered),
+        "simulated_seconds": simulated,
+        **_summaries(summaries),
         **({} if comparison is None else {"comparison": comparison_data(comparison)}),
         **({} if study is None else {"study": study_data(study)}),
-        "runs": [{**result_data(run.result), "artifacts": _artifacts(run, folder), **_resumed(run)} for run in ordered],
+        "runs": [],
     }
 
 
-def _summaries(runs: Sequence[RunFinished]) -> dict[str, Any]:
+def _run_data(run: RunFinished, folder: str) -> dict[str, Any]:
+    return {**result_data(run.result), "artifacts": _artifacts(run, folder), **_resumed(run)}
+
+
+def _summaries(figures: Mapping[str, SessionFigures]) -> dict[str, Any]:
     """Return `suite`, or `suites` by name for several stacks, which are never pooled."""
-    found = {
-        stack: session_summary_data(summarize_session(results)) for stack, results in results_by_stack(runs).items()
-    }
+    found = {stack: session_summary_data(one.summary()) for stack, one in figures.items()}
     if len(found) > 1:
         return {"suites": found}
-    return {"suite": next(iter(found.values()), session_summary_data(summarize_session([])))}
+    return {"suite": next(iter(found.values()), session_summary_data(SessionFigures().summary()))}
 
 
-def results_by_stack(runs: Sequence[RunFinished]) -> dict[str, list[RunResult]]:
-    """Return the results by stack in order of appearance, without the second runs of --check-determinism."""
-    found: dict[str, list[RunResult]] = {}
+def summaries_by_stack(runs: Iterable[RunFinished]) -> dict[str, SessionSummary]:
+    """Return the statistics by stack in order of appearance, without the second runs of --check-determinism."""
+    found: dict[str, SessionFigures] = {}
     for run in runs:
         if not run.key.repeats:
-            found.setdefault(run.key.stack_name, []).append(run.result)
-    return found
+            found.setdefault(run.key.stack_name, SessionFigures()).add(run.result)
+    return {stack: figures.summary() for stack, figures in found.items()}
 
 
-def in_order(runs: Sequence[RunFinished]) -> list[RunFinished]:
+def in_order(runs: Sequence[RunFinished]) -> RunStore:
     """Return the runs sorted by file, scenario and seed."""
-    return sorted(runs, key=lambda run: (run.result.path, run.key))
+    return (runs if isinstance(runs, RunStore) else RunStore(runs)).in_order()
 
 
 def _resumed(run: RunFinished) -> dict[str, bool]:
@@ -94,7 +128,7 @@ def json_reporter(out: TextIO) -> Reporter:
 class _JsonReporter:
     def __init__(self, out: TextIO) -> None:
         self._out = out
-        self._runs: list[RunFinished] = []
+        self._runs = RunStore()
 
     def __enter__(self) -> "_JsonReporter":
         return self
@@ -109,5 +143,6 @@ class _JsonReporter:
         if isinstance(event, RunFinished):
             self._runs.append(event)
         if isinstance(event, SessionFinished):
-            self._out.write(escape_ci_markers_in_json(to_json(self._runs, event.folder, event.comparison, event.study)))
+            for part in json_parts(self._runs, event.folder, event.comparison, event.study):
+                self._out.write(escape_ci_markers_in_json(part))
             self._out.flush()

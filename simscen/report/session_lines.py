@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from heapq import nsmallest
 
 from simscen.core.records.run_result import REPEAT_SUFFIX, Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionFinished, SessionStarted
@@ -242,9 +243,9 @@ def failed_runs(runs: Sequence[RunFinished], name: Name) -> Iterator[StyledLine]
 
 def slowest_runs(runs: Sequence[RunFinished], most: int, name: Name) -> Iterator[StyledLine]:
     """Yield the runs with the longest wall time, the longest first; `most` 0 lists all."""
-    ordered = sorted((run for run in runs if run.wall), key=lambda run: (-run.wall, run.key))
+    ordered = nsmallest(most or len(runs), (run for run in runs if run.wall), key=lambda run: (-run.wall, run.key))
     yield (StyledText("slowest:", "quiet"),)
-    for run in ordered[: most or None]:
+    for run in ordered:
         wall = f"{run.wall:8.2f} s"
         simulated = f"   {run.result.simulated:.1f} s simulated"
         yield (StyledText(wall), StyledText(f"  {name(run.key)}", "name"), StyledText(simulated, "quiet"))
@@ -252,6 +253,8 @@ def slowest_runs(runs: Sequence[RunFinished], most: int, name: Name) -> Iterator
 
 def log_comparison(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
     """Yield the result of --check-determinism: whether the logs of repeated runs are equal."""
+    if not any(run.key.repeats for run in runs):
+        return
     firsts = {run.key: run for run in runs if not run.key.repeats}
     pairs = [(firsts[run.key.first], run) for run in runs if run.key.repeats and run.key.first in firsts]
     compared = [pair for pair in pairs if all(run.artifacts.mcap for run in pair)]

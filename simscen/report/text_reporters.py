@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import Protocol, TextIO
 
 from simscen.core.records.run_result import RunKey
+from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import (
     RunFinished,
     RunProgress,
@@ -50,7 +51,7 @@ class SessionFormatter:
     def __init__(self, slow: int | None = None, columns: Callable[[], int | None] = lambda: None) -> None:
         self.naming = RunNaming()
         self._slow, self._columns = slow, columns
-        self._runs: list[RunFinished] = []
+        self._runs = RunStore()
         self._warned: set[str] = set()
 
     def __call__(self, event: SessionEvent) -> list[StyledLine]:
@@ -86,7 +87,7 @@ class SessionFormatter:
             return
         if event.comparison is not None:
             yield from comparison_lines(event.comparison, self.naming.prefix, self._columns())
-        done = [run for run in self._runs if _error_kind(run) != NOT_RUN]
+        done = self._runs.picked(index for index, run in enumerate(self._runs) if _error_kind(run) != NOT_RUN)
         slow = [] if self._slow is None else list(slowest_runs(done, self._slow, self._name))
         sections = [section for section in (slow, list(failed_runs(done, self._name))) if section]
         for section in sections:

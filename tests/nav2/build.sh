@@ -5,7 +5,7 @@
 # Environment: J = number of parallel compilers (2). About 25 minutes on two cores; a second call builds what is missing.
 # Debian packages: libtinyxml2-dev libconsole-bridge-dev libeigen3-dev libyaml-cpp-dev liborocos-kdl-dev libzmq3-dev
 #   libgraphicsmagick++1-dev libsqlite3-dev nlohmann-json3-dev libboost-dev liblttng-ust-dev libpython3.11 pkg-config
-#   libompl-dev (Smac) libxtensor-dev libxsimd-dev (MPPI)
+#   libompl-dev libboost-serialization-dev libboost-filesystem-dev libboost-system-dev libboost-program-options-dev (Smac) libxtensor-dev libxsimd-dev (MPPI)
 set -eu
 PREFIX=$(mkdir -p "$1" && cd "$1" && pwd)
 SOURCES=$2

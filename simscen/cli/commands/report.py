@@ -11,12 +11,12 @@ from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Rep
 from simscen.cli.session.terminal import Format, FormatOption, screen
 from simscen.core.errors import Exit, UsageError
 from simscen.judge.metrics.comparison import compare_stacks
-from simscen.judge.metrics.session_summary import session_summary_line, summarize_session
+from simscen.judge.metrics.session_summary import session_summary_line
 from simscen.judge.study import evaluate_study
 from simscen.report.journal import require_free
 from simscen.report.journal_reader import read_journal
 from simscen.report.parquet import write_parquet
-from simscen.report.results_json import results_by_stack
+from simscen.report.results_json import summaries_by_stack
 
 
 def command(
@@ -71,11 +71,8 @@ def write_reports(
         written = reports.write(answers, comparison, study)
         output(reports.finished_event(answers, past.wall, past.interrupted, comparison, study))
     if format_ is Format.TEXT:
-        for stack, results in results_by_stack(answers).items():
-            print_text(
-                f"{stack}: {session_summary_line(summarize_session(results))}"
-                if stack
-                else session_summary_line(summarize_session(results))
-            )
+        for stack, summary in summaries_by_stack(answers).items():
+            line = session_summary_line(summary)
+            print_text(f"{stack}: {line}" if stack else line)
     code = exit_code(answers, study) if written else Exit.INCOMPLETE
     sys.exit(output.exit(code))

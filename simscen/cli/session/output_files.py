@@ -7,6 +7,7 @@ import platform
 import sys
 import time
 import webbrowser
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime, timezone
 from enum import Enum
@@ -20,6 +21,7 @@ from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
 from simscen.core.files import require_not_input, require_regular_file
 from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import (
     Comparison,
     RunFinished,
@@ -30,8 +32,8 @@ from simscen.core.records.session_events import (
 )
 from simscen.core.records.study import ClaimStatus, Study
 from simscen.report.journal_reader import JOURNAL_FILE
-from simscen.report.junit import Family, to_xml
-from simscen.report.results_json import to_json
+from simscen.report.junit import Family, xml_parts
+from simscen.report.results_json import json_parts
 from simscen.report.suite import RunningSession, Session, to_html
 from simscen.report.suite.history import PastSession, past_sessions
 from simscen.run.reproducibility import arithmetic_fingerprints, cpu_flags, software_versions
@@ -83,13 +85,13 @@ class Reports:
         self, answers: Sequence[RunFinished], comparison: Comparison | None = None, study: Study | None = None
     ) -> bool:
         """Write the reports and return whether all were written; the old file of a failed one is kept."""
-        junit = to_xml(answers, self._family, study=study)
-        whole = {
-            self.folder / "results.json": to_json(answers, str(self.folder), comparison, study).encode(),
-            self.folder / "junit.xml": junit,
-            self.folder / PAGE: self._page(answers, comparison, study),
-        }
-        documents = {**({} if self._only else whole), self.junit: junit}
+        results = map(str.encode, json_parts(answers, str(self.folder), comparison, study))
+        documents: dict[Path, bytes | Iterable[bytes]] = {}
+        if not self._only:
+            documents[self.folder / "results.json"] = results
+            documents[self.folder / PAGE] = self._page(answers, comparison, study)
+        for path in {self.junit: None} if self._only else {self.folder / "junit.xml": None, self.junit: None}:
+            documents[path] = xml_parts(answers, self._family, study=study)
         self._missing = frozenset(path for path, data in documents.items() if not _write(path, data))
         return not self._missing
 
@@ -119,12 +121,15 @@ class Reports:
         study: Study | None = None,
     ) -> SessionFinished:
         """Return the last event of a session, without reports that could not be written."""
-        count = {outcome: sum(answer.outcome is outcome for answer in answers) for outcome in Outcome}
+        count, simulated = Counter[Outcome](), 0.0
+        for answer in answers:
+            count[answer.outcome] += 1
+            simulated += answer.result.simulated
         return SessionFinished(
             count[Outcome.PASSED],
             count[Outcome.FAILED],
             count[Outcome.ERROR],
-            simulated=sum(answer.result.simulated for answer in answers),
+            simulated=simulated,
             wall=wall,
             interrupted=interrupted,
             junit="" if self.junit in self._missing else str(self.junit),
@@ -183,7 +188,7 @@ def _require_free_name(junit: Path, folder: Path | None) -> None:
             raise OSError(errno.EINVAL, "simscen writes another file of this name there")
 
 
-def _write(path: Path, data: bytes) -> bool:
+def _write(path: Path, data: bytes | Iterable[bytes]) -> bool:
     try:
         write_atomically(path, data)
     except OSError as error:
@@ -239,7 +244,7 @@ class LivePage:
     def __init__(self, reports: Reports) -> None:
         self._reports = reports
         self._total, self._due = 0, 0.0
-        self._answers: list[RunFinished] = []
+        self._answers = RunStore()
         self._under_way: dict[RunKey, None] = {}
 
     def __call__(self, event: SessionEvent) -> None:

@@ -17,6 +17,7 @@ from simscen.cli.session.stacks import commands_of
 from simscen.cli.session.terminal import Format, Screen, screen
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.run_result import RunKey
+from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import Listener, SessionEvent
 from simscen.judge.metrics.comparison import compare_stacks
 from simscen.loading.loaded import LoadedScenario
@@ -117,8 +118,9 @@ def _run(
     for answer in work.kept:
         show(answer)
     with signals_interrupt(), backend_of(options) as backend:
-        answers, stopped = run_session(work.jobs, options, backend, listen)
-    answers = [*work.kept, *answers]
+        done, stopped = run_session(work.jobs, options, backend, listen)
+    answers = RunStore(work.kept)
+    answers.extend(done)
     work.journal.complete(answers)
     comparison = compare_stacks((answer.result for answer in answers), work.stacks)
     written = reports.write(answers, comparison)

@@ -19,6 +19,7 @@ from simscen.cli.session.stacks import commands_of
 from simscen.cli.session.terminal import Format, Screen, screen
 from simscen.core.errors import Exit, InvalidInput, NothingSelected, Problem, UsageError
 from simscen.core.random_streams import LARGEST_SEED
+from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
 from simscen.core.records.study import ClaimStatus
 from simscen.core.version import __version__
@@ -129,7 +130,7 @@ class _StudySession:
 
     def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
         """Run all batches and write the reports. Returns the exit code."""
-        begun, answers, stopped = time.monotonic(), list[RunFinished](), None
+        begun, answers, stopped = time.monotonic(), RunStore(), None
         invalid: InvalidInput | None = None
         known = previous_results(journal)
         title = next(iter(self._loaded.values())).id
@@ -154,8 +155,8 @@ class _StudySession:
                 show(answer)
             with signals_interrupt():
                 done, stopped = run_session(left, self._request.options, backend, listen)
-            answers += [*kept, *done]
-            journal.complete(answers)
+            journal.complete([*kept, *done])
+            answers.extend([*kept, *done])
             if self._is_decided(answers):
                 break
             self._waiting = list(islice(self._runs, self._batch_size))

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.statistics import wilson_interval
@@ -39,24 +40,70 @@ class SessionSummary:
         return self.collisions / self.hours if self.hours > 0 else None
 
 
+class SessionFigures:
+    """Collects the figures of a session's runs, of which only a few numbers are kept."""
+
+    def __init__(self) -> None:
+        self._runs: list[tuple[tuple[str, str, int, str], RunFigures | None]] = []
+
+    def add(self, result: RunResult) -> None:
+        """Add a run. Skipped runs do not count."""
+        if result.outcome is not Outcome.SKIPPED:
+            key = result.key
+            order = key.scenario, key.variation, key.seed, key.stack_name
+            self._runs.append((order, RunFigures.of(result) if result.metrics else None))
+
+    def summary(self) -> SessionSummary:
+        """Return the statistics. The order in which runs were added does not matter."""
+        measured = [figures for _, figures in sorted(self._runs, key=lambda one: one[0]) if figures is not None]
+        successes = sum(figures.success for figures in measured)
+        spl = [value for one in measured for value in one.spl]
+        soft_spl = [value for one in measured for value in one.soft_spl]
+        runs = len(self._runs)
+        return SessionSummary(
+            runs=runs,
+            success_rate=successes / runs if runs else None,
+            success_interval=wilson_interval(successes, runs) if runs else None,
+            spl=_mean(spl),
+            soft_spl=_mean(soft_spl),
+            spl_runs=len(spl),
+            collisions=round(sum(value for one in measured for value in one.collisions)),
+            kilometers=sum(value for one in measured for value in one.path_lengths) / 1000.0,
+            hours=sum(one.robot_seconds for one in measured) / 3600.0,
+            measured_runs=len(measured),
+        )
+
+
+class RunFigures(NamedTuple):
+    """What the statistics need of a run; tuples have one value for each robot."""
+
+    success: bool
+    spl: tuple[float, ...]
+    soft_spl: tuple[float, ...]
+    collisions: tuple[float, ...]
+    path_lengths: tuple[float, ...]
+    robot_seconds: float
+
+    @classmethod
+    def of(cls, run: RunResult) -> "RunFigures":
+        """Return the figures of a run."""
+        robots = max(1, sum(_is(metric, "path_length") for metric in run.metrics))
+        return cls(
+            run.metrics.get("success") == 1.0,
+            _known(run, "spl"),
+            _known(run, "soft_spl"),
+            _known(run, "collisions"),
+            _known(run, "path_length"),
+            run.simulated * robots,
+        )
+
+
 def summarize_session(results: Iterable[RunResult]) -> SessionSummary:
     """Return the statistics of a session without skipped runs. The order of the runs does not matter."""
-    runs = sorted((run for run in results if run.outcome is not Outcome.SKIPPED), key=lambda run: run.key)
-    measured = [run for run in runs if run.metrics]
-    successes = sum(run.metrics.get("success") == 1.0 for run in measured)
-    spl, soft_spl = (_known(measured, name) for name in ("spl", "soft_spl"))
-    return SessionSummary(
-        runs=len(runs),
-        success_rate=successes / len(runs) if runs else None,
-        success_interval=wilson_interval(successes, len(runs)) if runs else None,
-        spl=_mean(spl),
-        soft_spl=_mean(soft_spl),
-        spl_runs=len(spl),
-        collisions=round(sum(_known(measured, "collisions"))),
-        kilometers=sum(_known(measured, "path_length")) / 1000.0,
-        hours=sum(run.simulated * _robots(run) for run in measured) / 3600.0,
-        measured_runs=len(measured),
-    )
+    figures = SessionFigures()
+    for result in results:
+        figures.add(result)
+    return figures.summary()
 
 
 def session_summary_data(figures: SessionSummary) -> dict[str, float | list[float] | None]:
@@ -98,14 +145,9 @@ def _runs(number: int) -> str:
     return f"{number} run" if number == 1 else f"{number} runs"
 
 
-def _known(runs: list[RunResult], name: str) -> list[float]:
+def _known(run: RunResult, name: str) -> tuple[float, ...]:
     """Return the values of a metric, including those of each of several robots (`a/collisions`)."""
-    found = [value for run in runs for metric, value in run.metrics.items() if _is(metric, name)]
-    return [value for value in found if value is not None]
-
-
-def _robots(run: RunResult) -> int:
-    return max(1, sum(_is(metric, "path_length") for metric in run.metrics))
+    return tuple(value for metric, value in run.metrics.items() if _is(metric, name) and value is not None)
 
 
 def _is(metric: str, name: str) -> bool:

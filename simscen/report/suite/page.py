@@ -3,7 +3,7 @@
 import base64
 import hashlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -22,6 +22,8 @@ from simscen.report.suite.history import PastSession, outcome_change, past_outco
 from simscen.report.suite.run_entry import full_run_name, run_element, theme
 
 ORDER = (Outcome.ERROR, Outcome.FAILED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED, Outcome.PASSED)
+MAX_LISTED = 2000
+"""Maximum number of runs on the page."""
 _FILES = ("report.html", "junit.xml", "results.json", "run.json", "console.txt")
 
 
@@ -59,18 +61,20 @@ class Session:
 
 def to_html(session: Session) -> str:
     """Return the report as HTML, with failures first and expanded. Reads the pictures of the runs."""
-    ordered = sorted(session.runs, key=lambda run: run.key)
+    totals = Totals(session.runs)
+    listed = listed_runs(session.runs)
+    ordered = sorted(listed, key=lambda run: run.key)
     groups = [list(group) for _, group in groupby(ordered, key=lambda run: run.key.scenario)]
     groups.sort(key=lambda group: min(ORDER.index(run.outcome) for run in group))
     pictures = elements.embedded_pictures(
         [run for group in groups for run in sorted(group, key=_severity_order)], session.folder
     )
-    groups_html = "\n".join(_group(group, session, pictures) for group in groups)
+    groups_html = "\n".join(_group(group, session, totals, pictures) for group in groups)
     style, script = css_variables() + _asset("suite.css"), _asset("suite.js")
-    counts = _outcome_counts(session.runs)
+    counts = _outcome_counts(totals)
     compared = "" if session.comparison is None else as_html(session.comparison)
     if session.study is not None:
-        compared += study_html(session.study, session.runs, session.folder)
+        compared += study_html(session.study, listed, session.folder)
     return (
         f'<!doctype html>\n<html lang="en"{" data-live" if session.live else ""}>\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -78,31 +82,59 @@ def to_html(session: Session) -> str:
         f"style-src {_hash(style)}; script-src {_hash(script)}; base-uri 'none'; form-action 'none'\">\n"
         f"{'<noscript><meta http-equiv=refresh content=3></noscript>' if session.live else ''}"
         f"<title>{html_text(session.title)}: {counts}</title>\n<style>{style}</style>\n</head>\n<body>\n"
-        f"<header>{_headline(session, counts)}</header>\n<main>\n"
-        f"{history_section(session.runs, session.past)}{compared}\n"
-        f"{filter_form(session.runs, session.past)}\n"
+        f"<header>{_headline(session, totals, counts, len(listed))}</header>\n<main>\n"
+        f"{history_section(listed, session.past)}{compared}\n"
+        f"{filter_form(listed, session.past)}\n"
         f'<section id="runs" aria-label="runs">\n{groups_html}\n</section>\n'
         '<p id="nothing" class="quiet" hidden>No run matches. <button type="button" id="all">Show all</button></p>\n'
         f"</main>\n<script>{script}</script>\n</body>\n</html>\n"
     )
 
 
-def _headline(session: Session, counts: str) -> str:
-    simulated = sum(run.result.simulated for run in session.runs)
+class Totals:
+    """Sums over all runs: number by outcome, simulated seconds, and runs (good, all) by scenario."""
+
+    def __init__(self, runs: Iterable[RunFinished]) -> None:
+        self.outcomes: Counter[Outcome] = Counter()
+        self.simulated = 0.0
+        self.good: Counter[str] = Counter()
+        self.runs: Counter[str] = Counter()
+        for run in runs:
+            self.outcomes[run.outcome] += 1
+            self.simulated += run.result.simulated
+            self.good[run.key.scenario] += run.outcome.good
+            self.runs[run.key.scenario] += 1
+
+
+def listed_runs(runs: Sequence[RunFinished]) -> Sequence[RunFinished]:
+    """Return at most MAX_LISTED of the runs, those that did not end as expected first."""
+    if len(runs) <= MAX_LISTED:
+        return runs
+    bad, good = list[int](), list[int]()
+    for index, run in enumerate(runs):
+        found = good if run.outcome.good else bad
+        if len(found) < MAX_LISTED:
+            found.append(index)
+    return [runs[index] for index in (*bad, *good)[:MAX_LISTED]]
+
+
+def _headline(session: Session, totals: Totals, counts: str, listed: int) -> str:
     links = " · ".join(f'<a href="{name}">{name}</a>' for name in _FILES[1:] if name in session.files)
-    facts = [count(len(session.runs), "run"), f"{simulated:.0f} s simulated", *([links] if links else [])]
+    facts = [count(len(session.runs), "run"), f"{totals.simulated:.0f} s simulated", *([links] if links else [])]
+    if listed < len(session.runs):
+        facts.append(f"this page lists {listed} of them, those that did not end as expected first")
     return (
         f"<h1>{counts}</h1>"
-        f'{_outcome_bar(session.runs)}<p class="quiet">{" · ".join(facts)}</p>'
+        f'{_outcome_bar(totals)}<p class="quiet">{" · ".join(facts)}</p>'
         f"{_progress(session.live, len(session.runs)) if session.live else ''}"
     )
 
 
-def _outcome_bar(runs: Sequence[RunFinished]) -> str:
+def _outcome_bar(totals: Totals) -> str:
     """Return a bar with the shares of the outcomes."""
     parts, start = "", 0
     for outcome in reversed(ORDER):
-        number = sum(run.outcome is outcome for run in runs)
+        number = totals.outcomes[outcome]
         parts += f'<rect class="{outcome.value}" x="{start}" width="{number}" height="1"/>' if number else ""
         start += number
     view = f'viewBox="0 0 {max(start, 1)} 1" preserveAspectRatio="none"'
@@ -119,7 +151,7 @@ def _progress(live: RunningSession, done: int) -> str:
     )
 
 
-def _group(group: list[RunFinished], session: Session, pictures: dict[RunKey, str]) -> str:
+def _group(group: list[RunFinished], session: Session, totals: Totals, pictures: dict[RunKey, str]) -> str:
     """Return the runs of a scenario, with a heading if there are several variations, seeds or stacks."""
     ranked = sorted(group, key=_severity_order)
     elements = "\n".join(
@@ -128,10 +160,11 @@ def _group(group: list[RunFinished], session: Session, pictures: dict[RunKey, st
     )
     if len(group) == 1:
         return f'<div class="group">{elements}</div>'
-    good, name = sum(run.outcome.good for run in group), group[0].key.scenario
+    name = group[0].key.scenario
+    good, number = totals.good[name], totals.runs[name]
     flipped = sum(outcome_change(run, session.past) != "" for run in group)
-    summary = f"{good} of {len(group)} as expected" + (f", {flipped} changed" if flipped else "")
-    opened = "" if good == len(group) else " open"
+    summary = f"{good} of {number} as expected" + (f", {flipped} changed" if flipped else "")
+    opened = "" if good == number else " open"
     return (
         f'<details class="group many"{opened}><summary><h2 class="name">{html_text(name)}</h2>'
         f'<span class="quiet">{summary}</span>{outcome_marks([run.outcome for run in group], "runs")}</summary>\n'
@@ -143,11 +176,11 @@ def _severity_order(run: RunFinished) -> tuple[int, RunKey]:
     return ORDER.index(run.outcome), run.key
 
 
-def _outcome_counts(runs: Sequence[RunFinished]) -> str:
+def _outcome_counts(totals: Totals) -> str:
     return ", ".join(
         f"{SIGNS[outcome]} {number} {outcome.value.replace('-', ' ')}"
         for outcome in Outcome
-        if (number := sum(run.outcome is outcome for run in runs)) or outcome is Outcome.PASSED
+        if (number := totals.outcomes[outcome]) or outcome is Outcome.PASSED
     )
 
 

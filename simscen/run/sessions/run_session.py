@@ -9,6 +9,7 @@ from pathlib import Path
 from simscen.core.errors import Exit, InvalidInput, UsageError
 from simscen.core.random_streams import LARGEST_SEED
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import Listener, RunFinished, RunProgress, RunStarted
 from simscen.judge.result_json import from_json
 from simscen.loading.loaded import LoadedScenario
@@ -85,26 +86,30 @@ def _seeds(title: str, scenario: LoadedScenario, options: SessionOptions) -> Seq
 
 def run_session(
     jobs: Sequence[Job], options: SessionOptions, backend: Backend, listen: Listener
-) -> tuple[list[RunFinished], Exit | None]:
+) -> tuple[RunStore, Exit | None]:
     """Run all jobs and report exactly one result for each, in the order in which they finish.
 
     Returns the results, and the exit code if the session was interrupted.
     """
-    answers: dict[int, RunFinished] = {}
+    answers, places = RunStore(), dict[int, int]()
     begun: set[int] = set()
     stopped: Exit | None = None
+    all_good = True
 
-    def go_on() -> bool:
-        return not options.fail_fast or all(answer.outcome.good for answer in answers.values())
+    def answer(job: Job, run: RunFinished) -> None:
+        nonlocal all_good
+        all_good = all_good and run.outcome.good
+        places[job.number] = len(answers)
+        answers.append(run)
+        listen(run)
 
     for job in jobs:
         if job.scenario.spec.skip is not None:
-            answers[job.number] = skipped_run(job, job.scenario.spec.skip)
-            listen(answers[job.number])
-    jobs_to_do = [job for job in jobs if job.number not in answers]
+            answer(job, skipped_run(job, job.scenario.spec.skip))
+    jobs_to_do = [job for job in jobs if job.number not in places]
     try:
         plugins = plugins_of_all([job.scenario for job in jobs_to_do])
-        for happening in backend.run(jobs_to_do, plugins, go_on):
+        for happening in backend.run(jobs_to_do, plugins, lambda: all_good or not options.fail_fast):
             job = happening.job
             match happening:
                 case Started():
@@ -113,21 +118,20 @@ def run_session(
                 case Progressed(seconds=seconds):
                     listen(RunProgress(job.key, seconds))
                 case Ended(end=end):
-                    twin = answers.get(job.number ^ 1) if options.twice else None
-                    answer = compare_twins(finished_run(job, end), twin)
-                    answers[job.number] = (
-                        answer if options.against is None else compare_with_session(answer, options.against)
-                    )
-                    if options.keep_logs is KeptLogs.FAILED and answers[job.number].outcome.good:
-                        answers[job.number] = without_log(answers[job.number])
-                    listen(answers[job.number])
+                    has_twin = options.twice and job.number ^ 1 in places
+                    twin = answers[places[job.number ^ 1]] if has_twin else None
+                    run = compare_twins(finished_run(job, end), twin)
+                    if options.against is not None:
+                        run = compare_with_session(run, options.against)
+                    if options.keep_logs is KeptLogs.FAILED and run.outcome.good:
+                        run = without_log(run)
+                    answer(job, run)
     except Interrupted as interrupted:
         stopped = Exit(128 + interrupted.number)
     for job in jobs:
-        if job.number not in answers:
-            answers[job.number] = unfinished_run(job, _why_not_done(job.number in begun, stopped))
-            listen(answers[job.number])
-    return list(answers.values()), stopped
+        if job.number not in places:
+            answer(job, unfinished_run(job, _why_not_done(job.number in begun, stopped)))
+    return answers, stopped
 
 
 def without_log(run: RunFinished) -> RunFinished:

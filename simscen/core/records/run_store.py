@@ -1,0 +1,109 @@
+"""Results of many runs in little memory."""
+
+import pickle
+import sys
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import overload
+
+from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import RunFinished
+
+MAX_PLAIN = 2000
+"""Number of results that are kept as they are, for speed."""
+
+
+class RunStore(Sequence[RunFinished]):
+    """Results of runs; those after the first MAX_PLAIN are compressed, to about 1 kB each, and restored when they are
+    read.
+
+    Iterate over it instead of making a list of it.
+    """
+
+    def __init__(self, runs: Iterable[RunFinished] = ()) -> None:
+        self._entries: list[RunFinished | bytes] = []
+        self._order: list[tuple[str, str, str, int, str]] = []
+        self._sample = b""
+        self.extend(runs)
+
+    def append(self, run: RunFinished) -> None:
+        """Add a result at the end."""
+        key = run.key
+        self._order.append(
+            (sys.intern(run.result.path), sys.intern(key.scenario), key.variation, key.seed, sys.intern(key.stack_name))
+        )
+        self._entries.append(run if len(self._entries) < MAX_PLAIN else self._compressed(run))
+
+    def extend(self, runs: Iterable[RunFinished]) -> None:
+        """Add results at the end."""
+        for run in runs:
+            self.append(run)
+
+    def in_order(self) -> "RunStore":
+        """Return the same results sorted by file, scenario, variation, seed, and stack."""
+        return self.picked(sorted(range(len(self)), key=self._order.__getitem__))
+
+    def picked(self, indices: Iterable[int]) -> "RunStore":
+        """Return the results with these indices, without restoring them."""
+        found = RunStore()
+        found._sample = self._sample
+        for index in indices:
+            found._entries.append(self._entries[index])
+            found._order.append(self._order[index])
+        return found
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    @overload
+    def __getitem__(self, index: int) -> RunFinished: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> "RunStore": ...
+
+    def __getitem__(self, index: int | slice) -> "RunFinished | RunStore":
+        if isinstance(index, slice):
+            return self.picked(range(*index.indices(len(self))))
+        return self._restored(self._entries[index])
+
+    def __iter__(self) -> Iterator[RunFinished]:
+        return map(self._restored, self._entries)
+
+    def _compressed(self, run: RunFinished) -> bytes:
+        data = pickle.dumps(run, pickle.HIGHEST_PROTOCOL)
+        self._sample = self._sample or data
+        packer = zlib.compressobj(1, zdict=self._sample)  # other results share most of their words with the sample
+        return packer.compress(data) + packer.flush()
+
+    def _restored(self, entry: RunFinished | bytes) -> RunFinished:
+        if isinstance(entry, RunFinished):
+            return entry
+        run = pickle.loads(zlib.decompressobj(zdict=self._sample).decompress(entry))
+        assert isinstance(run, RunFinished)
+        return run
+
+
+class FinishedRuns(Mapping[RunKey, RunFinished]):
+    """The last result of each run, by key."""
+
+    def __init__(self) -> None:
+        self._index: dict[RunKey, int] = {}
+        self.store = RunStore()
+
+    def add(self, key: RunKey, run: RunFinished) -> None:
+        """Add the result of a run, or replace it."""
+        self._index[key] = len(self.store)
+        self.store.append(run)
+
+    def index(self, key: RunKey) -> int | None:
+        """Return the index of a run's result in `store`, or None."""
+        return self._index.get(key)
+
+    def __getitem__(self, key: RunKey) -> RunFinished:
+        return self.store[self._index[key]]
+
+    def __iter__(self) -> Iterator[RunKey]:
+        return iter(self._index)
+
+    def __len__(self) -> int:
+        return len(self._index)
