@@ -1,0 +1,95 @@
+"""Shrinking of failures that a search found, on plants of eight parameters of which 0.4 % of the values fail."""
+
+import statistics
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from simscen.cli.session.candidates import CandidateRuns
+from simscen.cli.session.shrinking import Failure, Shrinking
+from simscen.core.geometry import Array
+from simscen.core.records.run_result import Outcome, RunKey, RunResult
+from simscen.core.records.verdict import Finding, Status, Verdict
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.tree import MappingNode, child, node_at
+from simscen.run.sessions.search import SearchMethod, make_search
+
+NOMINAL = 0.5
+WEIGHTS = np.array([1, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02])
+CENTER = np.array([0.3, 0.6, 0.2])
+PLANTS: dict[str, Callable[[Array], Array]] = {
+    "linear": lambda points: points @ WEIGHTS,
+    "region": lambda points: -np.linalg.norm(points[..., :3] - CENTER, axis=-1),
+    "product": lambda points: points[..., :4].prod(axis=-1),
+}
+"""A run fails if the value is above a threshold. In the region and the product, some parameters do not matter."""
+MATTERING = {"linear": 8, "region": 3, "product": 4}
+
+
+class PlantRuns(CandidateRuns):
+    """Runs a plant instead of scenarios: the parameters are in `stack`, and a missing one has its nominal value."""
+
+    def __init__(self, plant: Callable[[Array], Array], threshold: float) -> None:
+        self.plant, self.threshold, self.runs, self.known = plant, threshold, 0, dict[tuple[float, ...], RunResult]()
+
+    def results(self, trees: Sequence[MappingNode]) -> list[RunResult | None]:
+        return [self.result(values_of(tree)) for tree in trees]
+
+    def result(self, values: tuple[float, ...]) -> RunResult:
+        if values not in self.known:
+            self.runs += 1
+            margin = self.threshold - float(self.plant(np.array(values)))
+            status = Status.PASS if margin >= 0 else Status.FAIL
+            finding = Finding(status, "plant", "", "", margin=margin)
+            outcome = Outcome.PASSED if margin >= 0 else Outcome.FAILED
+            verdicts = (Verdict("plant", "plant", "fail", (finding,)),)
+            self.known[values] = RunResult(RunKey("a", 1), "a", outcome, verdicts=verdicts)
+        return self.known[values]
+
+
+def values_of(tree: MappingNode) -> tuple[float, ...]:
+    stack = child(tree, "stack")
+    plain: dict[str, Any] = {} if stack is None else stack.plain
+    return tuple(float(plain.get(f"p{number}", NOMINAL)) for number in range(8))
+
+
+def tree_of(values: Sequence[float]) -> MappingNode:
+    lines = [f"  p{number}: {value:.6f}" for number, value in enumerate(values)]
+    tree, _ = parse_yaml("\n".join(["stack:", *lines, ""]), "a")
+    assert isinstance(tree, MappingNode)
+    return tree
+
+
+def first_failure(plant: Callable[[Array], Array], threshold: float, seed: int) -> tuple[float, ...]:
+    search = make_search(SearchMethod.TPE, [0] * 8, seed)
+    while True:
+        points = search.ask(8)
+        margins = [threshold - float(plant(np.array(point))) for point in points]
+        if min(margins) < 0:
+            return points[int(np.argmin(margins))]
+        search.tell(points, margins)
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_found_failure_is_shrunk_in_sixty_runs(name: str) -> None:
+    plant = PLANTS[name]
+    threshold = float(np.quantile(plant(np.random.default_rng(0).random((200_000, 8))), 0.996))
+    spent, left = [], []
+    for seed in range(1, 21):
+        found = first_failure(plant, threshold, seed)
+        runs = PlantRuns(plant, threshold)
+        tree = tree_of(found)
+        margin = runs.result(values_of(tree)).verdicts[0].findings[0].margin
+        shrinking = Shrinking(runs, Failure("plant", "plant", 0.5 * margin), tree)
+        nominal = tree_of([NOMINAL] * 8)
+        shrinking.shrink({("stack", f"p{number}"): node_at(nominal, ("stack", f"p{number}")) for number in range(8)})
+        assert shrinking.is_complete
+        values = values_of(shrinking.tree)
+        assert threshold - float(plant(np.array(values))) <= 0.5 * margin
+        spent.append(runs.runs)
+        left.append(sum(value != NOMINAL for value in values))
+    print(name, statistics.median(spent), max(spent), statistics.mean(left))
+    assert statistics.median(spent) <= 60
+    assert max(left) <= MATTERING[name]
