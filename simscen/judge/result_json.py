@@ -4,6 +4,7 @@ import json
 import math
 from dataclasses import asdict
 from pathlib import Path
+from sys import intern
 from typing import Any
 
 from simscen.core.records.events import Disturbance, DisturbanceOutcome
@@ -85,7 +86,7 @@ def from_data(data: dict[str, Any]) -> RunResult:
 def read_key(data: dict[str, Any]) -> RunKey:
     """Convert plain data to the key of a run. In simscen 0.1, `variation` was the name of the stack."""
     variation, stack_name = (data["variation"], data["stack_name"]) if "stack_name" in data else ("", data["variation"])
-    return RunKey(data["scenario"], data["seed"], variation, stack_name)
+    return RunKey(intern(data["scenario"]), data["seed"], variation, intern(stack_name))
 
 
 def _error_data(error: RunFailure) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import islice
 from pathlib import Path
+from sys import intern
 from typing import Any, TypeVar
 
 from simscen.core.errors import InvalidInput, Problem
@@ -21,7 +22,7 @@ JOURNAL_FILE = "events.jsonl"
 JOURNAL_FORMAT = 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class PlannedRun:
     """A run of a session that may not have started yet. `path` is the scenario file.
 
@@ -50,13 +51,13 @@ def planned_run_to_data(run: PlannedRun) -> dict[str, Any]:
 
 def planned_run_from_data(data: dict[str, Any]) -> PlannedRun:
     """Read the data of `planned_run_to_data`. Raises KeyError or TypeError if they are invalid."""
-    stack, definition = data.get("stack", ""), data.get("definition", "")
+    stack, definition = intern(data.get("stack", "")), intern(data.get("definition", ""))
     return PlannedRun(
         read_key(data),
-        data["path"],
-        data["digest"],
+        intern(data["path"]),
+        intern(data["digest"]),
         data["again"],
-        data["file"],
+        intern(data["file"]),
         stack,
         definition,
         data.get("varied", {}),
@@ -241,7 +242,7 @@ class _SessionReader:
 
 def _relocate(run: Run, cwd: str) -> Run:
     """Return the run with the path of its scenario file relative to the current working folder."""
-    return replace(run, file=relative_to_cwd(run.file, cwd))
+    return replace(run, file=intern(relative_to_cwd(run.file, cwd)))
 
 
 def _invalid(path: Path, message: str, hint: str = "") -> InvalidInput:

@@ -32,7 +32,7 @@ _SEPARATOR = "@"
 
 
 @total_ordering
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class RunKey:
     """Identity of a run: scenario id, seed, variation ("" if there is none), and stack name if there are several.
 
