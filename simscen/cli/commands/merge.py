@@ -10,6 +10,7 @@ from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Rep
 from simscen.cli.session.terminal import Format, FormatOption
 from simscen.core.errors import UsageError
 from simscen.report.journal import require_free
+from simscen.report.journal_reader import read_journal
 from simscen.report.merge import merge_shards, read_shards
 from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
 
@@ -34,7 +35,7 @@ def command(
     """
     folder = _merged(shards, allow_missing, out)
     Reports(folder, junit, junit_family.value).begin()
-    write_reports(folder, junit, junit_family, format_, only_junit=False)
+    write_reports(read_journal(folder), folder, junit, junit_family, format_, only_junit=False)
 
 
 def _merged(shards: list[Path], allow_missing: bool, out: Path) -> Path:

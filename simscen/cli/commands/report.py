@@ -14,7 +14,7 @@ from simscen.judge.metrics.comparison import compare_stacks
 from simscen.judge.metrics.session_summary import session_summary_line
 from simscen.judge.study import evaluate_study
 from simscen.report.journal import require_free
-from simscen.report.journal_reader import read_journal
+from simscen.report.journal_reader import JournaledSession, read_journal
 from simscen.report.parquet import write_parquet
 from simscen.report.results_json import summaries_by_stack
 
@@ -38,14 +38,14 @@ def command(
     run was not completed.
     """
     require_free(folder)
-    if parquet is not None:
-        _write_tables(folder, parquet)
-    write_reports(folder, junit, junit_family, format_, only_junit=junit is not None)
-
-
-def _write_tables(folder: Path, target: Path) -> None:
-    """Write the results as Parquet tables. Raises UsageError if that fails."""
     past = read_journal(folder)
+    if parquet is not None:
+        _write_tables(past, parquet)
+    write_reports(past, folder, junit, junit_family, format_, only_junit=junit is not None)
+
+
+def _write_tables(past: JournaledSession, target: Path) -> None:
+    """Write the results as Parquet tables. Raises UsageError if that fails."""
     try:
         files = write_parquet(target, past.runs, {run.key: run.varied for run in past.planned})
     except OSError as error:
@@ -55,10 +55,14 @@ def _write_tables(folder: Path, target: Path) -> None:
 
 
 def write_reports(
-    folder: Path, junit: Path | None, junit_family: JunitFamily, format_: Format, only_junit: bool
+    past: JournaledSession,
+    folder: Path,
+    junit: Path | None,
+    junit_family: JunitFamily,
+    format_: Format,
+    only_junit: bool,
 ) -> NoReturn:
     """Write the reports of an output folder from its journal, print the session, and exit with its code."""
-    past = read_journal(folder)
     require_writable(junit, folder)
     reports = Reports(folder, junit, junit_family.value, only=only_junit)
     answers = past.runs
