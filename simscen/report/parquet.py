@@ -6,6 +6,7 @@ from typing import Any
 
 from simscen.core.errors import UsageError
 from simscen.core.records.run_result import RunKey
+from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import RunFinished
 from simscen.report.results_json import in_order
 from simscen.spec.quantities import si_number
@@ -60,10 +61,10 @@ def _fields(pa: Any, text: str) -> list[Any]:
     return [pa.field(name, getattr(pa, kind)()) for name, _, kind in (word.partition(":") for word in text.split())]
 
 
-def _groups(runs: Sequence[RunFinished]) -> Iterator[list[tuple[int, RunFinished]]]:
-    numbered = list(enumerate(runs))
-    for start in range(0, max(len(numbered), 1), ROWS_PER_GROUP):
-        yield numbered[start : start + ROWS_PER_GROUP]
+def _groups(runs: RunStore) -> Iterator[Iterator[tuple[int, RunFinished]]]:
+    """Yield groups of runs with their numbers; one empty group if there are none."""
+    for start in range(0, max(len(runs), 1), ROWS_PER_GROUP):
+        yield enumerate(runs[start : start + ROWS_PER_GROUP], start)
 
 
 def _run_row(number: int, run: RunFinished, values: Mapping[str, Any], numeric: set[str]) -> dict[str, Any]:
