@@ -22,6 +22,7 @@ from simscen.ros2.graph import CLOCK, LATCHED, Graph, Received, Topic
 from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.lockstep import Lockstep, Message, Paced
 from simscen.ros2.messages import NANOSECONDS, find_type, read_twist, write_twist
+from simscen.ros2.motion_actions import MotionActions
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError, Options, TopicNames
 from simscen.ros2.pose_estimate import PLAN, PoseEstimate
@@ -80,7 +81,10 @@ class Adapter:
         self._unavailable = [topic for topic in offered if not self._graph.advertise(topic.name, topic.type)]
         published = [topic for topic in offered if topic.name in self._graph.publishers]
         self._readiness = Readiness(self._graph, self._barrier, published, self._senders, options)
-        self._lockstep = Lockstep(self._graph, self._barrier, options.rounds, options.wait)
+        self._actions = MotionActions(self._graph, self._barrier)
+        self._lockstep = Lockstep(
+            self._graph, self._barrier, self._actions, options.rounds, options.wait, options.answer
+        )
         self._paced = Paced(self._graph, options.factor)
 
     @property
@@ -254,6 +258,7 @@ class Adapter:
         for topic, type_name in SUBSCRIPTIONS.items():
             if topic == "/tf" or self._graph.publishers_of(self._graph.names(topic)):
                 self._graph.subscribe(topic, type_name)
+        self._actions.subscribe()
         self._sender = self._senders.usable
 
     def _send(self, now: int) -> None:

@@ -95,14 +95,17 @@ class Graph:
             return
         if known is not None:
             self.node.destroy_subscription(known[1])
-        publishers = self.node.get_publishers_info_by_topic(self.names(topic))
 
         def keep(data: bytes) -> None:
             self.inbox.append(Received(topic, type_name, shift_stamps(type_name, bytes(data), -self.offset_ns)))
 
-        profile = subscription_qos([end for end in publishers if end.node_name != NODE])
+        profile = self.subscription_profile(self.names(topic))
         made = self.node.create_subscription(message_type, self.names(topic), keep, profile, raw=True)
         self._subscriptions[topic] = (type_name, made)
+
+    def subscription_profile(self, name: str) -> QoSProfile:
+        """Return a quality of service that all publishers of a topic of the graph in other nodes offer."""
+        return subscription_qos([end for end in self.node.get_publishers_info_by_topic(name) if end.node_name != NODE])
 
     def spin_once(self, seconds: float = 0.0) -> None:
         """Handle one event; wait at most this long for it."""

@@ -9,6 +9,8 @@
    run. While there is no command, one more round per node follows, so that a command can pass through filters.
 4. If there is still no command while driving to a goal, wait a short wall time for nodes that take /clock in a separate
    thread, as those of rclcpp do.
+5. If a server of Nav2 executes an action that moves the robot, and its command is due, wait for it: `limit_s` of wall
+   time at most, then the run ends with an error that names the node.
 
 The command of the period is the last one received. Without one, the robot keeps its command, as a real robot would; the
 adapter counts such periods. Time stands still within a control period: /clock publishes multiples of it only.
@@ -21,7 +23,9 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from simscen.ros2.graph import Graph, Received
 from simscen.ros2.messages import NANOSECONDS, read_header
+from simscen.ros2.motion_actions import MotionActions
 from simscen.ros2.node_barrier import NodeBarrier
+from simscen.ros2.options import AdapterError
 from simscen.ros2.readiness import COMMAND, TWIST_STAMPED
 
 Message = Tuple[str, bytes]
@@ -31,14 +35,19 @@ Message = Tuple[str, bytes]
 class Lockstep:
     """The simulation waits for the stack."""
 
-    def __init__(self, graph: Graph, barrier: NodeBarrier, rounds: int, wait_s: float) -> None:
+    def __init__(
+        self, graph: Graph, barrier: NodeBarrier, actions: MotionActions, rounds: int, wait_s: float, limit_s: float
+    ) -> None:
         """Take the graph, the barrier, and the limit of additional rounds without a command (0 = one per node)."""
-        self._graph, self._barrier = graph, barrier
-        self._extra_rounds, self._wait = rounds, wait_s
+        self._graph, self._barrier, self._actions = graph, barrier, actions
+        self._extra_rounds, self._wait, self._limit = rounds, wait_s, limit_s
         self.counters: Dict[str, Any] = {"beats": 0, "without_command": 0, "late_commands": 0}
 
     def step(self, now: int, messages: Sequence[Message], due: bool, driving: bool) -> List[Received]:
-        """Return the messages of the stack since the last step; `now` in nanoseconds, `driving` to a goal."""
+        """Return the messages of the stack since the last step; `now` in nanoseconds, `driving` to a goal.
+
+        Raises AdapterError naming a node that owes a command.
+        """
         graph, barrier = self._graph, self._barrier
         for topic, data in messages:
             if graph.publish(topic, data):
@@ -53,14 +62,27 @@ class Lockstep:
                 break
         if driving:
             graph.spin_until(lambda: _last_command(graph.inbox[start:]) is not None, self._wait)
+            self._wait_for_owed(now, start)
         self._count(now, _last_command(graph.inbox[start:]))
         return _take_inbox(graph)
+
+    def _wait_for_owed(self, now: int, start: int) -> None:
+        def is_settled() -> bool:
+            return _last_command(self._graph.inbox[start:]) is not None or self._actions.owed(now) is None
+
+        if not self._graph.spin_until(is_settled, self._limit):
+            owed = self._actions.owed(now)
+            if owed is not None:
+                reason = f"has sent no command for {self._limit:g} s of wall time, although it executes {owed.action}"
+                raise AdapterError(f"{owed.node} {reason}")
 
     def _count(self, now: int, command: Optional[Received]) -> None:
         self.counters["beats"] += 1
         if command is None:
             self.counters["without_command"] += 1
-        elif command.type == TWIST_STAMPED and read_header(command.data)[0] < now:
+            return
+        self._actions.commanded(now)
+        if command.type == TWIST_STAMPED and read_header(command.data)[0] < now:
             self.counters["late_commands"] += 1
 
 

@@ -76,7 +76,9 @@ TESTS_OF_MODULE = {
         [f"{_SIGNALS}/test_sparc_ldlj.py"],
         ["tests/unit/criteria/test_smoothness_and_consistency.py"],
     ],
-    "judge/run_result": [["tests/unit/judge/test_run_result.py", "tests/unit/judge/test_disturbances.py"]],
+    "judge/run_result": [
+        [f"tests/unit/judge/test_{of}.py" for of in ("run_result", "disturbances", "several_robots")],
+    ],
     "judge/result_json": [[f"tests/unit/judge/test_{of}.py" for of in ("result_json", "run_result", "disturbances")]],
     "judge/evaluation": [
         [

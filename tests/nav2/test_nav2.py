@@ -6,11 +6,24 @@ import signal
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
 pytestmark = pytest.mark.slow
 GOAL = "navigation/goal.scenario.yaml"
+DWB = {
+    "plugin": "dwb_core::DWBLocalPlanner",
+    **{"max_vel_x": 0.26, "max_speed_xy": 0.26, "max_vel_theta": 1.0},
+    **{"acc_lim_x": 2.5, "decel_lim_x": -2.5, "acc_lim_theta": 3.2, "decel_lim_theta": -3.2},
+    **{"vx_samples": 20, "vtheta_samples": 20, "sim_time": 1.7, "linear_granularity": 0.05},
+    "critics": ["RotateToGoal", "Oscillation", "BaseObstacle", "GoalAlign", "PathAlign", "PathDist", "GoalDist"],
+    **{"BaseObstacle.scale": 0.02, "PathAlign.scale": 32.0, "PathAlign.forward_point_distance": 0.1},
+    **{"GoalAlign.scale": 24.0, "GoalAlign.forward_point_distance": 0.1, "PathDist.scale": 32.0},
+    **{"GoalDist.scale": 24.0, "RotateToGoal.scale": 32.0},
+}
+"""The controller of the parameters that nav2_bringup had up to Iron."""
 
 
 def processes(word: str) -> list[int]:
@@ -35,6 +48,29 @@ def test_nav2_reaches_a_goal_in_lockstep(run, nav2) -> None:
     assert {"/amcl", "/bt_navigator", "/controller_server", "/planner_server"} <= set(about["nodes"])
     assert "Traceback" not in ended.stack_log
     assert processes(str(nav2.params)) == []
+    # No command is due before the first path, after the goal, or while the tree plans.
+    assert about["without_command"] < 0.2 * about["beats"]
+
+
+@pytest.mark.parametrize("plugins", ["dwb", "smac_2d"])
+def test_other_plugins_of_nav2_reach_the_goal(run, nav2, tmp_path: Path, plugins: str) -> None:
+    params = tmp_path / "nav2_params.yaml"
+    params.write_text(yaml.safe_dump(with_plugins(yaml.safe_load(nav2.params.read_text()), plugins)))
+    ended = run(GOAL, launch=nav2.launch.replace(str(nav2.params), shlex.quote(str(params))))
+    assert ended.code == 0, ended.said
+
+
+def with_plugins(nodes: dict[str, Any], plugins: str) -> dict[str, Any]:
+    """Return parameters with the DWB controller, or with the Smac 2D planner."""
+    if plugins == "dwb":
+        nodes["controller_server"]["ros__parameters"]["FollowPath"] = DWB
+    else:
+        nodes["planner_server"]["ros__parameters"]["GridBased"] = {
+            "plugin": "nav2_smac_planner::SmacPlanner2D",
+            "tolerance": 0.125,
+            "max_planning_time": 2.0,
+        }
+    return nodes
 
 
 def test_a_wrong_frame_is_named_with_its_node(run, nav2, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import math
 import pytest
 
 from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.verdict import ExpectedFailure
 from simscen.criteria.clearance import Clearance
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.result_json import from_json, read_result, to_json
@@ -108,3 +109,32 @@ def test_a_run_that_nothing_judged_is_an_error():
 def test_something_else_is_refused(text):
     with pytest.raises(ValueError, match=r"not a result|format 99|Expecting"):
         from_json(text)
+
+
+def expecting(trace, *criteria, lines=(10,)):
+    built, case = synthetic_trace(trace), synthetic_case({})
+    asked = [AnyCriterion.model_validate(words) for words in criteria]
+    expected = ExpectedFailure("NAV-1", (), 30)
+    return judge_run(RunKey("a/b", 7), "a/b.scenario.yaml", asked, built, case, lines, expected=expected)
+
+
+def test_the_verdict_on_an_expected_failure_is_the_last_one_with_its_own_line():
+    result = expecting(TRACE, {"clearance": {"min": 0.6}})
+    assert result.outcome is Outcome.FAILED_AS_EXPECTED
+    assert [verdict.criterion for verdict in result.verdicts] == ["clearance", "expected"]
+    assert result.lines == (10, 30)
+    assert result.reason == "NAV-1"
+    held = expecting(TRACE, {"clearance": {"min": 0.2}})
+    assert (held.outcome, held.lines) == (Outcome.FAILED, (10, 30))
+
+
+def test_without_lines_an_expected_failure_has_none_either():
+    assert expecting(TRACE, {"clearance": {"min": 0.6}}, lines=()).lines == ()
+
+
+def test_nothing_is_expected_of_a_log_that_breaks_off_or_without_an_expectation():
+    broken = expecting({**TRACE, "ended": None}, {"clearance": {"min": 0.6}})
+    assert [verdict.criterion for verdict in broken.verdicts] == ["clearance"]
+    assert broken.lines == (10,)
+    usual = conclude(TRACE, {"clearance": {"min": 0.6}})
+    assert [verdict.criterion for verdict in usual.verdicts] == ["clearance"]

@@ -124,3 +124,16 @@ def test_an_expected_failure_is_judged_over_all_robots() -> None:
     held = combine_robots({"a": good, "b": good}, TRACES, expected)
     assert held.outcome is Outcome.FAILED
     assert (held.verdicts[-1].criterion, held.lines[-1]) == ("expected", 12)
+
+
+def test_a_failure_is_only_expected_if_the_logs_of_all_robots_are_whole() -> None:
+    bad = result(Outcome.FAILED, verdicts=(verdict("clearance", Status.FAIL),), lines=(4,))
+    good = result(verdicts=(verdict("clearance"),), lines=(5,))
+    broken = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 1, 0]], "ended": None})
+    expected = ExpectedFailure("NAV-7", (), 12)
+    whole = combine_robots({"a": bad, "b": good}, TRACES, expected)
+    assert whole.outcome is Outcome.FAILED_AS_EXPECTED
+    cut = combine_robots({"a": bad, "b": good}, {"a": trace(), "b": broken}, expected)
+    assert cut.outcome is Outcome.FAILED
+    assert [one.criterion for one in cut.verdicts] == ["clearance", "clearance"]
+    assert cut.lines == (4, 5)

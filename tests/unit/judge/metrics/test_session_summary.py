@@ -73,3 +73,13 @@ def test_each_of_several_robots_drives_and_collides_and_a_run_succeeds_where_all
     assert (figures.runs, figures.measured_runs, figures.success_rate) == (1, 1, 0.0)
     assert (figures.spl, figures.spl_runs) == (0.5, 1)
     assert (figures.collisions, figures.kilometers, figures.hours) == (3, 2.0, 1.0)
+
+
+def test_the_order_of_the_runs_changes_not_even_the_last_bit() -> None:
+    lengths = {1: 1e16, 2: 1.0, 3: 1.0}  # 1e16 + 1 + 1 = 1e16, but 1 + 1 + 1e16 > 1e16
+    results = [
+        RunResult(RunKey("a", seed), "a", Outcome.PASSED, metrics={"path_length": length})
+        for seed, length in lengths.items()
+    ]
+    assert summarize_session(results) == summarize_session(reversed(results))
+    assert sum(lengths.values()) != sum(reversed(lengths.values()))

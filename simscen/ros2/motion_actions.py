@@ -1,0 +1,91 @@
+"""Which node owes a command: the servers of Nav2 whose actions move the robot, while they execute a goal.
+
+The loops of Nav2 up to Jazzy run on wall time. Without waiting for them, the simulation would run ahead of a controller
+that takes longer than a control period, for example MPPI on a slow machine.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from simscen.ros2.messages import NANOSECONDS, find_type
+
+if TYPE_CHECKING:
+    from simscen.ros2.graph import Graph
+    from simscen.ros2.node_barrier import NodeBarrier
+
+STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
+EXECUTING = 2
+"""GoalStatus.STATUS_EXECUTING."""
+RATE_PARAMETERS = {
+    "follow_path": "controller_frequency",
+    "spin": "cycle_frequency",
+    "backup": "cycle_frequency",
+    "drive_on_heading": "cycle_frequency",
+}
+"""Actions that move the robot, and the parameter of their server with the rate of its commands in Hz."""
+
+
+class Owed(NamedTuple):
+    """A command that has not come: the node that owes it, and the action that it executes."""
+
+    node: str
+    action: str
+
+
+class _Server(NamedTuple):
+    node: str
+    period_ns: float
+
+
+class MotionActions:
+    """Knows by their status topics which actions are being executed."""
+
+    def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
+        self._graph, self._barrier = graph, barrier
+        self._servers: dict[str, _Server] = {}
+        self._executing: dict[str, bool] = {}
+        self._subscriptions: list[Any] = []
+        self._last_command: int | None = None
+
+    def subscribe(self) -> None:
+        """Follow the actions that the graph has now."""
+        status_type = find_type(STATUS_TYPE)
+        for action in RATE_PARAMETERS if status_type is not None else ():
+            topic = self._graph.names(f"/{action}/_action/status")
+            publishers = self._graph.publishers_of(topic)
+            if len(publishers) != 1:
+                continue
+            rate = self._rate(publishers[0].node, RATE_PARAMETERS[action])
+            if rate is not None and rate > 0.0:
+                self._servers[action] = _Server(publishers[0].node, NANOSECONDS / rate)
+                self._follow(action, status_type, topic)
+
+    def _rate(self, node: str, parameter: str) -> float | None:
+        service_type: Any = find_type("rcl_interfaces/srv/GetParameters")
+        client = self._graph.node.create_client(service_type, f"{node}/get_parameters")
+        try:
+            answer = self._barrier.call(client, service_type.Request(names=[parameter]))
+        finally:
+            self._graph.node.destroy_client(client)
+        values = [] if answer is None else answer.values
+        return float(values[0].double_value) if values else None
+
+    def _follow(self, action: str, status_type: Any, topic: str) -> None:
+        def keep(message: Any) -> None:
+            self._executing[action] = any(goal.status == EXECUTING for goal in message.status_list)
+
+        profile = self._graph.subscription_profile(topic)
+        self._subscriptions.append(self._graph.node.create_subscription(status_type, topic, keep, profile))
+
+    def commanded(self, now: int) -> None:
+        """Note that a command has come at `now` nanoseconds."""
+        self._last_command = now
+
+    def owed(self, now: int) -> Owed | None:
+        """Return the command that is due at `now` nanoseconds, or None. Slower loops owe one less often."""
+        for action, server in self._servers.items():
+            since = server.period_ns if self._last_command is None else now - self._last_command
+            if self._executing.get(action) and since >= server.period_ns:
+                return Owed(server.node, action)
+        return None

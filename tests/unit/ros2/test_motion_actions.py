@@ -1,0 +1,71 @@
+"""Which node of Nav2 owes a command."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from simscen.ros2 import motion_actions
+from simscen.ros2.motion_actions import MotionActions, Owed
+
+MS = 1_000_000
+
+
+class FakeGraph:
+    """A graph with the status topics of these actions, and their servers."""
+
+    def __init__(self, servers: dict[str, str], rates: dict[str, float]) -> None:
+        self.servers, self.rates, self.callbacks = servers, rates, dict[str, Any]()
+        self.node = SimpleNamespace(
+            create_client=lambda _, name: name,
+            destroy_client=lambda client: None,
+            create_subscription=lambda _, topic, callback, profile: self.callbacks.setdefault(topic, callback),
+        )
+
+    def names(self, topic: str) -> str:
+        return f"/robot1{topic}"
+
+    def publishers_of(self, topic: str) -> list[Any]:
+        action = topic.split("/")[2]
+        return [SimpleNamespace(node=self.servers[action])] if action in self.servers else []
+
+    def subscription_profile(self, name: str) -> None:
+        return None
+
+    def call(self, client: str, request: Any) -> Any:
+        rate = self.rates.get(client.removesuffix("/get_parameters"))
+        return None if rate is None else SimpleNamespace(values=[SimpleNamespace(double_value=rate)])
+
+    def report(self, action: str, *statuses: int) -> None:
+        goals = [SimpleNamespace(status=status) for status in statuses]
+        self.callbacks[f"/robot1/{action}/_action/status"](SimpleNamespace(status_list=goals))
+
+
+@pytest.fixture
+def types(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion_actions, "find_type", lambda name: SimpleNamespace(Request=lambda **_: None))
+
+
+@pytest.mark.usefixtures("types")
+def test_a_controller_owes_a_command_in_each_of_its_periods_while_it_executes_a_goal() -> None:
+    graph = FakeGraph({"follow_path": "/robot1/controller_server"}, {"/robot1/controller_server": 10.0})
+    actions = MotionActions(graph, graph)  # type: ignore[arg-type]
+    actions.subscribe()
+    assert actions.owed(0) is None
+    graph.report("follow_path", 4, 2)
+    owed = Owed("/robot1/controller_server", "follow_path")
+    assert actions.owed(50 * MS) == owed
+    actions.commanded(50 * MS)
+    assert actions.owed(100 * MS) is None  # the loop is slower than the control period
+    assert actions.owed(150 * MS) == owed
+    graph.report("follow_path", 4, 4)
+    assert actions.owed(150 * MS) is None
+
+
+@pytest.mark.usefixtures("types")
+def test_servers_without_a_rate_or_without_a_status_owe_nothing() -> None:
+    graph = FakeGraph({"spin": "/behavior_server", "follow_path": "/silent"}, {"/behavior_server": 0.0})
+    actions = MotionActions(graph, graph)  # type: ignore[arg-type]
+    actions.subscribe()
+    assert graph.callbacks == {}
+    assert actions.owed(0) is None
