@@ -264,8 +264,25 @@ def log_comparison(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
     pairs_text = f"{len(compared)} pair{'s' if len(compared) > 1 else ''} of runs, byte for byte"
     if differ:
         yield (StyledText(f"logs differ: in {differ} of {pairs_text}", "warning"),)
+        yield (StyledText(f"  {_spread(compared)}", "quiet"),)
     else:
         yield (StyledText(f"logs equal: {pairs_text}", "good"),)
+
+
+def _spread(pairs: Sequence[tuple[RunFinished, RunFinished]]) -> str:
+    """Return by how much the runs of pairs differ, e.g. for a stack that is not deterministic."""
+    equal = sum(_statuses(first) == _statuses(second) for first, second in pairs)
+    parts = [f"verdicts equal in {equal} of {len(pairs)}"]
+    for metric, name, unit in (("time_to_goal", "time to goal", "s"), ("path_length", "path length", "m")):
+        both = [(first.result.metrics.get(metric), second.result.metrics.get(metric)) for first, second in pairs]
+        gaps = [abs(a - b) for a, b in both if a is not None and b is not None]
+        if gaps:
+            parts.append(f"{name} differs by up to {max(gaps):.2f} {unit}")
+    return ", ".join(parts)
+
+
+def _statuses(run: RunFinished) -> list[tuple[str, str]]:
+    return [(verdict.id, verdict.status.value) for verdict in run.result.verdicts]
 
 
 def interruption_lines(session: SessionFinished, left: Mapping[str, int]) -> Iterator[StyledLine]:

@@ -151,8 +151,20 @@ def test_logs_that_differ_are_never_said_to_be_equal(session, failed):
         error=RunFailure("nondeterministic", "two runs with the same seed differ: truth at t = 1 s"),
     )
     lines = told([failed, other, keyed(failed, 8), keyed(failed, 8, again=True), session[-1]])
-    assert "logs differ: in 1 of 2 pairs of runs, byte for byte" in lines
+    at = lines.index("logs differ: in 1 of 2 pairs of runs, byte for byte")
+    assert lines[at + 1] == "  verdicts equal in 2 of 2"
     assert not any(line.startswith("logs equal") for line in lines)
+
+
+def test_the_spread_of_runs_that_differ_is_told(session, failed):
+    pairs = []
+    for seed, arrival in ((7, 31.75), (8, 32.5)):
+        second = of(keyed(failed, seed, again=True), metrics={"time_to_goal": arrival, "path_length": None})
+        pairs += [of(keyed(failed, seed), metrics={"time_to_goal": 32.0, "path_length": 9.0}), second]
+    pairs[3] = of(pairs[3], outcome=Outcome.ERROR, error=RunFailure("nondeterministic", "x"))
+    pairs[1] = of(pairs[1], verdicts=(), lines=())
+    lines = told([*pairs, session[-1]])
+    assert "  verdicts equal in 1 of 2, time to goal differs by up to 0.50 s" in lines
 
 
 def test_a_run_without_a_log_is_not_among_those_whose_logs_are_equal(session, failed):
