@@ -35,6 +35,8 @@ LOOK_FOR_NODES_S = 5.0
 """Time between two looks for nodes that have joined the cluster."""
 
 CONNECT_S = 5.0
+START_LIMIT_S = 120.0
+"""Time to wait for the first runner."""
 POLL_S = 0.5
 UNSENT_UPDATES = 64
 """Updates of a runner that wait to be read before the runner pauses."""
@@ -90,7 +92,7 @@ class RayBackend:
         self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), go_on: Callable[[], bool] = always
     ) -> Iterator[JobUpdate]:
         """Run jobs and yield their updates, as described in Backend. Raises UsageError for an unusable cluster."""
-        batch = _Batch(jobs, go_on)
+        batch, begun = _Batch(jobs, go_on), time.monotonic()
         try:
             while batch.is_going_on():
                 self._look_for_nodes()
@@ -100,8 +102,9 @@ class RayBackend:
                 for call in ready:
                     yield from self._hear(calls[call], batch, plugins)
                 for runner in self._runners:
-                    if runner.is_ready and runner.call is None and batch.is_going_on():
+                    if runner.is_ready and runner.call is None and batch.sent:
                         self._start(runner, plugins)
+                self._require_free_cpus(begun)
         except SystemError as error:  # what Ray makes of an exception that a signal handler raised
             raise error.__cause__ or error from None
         finally:
@@ -124,6 +127,14 @@ class RayBackend:
             workers = min(int(node["Resources"]["CPU"]), left)
             if node["NodeID"] not in used and workers > 0:
                 self._runners.append(self._new_runner(node["NodeID"], node["NodeManagerAddress"], workers))
+
+    def _require_free_cpus(self, begun: float) -> None:
+        """Raise UsageError if no runner has started for too long: Ray waits until a node has enough free CPUs."""
+        if time.monotonic() > begun + START_LIMIT_S and not any(runner.is_ready for runner in self._runners):
+            raise UsageError(
+                f"no node of the Ray cluster at {self._address} has become free in {START_LIMIT_S:g} s: other programs "
+                "use its CPUs; wait, or use fewer with --jobs"
+            )
 
     def _new_runner(self, node: str, address: str, workers: int) -> _Runner:
         self._next_name += 1
