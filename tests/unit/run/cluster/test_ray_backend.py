@@ -68,12 +68,20 @@ def processes(word: str) -> list[int]:
     found = []
     for process in Path("/proc").glob("[0-9]*"):
         try:
-            command = (process / "cmdline").read_bytes()
+            command = command_of(int(process.name))
         except OSError:
             continue
         if word.encode() in command:
             found.append(int(process.name))
     return found
+
+
+def parent_of(pid: int) -> int:
+    return int(Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[1])
+
+
+def command_of(pid: int) -> bytes:
+    return Path(f"/proc/{pid}/cmdline").read_bytes()
 
 
 def test_every_job_is_run_once_and_its_files_arrive(cluster, jobs) -> None:
@@ -110,10 +118,10 @@ def test_a_job_that_is_lost_twice_is_an_error(cluster, jobs) -> None:
     def kill_runners() -> None:
         while not done.wait(0.1):
             for server in processes(ENTRY[0]):
-                parent = int(Path(f"/proc/{server}/stat").read_text().rsplit(")", 1)[1].split()[1])
-                if b"ray::" in Path(f"/proc/{parent}/cmdline").read_bytes():
+                runner = parent_of(server)
+                if b"ray::" in command_of(runner):
                     time.sleep(1.0)
-                    os.kill(parent, signal.SIGKILL)
+                    os.kill(runner, signal.SIGKILL)
 
     killer = threading.Thread(target=kill_runners)
     killer.start()
@@ -145,13 +153,15 @@ def test_an_interrupt_ends_the_processes_on_all_nodes(cluster, tmp_path: Path) -
     assert session.stdout is not None
     while b"\xe2\x9c\x93" not in session.stdout.readline():  # until a run has passed
         assert session.poll() is None
+    servers = [pid for pid in processes("simscen.cli.session.warm_process") if b"ray::" in command_of(parent_of(pid))]
+    assert servers
     session.send_signal(signal.SIGINT)
     session.communicate(timeout=60)
     assert session.returncode == 130
     end = time.monotonic() + 20
-    while processes("simscen.cli.session.warm_process") and time.monotonic() < end:
+    while set(servers) & set(processes("warm_process")) and time.monotonic() < end:
         time.sleep(0.1)
-    assert not processes("simscen.cli.session.warm_process")
+    assert not set(servers) & set(processes("warm_process"))
 
 
 def test_a_cluster_that_is_not_there_is_an_error() -> None:
