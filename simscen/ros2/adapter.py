@@ -17,7 +17,7 @@ import rclpy
 from rclpy.clock import Clock, ClockType
 
 from simscen.peer.goals import Goal, Goals
-from simscen.ros2.goal_sender import ACTIONS, Failed, GoalSender, GoalSenders, StackState
+from simscen.ros2.goal_sender import ACTIONS, ActionSender, Failed, GoalSender, GoalSenders, StackState
 from simscen.ros2.graph import CLOCK, LATCHED, Graph, Received, Topic
 from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.lockstep import Lockstep, Message, Paced
@@ -27,6 +27,7 @@ from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError, Options, TopicNames
 from simscen.ros2.pose_estimate import PLAN, PoseEstimate
 from simscen.ros2.readiness import COMMAND, TWIST_STAMPED, Readiness
+from simscen.ros2.recoveries import Recoveries
 
 SUBSCRIPTIONS = {
     "/plan": "nav_msgs/msg/Path",
@@ -82,6 +83,7 @@ class Adapter:
         published = [topic for topic in offered if topic.name in self._graph.publishers]
         self._readiness = Readiness(self._graph, self._barrier, published, self._senders, options)
         self._actions = MotionActions(self._graph, self._barrier)
+        self._recoveries = Recoveries(self._graph, goals.say)
         self._lockstep = Lockstep(
             self._graph, self._barrier, self._actions, options.rounds, options.wait, options.answer
         )
@@ -246,6 +248,9 @@ class Adapter:
         if due or commanded:
             answers.append((COMMAND, write_twist(self._velocity)))
         if self._ready:
+            if isinstance(self._sender, ActionSender):
+                self._recoveries.counted(self._sender.recoveries)
+            self._recoveries.report_clearing(now)
             self._report_outcomes(now)
         return answers
 
@@ -259,6 +264,7 @@ class Adapter:
             if topic == "/tf" or self._graph.publishers_of(self._graph.names(topic)):
                 self._graph.subscribe(topic, type_name)
         self._actions.subscribe()
+        self._recoveries.subscribe()
         self._sender = self._senders.usable
 
     def _send(self, now: int) -> None:
@@ -268,6 +274,7 @@ class Adapter:
             self._sent = 1 if self._sender.one_by_one else len(batch)
             failed = self._sender.send(batch, now, self._barrier)
             if failed is None:
+                self._recoveries.begin_goal()
                 return
             self._goals.failed(failed.code, failed.message, go_on=self._continue_after_failure)
 

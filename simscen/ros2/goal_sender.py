@@ -120,7 +120,7 @@ class ActionSender:
         self._handle: Any = None
         self._result: Any = None
         self._goals: Sequence[Goal] = ()
-        self._passed = self._reported = 0
+        self._passed = self._reported = self.recoveries = 0
 
     @property
     def one_by_one(self) -> bool:
@@ -144,7 +144,7 @@ class ActionSender:
             request.poses.header = poses[0].header
         else:
             request.poses = poses
-        self._goals, self._passed, self._reported = goals, 0, 0
+        self._goals, self._passed, self._reported, self.recoveries = goals, 0, 0, 0
         self._result = None
         answer = self._client.send_goal_async(request, feedback_callback=self._take_feedback)
         barrier.wait(answer, f"{self.name} has not accepted or rejected the goal")
@@ -157,6 +157,7 @@ class ActionSender:
 
     def _take_feedback(self, message: Any) -> None:
         feedback = message.feedback
+        self.recoveries = getattr(feedback, "number_of_recoveries", 0)
         if self.action == "navigate_through_poses":
             remaining = feedback.number_of_poses_remaining
             # A server that does not count reports 0.

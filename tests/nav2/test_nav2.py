@@ -52,6 +52,12 @@ def test_nav2_reaches_a_goal_in_lockstep(run, nav2) -> None:
     assert about["without_command"] < 0.2 * about["beats"]
 
 
+def test_recoveries_of_nav2_are_events(run) -> None:
+    """The scenario expects at least one recovery before the goal fails."""
+    ended = run("corner_cases/goal_blocked_for_good.scenario.yaml")
+    assert ended.code == 0, ended.said
+
+
 @pytest.mark.parametrize("plugins", ["dwb", "smac_2d"])
 def test_other_plugins_of_nav2_reach_the_goal(run, nav2, tmp_path: Path, plugins: str) -> None:
     params = tmp_path / "nav2_params.yaml"

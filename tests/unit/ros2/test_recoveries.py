@@ -1,0 +1,106 @@
+"""Recoveries of Nav2 as events."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from simscen.ros2 import recoveries
+from simscen.ros2.recoveries import Recoveries
+
+S = 1_000_000_000
+
+
+class FakeGraph:
+    """A graph with the status topics of all behaviors."""
+
+    def __init__(self) -> None:
+        self.callbacks: dict[str, Any] = {}
+        self.node = SimpleNamespace(
+            create_subscription=lambda _, topic, callback, profile: self.callbacks.setdefault(topic, callback)
+        )
+
+    def names(self, topic: str) -> str:
+        return topic
+
+    def publishers_of(self, topic: str) -> list[str]:
+        return [topic]
+
+    def subscription_profile(self, name: str) -> None:
+        return None
+
+    def report(self, behavior: str, *goals: tuple[int, int]) -> None:
+        """Publish the status of goals: their ids, and the numbers of GoalStatus."""
+        messages = [
+            SimpleNamespace(goal_info=SimpleNamespace(goal_id=SimpleNamespace(uuid=[number] * 16)), status=status)
+            for number, status in goals
+        ]
+        self.callbacks[f"/{behavior}/_action/status"](SimpleNamespace(status_list=messages))
+
+
+@pytest.fixture
+def graph(monkeypatch: pytest.MonkeyPatch) -> FakeGraph:
+    monkeypatch.setattr(recoveries, "find_type", lambda name: object)
+    return FakeGraph()
+
+
+@pytest.fixture
+def events(graph: FakeGraph) -> list[tuple[str, ...]]:
+    return []
+
+
+@pytest.fixture
+def followed(graph: FakeGraph, events: list[tuple[str, ...]]) -> Recoveries:
+    made = Recoveries(graph, lambda kind, name, **data: events.append((kind, name, *data.values())))  # type: ignore[arg-type]
+    made.subscribe()
+    return made
+
+
+def test_a_behavior_starts_and_ends_once_although_its_status_is_repeated(graph, events, followed) -> None:
+    graph.report("spin", (1, 1))
+    assert events == []
+    graph.report("spin", (1, 2))
+    graph.report("spin", (1, 2))
+    graph.report("spin", (1, 6))
+    graph.report("spin", (1, 6), (2, 2))
+    assert events == [
+        ("recovery.started", "spin"),
+        ("recovery.ended", "spin", "failed"),
+        ("recovery.started", "spin"),
+    ]
+
+
+def test_a_behavior_of_which_only_the_end_was_seen_has_both_events(graph, events, followed) -> None:
+    graph.report("wait", (1, 4))
+    assert events == [("recovery.started", "wait"), ("recovery.ended", "wait", "succeeded")]
+
+
+def test_counted_recoveries_that_are_no_behavior_are_costmap_clearing(graph, events, followed) -> None:
+    followed.begin_goal()
+    followed.counted(1)
+    followed.report_clearing(0)
+    assert events == []  # the status of a behavior may still come
+    followed.report_clearing(1 * S)
+    clearing = [("recovery.started", "clear_costmap"), ("recovery.ended", "clear_costmap", "succeeded")]
+    assert events == clearing
+    followed.counted(1)
+    followed.report_clearing(3 * S)
+    assert events == clearing
+
+
+def test_a_counted_behavior_is_not_reported_twice(graph, events, followed) -> None:
+    followed.begin_goal()
+    followed.counted(1)  # the feedback comes before the status
+    followed.report_clearing(0)
+    graph.report("backup", (1, 2))
+    followed.report_clearing(2 * S)
+    assert events == [("recovery.started", "backup")]
+
+
+def test_each_goal_counts_from_zero(graph, events, followed) -> None:
+    for now in (0, 10 * S):
+        followed.begin_goal()
+        followed.counted(2)
+        followed.report_clearing(now)
+        followed.report_clearing(now + S)
+    assert [event[0] for event in events].count("recovery.started") == 4
