@@ -155,6 +155,13 @@ def cost(folder: Path) -> Callable[..., tuple[int, float, float, str]]:
     return call
 
 
+@pytest.fixture
+def is_cheap(cost: Callable[..., tuple[int, float, float, str]]) -> Callable[[float], bool]:
+    """Whether a CPU time is of the order of that of a small valid scenario on this machine."""
+    _, _, usual, _ = cost("validate", "a.scenario.yaml")
+    return lambda cpu: cpu < 4.0 * usual
+
+
 def cases_of(nodeid: str) -> set[int]:
     """The numbers (CASES.md) that a test is about, by its name and its parameters: `test_59_…`, `[59 a daemon]`."""
     name = nodeid.rpartition("::")[2]
