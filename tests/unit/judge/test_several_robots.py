@@ -137,3 +137,9 @@ def test_a_failure_is_only_expected_if_the_logs_of_all_robots_are_whole() -> Non
     assert cut.outcome is Outcome.FAILED
     assert [one.criterion for one in cut.verdicts] == ["clearance", "clearance"]
     assert cut.lines == (4, 5)
+
+
+def test_a_result_with_another_number_of_lines_than_verdicts_is_refused() -> None:
+    broken = result(verdicts=(verdict("clearance"), verdict("speed")), lines=(4,))
+    with pytest.raises(ValueError, match="shorter"):
+        combine_robots({"a": broken, "b": result()}, TRACES)
