@@ -165,14 +165,13 @@ def read_journal(folder: Path) -> JournaledSession:
         hint = "name the folder that `simscen run` wrote, e.g. simscen-out/latest"
         raise _invalid(folder, f"the folder has no {JOURNAL_FILE}", hint)
     try:
-        session = None
-        for line in _complete_lines(folder):
-            if line["event"] == "planned":
-                session = _SessionReader(line, folder)
-            elif session is not None:
-                session.read(line)
-        if session is None:
+        lines = _last_session_lines(folder)
+        first = next(lines, None)
+        if first is None:
             raise _invalid(folder / JOURNAL_FILE, "the session ended before it listed its runs")
+        session = _SessionReader(first, folder)
+        for line in lines:
+            session.read(line)
         return session.result()
     except OSError as error:
         raise _invalid(folder / JOURNAL_FILE, f"cannot read the journal: {error.strerror}") from error
@@ -180,18 +179,26 @@ def read_journal(folder: Path) -> JournaledSession:
         raise _invalid(folder / JOURNAL_FILE, f"the journal is damaged: {error}") from error
 
 
-def _complete_lines(folder: Path) -> Iterator[dict[str, Any]]:
-    """Yield the complete lines of a journal. Raises OSError or ValueError."""
+def _last_session_lines(folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield the complete lines of the last session in a journal. Raises OSError or ValueError."""
     with (folder / JOURNAL_FILE).open("rb") as file:
+        start, position = None, 0
         for line in file:
-            if line.endswith(b"\n"):
-                yield json.loads(line)
+            # The text may also be part of a name, so only the parsed line decides.
+            if b'"planned"' in line and line.endswith(b"\n") and json.loads(line)["event"] == "planned":
+                start = position
+            position += len(line)
+        file.seek(start or 0)
+        for line in file:
+            message = json.loads(line) if line.endswith(b"\n") else None
+            if message is not None and start is not None:
+                yield message
 
 
 def session_process(folder: Path) -> int | None:
     """Return the id of the process that wrote the last session, or None. Raises OSError or ValueError."""
-    starts = [int(line["pid"]) for line in _complete_lines(folder) if line["event"] == "planned"]
-    return starts[-1] if starts else None
+    first = next(_last_session_lines(folder), None)
+    return None if first is None else int(first["pid"])
 
 
 class _SessionReader:
