@@ -50,6 +50,9 @@ class Endpoint(NamedTuple):
     qos: Any
 
 
+STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
+
+
 class Graph:
     """One node in one ROS domain. `watch` is called while waiting and may raise."""
 
@@ -102,6 +105,15 @@ class Graph:
         profile = self.subscription_profile(self.names(topic))
         made = self.node.create_subscription(message_type, self.names(topic), keep, profile, raw=True)
         self._subscriptions[topic] = (type_name, made)
+
+    def follow_action(self, action: str, keep: Callable[[Any], None]) -> Optional[str]:
+        """Call `keep` with each status of an action (GoalStatusArray); return the node of its server, or None."""
+        status_type, topic = find_type(STATUS_TYPE), self.names(f"/{action}/_action/status")
+        servers = self.publishers_of(topic)
+        if status_type is None or len(servers) != 1:
+            return None
+        self.node.create_subscription(status_type, topic, keep, self.subscription_profile(topic))
+        return servers[0].node
 
     def subscription_profile(self, name: str) -> QoSProfile:
         """Return a quality of service that all publishers of a topic of the graph in other nodes offer."""

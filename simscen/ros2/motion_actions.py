@@ -6,6 +6,7 @@ that takes longer than a control period, for example MPPI on a slow machine.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from simscen.ros2.messages import NANOSECONDS, find_type
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from simscen.ros2.graph import Graph
     from simscen.ros2.node_barrier import NodeBarrier
 
-STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
 EXECUTING = 2
 """GoalStatus.STATUS_EXECUTING."""
 RATE_PARAMETERS = {
@@ -45,21 +45,15 @@ class MotionActions:
         self._graph, self._barrier = graph, barrier
         self._servers: dict[str, _Server] = {}
         self._executing: dict[str, bool] = {}
-        self._subscriptions: list[Any] = []
         self._last_command: int | None = None
 
     def subscribe(self) -> None:
         """Follow the actions that the graph has now."""
-        status_type = find_type(STATUS_TYPE)
-        for action in RATE_PARAMETERS if status_type is not None else ():
-            topic = self._graph.names(f"/{action}/_action/status")
-            publishers = self._graph.publishers_of(topic)
-            if len(publishers) != 1:
-                continue
-            rate = self._rate(publishers[0].node, RATE_PARAMETERS[action])
-            if rate is not None and rate > 0.0:
-                self._servers[action] = _Server(publishers[0].node, NANOSECONDS / rate)
-                self._follow(action, status_type, topic)
+        for action, parameter in RATE_PARAMETERS.items():
+            node = self._graph.follow_action(action, partial(self._take, action))
+            rate = None if node is None else self._rate(node, parameter)
+            if node is not None and rate is not None and rate > 0.0:
+                self._servers[action] = _Server(node, NANOSECONDS / rate)
 
     def _rate(self, node: str, parameter: str) -> float | None:
         service_type: Any = find_type("rcl_interfaces/srv/GetParameters")
@@ -71,12 +65,8 @@ class MotionActions:
         values = [] if answer is None else answer.values
         return float(values[0].double_value) if values else None
 
-    def _follow(self, action: str, status_type: Any, topic: str) -> None:
-        def keep(message: Any) -> None:
-            self._executing[action] = any(goal.status == EXECUTING for goal in message.status_list)
-
-        profile = self._graph.subscription_profile(topic)
-        self._subscriptions.append(self._graph.node.create_subscription(status_type, topic, keep, profile))
+    def _take(self, action: str, message: Any) -> None:
+        self._executing[action] = any(goal.status == EXECUTING for goal in message.status_list)
 
     def commanded(self, now: int) -> None:
         """Note that a command has come at `now` nanoseconds."""

@@ -7,18 +7,18 @@ too).
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any, Callable
 
-from simscen.ros2.messages import NANOSECONDS, find_type
+from simscen.ros2.messages import NANOSECONDS
+from simscen.ros2.motion_actions import EXECUTING
 
 if TYPE_CHECKING:
     from simscen.ros2.graph import Graph
 
-STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
 BEHAVIORS = ("spin", "backup", "wait")
 """Actions of Nav2's behavior server that its behavior trees count as recoveries."""
 CLEARING = "clear_costmap"
-EXECUTING = 2
 OUTCOMES = {4: "succeeded", 5: "canceled", 6: "failed"}
 """GoalStatus.STATUS_…"""
 FEEDBACK_DELAY_NS = NANOSECONDS
@@ -33,7 +33,6 @@ class Recoveries:
 
     def __init__(self, graph: Graph, say: Say) -> None:
         self._graph, self._say = graph, say
-        self._subscriptions: list[Any] = []
         self._executing: dict[bytes, str] = {}
         self._known: set[bytes] = set()
         self._named = self._counted = self._latest = 0
@@ -41,19 +40,12 @@ class Recoveries:
 
     def subscribe(self) -> None:
         """Follow the behaviors that the graph has now."""
-        status_type = find_type(STATUS_TYPE)
-        for behavior in BEHAVIORS if status_type is not None else ():
-            topic = self._graph.names(f"/{behavior}/_action/status")
-            if self._graph.publishers_of(topic):
-                self._follow(behavior, status_type, topic)
+        for behavior in BEHAVIORS:
+            self._graph.follow_action(behavior, partial(self._take_all, behavior))
 
-    def _follow(self, behavior: str, status_type: Any, topic: str) -> None:
-        def keep(message: Any) -> None:
-            for goal in message.status_list:
-                self._take(behavior, bytes(goal.goal_info.goal_id.uuid), goal.status)
-
-        profile = self._graph.subscription_profile(topic)
-        self._subscriptions.append(self._graph.node.create_subscription(status_type, topic, keep, profile))
+    def _take_all(self, behavior: str, message: Any) -> None:
+        for goal in message.status_list:
+            self._take(behavior, bytes(goal.goal_info.goal_id.uuid), goal.status)
 
     def _take(self, behavior: str, goal: bytes, status: int) -> None:
         if goal not in self._known and (status == EXECUTING or status in OUTCOMES):

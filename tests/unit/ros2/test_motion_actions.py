@@ -19,18 +19,11 @@ class FakeGraph:
         self.node = SimpleNamespace(
             create_client=lambda _, name: name,
             destroy_client=lambda client: None,
-            create_subscription=lambda _, topic, callback, profile: self.callbacks.setdefault(topic, callback),
         )
 
-    def names(self, topic: str) -> str:
-        return f"/robot1{topic}"
-
-    def publishers_of(self, topic: str) -> list[Any]:
-        action = topic.split("/")[2]
-        return [SimpleNamespace(node=self.servers[action])] if action in self.servers else []
-
-    def subscription_profile(self, name: str) -> None:
-        return None
+    def follow_action(self, action: str, keep: Any) -> str | None:
+        self.callbacks[action] = keep
+        return self.servers.get(action)
 
     def call(self, client: str, request: Any) -> Any:
         rate = self.rates.get(client.removesuffix("/get_parameters"))
@@ -38,7 +31,7 @@ class FakeGraph:
 
     def report(self, action: str, *statuses: int) -> None:
         goals = [SimpleNamespace(status=status) for status in statuses]
-        self.callbacks[f"/robot1/{action}/_action/status"](SimpleNamespace(status_list=goals))
+        self.callbacks[action](SimpleNamespace(status_list=goals))
 
 
 @pytest.fixture
@@ -67,5 +60,6 @@ def test_servers_without_a_rate_or_without_a_status_owe_nothing() -> None:
     graph = FakeGraph({"spin": "/behavior_server", "follow_path": "/silent"}, {"/behavior_server": 0.0})
     actions = MotionActions(graph, graph)  # type: ignore[arg-type]
     actions.subscribe()
-    assert graph.callbacks == {}
+    graph.report("spin", 2)
+    graph.report("follow_path", 2)
     assert actions.owed(0) is None

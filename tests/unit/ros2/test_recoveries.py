@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from simscen.ros2 import recoveries
 from simscen.ros2.recoveries import Recoveries
 
 S = 1_000_000_000
@@ -16,18 +15,10 @@ class FakeGraph:
 
     def __init__(self) -> None:
         self.callbacks: dict[str, Any] = {}
-        self.node = SimpleNamespace(
-            create_subscription=lambda _, topic, callback, profile: self.callbacks.setdefault(topic, callback)
-        )
 
-    def names(self, topic: str) -> str:
-        return topic
-
-    def publishers_of(self, topic: str) -> list[str]:
-        return [topic]
-
-    def subscription_profile(self, name: str) -> None:
-        return None
+    def follow_action(self, action: str, keep: Any) -> str:
+        self.callbacks[action] = keep
+        return "/behavior_server"
 
     def report(self, behavior: str, *goals: tuple[int, int]) -> None:
         """Publish the status of goals: their ids, and the numbers of GoalStatus."""
@@ -35,12 +26,11 @@ class FakeGraph:
             SimpleNamespace(goal_info=SimpleNamespace(goal_id=SimpleNamespace(uuid=[number] * 16)), status=status)
             for number, status in goals
         ]
-        self.callbacks[f"/{behavior}/_action/status"](SimpleNamespace(status_list=messages))
+        self.callbacks[behavior](SimpleNamespace(status_list=messages))
 
 
 @pytest.fixture
-def graph(monkeypatch: pytest.MonkeyPatch) -> FakeGraph:
-    monkeypatch.setattr(recoveries, "find_type", lambda name: object)
+def graph() -> FakeGraph:
     return FakeGraph()
 
 
