@@ -1,10 +1,15 @@
-"""Whole runs of small scenarios, in this process."""
+"""Whole runs of small scenarios, in this process; and `search_plants.py`, which the tests of this folder share."""
+
+import sys
+from pathlib import Path
 
 import pytest
 
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 ROOM = """\
 simscen: 1

@@ -7,17 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scipy.stats import qmc
+from search_plants import PLANTS, failure_threshold
 
 from simscen.core.geometry import Array
 from simscen.run.sessions.search import Search, SearchMethod, make_search
-
-WEIGHTS = np.array([1, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02])
-CENTER = np.array([0.3, 0.6, 0.2])
-PLANTS: dict[str, Callable[[Array], Array]] = {
-    "linear": lambda points: points @ WEIGHTS,
-    "region": lambda points: -np.linalg.norm(points[..., :3] - CENTER, axis=-1),
-    "product": lambda points: points[..., :4].prod(axis=-1),
-}
 
 
 def runs_to_failure(search: Search, plant: Callable[[Array], Array], threshold: float, limit: int) -> int:
@@ -36,7 +29,7 @@ def runs_to_failure(search: Search, plant: Callable[[Array], Array], threshold: 
 @pytest.mark.parametrize("name", PLANTS)
 def test_tpe_finds_rare_failures_in_sixty_runs(name: str) -> None:
     plant = PLANTS[name]
-    threshold = float(np.quantile(plant(np.random.default_rng(0).random((200_000, 8))), 0.996))
+    threshold = failure_threshold(plant)
     runs = [
         runs_to_failure(make_search(SearchMethod.TPE, [0] * 8, seed), plant, threshold, 400) for seed in range(1, 21)
     ]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from search_plants import PLANTS, failure_threshold
 
 from simscen.cli.session.candidates import CandidateRuns
 from simscen.cli.session.shrinking import Failure, Shrinking
@@ -17,14 +18,6 @@ from simscen.loading.yaml.tree import MappingNode, child, node_at
 from simscen.run.sessions.search import SearchMethod, make_search
 
 NOMINAL = 0.5
-WEIGHTS = np.array([1, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02])
-CENTER = np.array([0.3, 0.6, 0.2])
-PLANTS: dict[str, Callable[[Array], Array]] = {
-    "linear": lambda points: points @ WEIGHTS,
-    "region": lambda points: -np.linalg.norm(points[..., :3] - CENTER, axis=-1),
-    "product": lambda points: points[..., :4].prod(axis=-1),
-}
-"""A run fails if the value is above a threshold. In the region and the product, some parameters do not matter."""
 MATTERING = {"linear": 8, "region": 3, "product": 4}
 
 
@@ -75,7 +68,7 @@ def first_failure(plant: Callable[[Array], Array], threshold: float, seed: int) 
 @pytest.mark.parametrize("name", PLANTS)
 def test_a_found_failure_is_shrunk_in_sixty_runs(name: str) -> None:
     plant = PLANTS[name]
-    threshold = float(np.quantile(plant(np.random.default_rng(0).random((200_000, 8))), 0.996))
+    threshold = failure_threshold(plant)
     spent, left = [], []
     for seed in range(1, 21):
         found = first_failure(plant, threshold, seed)

@@ -1,0 +1,21 @@
+"""Plants of eight parameters between 0 and 1, of which 0.4 % of the values fail."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from simscen.core.geometry import Array
+
+WEIGHTS = np.array([1, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02])
+CENTER = np.array([0.3, 0.6, 0.2])
+PLANTS: dict[str, Callable[[Array], Array]] = {
+    "linear": lambda points: points @ WEIGHTS,
+    "region": lambda points: -np.linalg.norm(points[..., :3] - CENTER, axis=-1),
+    "product": lambda points: points[..., :4].prod(axis=-1),
+}
+"""A run fails if the value is above the threshold. In the region and the product, some parameters do not matter."""
+
+
+def failure_threshold(plant: Callable[[Array], Array]) -> float:
+    """Return the value that 0.4 % of the points exceed."""
+    return float(np.quantile(plant(np.random.default_rng(0).random((200_000, 8))), 0.996))
