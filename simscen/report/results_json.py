@@ -1,7 +1,7 @@
 """Writer of results.json, without wall-clock times so that two sessions can be compared."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePath
 from types import TracebackType
 from typing import Any, TextIO
@@ -59,18 +59,16 @@ def as_document(
 def _document(ordered: RunStore, comparison: Comparison | None, study: Study | None) -> dict[str, Any]:
     """Return the document without its runs."""
     counts = dict.fromkeys((outcome.value for outcome in Outcome), 0)
-    simulated, summaries = 0.0, dict[str, SessionFigures]()
+    simulated = 0.0
     for run in ordered:
         counts[run.outcome.value] += 1
         simulated += run.result.simulated
-        if not run.key.repeats:
-            summaries.setdefault(run.key.stack_name, SessionFigures()).add(run.result)
     return {
         "format": FORMAT,
         "total": len(ordered),
         **counts,
         "simulated_seconds": simulated,
-        **_summaries(summaries),
+        **_summaries(ordered),
         **({} if comparison is None else {"comparison": comparison_data(comparison)}),
         **({} if study is None else {"study": study_data(study)}),
         "runs": [],
@@ -81,9 +79,9 @@ def _run_data(run: RunFinished, folder: str) -> dict[str, Any]:
     return {**result_data(run.result), "artifacts": _artifacts(run, folder), **_resumed(run)}
 
 
-def _summaries(figures: Mapping[str, SessionFigures]) -> dict[str, Any]:
+def _summaries(runs: Iterable[RunFinished]) -> dict[str, Any]:
     """Return `suite`, or `suites` by name for several stacks, which are never pooled."""
-    found = {stack: session_summary_data(one.summary()) for stack, one in figures.items()}
+    found = {stack: session_summary_data(summary) for stack, summary in summaries_by_stack(runs).items()}
     if len(found) > 1:
         return {"suites": found}
     return {"suite": next(iter(found.values()), session_summary_data(SessionFigures().summary()))}

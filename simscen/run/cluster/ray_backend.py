@@ -194,6 +194,7 @@ class RayBackend:
     def _lost(self, runner: _Runner, batch: "_Batch") -> Iterator[JobUpdate]:
         """Forget a runner that has died, and repeat its jobs, once each."""
         self._runners.remove(runner)
+        ray.kill(runner.actor)  # it may only be unreachable
         self._last_look = 0.0
         for number in ray.get(self._queue.taken_by.remote(runner.name)):
             yield from batch.lost(number, runner.address)
