@@ -1,6 +1,5 @@
 """Statistics of a session that navigation benchmarks publish, each with its number of runs."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -96,14 +95,6 @@ class RunFigures(NamedTuple):
             _known(run, "path_length"),
             run.simulated * robots,
         )
-
-
-def summarize_session(results: Iterable[RunResult]) -> SessionSummary:
-    """Return the statistics of a session without skipped runs. The order of the runs does not matter."""
-    figures = SessionFigures()
-    for result in results:
-        figures.add(result)
-    return figures.summary()
 
 
 def session_summary_data(figures: SessionSummary) -> dict[str, float | list[float] | None]:

@@ -1,9 +1,23 @@
 """The figures of a session."""
 
+from collections.abc import Iterable
+
 import pytest
 
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
-from simscen.judge.metrics.session_summary import session_summary_data, session_summary_line, summarize_session
+from simscen.judge.metrics.session_summary import (
+    SessionFigures,
+    SessionSummary,
+    session_summary_data,
+    session_summary_line,
+)
+
+
+def summarize_session(results: Iterable[RunResult]) -> SessionSummary:
+    figures = SessionFigures()
+    for result in results:
+        figures.add(result)
+    return figures.summary()
 
 
 def run(seed, simulated=1800.0, **metrics):
