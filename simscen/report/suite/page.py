@@ -22,6 +22,8 @@ from simscen.report.suite.history import PastSession, outcome_change, past_outco
 from simscen.report.suite.run_entry import full_run_name, run_element, theme
 
 ORDER = (Outcome.ERROR, Outcome.FAILED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED, Outcome.PASSED)
+MAX_MARKS = 200
+"""Maximum number of runs of a scenario of which the heading shows a mark each."""
 MAX_LISTED = 2000
 """Maximum number of runs on the page."""
 _FILES = ("report.html", "junit.xml", "results.json", "run.json", "console.txt")
@@ -165,9 +167,10 @@ def _group(group: list[RunFinished], session: Session, totals: Totals, pictures:
     flipped = sum(outcome_change(run, session.past) != "" for run in group)
     summary = f"{good} of {number} as expected" + (f", {flipped} changed" if flipped else "")
     opened = "" if good == number else " open"
+    marks = outcome_marks([run.outcome for run in group], "runs") if number <= MAX_MARKS else ""
     return (
         f'<details class="group many"{opened}><summary><h2 class="name">{html_text(name)}</h2>'
-        f'<span class="quiet">{summary}</span>{outcome_marks([run.outcome for run in group], "runs")}</summary>\n'
+        f'<span class="quiet">{summary}</span>{marks}</summary>\n'
         f"{elements}\n</details>"
     )
 

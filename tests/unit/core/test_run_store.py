@@ -96,3 +96,10 @@ def test_the_summary_on_github_is_limited_to_the_first_rows(monkeypatch: pytest.
     rows = [line for line in text.splitlines() if "seed" in line or "more" in line]
     assert [("❌" in row, "✅" in row) for row in rows] == [(True, False), (False, True), (False, False)]
     assert "and 1 more" in rows[-1]
+
+
+@pytest.mark.parametrize(("number", "marks"), [(200, 200), (201, 0)])
+def test_the_heading_of_a_scenario_has_a_mark_for_each_run_unless_there_are_too_many(number: int, marks: int) -> None:
+    html = to_html(Session([run(seed) for seed in range(1, number + 1)]))
+    heading = html.partition('<details class="group many"')[2].partition("</summary>")[0]
+    assert heading.count("✓") == marks
