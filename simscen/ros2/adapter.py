@@ -23,6 +23,7 @@ from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.lockstep import Lockstep, Message, Paced
 from simscen.ros2.messages import NANOSECONDS, find_type, read_twist, write_twist
 from simscen.ros2.motion_actions import MotionActions
+from simscen.ros2.nav2_report import Line, Nav2Report
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError, Options, TopicNames
 from simscen.ros2.pose_estimate import PLAN, PoseEstimate
@@ -34,6 +35,8 @@ SUBSCRIPTIONS = {
     "/amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
     "/particle_cloud": "nav2_msgs/msg/ParticleCloud",
     "/tf": "tf2_msgs/msg/TFMessage",
+    "/global_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
+    "/local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
 }
 """Topics of the stack besides its commands."""
 THROUGH_POSES = "navigate_through_poses"
@@ -84,6 +87,7 @@ class Adapter:
         self._readiness = Readiness(self._graph, self._barrier, published, self._senders, options)
         self._actions = MotionActions(self._graph, self._barrier)
         self._recoveries = Recoveries(self._graph, goals.say)
+        self._report = Nav2Report(self._graph, self._barrier) if options.nav2 else None
         self._lockstep = Lockstep(
             self._graph, self._barrier, self._actions, options.rounds, options.wait, options.answer
         )
@@ -120,6 +124,8 @@ class Adapter:
             ]
         if self._sender is not None:
             about["goals"] = self._sender.name
+        if self._report is not None:
+            about["parameters"] = self._report.parameters
         if self._unavailable:
             about["not_published"] = [f"{topic.name} ({topic.type})" for topic in self._unavailable]
         return about
@@ -254,6 +260,10 @@ class Adapter:
             self._report_outcomes(now)
         return answers
 
+    def take_lines(self) -> List[Line]:
+        """Return what Nav2 has reported since the last call, for /rosout of the run's log."""
+        return [] if self._report is None else self._report.take_lines()
+
     def _begin(self) -> None:
         """Subscribe to the topics of the ready graph."""
         self._ready = True
@@ -265,6 +275,8 @@ class Adapter:
                 self._graph.subscribe(topic, type_name)
         self._actions.subscribe()
         self._recoveries.subscribe()
+        if self._report is not None:
+            self._report.begin()
         self._sender = self._senders.usable
 
     def _send(self, now: int) -> None:

@@ -12,6 +12,7 @@ from simscen.peer import messages, wire
 from simscen.peer.goals import Goal, Goals
 from simscen.peer.wire import Connection, Gone
 from simscen.ros2.launch import LaunchedCommand
+from simscen.ros2.nav2_report import ROSOUT
 from simscen.ros2.options import AdapterError, Domain, Options, claim, ros_environment
 
 EVENTS = "/simscen/events"
@@ -122,6 +123,8 @@ class AdapterRun:
                 published = [(hello.topics[number][0], data) for number, data in content]
                 due = bool(header.flags & wire.COMMAND_DUE)
                 received = adapter.step(now, published, due, header.deadline * 1e-3)
+                stamp = header.sec, header.nanosec
+                received += [(ROSOUT, messages.log(stamp, *line)) for line in adapter.take_lines()]
                 connection.send(wire.answer_frame(header.tick, self._numbered(received, hello.answers)))
             elif kind == wire.END:
                 connection.send_json(wire.BYE, {"about": adapter.about()})

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 import yaml
+from mcap.reader import make_reader
 
 pytestmark = pytest.mark.slow
 GOAL = "navigation/goal.scenario.yaml"
@@ -50,6 +51,23 @@ def test_nav2_reaches_a_goal_in_lockstep(run, nav2) -> None:
     assert processes(str(nav2.params)) == []
     # No command is due before the first path, after the goal, or while the tree plans.
     assert about["without_command"] < 0.2 * about["beats"]
+
+
+def test_the_log_contains_what_nav2_computed(run) -> None:
+    """Costmaps, plans, particles, changes of the behavior tree, and the values of all parameters."""
+    ended = run(GOAL)
+    assert ended.code == 0, ended.said
+    with next(ended.out.rglob("run.mcap")).open("rb") as file:
+        summary = make_reader(file).get_summary()
+    counts = {summary.channels[k].topic: n for k, n in summary.statistics.channel_message_counts.items()}
+    for topic in ("/global_costmap/costmap", "/local_costmap/costmap", "/plan", "/particle_cloud", "/amcl_pose"):
+        assert counts.get(topic, 0) > 1, topic
+    with next(ended.out.rglob("run.mcap")).open("rb") as file:
+        lines = [message.data for _, _, message in make_reader(file).iter_messages(topics=["/rosout"])]
+    assert any(b"FollowPath: IDLE -> RUNNING" in line for line in lines)
+    parameters = ended.about["parameters"]
+    assert parameters["/controller_server"]["FollowPath.desired_linear_vel"] == 0.4
+    assert parameters["/local_costmap/local_costmap"]["plugins"] == ["voxel_layer", "inflation_layer"]
 
 
 def test_recoveries_of_nav2_are_events(run) -> None:

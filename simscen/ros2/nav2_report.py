@@ -1,0 +1,105 @@
+"""What Nav2 reports about itself, for the log of the run: its behavior tree, its warnings, and its parameters."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Callable, NamedTuple
+
+from simscen.ros2.messages import find_type
+
+if TYPE_CHECKING:
+    from simscen.ros2.graph import Graph
+    from simscen.ros2.node_barrier import NodeBarrier
+
+BEHAVIOR_TREE_LOG = "/behavior_tree_log"
+ROSOUT = "/rosout"
+INFO, WARNING = 20, 30
+"""Levels of rcl_interfaces/msg/Log."""
+NODES = (
+    *("amcl", "map_server", "planner_server", "controller_server", "smoother_server", "behavior_server"),
+    *("bt_navigator", "waypoint_follower", "velocity_smoother", "collision_monitor"),
+    *("local_costmap", "global_costmap"),
+)
+"""Names of the nodes whose parameters are recorded."""
+OMITTED = ("use_sim_time", "qos_overrides.")
+"""Beginnings of the names of parameters that say nothing about navigation."""
+
+
+class Line(NamedTuple):
+    """A line for /rosout of the run's log."""
+
+    level: int
+    name: str
+    text: str
+
+
+class Nav2Report:
+    """Collects lines for the log during the run, and reads the parameters once."""
+
+    def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
+        self._graph, self._barrier = graph, barrier
+        self._lines: list[Line] = []
+        self.parameters: dict[str, dict[str, Any]] = {}
+        """Values of all parameters by node."""
+
+    def begin(self) -> None:
+        """Subscribe to the logs of the graph, and read the parameters of Nav2's nodes."""
+        self._follow(self._graph.names(BEHAVIOR_TREE_LOG), "nav2_msgs/msg/BehaviorTreeLog", self._take_tree)
+        self._follow(ROSOUT, "rcl_interfaces/msg/Log", self._take_log)
+        for node in self._barrier.nodes:
+            if node.rpartition("/")[2] in NODES:
+                self.parameters[node] = self._read_parameters(node)
+
+    def take_lines(self) -> list[Line]:
+        """Return the lines since the last call, by logger: lines of different nodes arrive in random order."""
+        lines, self._lines = self._lines, []
+        return sorted(lines, key=lambda line: line.name)
+
+    def _follow(self, topic: str, type_name: str, take: Callable[[Any], None]) -> None:
+        message_type = find_type(type_name)
+        if message_type is not None and self._graph.publishers_of(topic):
+            profile = self._graph.subscription_profile(topic)
+            self._graph.node.create_subscription(message_type, topic, take, profile)
+
+    def _take_tree(self, message: Any) -> None:
+        for change in message.event_log:
+            text = f"{change.node_name}: {change.previous_status} -> {change.current_status}"
+            self._lines.append(Line(INFO, "behavior_tree", text))
+
+    def _take_log(self, message: Any) -> None:
+        if message.level >= WARNING:
+            self._lines.append(Line(message.level, message.name, message.msg))
+
+    def _read_parameters(self, node: str) -> dict[str, Any]:
+        """Return the values of a node's parameters; empty if the node does not answer."""
+        listed = self._call(node, "ListParameters")
+        names = [] if listed is None else sorted(n for n in listed.result.names if not n.startswith(OMITTED))
+        answer = self._call(node, "GetParameters", names=names)
+        return {} if answer is None else dict(zip(names, map(plain_value, answer.values)))
+
+    def _call(self, node: str, service: str, **request: Any) -> Any:
+        service_type: Any = find_type(f"rcl_interfaces/srv/{service}")
+        name = "list_parameters" if service == "ListParameters" else "get_parameters"
+        client = self._graph.node.create_client(service_type, f"{node}/{name}")
+        try:
+            return self._barrier.call(client, service_type.Request(**request))
+        finally:
+            self._graph.node.destroy_client(client)
+
+
+FIELDS = ("bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array", "double_array")
+"""Fields of rcl_interfaces/msg/ParameterValue in the order of ParameterType, from PARAMETER_BOOL = 1."""
+STRING_ARRAY = 9
+
+
+def plain_value(value: Any) -> Any:
+    """Return a rcl_interfaces/msg/ParameterValue as a value of JSON; None if it is not set."""
+    if value.type == 0:
+        return None
+    field = "string_array" if value.type == STRING_ARRAY else FIELDS[value.type - 1]
+    found = getattr(value, f"{field}_value")
+    if isinstance(found, (bool, int, str)):
+        return found
+    if isinstance(found, float):
+        return found if math.isfinite(found) else str(found)
+    return [number[0] if isinstance(number, bytes) else number for number in found]
