@@ -1,0 +1,48 @@
+"""What Nav2 reports about itself: values of parameters, and lines for the log."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from simscen.ros2.nav2_report import Line, Nav2Report, plain_value
+
+
+def parameter(number: int, **fields: object) -> SimpleNamespace:
+    """Return a rcl_interfaces/msg/ParameterValue with a type by its number."""
+    return SimpleNamespace(type=number, **fields)
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (parameter(0), None),
+        (parameter(1, bool_value=True), True),
+        (parameter(2, integer_value=7), 7),
+        (parameter(3, double_value=0.4), 0.4),
+        (parameter(3, double_value=math.inf), "inf"),
+        (parameter(4, string_value="scan"), "scan"),
+        (parameter(5, byte_array_value=[b"\x01", b"\xff"]), [1, 255]),
+        (parameter(6, bool_array_value=[True, False]), [True, False]),
+        (parameter(7, integer_array_value=(1, 2)), [1, 2]),
+        (parameter(8, double_array_value=(0.5, 1.5)), [0.5, 1.5]),
+        (parameter(9, string_array_value=["a", "b"]), ["a", "b"]),
+    ],
+)
+def test_a_parameter_becomes_a_value_of_json(value: SimpleNamespace, expected: object) -> None:
+    assert plain_value(value) == expected
+
+
+def test_lines_are_taken_once_and_sorted_by_logger() -> None:
+    missing: Any = None
+    report = Nav2Report(missing, missing)
+    report._take_log(SimpleNamespace(level=40, name="planner_server", msg="no path"))
+    report._take_log(SimpleNamespace(level=20, name="amcl", msg="created"))
+    change = SimpleNamespace(node_name="FollowPath", previous_status="IDLE", current_status="RUNNING")
+    report._take_tree(SimpleNamespace(event_log=[change]))
+    assert report.take_lines() == [
+        Line(20, "behavior_tree", "FollowPath: IDLE -> RUNNING"),
+        Line(40, "planner_server", "no path"),
+    ]
+    assert report.take_lines() == []
