@@ -1,4 +1,4 @@
-"""Packages that add to simscen, laid out as an installer leaves them, without installing anything."""
+"""Settings of all tests, and packages that add to simscen, laid out as an installer leaves them."""
 
 import os
 import re
@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from simscen.core.cpu_kernels import pin_kernels
 from simscen.spec import choice, registry
@@ -16,13 +17,17 @@ from simscen.spec import choice, registry
 pin_kernels()  # before the tests import NumPy, so that runs in this process are the same as on the command line
 Lay = Callable[..., Path]
 
-# Whoever starts the tests in the background has them ignore Ctrl-C, which every program that they start would inherit.
+# Tests that run in the background ignore Ctrl-C, and every program that they start would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-# No test may write to the cache of whoever runs it, nor find there what it is to work out.
+# Tests neither write to the user's cache nor find results in it.
 os.environ["SIMSCEN_CACHE_DIR"] = "off"
+
+# A deadline for each example depends on how busy the machine is.
+settings.register_profile("simscen", parent=settings.default, deadline=None)
+settings.load_profile("simscen")
 
 LONG = ("tests/scenarios/test_shipped.py", "tests/ros/", "tests/conformance/")
 """Tests that start first because they take longest, so that no worker is left alone with them at the end."""
