@@ -27,7 +27,7 @@ from simscen.ros2.nav2_report import Line, Nav2Report
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError, Options, TopicNames
 from simscen.ros2.pose_estimate import PLAN, PoseEstimate
-from simscen.ros2.readiness import COMMAND, TWIST_STAMPED, Readiness
+from simscen.ros2.readiness import COMMAND, MAP, TWIST_STAMPED, Readiness
 from simscen.ros2.recoveries import Recoveries
 
 SUBSCRIPTIONS = {
@@ -162,6 +162,7 @@ class Adapter:
 
         Raises AdapterError with what is missing after `limit_s` seconds.
         """
+        self._readiness.has_map = MAP in self._latest
         for topic in LATCHED.intersection(self._latest):
             self._graph.publish(topic, self._latest.pop(topic))
 

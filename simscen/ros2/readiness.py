@@ -12,6 +12,7 @@ from simscen.ros2.options import Options
 COMMAND = "/cmd_vel"
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 SCAN, ODOMETRY = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
+MAP = "/map"
 STATE_SERVICE = "lifecycle_msgs/srv/GetState"
 ACTIVE = 3
 """lifecycle_msgs/msg/State.PRIMARY_STATE_ACTIVE."""
@@ -29,6 +30,8 @@ class Readiness:
         self._options = options
         self._states = ServicePoll(graph, STATE_SERVICE, "get_state") if find_type(STATE_SERVICE) else None
         self._nav2 = Nav2Readiness(graph, barrier, topics, options)
+        self.has_map = True
+        """Whether simscen has published the map."""
         barrier.required = self.required_nodes
 
     def no_nodes(self) -> List[str]:
@@ -50,8 +53,16 @@ class Readiness:
         return busy + found + self._wall_time() + self._inactive()
 
     def likely_causes(self) -> List[str]:
-        """Return wrong parameters of Nav2's nodes, which may prevent other nodes from becoming active."""
-        return self._nav2.wrong_parameters() if self._options.nav2 else []
+        """Return a missing map and wrong parameters of Nav2's nodes, which may prevent nodes from becoming active."""
+        return self._missing_map() + (self._nav2.wrong_parameters() if self._options.nav2 else [])
+
+    def _missing_map(self) -> List[str]:
+        name = self._graph.names(MAP)
+        if self.has_map or self._graph.publishers_of(name):
+            return []
+        nodes = sorted({end.node for end in self._graph.subscribers_of(name)})
+        reason = "which no node publishes: the scenario has `map: none`, or simscen was started with --without /map"
+        return [f"{', '.join(nodes)}: waiting for {name}, {reason}"] if nodes else []
 
     def required_nodes(self) -> Set[str]:
         """Return the full names of nodes without which the run cannot continue.

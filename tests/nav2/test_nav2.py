@@ -106,6 +106,12 @@ def test_a_wrong_frame_is_named_with_its_node(run, nav2, tmp_path: Path) -> None
     assert processes(str(params)) == []
 
 
+def test_a_scenario_without_a_map_is_named_as_the_cause(run) -> None:
+    ended = run("corner_cases/u_trap.scenario.yaml", "--ready", "20")
+    assert ended.code == 3
+    assert "waiting for /map, which no node publishes" in ended.said
+
+
 def test_a_server_that_is_killed_during_the_run_is_named(run, nav2) -> None:
     """Kill the planner server some time after the controller server has its goal."""
     params = str(nav2.params)
