@@ -48,6 +48,9 @@ PREPARE_SETTLE_S = 2.0
 """Additional time without new nodes after which an incomplete graph probably needs sensor data."""
 CHECK_PERIOD_S = 0.25
 """Time between two checks of the graph, which should not slow down nodes that are starting."""
+FIRST_SCAN_S = 2.0
+"""Simulated time that passes at real time, if necessary, until each lidar has measured."""
+SCAN = "sensor_msgs/msg/LaserScan"
 STEP_SHARE = 0.8
 """Part of a step's wall time that waiting may take, so that the error arrives in time."""
 
@@ -236,7 +239,7 @@ class Adapter:
         messages = [(topic, self._with_base_frame(topic, data)) for topic, data in messages]
         self._initial_pose = next((m for m in messages if m[0] == INITIAL_POSE), self._initial_pose)
         messages = [message for message in messages if message[0] != INITIAL_POSE]
-        warming_up = now < self._options.warm_up * NANOSECONDS
+        warming_up = now < self._options.warm_up * NANOSECONDS or self._lacks_scan(now, messages)
         if not self._ready:
             self._latest.update(messages)
         if not warming_up and not self._ready:
@@ -264,6 +267,16 @@ class Adapter:
     def take_lines(self) -> List[Line]:
         """Return what Nav2 has reported since the last call, for /rosout of the run's log."""
         return [] if self._report is None else self._report.take_lines()
+
+    def _lacks_scan(self, now: int, messages: Sequence[Message]) -> bool:
+        """Return whether the run waits to be ready and a lidar has not measured yet, for example a delayed one.
+
+        AMCL publishes map -> odom only with scans, so that waiting with the readings of this step would be in vain.
+        """
+        if not self._options.nav2 or self._ready or now >= FIRST_SCAN_S * NANOSECONDS:
+            return False
+        known = {*self._latest, *(topic for topic, _ in messages)}
+        return any(type_name == SCAN and topic not in known for topic, type_name in self._graph.types.items())
 
     def _begin(self) -> None:
         """Subscribe to the topics of the ready graph."""

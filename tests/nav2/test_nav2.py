@@ -70,6 +70,11 @@ def test_the_log_contains_what_nav2_computed(run) -> None:
     assert parameters["/local_costmap/local_costmap"]["plugins"] == ["voxel_layer", "inflation_layer"]
 
 
+def test_nav2_becomes_active_although_scans_are_delayed(run) -> None:
+    ended = run("faults/lidar_delay.scenario.yaml")
+    assert ended.code == 0, ended.said
+
+
 def test_recoveries_of_nav2_are_events(run) -> None:
     """The scenario expects at least one recovery before the goal fails."""
     ended = run("corner_cases/goal_blocked_for_good.scenario.yaml")
