@@ -27,7 +27,7 @@ from simscen.ros2.nav2_report import Line, Nav2Report
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError, Options, TopicNames
 from simscen.ros2.pose_estimate import PLAN, PoseEstimate
-from simscen.ros2.readiness import COMMAND, MAP, TWIST_STAMPED, Readiness
+from simscen.ros2.readiness import COMMAND, MAP, SCAN, TWIST_STAMPED, Readiness
 from simscen.ros2.recoveries import Recoveries
 
 SUBSCRIPTIONS = {
@@ -50,7 +50,6 @@ CHECK_PERIOD_S = 0.25
 """Time between two checks of the graph, which should not slow down nodes that are starting."""
 FIRST_SCAN_S = 2.0
 """Simulated time that passes at real time, if necessary, until each lidar has measured."""
-SCAN = "sensor_msgs/msg/LaserScan"
 STEP_SHARE = 0.8
 """Part of a step's wall time that waiting may take, so that the error arrives in time."""
 
