@@ -23,14 +23,12 @@ def evaluate_claim(claim: PassRate, results: Sequence[RunResult]) -> ClaimResult
     errors = len(results) - len(outcomes)
     runs, status = decide(claim, outcomes[: claim.max_runs])
     passed = sum(outcomes[:runs])
-    if errors and status is not ClaimStatus.BLOCKED:
-        status = ClaimStatus.BLOCKED
     return ClaimResult(
         method=claim.method,
         min_rate=claim.min,
         confidence=claim.confidence,
         max_runs=claim.max_runs,
-        status=status,
+        status=ClaimStatus.BLOCKED if errors else status,
         passed=passed,
         runs=runs,
         errors=errors,

@@ -86,7 +86,11 @@ TESTS_OF_MODULE = {
             for of in ("required_evidence", "required_evidence_of_signals", "evaluation", "expected_failure")
         ]
     ],
-    **{f"judge/{of}": [[f"tests/unit/judge/test_{of}.py"]] for of in ("finding_text", "disturbances")},
+    **{
+        f"judge/{of}": [[f"tests/unit/judge/test_{of}.py"]]
+        for of in ("acceptance", "disturbances", "finding_text", "study")
+    },
+    "judge/study_json": [["tests/unit/judge/test_study.py"]],
     "judge/metrics/trajectory": [
         [f"{_METRICS}/test_path.py", f"{_METRICS}/test_pose_error.py"],
         [f"{_METRICS}/test_compute.py"],
