@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 from typing import NoReturn
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.core.geometry.kinematics import Twist
@@ -225,7 +226,12 @@ def _equal(one: Reading, other: Reading) -> bool:
     """Return whether two readings are equal except for rounding; nan equals nan."""
     if one is other:
         return True
-    said = [(getattr(one, field.name), getattr(other, field.name)) for field in fields(one) if field.name != "sensor"]
+    pairs = [(getattr(one, field.name), getattr(other, field.name)) for field in fields(one) if field.name != "sensor"]
     return all(
-        np.shape(a) == np.shape(b) and np.allclose(a, b, rtol=0.0, atol=ROUNDING, equal_nan=True) for a, b in said
+        a is b or (a is not None and b is not None and _is_close(a, b))  # a mount that is not tilted is None
+        for a, b in pairs
     )
+
+
+def _is_close(a: npt.ArrayLike, b: npt.ArrayLike) -> bool:
+    return np.shape(a) == np.shape(b) and np.allclose(a, b, rtol=0.0, atol=ROUNDING, equal_nan=True)
