@@ -63,7 +63,7 @@ def decide(claim: PassRate, outcomes: Sequence[bool]) -> tuple[int, ClaimStatus]
 
 
 def _by_limits(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
-    low, high = confidence_limits(claim, passed, runs) or (0.0, 1.0)
+    low, high = clopper_pearson_limits(passed, runs, claim.confidence)
     if low >= claim.min:
         return ClaimStatus.HELD
     return ClaimStatus.REFUTED if high < claim.min else ClaimStatus.UNDECIDED

@@ -160,3 +160,14 @@ def test_a_crash_of_the_stack_is_a_failure_and_any_other_error_blocks_the_claim(
 def test_contradictory_claims_are_refused(fields: dict[str, object], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         claim(**fields)
+
+
+def test_a_limit_that_equals_the_claimed_rate_is_enough_to_hold_and_not_to_refute() -> None:
+    low, high = clopper_pearson_limits(95, 100, 0.95)
+    assert evaluate_claim(claim(min=low, runs=100), results([True] * 95 + [False] * 5)).status is ClaimStatus.HELD
+    assert evaluate_claim(claim(min=high, runs=100), results([True] * 95 + [False] * 5)).status is ClaimStatus.UNDECIDED
+
+
+def test_an_anytime_claim_is_refuted_although_the_first_run_passed() -> None:
+    status = evaluate_claim(claim(method="anytime", runs=400), results([True] + [False] * 30)).status
+    assert status is ClaimStatus.REFUTED

@@ -273,3 +273,14 @@ def test_a_flip_has_the_first_reason_and_the_number_of_others(count: int, more: 
     warning = replace(bad.verdicts[0], severity="warn")
     (flip,) = against(run("ref"), replace(bad, verdicts=(warning, *bad.verdicts * count))).flips
     assert flip.why == f"clearance: 0.03 m < 0.05 m, at t = 1.00 s, (1.00, 2.00){more}"
+
+
+@pytest.mark.parametrize(("pairs", "has_interval"), [(4, False), (6, True)])
+def test_differences_are_counted_by_direction_and_written_with_their_interval(pairs: int, has_interval: bool) -> None:
+    runs = [run(name, seed, headway=2.0 + 0.5 * k) for seed in range(pairs) for k, name in enumerate(("ref", "mine"))]
+    comparison = compare_stacks(runs, STACKS)
+    assert comparison is not None
+    found = of(comparison.against[0], "headway")
+    assert (found.lower, found.equal, found.higher) == (0, 0, pairs)
+    data = next(one for one in comparison_data(comparison)["against"][0]["differences"] if one["metric"] == "headway")
+    assert data["interval"] == ([0.5, 0.5] if has_interval else None)
