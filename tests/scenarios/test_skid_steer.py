@@ -50,5 +50,5 @@ def test_a_husky_reaches_its_goals(imu: str, scale: float, profile: str, tmp_pat
     (tmp_path / "husky.robot.yaml").write_text(ROBOT.replace("SCALE", str(scale)) + imu)
     scenario = tmp_path / "husky.scenario.yaml"
     scenario.write_text(SCENARIO.replace("PROFILE", profile))
-    run = simscen.simulate(scenario, seed=3)
-    assert run.passed, run.result
+    runs = [simscen.simulate(scenario, seed=seed) for seed in range(1, 6)]
+    assert sum(run.passed for run in runs) >= 4, [run.result for run in runs if not run.passed]

@@ -171,3 +171,10 @@ def test_a_limit_that_equals_the_claimed_rate_is_enough_to_hold_and_not_to_refut
 def test_an_anytime_claim_is_refuted_although_the_first_run_passed() -> None:
     status = evaluate_claim(claim(method="anytime", runs=400), results([True] + [False] * 30)).status
     assert status is ClaimStatus.REFUTED
+
+
+def test_a_likelihood_ratio_that_equals_its_limit_decides() -> None:
+    sprt = claim(min=0.5, target=0.75, confidence=0.5, power=0.5, method="sprt", runs=10)
+    assert decide(sprt, [False, True]) == (1, ClaimStatus.REFUTED)  # 0.25 / 0.5 = 1 - power
+    sprt = claim(min=0.375, target=0.75, confidence=0.5, power=0.9, method="sprt", runs=10)
+    assert decide(sprt, [True, False]) == (1, ClaimStatus.HELD)  # 0.75 / 0.375 = 1 / (1 - confidence)
