@@ -121,6 +121,8 @@ def test_anytime_limits_cover_after_all_runs_at_once() -> None:
 def test_anytime_limits_are_the_roots_of_the_mixture(passed: int, runs: int) -> None:
     low, high = anytime_limits(passed, runs, 0.95)
     assert 0.0 <= low <= passed / runs <= high <= 1.0
+    assert (low == 0.0) == (passed == 0)
+    assert (high == 1.0) == (passed == runs)
     for limit in (low, high):
         if 0.0 < limit < 1.0:
             assert (runs + 1) * binom.pmf(passed, runs, limit) == pytest.approx(0.05, rel=1e-6)
