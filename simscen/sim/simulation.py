@@ -65,7 +65,7 @@ class Simulation:
         are no engine primitive. Without `has_images`, nothing is prepared for the renderer.
         """
         client = CLIENT_POOL.take()
-        engine.set_physics_parameters(client, tick_rate, solver_iterations, one_by_one=len(robots) > 1)
+        engine.set_physics_parameters(client, tick_rate, solver_iterations, solve_islands_separately=len(robots) > 1)
         terrain = Terrain(client, static, max((w.radius for r in robots.values() for w in r.body.wheels), default=0.0))
         walls = Walls(client, terrain.obstacles)
         visual_shape = engine.DEFAULT_VISUAL if has_images else engine.invisible_shape(client)
@@ -292,4 +292,4 @@ class Simulation:
         """Release the engine."""
         for robot in self.robots.values():
             robot.close()
-        CLIENT_POOL.give_back(self._scene.client)
+        CLIENT_POOL.release(self._scene.client)

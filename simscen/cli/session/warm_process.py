@@ -51,7 +51,7 @@ def _warm_up(job: Job) -> None:
     import_components(prepared)
     precompute(prepared)
     log_header(prepared, job.key.seed)
-    CLIENT_POOL.make_ahead()
+    CLIENT_POOL.create_in_advance()
 
 
 def _memory() -> int:

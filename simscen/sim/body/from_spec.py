@@ -1,4 +1,4 @@
-"""The body of a robot from its specification: of simple shapes, or from a URDF."""
+"""Builds the body of a robot from its specification: from simple shapes, or from a URDF."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ from simscen.sim.urdf.elements import MeshReader
 from simscen.sim.urdf.xml_source import RobotFiles
 
 CENTER_OF_MASS_HEIGHT_RATIO = 0.5
-"""Height of the center of mass over that of the hull's volume: batteries and motors lie at the bottom."""
+"""Height of the center of mass divided by that of the hull's centroid: batteries and motors are at the bottom."""
 
 
 def build_robot_body(
@@ -26,17 +26,17 @@ def build_robot_body(
 ) -> RobotBody:
     """Build the body of a robot from its specification.
 
-    `file` is the `*.robot.yaml`, to which `spec.urdf` is relative unless it was `found` already; `roots` are the
-    folders that the URDF and its meshes must lie in; `read_mesh` reads a mesh file. Raises InvalidInput when the URDF
-    or the body cannot be used.
+    `file` is the `*.robot.yaml`, to which `spec.urdf` is relative; `found` has the files if they are located
+    already. `roots` are the folders that must contain the URDF and its meshes; `read_mesh` reads a mesh file. Raises
+    InvalidInput if the URDF or the body is unusable.
     """
-    body = _of_shapes(spec, file) if spec.urdf is None else body_from_urdf(spec, file, roots, read_mesh, found)
+    body = _body_from_shapes(spec, file) if spec.urdf is None else body_from_urdf(spec, file, roots, read_mesh, found)
     check_robot_size(body, file)
     return body
 
 
-def _of_shapes(spec: RobotSpec, file: Path | None) -> RobotBody:
-    assert spec.body is not None and spec.mass is not None  # RobotSpec promises it
+def _body_from_shapes(spec: RobotSpec, file: Path | None) -> RobotBody:
+    assert spec.body is not None and spec.mass is not None  # ensured by RobotSpec
     check_ground_clearance(spec, file)
     parts = tuple(
         Solid(solid.shape, Pose3.planar(part.pose.pose).compose(solid.pose), solid.name)
@@ -44,6 +44,6 @@ def _of_shapes(spec: RobotSpec, file: Path | None) -> RobotBody:
         for solid in [part.solid("hull")]
     )
     wheels = wheels_for_drive(spec.drive, spec.mass)
-    even = inertia_of_solids(parts, spec.mass - sum(w.inertia.mass for w in wheels))
-    chassis = MassProperties(even.mass, even.center * (1.0, 1.0, CENTER_OF_MASS_HEIGHT_RATIO), even.tensor)
+    uniform = inertia_of_solids(parts, spec.mass - sum(w.inertia.mass for w in wheels))
+    chassis = MassProperties(uniform.mass, uniform.center * (1.0, 1.0, CENTER_OF_MASS_HEIGHT_RATIO), uniform.tensor)
     return assemble(spec, parts, wheels, chassis)

@@ -1,4 +1,4 @@
-"""Mass, center of mass and moments of inertia of simple shapes, and of things made up of them."""
+"""Mass, center of mass and moments of inertia of simple shapes, and of bodies composed of them."""
 
 import math
 from collections.abc import Sequence
@@ -11,12 +11,12 @@ from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid
 
 Vector = tuple[float, float, float]
 GRAVITY = 9.81
-"""m/s² down."""
+"""Gravitational acceleration in m/s², downwards."""
 
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:
-    """`mass` in kg, `center` of mass in m, and the `tensor` (3, 3) of inertia about that center in kg m²."""
+    """Mass in kg, center of mass in m, and inertia tensor (3, 3) about that center in kg m²."""
 
     mass: float
     center: Array
@@ -40,7 +40,7 @@ class MassProperties:
 
 
 def combine(parts: Sequence[MassProperties]) -> MassProperties:
-    """Rigidly joined parts, given in one frame (parallel axis theorem)."""
+    """Return the properties of rigidly joined parts that are given in one frame (parallel axis theorem)."""
     mass = sum(part.mass for part in parts)
     weighted = np.sum([part.mass * part.center for part in parts], axis=0)
     center = weighted / mass if mass > 0 else np.mean([part.center for part in parts], axis=0)
@@ -49,7 +49,7 @@ def combine(parts: Sequence[MassProperties]) -> MassProperties:
 
 
 def inertia_of_solids(solids: Sequence[Solid], mass: float) -> MassProperties:
-    """Solids of one density that weigh `mass` kg together."""
+    """Return the properties of solids of equal density with a total mass of `mass` kg."""
     volumes = [volume(solid.shape) for solid in solids]
     parts = [
         inertia_of_shape(s.shape, mass * v / sum(volumes)).placed(s.pose) for s, v in zip(solids, volumes, strict=True)
@@ -58,7 +58,7 @@ def inertia_of_solids(solids: Sequence[Solid], mass: float) -> MassProperties:
 
 
 def volume(shape: Shape) -> float:
-    """Volume in m³; of a mesh that of its bounding box, since it need not be closed."""
+    """Return the volume in m³; for a mesh, which may be open, that of its bounding box."""
     match shape:
         case Box(size):
             return math.prod(size)
@@ -126,7 +126,10 @@ def _prism(polygon: Sequence[tuple[float, float]], height: float, mass: float) -
 
 
 def _polygon_moments(polygon: Sequence[tuple[float, float]]) -> tuple[float, float, float, float, float, float]:
-    """Area, centroid x and y, and ∫x², ∫y², ∫xy over a simple polygon (Steger, On the calculation of moments, 1996)."""
+    """Return area, centroid x and y, and ∫x², ∫y², ∫xy over a simple polygon.
+
+    (Steger, On the calculation of arbitrary moments of polygons, 1996.)
+    """
     x, y = np.array(polygon).T
     u, v = np.roll(x, -1), np.roll(y, -1)
     cross = x * v - u * y
@@ -144,15 +147,15 @@ def _polygon_moments(polygon: Sequence[tuple[float, float]]) -> tuple[float, flo
 
 
 def _quaternion(rotation: Array) -> tuple[float, float, float, float]:
-    """(x, y, z, w) of a rotation matrix (Shepperd 1978): divide by the largest component."""
-    trace = np.array([*np.diag(rotation), np.trace(rotation)])
-    k = int(np.argmax(trace))
+    """Return (x, y, z, w) of a rotation matrix, dividing by the largest component (Shepperd 1978)."""
+    diagonal_and_trace = np.array([*np.diag(rotation), np.trace(rotation)])
+    k = int(np.argmax(diagonal_and_trace))
     if k == 3:
-        q = np.array([*_skew(rotation), 1 + trace[3]])
+        q = np.array([*_skew(rotation), 1 + diagonal_and_trace[3]])
     else:
         i, j = (k + 1) % 3, (k + 2) % 3
         q = np.empty(4)
-        q[k] = 1 - trace[3] + 2 * rotation[k, k]
+        q[k] = 1 - diagonal_and_trace[3] + 2 * rotation[k, k]
         q[i], q[j] = rotation[i, k] + rotation[k, i], rotation[j, k] + rotation[k, j]
         q[3] = _skew(rotation)[k]
     x, y, z, w = (q / np.linalg.norm(q)).tolist()

@@ -1,4 +1,4 @@
-"""What robots and things cover of the ground."""
+"""Outlines of solids seen from above: footprints, convex hulls, and the points that span them."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -11,9 +11,9 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 
 MIN_POINTS_TO_FILTER = 200
-"""Points up to which it does not pay to look which of them may be corners."""
-_CIRCLE = 64
-"""Corners of a circle's outline: within 0.03 % of the radius."""
+"""Number of points above which a convex hull first discards points inside of the extreme ones."""
+_CIRCLE_CORNERS = 64
+"""Number of corners that approximate a circle, within 0.03 % of the radius."""
 
 
 def circle(radius: float, corners: int = 32) -> Polygon:
@@ -34,7 +34,7 @@ def outlines_in_band(solids: Iterable[Solid], z_range: tuple[float, float]) -> l
 
 @cached_on_instance
 def _outline(shape: Shape, pose: Pose3, z_range: tuple[float, float]) -> Polygon:
-    """None (no corners) if it does not reach into the heights. Of a row of chairs it is one for all of them."""
+    """Return an empty outline if the shape is out of range; the cache serves repeated shapes, such as chairs."""
     corners = pose.apply(hull_points(shape))
     if corners[:, 2].min() >= z_range[1] or corners[:, 2].max() <= z_range[0]:
         return ()
@@ -48,7 +48,7 @@ def _bottom(corners: Array) -> Polygon:
 
 
 def hull_points(shape: Shape) -> Array:
-    """Points (n, 3) whose convex hull is that of the shape; round ones within 0.1 % of the radius."""
+    """Return points (n, 3) whose convex hull is that of the shape, for round shapes within 0.1 % of the radius."""
     match shape:
         case Box(size):
             return np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]) * size
@@ -70,32 +70,32 @@ def hull_points(shape: Shape) -> Array:
 
 
 def radius_and_height(solids: Iterable[Solid]) -> tuple[float, float]:
-    """How far solids extend from the z axis, and how high above or below the origin, in meters."""
+    """Return the largest distance from the z axis and the largest height above or below the origin, in meters."""
     points = np.concatenate([solid.pose.apply(hull_points(solid.shape)) for solid in solids])
     return float(np.hypot(points[:, 0], points[:, 1]).max()), float(np.abs(points[:, 2]).max())
 
 
 def convex_hull(points: Array) -> Polygon:
     """Return the convex hull of points (n, 2), counterclockwise (Andrew's monotone chain, 1979)."""
-    ordered = sorted({(round(x, 9), round(y, 9)) for x, y in _outer(points).tolist()})
+    ordered = sorted({(round(x, 9), round(y, 9)) for x, y in _without_inner_points(points).tolist()})
     if len(ordered) < 3:
         return tuple(ordered)
     return (*_chain(ordered)[:-1], *_chain(ordered[::-1])[:-1])
 
 
-def _outer(points: Array) -> Array:
-    """Without most of those that are no corners: they lie inside of what spans the outermost (Akl, Toussaint 1978)."""
+def _without_inner_points(points: Array) -> Array:
+    """Discard most points inside of the polygon of the extreme points (Akl and Toussaint 1978)."""
     if len(points) < MIN_POINTS_TO_FILTER:
         return points
     angles = np.arange(32) * (math.pi / 16)
-    outermost = (points @ np.array([np.cos(angles), np.sin(angles)])).argmax(axis=0)
-    ring = points[outermost]
+    extremes = (points @ np.array([np.cos(angles), np.sin(angles)])).argmax(axis=0)
+    ring = points[extremes]
     sides = np.roll(ring, -1, axis=0) - ring
     across = (points @ np.array([-sides[:, 1], sides[:, 0]])) - (ring[:, 1] * sides[:, 0] - ring[:, 0] * sides[:, 1])
     inside = ((across > 1e-6) | (np.abs(sides).sum(axis=1) == 0.0)).all(axis=1)
-    inside[outermost] = False
-    kept: Array = points[~inside]
-    return kept
+    inside[extremes] = False
+    outer: Array = points[~inside]
+    return outer
 
 
 def _chain(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -115,16 +115,16 @@ def _ring(radius: float, z: float) -> Array:
 
 
 def _rings(radii: Array, heights: Array) -> Array:
-    """Points of level circles about the z axis, one after the other."""
-    angles = np.arange(_CIRCLE) * (2 * math.pi / _CIRCLE)
-    points = np.empty((len(radii), _CIRCLE, 3))
+    """Return the points (n, 3) of horizontal circles around the z axis, circle by circle."""
+    angles = np.arange(_CIRCLE_CORNERS) * (2 * math.pi / _CIRCLE_CORNERS)
+    points = np.empty((len(radii), _CIRCLE_CORNERS, 3))
     points[:, :, 0], points[:, :, 1] = np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))
     points[:, :, 2] = heights[:, None]
     return points.reshape(-1, 3)
 
 
 def _ball(radii: tuple[float, float, float]) -> Array:
-    latitudes = np.linspace(-math.pi / 2, math.pi / 2, _CIRCLE // 2 + 1).tolist()
+    latitudes = np.linspace(-math.pi / 2, math.pi / 2, _CIRCLE_CORNERS // 2 + 1).tolist()
     rings = [(max(0.0, math.cos(latitude)), math.sin(latitude)) for latitude in latitudes]
     result: Array = _rings(*np.array(rings).T) * radii
     return result

@@ -19,12 +19,12 @@ from simscen.sim.body.undercarriage import Wheel, add_casters, add_motors, wheel
 
 @dataclass(frozen=True, eq=False)
 class RobotBody:
-    """Everything needed to build a robot, in its base frame: on the ground under the middle of its axle.
+    """Everything needed to build a robot, in its base frame: on the ground below the center of its axle.
 
-    `hull` and `casters` touch obstacles, the hull with the coefficient `hull_friction`; `casters` also glide on the
-    ground without friction; wheels only roll on it.
-    `chassis` is the mass of all but the wheels; `power` is the share of their force that its motors have. `footprint`
-    is anticlockwise; `radius` is set for a round robot.
+    `hull` and `casters` collide with obstacles, the hull with the friction coefficient `hull_friction`; `casters` also
+    slide on the ground without friction, and wheels only roll on it. `chassis` has the mass of everything except the
+    wheels; `power` is the share of their nominal force that the motors deliver. `footprint` is counterclockwise;
+    `radius` is set for a round robot.
     """
 
     name: str
@@ -41,29 +41,29 @@ class RobotBody:
 
     @property
     def mass(self) -> float:
-        """Of the whole robot in kg."""
+        """Mass of the whole robot in kg."""
         return self.chassis.mass + sum(wheel.inertia.mass for wheel in self.wheels)
 
     @property
     def solid(self) -> tuple[Solid, ...]:
-        """What can touch an obstacle, in the order in which the engine gets it."""
+        """Solids that collide with obstacles, in the order in which the engine receives them."""
         return (*self.casters, *self.hull)
 
     @property
     def tires(self) -> tuple[Solid, ...]:
-        """What wheels roll on the ground with: balls."""
+        """Spheres with which the wheels roll on the ground."""
         return tuple(Solid(Sphere(wheel.radius), Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in self.wheels)
 
     @property
     def circumscribed_radius(self) -> float:
-        """The smallest circle around the base's origin that holds the footprint, in meters."""
+        """Radius in m of the smallest circle around the base frame's origin that contains the footprint."""
         return max(math.hypot(x, y) for x, y in self.footprint)
 
 
 def assemble(
     spec: RobotSpec, parts: tuple[Solid, ...], wheels: tuple[Wheel, ...], chassis: MassProperties
 ) -> RobotBody:
-    """Put a hull on wheels: casters where two wheels would let it fall, and a footprint where none is given."""
+    """Return a body of a hull and wheels; adds casters to a differential drive, and a footprint if none is given."""
     hull = (*parts, *(guard for wheel in wheels for guard in wheel_guards(wheel, parts)))
     outline = footprint(hull)
     casters: tuple[Solid, ...] = ()
@@ -72,11 +72,11 @@ def assemble(
     given = None if spec.footprint is None else tuple((x, y) for x, y in spec.footprint)
     corners = circle(spec.radius) if spec.radius is not None else given or outline
     wheels = add_motors(wheels, spec.drive, chassis.mass + sum(wheel.inertia.mass for wheel in wheels))
-    return RobotBody(spec.name, hull, casters, wheels, chassis, _anticlockwise(corners), spec.radius, spec.drive,
+    return RobotBody(spec.name, hull, casters, wheels, chassis, _counterclockwise(corners), spec.radius, spec.drive,
                      spec.limits, spec.hull_friction)  # fmt: skip
 
 
-def _anticlockwise(polygon: Polygon) -> Polygon:
+def _counterclockwise(polygon: Polygon) -> Polygon:
     ends = (*polygon[1:], polygon[0])
     area = sum(ax * by - bx * ay for (ax, ay), (bx, by) in zip(polygon, ends, strict=True))
     return polygon if area > 0 else polygon[::-1]
@@ -98,7 +98,7 @@ def scale_motor_torque(body: RobotBody, share: float) -> RobotBody:
 
 
 def hull_height(body: RobotBody) -> float:
-    """How high the hull is, in m."""
+    """Return the height of the top of the hull above the ground in m."""
     return max(float(solid.pose.apply(hull_points(solid.shape))[:, 2].max()) for solid in body.hull)
 
 
@@ -110,14 +110,14 @@ def center_of_mass(body: RobotBody) -> Vector:
 
 
 def is_stable(body: RobotBody) -> bool:
-    """Whether its center of mass is above what its wheels and casters span; a base without wheels never tips."""
-    feet = [(wheel.x, wheel.y) for wheel in body.wheels] + [(c.pose.x, c.pose.y) for c in body.casters]
+    """Return whether the center of mass is above the support polygon; a base without wheels never tips."""
+    points = [(wheel.x, wheel.y) for wheel in body.wheels] + [(c.pose.x, c.pose.y) for c in body.casters]
     x, y, _ = center_of_mass(body)
-    return len(feet) < 3 or body.drive.type == "mecanum" or polygon_contains(convex_hull(np.array(feet)), (x, y))
+    return len(points) < 3 or body.drive.type == "mecanum" or polygon_contains(convex_hull(np.array(points)), (x, y))
 
 
 MIN_GROUND_CLEARANCE_M = 0.005
-"""m that a hull must be above the ground."""
+"""Minimum height in m of a hull above the ground."""
 
 
 def check_ground_clearance(spec: RobotSpec, file: Path | None) -> None:
@@ -129,9 +129,11 @@ def check_ground_clearance(spec: RobotSpec, file: Path | None) -> None:
         raise InvalidInput([Problem(str(file or spec.name), 0, 0, "SC401", message, hint)])
 
 
-# A larger robot would make maps and footprints of the stack exhaust memory and time.
 MAX_EXTENT_M = 10.0
-"""m from the base, across and in height; the largest vehicles in ports are 15 m long."""
+"""Largest extent of a robot from its base frame in m; the largest vehicles in ports are 15 m long.
+
+Maps and footprints of a larger robot would exhaust memory and time.
+"""
 
 
 def check_robot_size(body: RobotBody, file: Path | None) -> None:

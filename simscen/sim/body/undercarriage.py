@@ -1,4 +1,4 @@
-"""Wheels, casters and motors: what a hull stands on."""
+"""Wheels, casters, and motors below the hull of a robot."""
 
 import math
 from collections.abc import Sequence
@@ -12,34 +12,35 @@ from simscen.sim.body.inertia import GRAVITY, MassProperties, inertia_of_shape
 from simscen.sim.body.outline import footprint
 
 WHEEL_MASS_SHARE = 0.03
-"""A wheel's share of the mass, where nobody says: those of a TurtleBot3 and of a Jackal weigh 2 to 3 %."""
+"""Default mass of a wheel relative to that of the robot; the wheels of a TurtleBot3 and of a Jackal have 2 to 3 %."""
 ROTOR_INERTIA = {"differential": 0.25, "ackermann": 0.25, "skid_steer": 0.5}
-"""Rotor inertia of a wheel's motor as seen through the gear, in units of robot mass x wheel radius².
+"""Rotor inertia of a wheel's motor at the output of its gear, in units of robot mass x wheel radius².
 
-The square of the gear ratio makes it far larger than that of the wheel itself. It also is what lets ten solver
-iterations converge: without it a resting robot creeps at 1.1 mm/s, with it at 2 µm/s. Where wheels skid it keeps
-friction nearer to opposite to the slip, as Coulomb has it; yet a rotor that is spun up turns the chassis the other
-way, and with 1.0 a Jackal somersaults at 5 m/s².
+It grows with the square of the gear ratio and is far larger than the inertia of the wheel. It also lets ten solver
+iterations converge: without it, a robot at rest creeps at 1.1 mm/s, with it at 2 µm/s. For skidding wheels, friction
+is then closer to opposite to the slip (Coulomb). A larger inertia would tip the robot: the reaction torque of an
+accelerating rotor turns the chassis, and with 1.0 a Jackal flips over at 5 m/s².
 """
 STALL_TORQUE = {"differential": 0.7, "ackermann": 0.7, "skid_steer": 1.5}
-"""Stall torque of a motor over what spins its wheel on the spot.
+"""Stall torque of a motor relative to the torque at which its wheel spins on the spot.
 
-Differential drives stall against a wall rather than spin; skid steering needs more than its grip, to start the
-rotors as well.
+A differential drive stalls against a wall rather than spinning its wheels; skid steering needs more than the friction
+torque, because it also accelerates the rotors.
 """
 MASS_OFFSET_SHARE = 0.1
-"""How far behind the axle the mass of a symmetric robot sits, as a fraction of the way to the caster.
+"""Distance of the center of mass of a symmetric robot behind the axle, relative to the distance of the caster.
 
-With the mass exactly over the axle the robot rocks between its casters and the load on the wheels is left to the
-solver: they then slip 4 % when accelerating with 1 m/s², instead of 0.1 %.
+With the center of mass exactly above the axle, the robot would rock between its casters and the solver would decide the
+load on the wheels: they slip by 4 % when accelerating with 1 m/s², instead of 0.1 %.
 """
 CASTER_GAP_M = 0.001
-"""How far the unloaded caster hangs above the ground in m."""
+"""Height of the unloaded caster above the ground in m."""
 UNEVEN_CASTER_GAP_RATIO = math.tan(math.radians(8))
-"""How far the unloaded caster hangs on uneven ground, over its distance from the axle.
+"""Height of the unloaded caster above uneven ground, relative to its distance from the axle.
 
-Wheels between two rigid casters hang in the air at the foot of a ramp. Real bases have sprung ones, or sprung wheels;
-here the loaded caster and the wheels stand on the ground, and the other catches a robot that tips by 8°.
+Between two rigid casters, wheels would lose contact with the ground at the foot of a ramp. Real bases have suspended
+casters or wheels; here, the loaded caster and the wheels stand on the ground, and the other caster supports a robot
+that tips by 8°.
 """
 
 
@@ -63,7 +64,7 @@ class Wheel:
 
     @property
     def left(self) -> bool:
-        """On which side it is."""
+        """Whether it is on the left side."""
         return self.y > 0
 
 
@@ -119,11 +120,11 @@ def wheel_guards(wheel: Wheel, parts: Sequence[Solid]) -> tuple[Solid, ...]:
     box = Solid(
         Box((2 * wheel.radius, wheel.width, 1.2 * wheel.radius)), Pose3(wheel.x, wheel.y, wheel.radius), "wheel"
     )
-    hidden = any(_holds(footprint([part]), footprint([box])) for part in parts)
+    hidden = any(_contains(footprint([part]), footprint([box])) for part in parts)
     return () if hidden else (box,)
 
 
-def _holds(outer: Polygon, inner: Polygon) -> bool:
+def _contains(outer: Polygon, inner: Polygon) -> bool:
     edges = list(zip(outer, (*outer[1:], outer[0]), strict=True))
     return all((bx - ax) * (y - ay) - (by - ay) * (x - ax) >= -1e-6 for (ax, ay), (bx, by) in edges for x, y in inner)
 
@@ -131,7 +132,10 @@ def _holds(outer: Polygon, inner: Polygon) -> bool:
 def add_casters(
     chassis: MassProperties, outline: Polygon, wheel_radius: float
 ) -> tuple[MassProperties, tuple[Solid, ...]]:
-    """Balls before and behind the axle; the mass leans on one of them, the other hangs a hair above the ground."""
+    """Add casters in front of and behind the axle: one carries weight, the other ends just above the ground.
+
+    Returns the chassis, with its center of mass shifted towards the loaded caster if needed, and the casters.
+    """
     radius = 0.5 * wheel_radius
     front = 0.9 * (max(x for x, _ in outline) - radius)
     rear = 0.9 * (min(x for x, _ in outline) + radius)
@@ -145,7 +149,7 @@ def add_casters(
 
 
 def compliant_casters(casters: Sequence[Solid]) -> tuple[Solid, ...]:
-    """Return the casters for uneven ground, where the unloaded one yields."""
+    """Return the casters for uneven ground, where the unloaded one is higher."""
     return tuple(_raised(caster) if caster_gap(caster) > 0 else caster for caster in casters)
 
 
@@ -155,6 +159,6 @@ def _raised(caster: Solid) -> Solid:
 
 
 def caster_gap(caster: Solid) -> float:
-    """How far above the ground a caster hangs on level ground, in m."""
+    """Return the height of a caster above level ground in m."""
     assert isinstance(caster.shape, Sphere)
     return round(caster.pose.z - caster.shape.radius, 9)

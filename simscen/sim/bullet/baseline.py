@@ -1,4 +1,4 @@
-"""PyBullet as one would use it without simscen: what a run is compared with in `simscen bench`."""
+"""Plain PyBullet without simscen, for comparison in `simscen bench`."""
 
 from collections.abc import Sequence
 
@@ -14,9 +14,9 @@ from simscen.sim.robots.wheeled_base import WheeledBase
 
 
 class PyBulletBaseline:
-    """A robot at rest among static obstacles, stepped and scanned with nothing but PyBullet.
+    """A robot at rest among static obstacles, stepped and scanned with PyBullet only.
 
-    The obstacles are one fused mesh, or, given as solids, one body each.
+    The obstacles are one fused mesh, or one body for each solid.
     """
 
     def __init__(
@@ -24,38 +24,38 @@ class PyBulletBaseline:
     ) -> None:
         self._client = client = pybullet.connect(pybullet.DIRECT)
         engine.set_physics_parameters(client, 240, 10)
-        ground = self._stand(pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
+        ground = self._create_body(pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
         engine.set_collision_filter(client, ground, -1, engine.GROUND, engine.EVERYTHING)
         if isinstance(static, TriangleMesh):
-            for lot in engine.tiles(static.vertices, engine.above_floor(static.vertices, static.faces)):
-                mesh = self._stand(engine.concave_shape(client, submesh(static.vertices, lot)))
+            for tile in engine.tiles(static.vertices, engine.above_floor(static.vertices, static.faces)):
+                mesh = self._create_body(engine.concave_shape(client, submesh(static.vertices, tile)))
                 pybullet.changeDynamics(mesh, -1, collisionMargin=0.0, physicsClientId=client)
         else:
             for solid in static:
-                self._stand(engine.body_shape(client, [solid], False, triangulate))
+                self._create_body(engine.body_shape(client, [solid], False, triangulate))
         WheeledBase(self._client, robot, pose)
         self._pose = pose
 
-    def _stand(self, shape: int) -> int:
+    def _create_body(self, shape: int) -> int:
         """Create a static body with PyBullet's defaults; `engine.create_static_body` makes a faster one."""
         return engine.create_rigid_body(self._client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
 
     def step(self, ticks: int) -> None:
-        """Step and nothing else."""
+        """Simulate `ticks` ticks."""
         for _ in range(ticks):
             pybullet.stepSimulation(self._client)
 
-    def scan(self, directions: Array, least: float, reach: float, height: float) -> None:
-        """Cast rays along `directions` (n, 2), of length 1, between two ranges.
+    def scan(self, directions: Array, min_range: float, max_range: float, height: float) -> None:
+        """Cast rays along unit vectors (n, 2) between two ranges in m.
 
-        From the least on, as one does it so that no ray begins in the lidar's own housing: there PyBullet would try
-        each against it, which is a third of the time that a scan takes.
+        As is usual, rays start outside of the lidar's own housing: inside of it, PyBullet would test each ray against
+        it, which takes a third of the time of a scan.
         """
-        here = (self._pose.x, self._pose.y)
+        origin = (self._pose.x, self._pose.y)
         starts, ends = np.full((2, len(directions), 3), height)
-        starts[:, :2], ends[:, :2] = here + least * directions, here + reach * directions
+        starts[:, :2], ends[:, :2] = origin + min_range * directions, origin + max_range * directions
         pybullet.rayTestBatch(starts.tolist(), ends.tolist(), physicsClientId=self._client)
 
     def close(self) -> None:
-        """Leave the engine."""
+        """Disconnect from the engine."""
         pybullet.disconnect(self._client)

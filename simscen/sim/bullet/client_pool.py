@@ -1,6 +1,6 @@
-"""Clients of PyBullet with nothing in them but the ground: made once for all forks of a process, or used again.
+"""Pool of PyBullet clients that contain only the ground plane, created before a process forks, or reused.
 
-To make one takes 20 ms, for it touches 37 MB; to empty one and lay its ground anew takes 3.
+Creating a client takes 20 ms, because it touches 37 MB; resetting one takes 3 ms.
 """
 
 import pybullet
@@ -8,47 +8,47 @@ import pybullet
 from simscen.sim.bullet import engine
 
 MAX_FREE_CLIENTS = 2
-"""Clients that a run of one robot on even ground has."""
+"""Number of clients that a run with one robot on flat ground uses."""
 
 
 class ClientPool:
-    """Hands out clients and takes them back."""
+    """Lends clients and takes them back."""
 
     def __init__(self) -> None:
         self._free: list[int] = []
-        self._once = False
+        self._is_single_use = False
 
-    def make_ahead(self) -> None:
-        """Make now what a run asks for, in a process whose forks have one run each."""
-        self._once = True
+    def create_in_advance(self) -> None:
+        """Create the clients of a run in advance, in a process that forks for each run."""
+        self._is_single_use = True
         while len(self._free) < MAX_FREE_CLIENTS:
-            self._free.append(_grounded(_connected()))
+            self._free.append(_add_ground(_connect()))
 
     def take(self) -> int:
         """Return a client that contains only the plane z = 0; its parameters are undefined."""
-        return self._free.pop() if self._free else _grounded(_connected())
+        return self._free.pop() if self._free else _add_ground(_connect())
 
-    def give_back(self, client: int) -> None:
-        """Nobody uses it any more. Of what was in it nothing is left: its world and solver are made anew."""
-        if self._once or len(self._free) == MAX_FREE_CLIENTS:
+    def release(self, client: int) -> None:
+        """Take back a client that is no longer used, and reset its world and solver."""
+        if self._is_single_use or len(self._free) == MAX_FREE_CLIENTS:
             pybullet.disconnect(client)
         else:
             pybullet.resetSimulation(physicsClientId=client)
-            self._free.append(_grounded(client))
+            self._free.append(_add_ground(client))
 
 
 CLIENT_POOL = ClientPool()
-"""Those of this process."""
+"""Client pool of this process."""
 
 
-def _connected() -> int:
+def _connect() -> int:
     client: int = pybullet.connect(pybullet.DIRECT)
     if client < 0:
         raise RuntimeError("PyBullet has no free client left")
     return client
 
 
-def _grounded(client: int) -> int:
+def _add_ground(client: int) -> int:
     ground = engine.create_ground_plane(client, engine.invisible_shape(client))
     engine.set_collision_filter(client, ground, -1, engine.GROUND, engine.EVERYTHING)
     return client

@@ -1,21 +1,20 @@
-"""What the engine has lost: fallen through the floor, hurled away, or nowhere at all."""
+"""Detects bodies whose simulation has diverged: below the floor, too far away, or with a non-finite pose."""
 
 import math
 
 MAX_SUNK_DEPTH_M = 0.2
-"""m below the floor at which the center of a thing has fallen through it.
+"""Depth in m below the floor at which the center of a body has fallen through it.
 
-What lands sinks in by millimeters; a light thing that a scripted one presses down on is held up to 7 cm below.
+A landing body penetrates by millimeters, a light body that a scripted one presses down by up to 7 cm.
 """
 MAX_COORDINATE_M = 1e5
-"""m from the origin of the world at which nothing can be any more: worlds reach to 10 km."""
+"""Largest valid coordinate in m; worlds extend to 10 km."""
 
 
 def divergence_reason(what: str, x: float, y: float, z: float, others: float) -> str | None:
-    """Why something whose center is at a place in the world cannot be right, or None.
+    """Return why the position of the center of a body is invalid, or None.
 
-    `others` is the sum of more numbers that have to be finite, such as its velocity: one that is not leaves no sum
-    that is.
+    `others` is the sum of further numbers that must be finite, such as its velocity: it is finite only if all are.
     """
     if (
         -MAX_SUNK_DEPTH_M <= z <= MAX_COORDINATE_M
@@ -25,7 +24,7 @@ def divergence_reason(what: str, x: float, y: float, z: float, others: float) ->
     ):
         return None
     if not math.isfinite(x + y + z + others):
-        return f"{what} is nowhere: its pose is not finite"
+        return f"{what} has a pose that is not finite"
     if z < -MAX_SUNK_DEPTH_M:
         return f"{what} is below the floor, at z = {z:.2f} m"
     return f"{what} has left the world, to ({x:.4g}, {y:.4g}, {z:.4g})"

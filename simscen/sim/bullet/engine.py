@@ -1,4 +1,4 @@
-"""PyBullet itself: a client with every parameter set, and collision shapes from solids."""
+"""Functions on PyBullet clients: physics parameters, collision shapes of solids, and bodies."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -16,40 +16,42 @@ from simscen.sim.bullet.hull_vertices import reduce_hull_vertices
 MAX_FACES_PER_SHAPE = 40_000
 """Bullet's shared-memory commands hold at most 131072 vertices and 524288 indices."""
 STRIP_WIDTH_M = 20.0
-"""m of x that lie together in one lot of faces."""
+"""Width in m along x of the strips by which faces are sorted into tiles."""
 CONTACT_BREAKING_SHARE = 0.02
-"""Share of a shape's extent within which a point of contact is the one of the step before."""
+"""Share of a shape's extent by which a contact point may move in a step and still count as the same point."""
 REST_SPEED_SQUARED = 1e-6
-"""(m/s)² below which a body is at rest; Bullet's own 0.05 would stop a ball that rolls at 0.2 m/s."""
+"""Squared speed in (m/s)² below which a body is at rest; Bullet's default of 0.05 would stop a ball at 0.2 m/s."""
 SLEEP_DELAY_S = 2.0
-"""Seconds at rest after which Bullet lets a body lie until it is touched (btMultiBody's SLEEP_TIMEOUT)."""
+"""Time in s at rest after which Bullet puts a body to sleep until it is touched (btMultiBody's SLEEP_TIMEOUT)."""
 
 TERRAIN, GROUND, HULL, WHEEL, STATIC = 128, 64, 32, 16, 2
-"""Collision groups of uneven ground, of the plane, of a robot's parts, and Bullet's own of what nothing pushes."""
+"""Collision groups: uneven ground, ground plane, hull and wheels of robots, and Bullet's own group of static bodies."""
 NOTHING, EVERYTHING = 0, -1
 DEFAULT_VISUAL = -1
-"""The look of a body that the renderer shows as the shape that it is; of most triangles it shows nothing."""
+"""Visual shape that equals the collision shape; the renderer does not show most triangle meshes."""
 
 ORIGIN = Pose3()
 
 PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
-"""What the engine knows as such."""
+"""Shapes that the engine supports as primitives."""
 
 Triangulate = Callable[[Shape], Mesh]
 Frame = tuple[tuple[float, float, float], Pose3]
 Faces = npt.NDArray[np.int32]
 
 
-def set_physics_parameters(client: int, tick_rate: int, solver_iterations: int, one_by_one: bool = False) -> None:
-    """Set every parameter, so that no default decides a trajectory.
+def set_physics_parameters(
+    client: int, tick_rate: int, solver_iterations: int, solve_islands_separately: bool = False
+) -> None:
+    """Set all parameters, so that no trajectory depends on a default.
 
-    `one_by_one`: what touches nothing in common is solved apart, so that it does not matter what else is in the world.
+    With `solve_islands_separately`, bodies that are not in contact do not affect each other's solution.
     """
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=1 / tick_rate,
         numSolverIterations=solver_iterations,
         numSubSteps=0,
-        # Stopping at 1e-4 would spare 8 % of a step, but robots on four wheels then creep by 0.1 mm/s.
+        # 1e-4 would save 8 % of a step, but robots on four wheels would then creep by 0.1 mm/s.
         solverResidualThreshold=1e-7,
         erp=0.2,
         contactERP=0.2,
@@ -66,7 +68,7 @@ def set_physics_parameters(client: int, tick_rate: int, solver_iterations: int, 
         allowedCcdPenetration=0.04,
         jointFeedbackMode=0,
         constraintSolverType=pybullet.CONSTRAINT_SOLVER_LCP_SI,
-        minimumSolverIslandSize=1 if one_by_one else 128,
+        minimumSolverIslandSize=1 if solve_islands_separately else 128,
         reportSolverAnalytics=0,
         enableSAT=0,
         physicsClientId=client,
@@ -80,17 +82,17 @@ def set_collision_filter(client: int, body: int, link: int, group: int, others: 
 
 
 def static_mesh(client: int, mesh: TriangleMesh) -> list[int]:
-    """Create static geometry as few bodies: concave meshes without the faces that lie on the ground."""
+    """Create static geometry as a few concave bodies, without the faces that lie on the ground."""
     return static_faces(client, mesh.vertices, above_floor(mesh.vertices, mesh.faces))
 
 
 def static_faces(client: int, vertices: Array, faces: Faces) -> list[int]:
-    """Faces that never move, as few bodies."""
-    return [_concave(client, vertices, tile) for tile in tiles(vertices, faces)]
+    """Create static faces as a few concave bodies."""
+    return [_create_concave_body(client, vertices, tile) for tile in tiles(vertices, faces)]
 
 
 def tiles(vertices: Array, faces: Faces) -> list[Faces]:
-    """Faces in as many lots as Bullet takes at once; those of a lot lie together, in strips and from end to end."""
+    """Split faces into tiles that are small enough for Bullet; the faces of a tile are close together."""
     if len(faces) > MAX_FACES_PER_SHAPE:
         middle = vertices[faces, :2].mean(axis=1)
         faces = faces[np.lexsort((middle[:, 1], np.floor(middle[:, 0] / STRIP_WIDTH_M)))]
@@ -98,12 +100,12 @@ def tiles(vertices: Array, faces: Faces) -> list[Faces]:
 
 
 def above_floor(vertices: Array, faces: Faces) -> Faces:
-    """Those faces that do not lie on the ground."""
-    standing: Faces = faces[(vertices[faces, 2] > FLOOR_HEIGHT_M).any(axis=1)]
-    return standing
+    """Return the faces that do not lie on the ground."""
+    above: Faces = faces[(vertices[faces, 2] > FLOOR_HEIGHT_M).any(axis=1)]
+    return above
 
 
-def _concave(client: int, vertices: Array, faces: Faces) -> int:
+def _create_concave_body(client: int, vertices: Array, faces: Faces) -> int:
     body = create_static_body(client, concave_shape(client, submesh(vertices, faces)))
     # Bullet would thicken the triangles by 1 mm.
     pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
@@ -111,7 +113,7 @@ def _concave(client: int, vertices: Array, faces: Faces) -> int:
 
 
 def concave_shape(client: int, mesh: Mesh) -> int:
-    """Triangles as they are."""
+    """Create the shape of a triangle mesh."""
     vertices, indices = mesh.vertices.tolist(), mesh.faces.ravel().tolist()
     shape: int = pybullet.createCollisionShape(
         pybullet.GEOM_MESH,
@@ -120,39 +122,39 @@ def concave_shape(client: int, mesh: Mesh) -> int:
         flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
         physicsClientId=client,
     )
-    # PyBullet holds on to these lists for ever; 80 MB for a map of 220 000 triangles.
-    for emptied in (*vertices, vertices, indices):
-        emptied.clear()
-    return _made(shape)
+    # PyBullet never releases these lists, which take 80 MB for a map of 220 000 triangles.
+    for values in (*vertices, vertices, indices):
+        values.clear()
+    return _checked_shape(shape)
 
 
 def convex_shape(client: int, corners: Array) -> int:
     """Create the shape of the convex hull of points (n, 3)."""
     shape: int = pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=corners.tolist(), physicsClientId=client)
-    return _made(shape)
+    return _checked_shape(shape)
 
 
 def compound_shape(client: int, solids: Iterable[Solid]) -> int:
-    """One rigid shape of boxes, cylinders, balls and capsules."""
-    kinds, halves, radii, lengths, places, turns = [], [], [], [], [], []
+    """Create one rigid shape of boxes, cylinders, spheres, and capsules."""
+    kinds, halves, radii, lengths, positions, orientations = [], [], [], [], [], []
     for solid in solids:
         kind, half, radius, length = _primitive(solid.shape)
         kinds.append(kind)
         halves.append(half)
         radii.append(radius)
         lengths.append(length)
-        places.append(solid.pose.position)
-        turns.append(solid.pose.quaternion)
+        positions.append(solid.pose.position)
+        orientations.append(solid.pose.quaternion)
     shape: int = pybullet.createCollisionShapeArray(
         shapeTypes=kinds,
         halfExtents=halves,
         radii=radii,
         lengths=lengths,
-        collisionFramePositions=places,
-        collisionFrameOrientations=turns,
+        collisionFramePositions=positions,
+        collisionFrameOrientations=orientations,
         physicsClientId=client,
     )
-    return _made(shape)
+    return _checked_shape(shape)
 
 
 def hull_shape(client: int, solids: Iterable[Solid]) -> int:
@@ -183,12 +185,12 @@ def body_shape(client: int, solids: Sequence[Solid], pushable: bool, triangulate
 
 
 def is_hollow(solids: Sequence[Solid], pushable: bool) -> bool:
-    """Whether the collision shape of something that moves is a surface without an inside."""
+    """Return whether the collision shape of a moving object is a surface without an inside."""
     return not are_primitives(solids) and not pushable
 
 
 def are_primitives(solids: Sequence[Solid]) -> bool:
-    """Whether the engine knows all of them as such."""
+    """Return whether all solids are primitives of the engine."""
     return all(isinstance(solid.shape, PRIMITIVES) for solid in solids)
 
 
@@ -202,7 +204,7 @@ def fuse_surfaces(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
 
 
 def create_rigid_body(
-    client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float, look: int = DEFAULT_VISUAL
+    client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float, visual: int = DEFAULT_VISUAL
 ) -> int:
     """Create a rigid body with a collision shape, a visual shape, and principal moments and center of mass in `frame`.
 
@@ -211,7 +213,7 @@ def create_rigid_body(
     moments, base_from_center = frame
     center = pose.compose(base_from_center)
     number: int = pybullet.createMultiBody(
-        mass, shape, look, pose.position, pose.quaternion,
+        mass, shape, visual, pose.position, pose.quaternion,
         baseInertialFramePosition=base_from_center.position,
         baseInertialFrameOrientation=base_from_center.quaternion, physicsClientId=client,
     )  # fmt: skip
@@ -219,7 +221,7 @@ def create_rigid_body(
         number, -1, lateralFriction=friction, restitution=0.0, linearDamping=0.0, angularDamping=0.0,
         physicsClientId=client,
     )  # fmt: skip
-    if mass == 0:  # Bullet would look at each step for where it touches the ground, though neither moves the other
+    if mass == 0:  # otherwise, Bullet would search for contacts with the ground at each step
         set_collision_filter(client, number, -1, STATIC, ~(STATIC | GROUND | TERRAIN))
         sleeps = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
         pybullet.changeDynamics(number, -1, activationState=sleeps, physicsClientId=client)
@@ -260,7 +262,7 @@ def enable_collisions(client: int, number: int) -> None:
 
 
 def create_static_body(
-    client: int, shape: int, look: int = DEFAULT_VISUAL, pose: Pose3 = ORIGIN, friction: float = 1.0
+    client: int, shape: int, visual: int = DEFAULT_VISUAL, pose: Pose3 = ORIGIN, friction: float = 1.0
 ) -> int:
     """Create a static body. It sleeps, so that objects on it can sleep as well.
 
@@ -268,7 +270,7 @@ def create_static_body(
     multibody as the ground, a step of a robot takes an eighth longer.
     """
     number: int = pybullet.createMultiBody(
-        0.0, shape, look, pose.position, pose.quaternion, useMaximalCoordinates=1, physicsClientId=client
+        0.0, shape, visual, pose.position, pose.quaternion, useMaximalCoordinates=1, physicsClientId=client
     )
     set_collision_filter(client, number, -1, STATIC, ~(STATIC | GROUND | TERRAIN))
     pybullet.changeDynamics(
@@ -278,9 +280,11 @@ def create_static_body(
     return number
 
 
-def create_ground_plane(client: int, look: int = DEFAULT_VISUAL) -> int:
+def create_ground_plane(client: int, visual: int = DEFAULT_VISUAL) -> int:
     """Create the plane z = 0."""
-    return create_static_body(client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client), look)
+    return create_static_body(
+        client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client), visual
+    )
 
 
 def invisible_shape(client: int) -> int:
@@ -289,10 +293,10 @@ def invisible_shape(client: int) -> int:
     By default, Bullet creates a visual shape from each collision shape, which takes a millisecond for a plane.
     """
     corners = [(0.0, 0.0, 0.0), (1e-9, 0.0, 0.0), (0.0, 1e-9, 0.0)]
-    look: int = pybullet.createVisualShape(
+    visual: int = pybullet.createVisualShape(
         pybullet.GEOM_MESH, vertices=corners, indices=[0, 1, 2], physicsClientId=client
     )
-    return look
+    return visual
 
 
 def _primitive(shape: Shape) -> tuple[int, Sequence[float], float, float]:
@@ -309,7 +313,7 @@ def _primitive(shape: Shape) -> tuple[int, Sequence[float], float, float]:
             raise TypeError(f"{type(shape).__name__} is not a primitive of the engine")
 
 
-def _made(shape: int) -> int:
+def _checked_shape(shape: int) -> int:
     if shape < 0:
-        raise RuntimeError("PyBullet refused a collision shape")
+        raise RuntimeError("PyBullet could not create a collision shape")
     return shape

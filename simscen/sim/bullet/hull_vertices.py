@@ -1,4 +1,4 @@
-"""Convex hulls of few corners: what Bullet does with a hull costs time for each of them, at every step."""
+"""Reduces the vertices of convex hulls, because each vertex costs Bullet time at every step."""
 
 from weakref import WeakKeyDictionary
 
@@ -8,30 +8,30 @@ from simscen.core.geometry import Array
 from simscen.core.geometry.shapes import Mesh
 
 MAX_VERTICES = 256
-"""Vertices up to which a mesh is taken as it is."""
+"""Number of vertices above which a mesh is reduced."""
 TOLERANCE_M = 0.001
-"""m that a corner which is left out may stand out of the hull of those that are kept."""
+"""Largest distance in m of an omitted vertex from the reduced hull."""
 
-_known: "WeakKeyDictionary[Mesh, Array]" = WeakKeyDictionary()
+_cache: "WeakKeyDictionary[Mesh, Array]" = WeakKeyDictionary()
 
 
 def reduce_hull_vertices(mesh: Mesh) -> Array:
-    """Vertices (n, 3) of a mesh, in their order, whose convex hull is that of all of them within STANDS_OUT.
+    """Return vertices (n, 3) of a mesh, in order, whose convex hull deviates from that of all by at most TOLERANCE_M.
 
-    Found once for each mesh. Of one in a plane, which has no hull in space, all are kept.
+    The result is cached for each mesh. A planar mesh, which has no hull in space, is not reduced.
     """
     if len(mesh.vertices) <= MAX_VERTICES:
         return mesh.vertices
-    if mesh not in _known:
-        _known[mesh] = _fewest(mesh.vertices)
-    return _known[mesh]
+    if mesh not in _cache:
+        _cache[mesh] = _hull_corners(mesh.vertices)
+    return _cache[mesh]
 
 
-def _fewest(points: Array) -> Array:
+def _hull_corners(points: Array) -> Array:
     from scipy.spatial import ConvexHull, QhullError
 
     try:
-        # Qhull's W: a point that stands out of a facet by less is not taken for one outside.
+        # Qhull's option W: a point that is outside of a facet by less counts as inside.
         hull = ConvexHull(points, qhull_options=f"Qt W{TOLERANCE_M}")
     except QhullError:
         return points

@@ -197,7 +197,7 @@ class StaticDistance:
 
     def close(self) -> None:
         """Release the engine client."""
-        CLIENT_POOL.give_back(self._client)
+        CLIENT_POOL.release(self._client)
 
 
 def max_displacement(before: Pose3, after: Pose3, extent: float) -> float:
