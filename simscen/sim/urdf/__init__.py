@@ -1,1 +1,1 @@
-"""Robots from URDF files: read by ourselves, since Bullet opens whatever a file names and crashes on what it finds."""
+"""Robots from URDF files. Bullet's own reader is not used: it opens any file that a URDF names and can crash."""

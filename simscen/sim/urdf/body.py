@@ -1,4 +1,4 @@
-"""A robot's body from its URDF: everything rigid fused into one hull, wheels where its drive has them."""
+"""Builds the body of a robot from its URDF: all rigid links fused into one hull, and the wheels of its drive."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -21,14 +21,14 @@ from simscen.sim.urdf.wheels import WheelJoint, select_wheels
 from simscen.sim.urdf.xacro.expand import UnknownArgument, expand
 from simscen.sim.urdf.xml_source import CODE, RobotFiles, read_xml
 
-CASTER = 0.35
-"""A caster is smaller than this fraction of the hull's length and width."""
+MAX_CASTER_SIZE_RATIO = 0.35
+"""Largest length and width of a caster relative to those of the hull."""
 
 
 def body_from_urdf(
     spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: RobotFiles | None
 ) -> RobotBody:
-    """Return the body that `spec.urdf` describes, relative to `file` unless it was `found`. Raises InvalidInput."""
+    """Return the body that `spec.urdf` describes, located by `found` or relative to `file`. Raises InvalidInput."""
     return body_from_tree(spec, read_spec_tree(spec, file, roots, read_mesh, found))
 
 
@@ -78,14 +78,14 @@ def body_from_tree(spec: RobotSpec, tree: Tree) -> RobotBody:
         for solid in tree.links[name].solids
     ]
     if not solids:
-        raise InvalidInput([tree.element.problem("no link has a <collision>, so there is nothing to bump into")])
-    base_from_root = _base(joints, solids)
+        raise InvalidInput([tree.element.problem("no link has a <collision>, so nothing of the robot can collide")])
+    base_from_root = _base_from_root(joints, solids)
     hull = tuple(replace(solid, pose=base_from_root.compose(solid.pose)) for solid in solids)
     scale = _scale(spec, tree)
     wheels = tuple(_wheel(tree, joint, base_from_root, scale, spec) for joint in joints)
     if wheels:
-        hull = _off_the_ground(tree, hull)  # an omnidirectional base hovers, whatever its wheels are drawn as
-    return assemble(spec, hull, wheels, _weighed(tree, fixed, base_from_root, scale))
+        hull = _without_casters(tree, hull)  # an omnidirectional base has no ground contact
+    return assemble(spec, hull, wheels, _chassis_mass(tree, fixed, base_from_root, scale))
 
 
 def _check_wheels(spec: RobotSpec, tree: Tree, wheels: list[WheelJoint]) -> None:
@@ -116,23 +116,23 @@ def _check_corners(tree: Tree, wheels: list[WheelJoint]) -> None:
 
 
 def check_front_steering(wheels: Sequence[WheelJoint]) -> None:
-    """Raise InvalidInput for a car whose steered wheels are not ahead of those that drive."""
+    """Raise InvalidInput for a car whose steered wheels are not in front of the driven ones."""
     steered = [wheel for wheel in wheels if wheel.steered]
     if not steered:
         return
     front, rear = (
-        float(np.mean([w.place[0] for w in some])) for some in (steered, [w for w in wheels if not w.steered])
+        float(np.mean([w.place[0] for w in group])) for group in (steered, [w for w in wheels if not w.steered])
     )
     if front <= rear:
         message = (
             f"its steered wheels are {rear - front:.3g} m behind the driven ones: only front steering is simulated"
         )
-        hint = "x must point ahead: turn the root's joint by 180 degrees if the URDF is drawn the other way round"
+        hint = "x must point ahead: rotate the root's joint by 180 degrees if the URDF faces backwards"
         raise InvalidInput([steered[0].joint.element.problem(message, hint)])
 
 
-def _base(wheels: list[WheelJoint], solids: Sequence[Solid]) -> Pose3:
-    """From the root's frame to the base frame: on the ground under the middle of the axle or axles that drive."""
+def _base_from_root(wheels: list[WheelJoint], solids: Sequence[Solid]) -> Pose3:
+    """Return the root frame in the base frame, which is on the ground below the center of the driven axles."""
     if not wheels:
         return Pose3(0.0, 0.0, -min(_lowest(solid) for solid in solids))
     x, y, _ = np.mean([wheel.place for wheel in wheels if not wheel.steered], axis=0).tolist()
@@ -151,11 +151,11 @@ def _scale(spec: RobotSpec, tree: Tree) -> float:
     return spec.mass / total if spec.mass is not None else 1.0
 
 
-def _weighed(tree: Tree, links: Sequence[str], base_from_root: Pose3, scale: float) -> MassProperties:
+def _chassis_mass(tree: Tree, links: Sequence[str], base_from_root: Pose3, scale: float) -> MassProperties:
     masses = [(tree.poses[name], tree.links[name].mass) for name in links]
     parts = [mass.placed(base_from_root.compose(pose)) for pose, mass in masses if mass is not None and mass.mass > 0]
     if not parts:
-        raise InvalidInput([tree.element.problem("nothing but the wheels has a mass")])
+        raise InvalidInput([tree.element.problem("no link besides the wheels has a mass; give one an <inertial>")])
     whole = combine(parts)
     return MassProperties(whole.mass * scale, whole.center, whole.tensor * scale)
 
@@ -176,15 +176,15 @@ def _wheel(tree: Tree, wheel: WheelJoint, base_from_root: Pose3, scale: float, s
     )  # fmt: skip
 
 
-def _off_the_ground(tree: Tree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
-    """Return the hull without casters. Raises InvalidInput when the hull itself would drag over the ground."""
+def _without_casters(tree: Tree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
+    """Return the hull without casters. Raises InvalidInput if the hull itself would drag over the ground."""
     points = [solid.pose.apply(hull_points(solid.shape)) for solid in hull]
     whole = np.ptp(np.concatenate(points)[:, :2], axis=0)
     kept = []
     for solid, corners in zip(hull, points, strict=True):
         if corners[:, 2].min() >= MIN_GROUND_CLEARANCE_M:
             kept.append(solid)
-        elif (np.ptp(corners[:, :2], axis=0) > CASTER * whole).any():
+        elif (np.ptp(corners[:, :2], axis=0) > MAX_CASTER_SIZE_RATIO * whole).any():
             depth = MIN_GROUND_CLEARANCE_M - corners[:, 2].min()
             message = f"link {solid.name!r} reaches {depth:.3f} m too low: it would drag over the ground"
             hint = "its wheels' collision shapes must reach lower than everything else"

@@ -1,4 +1,4 @@
-"""Links and joints of a URDF (wiki.ros.org/urdf/XML), without what is only for the eye."""
+"""Links and joints of a URDF (wiki.ros.org/urdf/XML), without their visual elements."""
 
 import math
 from collections.abc import Callable
@@ -12,17 +12,17 @@ from simscen.assets.uris import PACKAGE_SCHEMES
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
 from simscen.sim.body.inertia import MassProperties
-from simscen.sim.urdf.xml_source import MESH_BYTES, Element, InvalidElement
+from simscen.sim.urdf.xml_source import MAX_MESH_BYTES, Element, InvalidElement
 
-MESH_REACH = 20.0
-"""m along any axis from a mesh's own origin, which need not be in it."""
+MAX_MESH_EXTENT_M = 20.0
+"""Largest coordinate of a mesh in its own frame in m."""
 
 MeshReader = Callable[[Path], Mesh]
 
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A rigid piece: its collision shapes and its mass in its own frame; None = has no mass of its own."""
+    """A rigid link: its collision shapes and mass properties in its own frame; `mass` is None without <inertial>."""
 
     name: str
     solids: tuple[Solid, ...]
@@ -32,7 +32,7 @@ class Link:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """The child's frame in the parent's, and the unit `axis` it turns about in its own frame."""
+    """A joint: `pose` of the child frame in the parent frame, and unit `axis` of motion in the child frame."""
 
     name: str
     type: str
@@ -45,10 +45,10 @@ class Joint:
 
 @dataclass(frozen=True)
 class MeshSource:
-    """Where meshes are looked for, and who reads them.
+    """Folders of meshes, and the function that reads them.
 
-    `read` gives the triangles of a file in meters, and raises ValueError with a sentence when it cannot. `expanded` =
-    the URDF was a xacro file.
+    `read` returns the triangles of a file in meters; raises ValueError for an invalid file. `expanded` tells that the
+    URDF was a xacro file.
     """
 
     folder: Path
@@ -57,40 +57,40 @@ class MeshSource:
     expanded: bool = False
 
     def mesh(self, element: Element) -> Mesh:
-        """Read the mesh of a `<mesh>` element; raises Unusable with its line."""
-        written = element.text("filename")
+        """Read the mesh of a `<mesh>` element; raises InvalidElement with its line."""
+        uri = element.text("filename")
         scale = element.numbers("scale", 3, (1.0, 1.0, 1.0))
         try:
-            path = self.folders.check(self._found(written), MESH_BYTES)
+            path = self.folders.check(self._find(uri), MAX_MESH_BYTES)
             if self.read is None:
                 raise UnusableFile("meshes cannot be read here")
             mesh = self.read(path)
         except (UnusableFile, ValueError) as error:
             hint = error.hint if isinstance(error, UnusableFile) else ""
-            raise InvalidElement(element, f"mesh {written[:200]!r}: {error}", hint) from error
+            raise InvalidElement(element, f"mesh {uri[:200]!r}: {error}", hint) from error
         with np.errstate(over="ignore"):
             vertices = mesh.vertices * np.array(scale)
             farthest = float(np.abs(vertices).max(initial=0.0))
-        if not farthest <= MESH_REACH:
+        if not farthest <= MAX_MESH_EXTENT_M:
             hint = 'is it in millimeters? give it scale="0.001 0.001 0.001"'
             raise InvalidElement(
-                element, f"mesh {written[:200]!r} reaches {farthest:.4g} m, more than {MESH_REACH:g} m", hint
+                element, f"mesh {uri[:200]!r} reaches {farthest:.4g} m, more than {MAX_MESH_EXTENT_M:g} m", hint
             )
         return Mesh(vertices, mesh.faces)
 
-    def _found(self, written: str) -> Path:
+    def _find(self, uri: str) -> Path:
         try:
-            return self.folders.find(written, self.folder, absolute=self.expanded)
+            return self.folders.find(uri, self.folder, absolute=self.expanded)
         except NoSuchFile:
-            if written.startswith(PACKAGE_SCHEMES):  # perhaps there is no such package, which tells more
-                self.folders.package(written.partition("://")[2].partition("/")[0], self.folder)
+            if uri.startswith(PACKAGE_SCHEMES):  # a missing package gives a more helpful error
+                self.folders.package(uri.partition("://")[2].partition("/")[0], self.folder)
             raise
 
 
 def parse_link(element: Element, meshes: MeshSource) -> Link:
-    """Parse a `<link>`; raises Unusable."""
+    """Parse a `<link>`; raises InvalidElement."""
     collisions = tuple(
-        Solid(_shape(collision.needed("geometry"), meshes), _origin(collision), element.text("name"))
+        Solid(_shape(collision.required_child("geometry"), meshes), _origin(collision), element.text("name"))
         for collision in element.all("collision")
     )
     inertial = element.child("inertial")
@@ -98,7 +98,7 @@ def parse_link(element: Element, meshes: MeshSource) -> Link:
 
 
 def parse_joint(element: Element) -> Joint:
-    """Parse a `<joint>`; raises Unusable."""
+    """Parse a `<joint>`; raises InvalidElement."""
     given = None if element.attributes.get("type") in ("fixed", "floating") else element.child("axis")
     axis = (1.0, 0.0, 0.0) if given is None else given.numbers("xyz", 3, (1.0, 0.0, 0.0))
     length = math.hypot(*axis)
@@ -107,8 +107,8 @@ def parse_joint(element: Element) -> Joint:
     return Joint(
         element.text("name"),
         element.text("type"),
-        element.needed("parent").text("link"),
-        element.needed("child").text("link"),
+        element.required_child("parent").text("link"),
+        element.required_child("child").text("link"),
         _origin(element),
         (axis[0] / length, axis[1] / length, axis[2] / length),
         element,
@@ -140,15 +140,15 @@ def _shape(geometry: Element, meshes: MeshSource) -> Shape:
                 return meshes.mesh(element)
             case other:
                 raise InvalidElement(
-                    element, f"unknown geometry <{other}>", "box, cylinder, sphere, capsule and mesh are read"
+                    element, f"unknown geometry <{other}>", "use box, cylinder, sphere, capsule, or mesh"
                 )
     raise InvalidElement(geometry, "<geometry> is empty")
 
 
 def _mass(inertial: Element) -> MassProperties:
-    mass = inertial.needed("mass").numbers("value", 1)[0]
+    mass = inertial.required_child("mass").numbers("value", 1)[0]
     if mass < 0:
-        raise InvalidElement(inertial.needed("mass"), "a mass must not be negative")
+        raise InvalidElement(inertial.required_child("mass"), "a mass must not be negative")
     tensor = inertial.child("inertia")
     values = [0.0] * 6
     if tensor is not None:

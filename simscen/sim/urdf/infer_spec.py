@@ -1,4 +1,4 @@
-"""A robot's specification from its URDF alone, where the URDF makes it plain."""
+"""Infers the specification of a robot from its URDF, if the URDF is unambiguous."""
 
 import math
 from collections.abc import Sequence
@@ -27,13 +27,13 @@ from simscen.sim.urdf.elements import MeshReader
 from simscen.sim.urdf.tree import Tree
 from simscen.sim.urdf.wheels import WheelJoint, infer_wheels
 
-STRAIGHT = 0.02
-"""m by which wheels of one axle may differ along x."""
-UPSIDE_DOWN_Z = -0.9
-"""The z axis of a lidar that is mounted upside down has a smaller z component in the frame of the robot."""
+AXLE_TOLERANCE_M = 0.02
+"""Largest difference in m along x of wheels on the same axle."""
+MAX_UPSIDE_DOWN_Z = -0.9
+"""Largest z component, in the frame of the robot, of the z axis of a lidar that is mounted upside down."""
 LIDAR_NAMES = ("laser", "lidar", "scan")
-"""What links are called that a lidar is on."""
-HINT = "write a short *.robot.yaml beside it that names its drive, limits and sensors: see `simscen explain robot`"
+"""Words in the names of links that carry a lidar."""
+HINT = "write a *.robot.yaml next to it with its drive, limits, and sensors; see `simscen explain robot`"
 
 
 def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshReader | None = None) -> RobotSpec:
@@ -67,7 +67,7 @@ def _drive(tree: Tree, wheels: list[WheelJoint]) -> Drive:
     driven = [wheel for wheel in wheels if not wheel.steered]
     left, right = ([w for w in driven if (w.place[1] > 0) is side] for side in (True, False))
     if not left or len(left) != len(right):
-        raise InvalidInput([tree.element.problem("cannot tell from its wheels how this robot drives", HINT)])
+        raise InvalidInput([tree.element.problem("the drive of the robot cannot be inferred from its wheels", HINT)])
     separation = float(np.mean([w.place[1] for w in left]) - np.mean([w.place[1] for w in right]))
     axles = [w.place[0] for w in driven]
     size = {"wheel_radius": driven[0].radius, "wheel_separation": separation, "wheel_width": driven[0].width}
@@ -76,7 +76,7 @@ def _drive(tree: Tree, wheels: list[WheelJoint]) -> Drive:
         check_front_steering(wheels)
         base = float(np.mean(steered) - np.mean(axles))
         return Ackermann.model_validate({"type": "ackermann", "wheel_base": base, "max_steering": 0.5, **size})
-    if max(axles) - min(axles) < STRAIGHT:
+    if max(axles) - min(axles) < AXLE_TOLERANCE_M:
         return Differential.model_validate({"type": "differential", **size})
     base = max(axles) - min(axles)
     # Coulomb friction at the corners of a rectangle: turning in place takes this much more than the kinematics say.
@@ -100,7 +100,7 @@ def _lidar_mount(tree: Tree, draft: RobotSpec, wheels: list[WheelJoint]) -> Moun
         if any(word in name.lower() for word in LIDAR_NAMES):
             pose = tree.poses[name]
             x, y, z = float(pose.x - axle[0]), float(pose.y - axle[1]), float(pose.z - ground)
-            roll = math.pi if pose.rotation()[2, 2] < UPSIDE_DOWN_Z else 0.0
+            roll = math.pi if pose.rotation()[2, 2] < MAX_UPSIDE_DOWN_Z else 0.0
             return Mount(x=x, y=y, z=max(0.0, z), roll=roll, yaw=pose.yaw)
     top = max(float(solid.pose.apply(hull_points(solid.shape))[:, 2].max()) for solid in body.hull)
     return Mount(z=top + 0.02)

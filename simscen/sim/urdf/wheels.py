@@ -1,4 +1,4 @@
-"""Which joints of a URDF are wheels, and which steer."""
+"""Finds the wheels and the steering joints of a URDF, and warns about misaligned ones."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,16 +13,16 @@ from simscen.sim.body.outline import hull_points
 from simscen.sim.urdf.elements import Joint
 from simscen.sim.urdf.tree import Tree
 
-ALONG = 0.99
-"""Cosine within which an axis counts as pointing sideways or up (8 degrees)."""
+MIN_AXIS_COSINE = 0.99
+"""Cosine of the largest angle (8 degrees) between a joint axis and the direction that it is compared with."""
 
-TURNING = ("revolute", "continuous")
-"""Joints that can steer; an upright prismatic one is a suspension."""
+STEERING_JOINT_TYPES = ("revolute", "continuous")
+"""Types of joints that can steer; a vertical prismatic joint is a suspension."""
 
 
 @dataclass(frozen=True, eq=False)
 class WheelJoint:
-    """A wheel in the frame of the root: the `place` of its middle, `radius` and `width` in meters."""
+    """A wheel in the root frame: the `place` of its center, `radius`, and `width` in meters."""
 
     joint: Joint
     place: tuple[float, float, float]
@@ -33,11 +33,13 @@ class WheelJoint:
 
 def infer_wheels(tree: Tree) -> list[WheelJoint]:
     """Return the wheels in a URDF: continuous joints with a lateral axis and a round link."""
-    steering = steered_links(tree, [j for j in tree.joints.values() if j.type in TURNING and _about(tree, j, 2)])
+    steering = steered_links(
+        tree, [j for j in tree.joints.values() if j.type in STEERING_JOINT_TYPES and _has_axis_along(tree, j, 2)]
+    )
     wheels = [
         wheel_joint(tree, joint, joint.child in steering)
         for joint in tree.joints.values()
-        if joint.type == "continuous" and _about(tree, joint, 1)
+        if joint.type == "continuous" and _has_axis_along(tree, joint, 1)
     ]
     return sorted((w for w in wheels if w is not None), key=lambda w: (w.place[0], -w.place[1], w.joint.name))
 
@@ -63,8 +65,8 @@ def select_wheels(tree: Tree, drive: Drive) -> list[WheelJoint]:
         WheelJoint(
             joint, tree.poses[joint.child].position, drive.wheel_radius, drive.wheel_width, joint.child in turned
         )
-        if (round_one := wheel_joint(tree, joint, joint.child in turned)) is None
-        else round_one
+        if (inferred := wheel_joint(tree, joint, joint.child in turned)) is None
+        else inferred
         for joint in (tree.joints[name] for name in (*(drive.left or []), *(drive.right or [])))
     ]
     rolling = {wheel.joint.name for wheel in given}
@@ -72,7 +74,7 @@ def select_wheels(tree: Tree, drive: Drive) -> list[WheelJoint]:
 
 
 def steered_links(tree: Tree, knuckles: Sequence[Joint]) -> set[str]:
-    """Everything that hangs on these joints."""
+    """Return the names of all links below the steering joints."""
     return {link for joint in knuckles for link in tree.subtree(joint.child)}
 
 
@@ -90,60 +92,60 @@ def wheel_joint(tree: Tree, joint: Joint, steered: bool) -> WheelJoint | None:
     return None
 
 
-def _about(tree: Tree, joint: Joint, direction: int) -> bool:
-    """Whether its axis points along the root's x, y or z (0, 1, 2), either way."""
-    turn = tree.poses[joint.child]._replace(x=0.0, y=0.0, z=0.0)
-    axis = turn.compose(Pose3(*joint.axis)).position
-    return abs(axis[direction]) >= ALONG
+def _has_axis_along(tree: Tree, joint: Joint, direction: int) -> bool:
+    """Return whether a joint axis is parallel to the x, y, or z axis (0, 1, 2) of the root frame."""
+    rotation = tree.poses[joint.child]._replace(x=0.0, y=0.0, z=0.0)
+    axis = rotation.compose(Pose3(*joint.axis)).position
+    return abs(axis[direction]) >= MIN_AXIS_COSINE
 
 
 CODE = "SC405"
-EVEN = 0.0005
-"""m by which what stands on the ground may differ in height."""
-RAISED = 0.003
-"""m that a caster may hang above the ground: the robot then leans on another, or rocks by a hair."""
-NEAR = 0.02
-"""m above the ground within which something small is meant to be a caster."""
-SMALL = 0.1
-"""m: neither the length nor the width of a caster exceeds it."""
+HEIGHT_TOLERANCE_M = 0.0005
+"""Largest difference in m between the heights of parts that stand on the ground."""
+MAX_CASTER_GAP_M = 0.003
+"""Largest gap in m below a caster; the robot then stands on another caster, or tilts slightly."""
+MAX_CASTER_HEIGHT_M = 0.02
+"""Height in m above the ground below which a small link is meant to be a caster."""
+MAX_CASTER_SIZE_M = 0.1
+"""Largest length and width of a caster in m."""
 
 
 def alignment_warnings(tree: Tree, drive: Drive) -> list[Problem]:
-    """Warnings about wheels at different heights, and about casters that are too low or too high."""
+    """Return warnings about wheels at different heights, and about casters that are too low or too high."""
     wheels = select_wheels(tree, drive)
     if not wheels:
         return []
     ground = min(wheel.place[2] - wheel.radius for wheel in wheels)
-    found = [*_wheels(wheels, ground), *_parts(tree, wheels, ground, drive.type == "differential")]
+    found = [*_wheel_warnings(wheels, ground), *_caster_warnings(tree, wheels, ground, drive.type == "differential")]
     return [Problem(p.path, p.line, p.col, CODE, p.message, p.hint, "warning", p.source) for p in found]
 
 
-def _wheels(wheels: list[WheelJoint], ground: float) -> Iterator[Problem]:
+def _wheel_warnings(wheels: list[WheelJoint], ground: float) -> Iterator[Problem]:
     for wheel in wheels:
         gap = wheel.place[2] - wheel.radius - ground
-        if gap > EVEN:
-            message = f"the wheel on joint {wheel.joint.name!r} hangs {1e3 * gap:.1f} mm above the lowest one's ground"
-            yield wheel.joint.element.problem(message, "simscen lets all of them stand on the ground")
+        if gap > HEIGHT_TOLERANCE_M:
+            message = f"the wheel on joint {wheel.joint.name!r} is {1e3 * gap:.1f} mm higher than the lowest wheel"
+            yield wheel.joint.element.problem(message, "simscen places all wheels on the ground")
 
 
-def _parts(tree: Tree, wheels: list[WheelJoint], ground: float, on_casters: bool) -> Iterator[Problem]:
+def _caster_warnings(tree: Tree, wheels: list[WheelJoint], ground: float, needs_caster: bool) -> Iterator[Problem]:
     rolling = {link for wheel in wheels for link in tree.subtree(wheel.joint.child)}
     gaps = {
         name: _lowest(tree, name) - ground for name in tree.links if name not in rolling and tree.links[name].solids
     }
     for name, gap in gaps.items():
-        if gap < -EVEN:
+        if gap < -HEIGHT_TOLERANCE_M:
             message = (
-                f"link {name!r} reaches {-1e3 * gap:.1f} mm below the wheels: as drawn it lifts them off the ground"
+                f"link {name!r} reaches {-1e3 * gap:.1f} mm below the wheels, which would lose contact with the ground"
             )
-            hint = f"raise it by {-gap:.4g} m; simscen drives it on frictionless balls in its place"
+            hint = f"raise it by {-gap:.4g} m; simscen uses frictionless spheres as casters instead"
             yield tree.links[name].element.problem(message, hint)
     nearest = min(gaps, key=lambda name: gaps[name], default=None)
-    if on_casters and nearest and RAISED < gaps[nearest] < NEAR and _is_small(tree, nearest):
+    if needs_caster and nearest and MAX_CASTER_GAP_M < gaps[nearest] < MAX_CASTER_HEIGHT_M and _is_small(tree, nearest):
         message = (
-            f"link {nearest!r} hangs {1e3 * gaps[nearest]:.1f} mm above the ground: as drawn the robot tips onto it"
+            f"link {nearest!r} is {1e3 * gaps[nearest]:.1f} mm above the ground, so that the robot would tip onto it"
         )
-        hint = f"lower it by {gaps[nearest]:.4g} m; simscen drives it on balls that touch the ground"
+        hint = f"lower it by {gaps[nearest]:.4g} m; simscen uses spheres that touch the ground as casters instead"
         yield tree.links[nearest].element.problem(message, hint)
 
 
@@ -157,4 +159,4 @@ def _lowest(tree: Tree, name: str) -> float:
 
 
 def _is_small(tree: Tree, name: str) -> bool:
-    return bool((np.ptp(_points(tree, name)[:, :2], axis=0) <= SMALL).all())
+    return bool((np.ptp(_points(tree, name)[:, :2], axis=0) <= MAX_CASTER_SIZE_M).all())

@@ -1,4 +1,4 @@
-"""A robot's body as URDF, for whoever shows it: /robot_description in a log."""
+"""Writes the body of a robot as URDF, for viewers of the topic /robot_description in a log."""
 
 import math
 from xml.etree import ElementTree as ET
@@ -13,27 +13,27 @@ BASE = "base_link"
 
 
 def to_urdf(body: RobotBody) -> str:
-    """URDF text: the base link with the hull in the base frame, and a continuous joint for each wheel.
+    """Return URDF text: the base link with the hull in the base frame, and a continuous joint for each wheel.
 
-    Shapes that URDF does not know are shown as their bounding boxes.
+    Shapes that URDF does not support are replaced by their bounding boxes.
     """
     robot = ET.Element("robot", name=body.name)
     base = ET.SubElement(robot, "link", name=BASE)
     center = Pose3(*body.chassis.center.tolist())
-    _inertial(base, body.chassis.mass, center, [[float(value) for value in row] for row in body.chassis.tensor])
+    _add_inertial(base, body.chassis.mass, center, [[float(value) for value in row] for row in body.chassis.tensor])
     for solid in (*body.hull, *body.casters):
-        _shown(base, solid)
+        _add_shape(base, solid)
     for wheel in body.wheels:
-        _wheel(robot, wheel)
+        _add_wheel(robot, wheel)
     ET.indent(robot)
     return ET.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"
 
 
-def _wheel(robot: ET.Element, wheel: Wheel) -> None:
+def _add_wheel(robot: ET.Element, wheel: Wheel) -> None:
     link = ET.SubElement(robot, "link", name=f"{wheel.name}_link")
     tensor = [[float(value) for value in row] for row in wheel.inertia.tensor]
-    _inertial(link, wheel.inertia.mass, Pose3(), tensor)
-    _shown(link, Solid(Cylinder(wheel.radius, wheel.width), Pose3.from_rpy(0, 0, 0, math.pi / 2, 0, 0)))
+    _add_inertial(link, wheel.inertia.mass, Pose3(), tensor)
+    _add_shape(link, Solid(Cylinder(wheel.radius, wheel.width), Pose3.from_rpy(0, 0, 0, math.pi / 2, 0, 0)))
     joint = ET.SubElement(robot, "joint", name=wheel.name, type="continuous")
     ET.SubElement(joint, "parent", link=BASE)
     ET.SubElement(joint, "child", link=f"{wheel.name}_link")
@@ -41,15 +41,15 @@ def _wheel(robot: ET.Element, wheel: Wheel) -> None:
     ET.SubElement(joint, "axis", xyz="0 1 0")
 
 
-def _inertial(link: ET.Element, mass: float, center: Pose3, tensor: list[list[float]]) -> None:
+def _add_inertial(link: ET.Element, mass: float, center: Pose3, tensor: list[list[float]]) -> None:
     inertial = ET.SubElement(link, "inertial")
-    _origin(inertial, center)
+    _add_origin(inertial, center)
     ET.SubElement(inertial, "mass", value=_text(mass))
     names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
     ET.SubElement(inertial, "inertia", {name: _text(tensor[row][column]) for name, (row, column) in names.items()})
 
 
-def _shown(link: ET.Element, solid: Solid) -> None:
+def _add_shape(link: ET.Element, solid: Solid) -> None:
     for kind in ("visual", "collision"):
         element = ET.SubElement(link, kind)
         geometry = ET.SubElement(element, "geometry")
@@ -65,10 +65,10 @@ def _shown(link: ET.Element, solid: Solid) -> None:
                 low, high = hull_points(other).min(axis=0), hull_points(other).max(axis=0)
                 ET.SubElement(geometry, "box", size=_text(*(high - low).tolist()))
                 pose = pose.compose(Pose3(*((low + high) / 2).tolist()))
-        _origin(element, pose)
+        _add_origin(element, pose)
 
 
-def _origin(element: ET.Element, pose: Pose3) -> None:
+def _add_origin(element: ET.Element, pose: Pose3) -> None:
     x, y, z, w = pose.quaternion
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))

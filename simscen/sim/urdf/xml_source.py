@@ -1,4 +1,4 @@
-"""The elements of a URDF, which say what is wrong with them at their line."""
+"""Elements of URDF files, with errors that refer to their line."""
 
 import math
 from collections.abc import Mapping
@@ -12,11 +12,11 @@ from simscen.assets.folders import AllowedFolders, UnusableFile
 from simscen.core.errors import InvalidInput, Problem
 
 CODE = "SC400"
-"""The stable code of every problem with a robot's URDF; the message tells them apart."""
+"""Code of all problems with a robot's URDF; the message distinguishes them."""
 
 
 class InvalidElement(Exception):
-    """An element that cannot be used, and why."""
+    """An element is invalid; `problem` has the reason and the line."""
 
     def __init__(self, element: "Element", message: str, hint: str = "") -> None:
         self.problem = element.problem(message, hint)
@@ -27,28 +27,28 @@ class InvalidElement(Exception):
 class Element(markup.Element):
     """An element of a URDF or xacro file."""
 
-    def needed(self, tag: str) -> Self:
-        """Return the first child with this tag; raises Unusable if there is none."""
+    def required_child(self, tag: str) -> Self:
+        """Return the first child with this tag; raises InvalidElement if there is none."""
         found = self.child(tag)
         if found is None:
             raise InvalidElement(self, f"<{self.tag}> without <{tag}>")
         return found
 
     def text(self, attribute: str) -> str:
-        """Return a required attribute."""
+        """Return a required attribute; raises InvalidElement if it is missing or empty."""
         if not self.attributes.get(attribute):
             raise InvalidElement(self, f'<{self.tag}> without {attribute}="…"')
         return self.attributes[attribute]
 
     def numbers(self, attribute: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
-        """So many finite numbers."""
+        """Return `count` finite numbers of an attribute, or the default; raises InvalidElement."""
         if attribute not in self.attributes and default is not None:
             return default
         words = self.text(attribute).split()
         try:
             values = tuple(float(word) for word in words)
         except ValueError:
-            raise InvalidElement(self, f'{attribute}="{" ".join(words)[:60]}" are not numbers') from None
+            raise InvalidElement(self, f'{attribute}="{" ".join(words)[:60]}" must consist of numbers') from None
         if len(values) != count:
             raise InvalidElement(self, f"{attribute} has {len(values)} numbers instead of {count}")
         if not all(math.isfinite(value) and abs(value) <= 1e6 for value in values):
@@ -56,7 +56,7 @@ class Element(markup.Element):
         return values
 
     def positive(self, attribute: str, count: int = 1) -> tuple[float, ...]:
-        """So many numbers above zero."""
+        """Return `count` positive numbers of an attribute; raises InvalidElement."""
         values = self.numbers(attribute, count)
         if min(values) <= 0:
             raise InvalidElement(self, f"{attribute} must be greater than 0")
@@ -77,14 +77,14 @@ def parse_xml(data: bytes, file: str) -> Element:
         raise InvalidInput([problem]) from error
 
 
-# Files that a robot description consists of.
-URDF_BYTES = 2 * 2**20
-MESH_BYTES = 20 * 2**20
+# Maximum sizes of the files of a robot description.
+MAX_URDF_BYTES = 2 * 2**20
+MAX_MESH_BYTES = 20 * 2**20
 
 
 @dataclass(frozen=True)
 class RobotFiles:
-    """Where the files are that a `*.robot.yaml` names: its URDF, and the folders of ROS packages by name."""
+    """Paths of the files that a `*.robot.yaml` names: its URDF, and the folders of ROS packages by name."""
 
     urdf: Path
     packages: Mapping[str, Path]
@@ -92,9 +92,9 @@ class RobotFiles:
 
 def read_xml(path: Path, folders: AllowedFolders) -> Element:
     """Read a URDF or an included file without expansion. Raises InvalidInput."""
-    shown = folders.shown(path)
+    shown_path = folders.shown(path)
     try:
-        _, data = folders.open(path, URDF_BYTES)
+        _, data = folders.open(path, MAX_URDF_BYTES)
     except UnusableFile as trouble:
-        raise InvalidInput([Problem(shown, 0, 0, CODE, str(trouble))]) from trouble
-    return parse_xml(data, shown)
+        raise InvalidInput([Problem(shown_path, 0, 0, CODE, str(trouble))]) from trouble
+    return parse_xml(data, shown_path)

@@ -93,13 +93,13 @@ def test_low_caster_is_reported_at_its_line(check):
 
 def test_caster_above_the_ground_is_reported(check):
     output = check("cart.urdf", cart_urdf=urdf(wheels(), CASTER.format(z=0.03)))[1]
-    assert "link 'caster' hangs 10.0 mm above the ground" in output
+    assert "link 'caster' is 10.0 mm above the ground" in output
 
 
 def test_wheels_at_different_heights_are_reported(check):
     four = wheels(x=-0.15, name="rear_") + wheels(x=0.15, name="front_", z=0.052)
     output = check("cart.urdf", cart_urdf=urdf(four))[1]
-    assert "the wheel on joint 'front_left_joint' hangs 2.0 mm above the lowest one's ground" in output
+    assert "the wheel on joint 'front_left_joint' is 2.0 mm higher than the lowest wheel" in output
 
 
 def test_consistent_robot_has_no_warnings(figures):

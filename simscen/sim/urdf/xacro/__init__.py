@@ -1,1 +1,1 @@
-"""xacro without Python: xacro runs what a file says, so its macros and arithmetic are expanded by ourselves."""
+"""Expansion of xacro files without executing code, which xacro itself would do."""

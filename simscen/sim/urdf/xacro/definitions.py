@@ -1,11 +1,11 @@
-"""What `<xacro:macro name="…" params="…">` defines."""
+"""Definitions in xacro files: macros with their parameters, and properties."""
 
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from simscen.sim.urdf.xacro.limits import ExpansionError, parse_bool, parse_literal
-from simscen.sim.urdf.xacro.scope import Block, Held, Lazy, Scope
+from simscen.sim.urdf.xacro.scope import Block, Lazy, Scope, ScopeValue
 from simscen.sim.urdf.xacro.text import TextEvaluator, required_attribute
 from simscen.sim.urdf.xml_source import Element
 
@@ -19,7 +19,7 @@ PARAMETER = re.compile(
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter: `*name` and `**name` are blocks; `forward` = take the caller's property of that name first."""
+    """A parameter of a macro. `*name` and `**name` are blocks; `forward` uses the caller's property of that name."""
 
     name: str
     forward: bool = False
@@ -27,7 +27,7 @@ class Parameter:
 
     @property
     def is_block(self) -> bool:
-        """Whether it takes an element."""
+        """Whether its argument is an element."""
         return self.name.startswith("*")
 
 
@@ -42,7 +42,7 @@ class Macro:
 
 @dataclass(eq=False)
 class Macros:
-    """Macros by name, each scope in front of the one around it; `spaces` are included namespaces."""
+    """Macros by name in nested scopes, the inner ones first; `spaces` are the namespaces of included files."""
 
     parent: "Macros | None" = None
     macros: dict[str, Macro] = field(default_factory=dict)
@@ -64,10 +64,10 @@ class Macros:
 
 
 def parse_macro(element: Element) -> Macro:
-    """Parse a macro definition; raises Refused."""
+    """Parse a macro definition; raises ExpansionError."""
     name = element.name.removeprefix("xacro:")
     if not name or name == "call" or "." in name:
-        raise ExpansionError(f"{name[:60]!r} is not a name for a macro")
+        raise ExpansionError(f"{name[:60]!r} is not a valid name of a macro")
     return Macro(name, tuple(_parameters(element.attributes.get("params", ""))), element)
 
 
@@ -84,62 +84,62 @@ def _parameters(text: str) -> list[Parameter]:
 
 
 # Resolve which macro a call means and bind its parameters.
-def resolve_macro(written: str, scope: Scope, macros: Macros) -> tuple[Macro, Scope, Macros]:
-    """Return the macro `name` or `namespace.name` with its enclosing scopes; raises Refused."""
-    *spaces, name = written.split(".")
+def resolve_macro(qualified_name: str, scope: Scope, macros: Macros) -> tuple[Macro, Scope, Macros]:
+    """Return the macro `name` or `namespace.name` with its enclosing scopes; raises ExpansionError."""
+    *spaces, name = qualified_name.split(".")
     for space in spaces:
         owner, inner = scope.owner(space), macros.space(space)
-        found = owner.held[space] if owner is not None else None
+        found = owner.values[space] if owner is not None else None
         if inner is None or not isinstance(found, Scope):
             raise ExpansionError(f"there is no namespace {space[:60]!r}")
         scope, macros = found, inner
     macro = macros.find(name)
     if macro is None:
-        raise ExpansionError(f"there is no macro {written[:60]!r}")
+        raise ExpansionError(f"there is no macro {qualified_name[:60]!r}")
     return macro, scope, macros
 
 
 def bind_parameters(
     macro: Macro, call: Element, blocks: list[Element], scope: Scope, inside: Scope, texts: TextEvaluator
 ) -> Scope:
-    """`inside` with the macro's parameters: all of them mean what they mean in `scope`, where it is called.
+    """Return `inside`, the scope of the macro's body, with the arguments of a call, evaluated in the caller's `scope`.
 
-    Raises Refused.
+    Raises ExpansionError.
     """
     missing = {parameter.name: parameter for parameter in macro.parameters}
     for name, text in call.attributes.items():
         if missing.pop(name, None) is None:
             raise ExpansionError(f"macro {macro.name!r} has no parameter {name[:60]!r}")
-        inside.held[name] = texts.literal(text, scope)
-    waiting = iter(blocks)
+        inside.values[name] = texts.literal(text, scope)
+    unused_blocks = iter(blocks)
     for name in [parameter.name for parameter in macro.parameters if parameter.is_block]:
-        block = next(waiting, None)
+        block = next(unused_blocks, None)
         if block is None:
             raise ExpansionError(f"macro {macro.name!r} needs a block for {name!r}")
-        inside.held[name] = Block(block, whole=not name.startswith("**"))
+        inside.values[name] = Block(block, whole=not name.startswith("**"))
         del missing[name]
-    if extra := next(waiting, None):
-        raise ExpansionError(f"macro {macro.name!r} has no use for <{extra.tag[:60]}>")
+    if extra := next(unused_blocks, None):
+        raise ExpansionError(f"macro {macro.name!r} has no parameter for the block <{extra.tag[:60]}>")
     for name, parameter in missing.items():
-        inside.held[name] = _default(parameter, scope, macro, texts)
+        inside.values[name] = _default(parameter, scope, macro, texts)
     return inside
 
 
-def _default(parameter: Parameter, scope: Scope, macro: Macro, texts: TextEvaluator) -> Held:
+def _default(parameter: Parameter, scope: Scope, macro: Macro, texts: TextEvaluator) -> ScopeValue:
     if parameter.forward and scope.owner(parameter.name) is not None:
         return texts.property(scope, parameter.name)
     if parameter.default is not None:
         return texts.literal(parameter.default, scope)
-    what = "there is no property to forward to" if parameter.forward else "a call does not give"
+    what = "there is no property to forward to" if parameter.forward else "a call lacks the argument"
     raise ExpansionError(f"macro {macro.name!r}: {what} {parameter.name!r}")
 
 
 # Properties that `<xacro:property>` defines.
 def define_property(source: Element, scope: Scope, texts: TextEvaluator) -> None:
-    """Define, default or remove a property; raises Refused."""
+    """Define a property, set its default, or remove it; raises ExpansionError."""
     name = texts.text(required_attribute(source, "name"), scope)
     if not name.isidentifier() or name.startswith("__"):
-        raise ExpansionError(f"{name[:60]!r} is not a name for a property")
+        raise ExpansionError(f"{name[:60]!r} is not a valid name of a property")
     value, default = source.attributes.get("value"), source.attributes.get("default")
     remove = parse_bool(texts.value(source.attributes.get("remove", "false"), scope))
     if (value is not None) + (default is not None) + remove > 1:
@@ -156,9 +156,9 @@ def _set(source: Element, name: str, value: str | None, scope: Scope, texts: Tex
     where = source.attributes.get("scope", "")
     into = {"global": scope.top(), "parent": scope.caller()}.get(where, scope)
     if value is None:
-        into.held[f"**{name}"] = Block(source, whole=False)
+        into.values[f"**{name}"] = Block(source, whole=False)
     elif lazy and into is scope:
         plain = parse_literal(value)
-        into.held[name] = Lazy(plain) if isinstance(plain, str) else plain
+        into.values[name] = Lazy(plain) if isinstance(plain, str) else plain
     else:
-        into.held[name] = texts.literal(value, scope)
+        into.values[name] = texts.literal(value, scope)

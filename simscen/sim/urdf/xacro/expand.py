@@ -1,6 +1,6 @@
-"""A xacro file as the elements that it stands for (wiki.ros.org/xacro), every one with the place it was written at.
+"""Expands a xacro file to URDF elements (wiki.ros.org/xacro) that keep their file and line.
 
-Text between elements and comments are passed over: nothing of a robot's body is in them.
+Comments and text between elements are ignored, because they do not describe the robot.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -20,18 +20,18 @@ from simscen.sim.urdf.xacro.definitions import (
 from simscen.sim.urdf.xacro.limits import Budget, ExpansionError, MissingFile, parse_bool
 from simscen.sim.urdf.xacro.scope import Block, Scope
 from simscen.sim.urdf.xacro.text import TextEvaluator, required_attribute
-from simscen.sim.urdf.xml_source import URDF_BYTES, Element
+from simscen.sim.urdf.xml_source import MAX_URDF_BYTES, Element
 
-MOST_FILES = 200
-"""Files that one robot is made of; each is at most as large as a URDF."""
-MOST_ELEMENTS = 100_000
+MAX_FILES = 200
+"""Maximum number of included files; each is at most as large as a URDF."""
+MAX_ELEMENTS = 100_000
 
 FileReader = Callable[[Path], Element]
 """Reads a file inside the allowed folders; raises InvalidInput."""
 
 
 class UnknownArgument(InvalidInput):
-    """An argument is given that no `<xacro:arg>` declares; `declared` are those that are."""
+    """An argument is given that no `<xacro:arg>` declares; `declared` are the declared ones."""
 
     def __init__(self, robot: Element, name: str, declared: Iterable[str]) -> None:
         self.name, self.declared = name, sorted(declared)
@@ -46,20 +46,20 @@ def expand(
 
     Raises InvalidInput, or its subclass UnknownArgument.
     """
-    whole = replace(robot, tag="", attributes={}, children=[])
+    container = replace(robot, tag="", attributes={}, children=[])
     expansion = _Expansion(file, folders, read, arguments or {})
     try:
-        expansion.element(robot, whole, Scope(), Macros())
+        expansion.element(robot, container, Scope(), Macros())
     except InvalidInput:
         if not expansion.missing:
             raise
-    if expansion.missing:  # what went wrong without these files is no news
+    if expansion.missing:  # without these files, other errors follow
         raise InvalidInput(list(expansion.missing.values()))
     declared = expansion.declared | declared_in(robot)
     for name in arguments or {}:
         if name not in declared:
             raise UnknownArgument(robot, name, declared)
-    return whole.children[0]
+    return container.children[0]
 
 
 def declared_in(element: Element) -> set[str]:
@@ -78,7 +78,7 @@ class _Expansion:
         self._read: dict[Path, Element] = {}
         self._calls: list[tuple[Macro, Element]] = []
         self._elements, self._bytes = 0, 0
-        self._meanings = {
+        self._handlers = {
             "xacro:property": lambda source, _, scope, __: define_property(source, scope, self._texts),
             "xacro:macro": self._macro,
             "xacro:arg": self._argument,
@@ -92,31 +92,31 @@ class _Expansion:
         }
 
     def element(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        """Append what an element stands for to the children of `into`."""
+        """Append the expansion of an element to the children of `into`."""
         try:
             with self._budget:
                 self._budget.spend()
                 other = self._call if source.tag.startswith("xacro:") else self._plain
-                self._meanings.get(source.tag, other)(source, into, scope, macros)
-        except ExpansionError as refused:
+                self._handlers.get(source.tag, other)(source, into, scope, macros)
+        except ExpansionError as error:
             calls = [f"in macro {m.name!r}, called at {e.source.name}:{e.line}" for m, e in self._calls[-1:]]
-            hint = "; ".join(filter(None, [refused.hint, *calls]))
-            raise InvalidInput([source.problem(refused.message, hint)]) from refused
+            hint = "; ".join(filter(None, [error.hint, *calls]))
+            raise InvalidInput([source.problem(error.message, hint)]) from error
 
     def _children(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
         for child in source.children:
             self.element(child, into, scope, macros)
 
     def _plain(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        written = {name: text for name, text in source.attributes.items() if not _of_xacro(name)}
-        attributes = {name: self._texts.text(text, scope) for name, text in written.items()}
+        own = {name: text for name, text in source.attributes.items() if not _is_xacro_attribute(name)}
+        attributes = {name: self._texts.text(text, scope) for name, text in own.items()}
         self._elements += 1
         self._bytes += len(source.tag) + sum(len(name) + len(text) for name, text in attributes.items())
-        if self._elements > MOST_ELEMENTS or self._bytes > URDF_BYTES:
-            raise ExpansionError(f"more than {MOST_ELEMENTS} elements or {URDF_BYTES // 2**20} MiB when expanded")
-        made = replace(source, attributes=attributes, children=[])
-        into.children.append(made)
-        self._children(source, made, scope, macros)
+        if self._elements > MAX_ELEMENTS or self._bytes > MAX_URDF_BYTES:
+            raise ExpansionError(f"more than {MAX_ELEMENTS} elements or {MAX_URDF_BYTES // 2**20} MiB when expanded")
+        copy = replace(source, attributes=attributes, children=[])
+        into.children.append(copy)
+        self._children(source, copy, scope, macros)
 
     def _macro(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
         macro = parse_macro(source)
@@ -143,9 +143,9 @@ class _Expansion:
 
     def _insert(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
         name = required_attribute(source, "name")
-        for written in (f"**{name}", f"*{name}"):
-            owner = scope.owner(written)
-            if owner is not None and isinstance(block := owner.held[written], Block):
+        for key in (f"**{name}", f"*{name}"):
+            owner = scope.owner(key)
+            if owner is not None and isinstance(block := owner.values[key], Block):
                 insert = self._plain if block.whole else self._children
                 insert(block.element, into, scope, macros)
                 return
@@ -158,45 +158,45 @@ class _Expansion:
 
     def _call(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
         self._budget.spend(10)
-        macro, around, around_macros = resolve_macro(source.tag.removeprefix("xacro:"), scope, macros)
-        holder = replace(source, attributes={}, children=[])
-        self._children(source, holder, scope, macros)
-        inside = bind_parameters(macro, source, holder.children, scope, Scope(around), self._texts)
+        macro, enclosing, enclosing_macros = resolve_macro(source.tag.removeprefix("xacro:"), scope, macros)
+        arguments = replace(source, attributes={}, children=[])
+        self._children(source, arguments, scope, macros)
+        inside = bind_parameters(macro, source, arguments.children, scope, Scope(enclosing), self._texts)
         self._calls.append((macro, source))
-        self._children(macro.body, into, inside, Macros(around_macros))
+        self._children(macro.body, into, inside, Macros(enclosing_macros))
         self._calls.pop()
 
     def _include(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
         try:
-            self._included(source, into, scope, macros)
+            self._include_file(source, into, scope, macros)
         except MissingFile as missing:
             self.missing.setdefault(missing.message, source.problem(missing.message, missing.hint))
 
-    def _included(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        written = self._texts.text(required_attribute(source, "filename"), scope)
+    def _include_file(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        filename = self._texts.text(required_attribute(source, "filename"), scope)
         if space := self._texts.text(source.attributes.get("ns", ""), scope):
-            around, scope = scope, Scope(scope, namespace=True)
-            around.held[space] = scope
+            enclosing, scope = scope, Scope(scope, namespace=True)
+            enclosing.values[space] = scope
             macros.spaces[space] = macros = Macros()
         try:
-            found = self._folders.find(written, self._texts.file.parent, absolute=True)
-            path = self._folders.check(found, URDF_BYTES)
+            found = self._folders.find(filename, self._texts.file.parent, absolute=True)
+            path = self._folders.check(found, MAX_URDF_BYTES)
         except UnusableFile as trouble:
             if isinstance(trouble, NoSuchFile) and parse_bool(source.attributes.get("optional", "false")):
                 return
-            raise MissingFile(f"include {written[:200]!r}: {trouble}", trouble.hint) from trouble
+            raise MissingFile(f"include {filename[:200]!r}: {trouble}", trouble.hint) from trouble
         before, self._texts.file = self._texts.file, path
-        self._children(self._parsed(path), into, scope, macros)
+        self._children(self._parse(path), into, scope, macros)
         self._texts.file = before
 
-    def _parsed(self, path: Path) -> Element:
+    def _parse(self, path: Path) -> Element:
         if path not in self._read:
-            if len(self._read) >= MOST_FILES:
-                raise ExpansionError(f"more than {MOST_FILES} files are included")
+            if len(self._read) >= MAX_FILES:
+                raise ExpansionError(f"more than {MAX_FILES} files are included")
             self._read[path] = self._read_file(path)
             self.declared |= declared_in(self._read[path])
         return self._read[path]
 
 
-def _of_xacro(attribute: str) -> bool:
+def _is_xacro_attribute(attribute: str) -> bool:
     return attribute.startswith("xacro:") or attribute == "xmlns:xacro"

@@ -1,4 +1,4 @@
-"""Expressions: Python's grammar is read, and what is not arithmetic on plain data is refused."""
+"""Evaluates `${…}` expressions with Python's grammar; raises an error for anything but arithmetic on plain data."""
 
 import ast
 import operator
@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from simscen.sim.urdf.xacro.functions import GLOBALS, METHODS, NAMESPACES, TYPES, Function
 from simscen.sim.urdf.xacro.limits import MAX_BITS, MAX_LENGTH, Budget, ExpansionError, Value, check_bounds, size
 
-MOST_CHARACTERS = 1000
+MAX_CHARACTERS = 1000
 
 BINARY: dict[type[ast.operator], Callable[[Any, Any], object]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -22,23 +22,23 @@ COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], object]] = {
     ast.GtE: operator.ge, ast.Is: operator.is_, ast.IsNot: operator.is_not,
     ast.In: lambda one, many: one in many, ast.NotIn: lambda one, many: one not in many,
 }  # fmt: skip
-HINT = "numbers, texts, lists, comparisons, `a if b else c`, math functions and properties are what is expanded"
+HINT = "supported are numbers, texts, lists, comparisons, `a if b else c`, math functions, and properties"
 
 
 class Names(Protocol):
-    """Where an expression's names are looked up."""
+    """Lookup of the names in an expression."""
 
     def value(self, path: tuple[str, ...]) -> Value:
         """Return the property with this name, given as its parts; raises KeyError."""
 
 
 def evaluate(text: str, names: Names, budget: Budget) -> Value:
-    """Evaluate an expression; raises Refused."""
-    if len(text) > MOST_CHARACTERS:
-        raise ExpansionError(f"an expression is longer than {MOST_CHARACTERS} characters")
+    """Evaluate an expression; raises ExpansionError."""
+    if len(text) > MAX_CHARACTERS:
+        raise ExpansionError(f"an expression is longer than {MAX_CHARACTERS} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval")
-    except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: brackets in brackets
+    except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: deeply nested brackets
         raise ExpansionError("not an expression", HINT) from None
     return _Evaluation(names, budget).value(tree.body)
 
@@ -51,18 +51,18 @@ class _Evaluation:
         with self._budget:
             self._budget.spend()
             try:
-                value = check_bounds(self._raw(node))
+                value = check_bounds(self._unchecked_value(node))
             except (ArithmeticError, TypeError, ValueError, LookupError) as error:
                 raise ExpansionError(str(error)[:200] or type(error).__name__) from None
             self._budget.spend(size(value) // 16)
             return value
 
-    def _raw(self, node: ast.expr) -> object:
+    def _unchecked_value(self, node: ast.expr) -> object:
         match node:
             case ast.Constant(value):
                 return value
             case ast.Name() | ast.Attribute():
-                return self._named(node)
+                return self._name(node)
             case ast.List(elts) | ast.Tuple(elts):
                 return [self.value(each) for each in elts]
             case ast.BinOp(left, kind, right) if type(kind) in BINARY:
@@ -70,19 +70,19 @@ class _Evaluation:
             case ast.UnaryOp(kind, operand) if type(kind) in UNARY:
                 return UNARY[type(kind)](self.value(operand))
             case ast.BoolOp(kind, values):
-                return self._first(values, isinstance(kind, ast.Or))
+                return self._boolean(values, isinstance(kind, ast.Or))
             case ast.Compare(left, kinds, others):
-                return self._compared(left, kinds, others)
+                return self._comparison(left, kinds, others)
             case ast.IfExp(test, body, orelse):
                 return self.value(body if self.value(test) else orelse)
             case ast.Subscript(whole, index):
-                return self._part(self.value(whole), index)
+                return self._subscript(self.value(whole), index)
             case ast.Call(function, arguments, keywords):
-                return self._called(function, arguments, keywords)
+                return self._call(function, arguments, keywords)
             case _:
-                raise ExpansionError(f"{_told(node)} is not expanded", HINT)
+                raise ExpansionError(f"{_describe(node)} is not supported", HINT)
 
-    def _named(self, node: ast.expr) -> object:
+    def _name(self, node: ast.expr) -> object:
         path = _path(node)
         try:
             return self._names.value(path)
@@ -91,17 +91,18 @@ class _Evaluation:
         if isinstance(known, int | float):
             return known
         raise ExpansionError(
-            f"{'.'.join(path)[:60]!r} is not defined" if known is None else f"{path[-1]}() is not called"
+            f"{'.'.join(path)[:60]!r} is not defined" if known is None else f"{path[-1]} is a function, not a value"
         )
 
-    def _first(self, values: list[ast.expr], wanted: bool) -> Value:
+    def _boolean(self, values: list[ast.expr], is_or: bool) -> Value:
+        """Return the value of `and` or `or`: the first operand that decides it, or the last one."""
         for each in values:
             value = self.value(each)
-            if bool(value) is wanted:
+            if bool(value) is is_or:
                 break
         return value
 
-    def _compared(self, left: ast.expr, kinds: list[ast.cmpop], others: list[ast.expr]) -> object:
+    def _comparison(self, left: ast.expr, kinds: list[ast.cmpop], others: list[ast.expr]) -> object:
         before, result = self.value(left), True
         for kind, other in zip(kinds, others, strict=True):
             after = self.value(other)
@@ -111,18 +112,18 @@ class _Evaluation:
             before = after
         return result
 
-    def _part(self, whole: Any, index: ast.expr) -> object:
+    def _subscript(self, whole: Any, index: ast.expr) -> object:
         if isinstance(index, ast.Slice):
             ends = [None if end is None else self.value(end) for end in (index.lower, index.upper, index.step)]
             return whole[slice(*ends)]
         return whole[self.value(index)]
 
-    def _called(self, function: ast.expr, arguments: list[ast.expr], keywords: list[ast.keyword]) -> object:
+    def _call(self, function: ast.expr, arguments: list[ast.expr], keywords: list[ast.keyword]) -> object:
         path = _path(function) if isinstance(function, ast.Name) or _is_namespace(function) else ()
         if path in (("isinstance",), ("python", "isinstance")) and len(arguments) == 2:
             kind = _path(arguments[1])[-1]
             if kind not in TYPES:
-                raise ExpansionError(f"isinstance() of {kind[:60]!r} is not expanded")
+                raise ExpansionError(f"isinstance() of {kind[:60]!r} is not supported")
             return isinstance(self.value(arguments[0]), TYPES[kind])
         known: Function | float | None
         if path:
@@ -133,10 +134,10 @@ class _Evaluation:
         else:
             known, receiver = None, []
         if not callable(known):
-            raise ExpansionError(f"{ast.unparse(function)[:60]}() is not called", HINT)
+            raise ExpansionError(f"{ast.unparse(function)[:60]}() is not supported", HINT)
         named = {keyword.arg: self.value(keyword.value) for keyword in keywords if keyword.arg is not None}
         if keywords and (known is not dict or len(named) < len(keywords)):
-            raise ExpansionError("arguments by name are not expanded")
+            raise ExpansionError("arguments by name are not supported")
         return known(*receiver, *(self.value(each) for each in arguments), **named)
 
 
@@ -148,7 +149,7 @@ def _binary(kind: type[ast.operator], left: Any, right: Any) -> object:
     if kind is ast.Pow and isinstance(left, int) and isinstance(right, int) and left.bit_length() * right > MAX_BITS:
         raise ExpansionError("the number is too large")
     if kind is ast.Mod and isinstance(left, str):
-        raise ExpansionError("texts are not formatted with %", "write ${…} between the words instead")
+        raise ExpansionError("formatting texts with % is not supported", "write ${…} between the words instead")
     return BINARY[kind](left, right)
 
 
@@ -159,7 +160,7 @@ def _path(node: ast.expr) -> tuple[str, ...]:
         case ast.Attribute(value, name):
             return (*_path(value), name)
         case _:
-            raise ExpansionError(f"{_told(node)} has no names that are expanded", HINT)
+            raise ExpansionError(f"{_describe(node)} is not a name", HINT)
 
 
 def _is_namespace(node: ast.expr) -> bool:
@@ -176,7 +177,7 @@ def _known(path: tuple[str, ...]) -> Function | float | None:
             return None
 
 
-def _told(node: ast.expr) -> str:
+def _describe(node: ast.expr) -> str:
     return {
         ast.Lambda: "a lambda", ast.ListComp: "a comprehension", ast.SetComp: "a comprehension", ast.Dict: "{…}",
         ast.DictComp: "a comprehension", ast.GeneratorExp: "a comprehension", ast.JoinedStr: "an f-string",

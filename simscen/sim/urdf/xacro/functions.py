@@ -1,4 +1,4 @@
-"""The functions and methods that expressions may call: none of them can take long or reach anything."""
+"""Functions and methods that expressions may call. None takes long or has side effects."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ TYPES: Mapping[str, type] = {"int": int, "float": float, "str": str, "bool": boo
 
 
 def _round(number: float, digits: int | None = None) -> float:
-    if digits is not None and abs(digits) > 100:  # Python would make 10**digits
+    if digits is not None and abs(digits) > 100:  # Python would compute 10**digits
         raise ExpansionError("round() takes up to 100 digits")
     return round(number, digits)
 
@@ -30,12 +30,12 @@ def _tokenize(text: str, separators: str = ",; ", skip_empty: bool = True) -> li
     return [word for word in text.split(separators[0]) if word or not skip_empty]
 
 
-def _told(*_: object) -> str:
-    return ""  # what a file says while it is expanded is for those who wrote it
+def _ignore_message(*_: object) -> str:
+    return ""  # messages of a file are meant for its authors
 
 
 def _fatal(*messages: object) -> str:
-    raise ExpansionError(f"the file says: {' '.join(map(str, messages))[:200]}")
+    raise ExpansionError(f"error in the file: {' '.join(map(str, messages))[:200]}")
 
 
 MATH: Mapping[str, Function | float] = {
@@ -51,7 +51,7 @@ PYTHON: Mapping[str, Function] = {
     "sorted": sorted, "sum": sum,
 }  # fmt: skip
 XACRO: Mapping[str, Function] = {
-    "message": _told, "warning": _told, "error": _fatal, "fatal": _fatal, "tokenize": _tokenize
+    "message": _ignore_message, "warning": _ignore_message, "error": _fatal, "fatal": _fatal, "tokenize": _tokenize
 }  # fmt: skip
 NAMESPACES: Mapping[str, Mapping[str, Function | float]] = {"math": MATH, "python": PYTHON, "xacro": XACRO}
 GLOBALS: Mapping[str, Function | float] = {**MATH, **PYTHON}

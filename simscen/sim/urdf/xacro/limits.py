@@ -1,17 +1,17 @@
-"""What one expansion may cost, counted and not timed: it ends alike on every machine."""
+"""Limits of an expansion, counted in steps rather than seconds, so that they are the same on every machine."""
 
 from typing import Union
 
 MAX_STEPS = 300_000
-"""Elements, macros (ten each), characters / 16 and parts of expressions; a TurtleBot 4 needs 10 000."""
+"""Maximum of elements, macros (10 each), characters / 16, and parts of expressions; a TurtleBot 4 needs 10 000."""
 MAX_DEPTH = 150
-"""Elements, macros, includes, properties and expressions within each other; Python's own stack holds 900."""
+"""Maximum nesting of elements, macros, includes, properties, and expressions; Python's own stack allows 900."""
 MAX_LENGTH = 1 << 16
-"""Characters of a text, values in a list."""
+"""Maximum number of characters in a text, or of values in a list."""
 
 
 class ExpansionError(Exception):
-    """Why a text or an expression is not expanded: a sentence without its place, and what helps."""
+    """A text or expression cannot be expanded; the message has no line number, `hint` says what to do."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         self.message, self.hint = message, hint
@@ -19,17 +19,17 @@ class ExpansionError(Exception):
 
 
 class MissingFile(ExpansionError):
-    """A file or a package is not there; what else there is can still be looked at."""
+    """A file or package does not exist; the expansion can continue to find further problems."""
 
 
 class Budget:
-    """Counts steps, and, as a context manager, how deep they are within each other. Raises Refused."""
+    """Counts steps and, as a context manager, the nesting depth. Raises ExpansionError above a limit."""
 
     def __init__(self) -> None:
         self._steps, self._depth = 0, 0
 
     def spend(self, steps: int = 1) -> None:
-        """So many steps more."""
+        """Count more steps."""
         self._steps += steps
         if self._steps > MAX_STEPS:
             raise ExpansionError(f"expanding takes more than {MAX_STEPS} steps")
@@ -48,11 +48,11 @@ class Budget:
 Value = Union[int, float, str, bool, None, "list[Value]", "dict[str, Value]"]
 
 MAX_BITS = 256
-"""Of a whole number: 2**256 is more than any robot needs, and its arithmetic takes no time."""
+"""Maximum size of an integer; its arithmetic then takes no noticeable time."""
 
 
 def check_bounds(value: object) -> Value:
-    """`value`, if it is plain data and not large; raises Refused."""
+    """Return `value` if it is plain data of bounded size; raises ExpansionError."""
     match value:
         case None | bool() | float():
             return value
@@ -65,11 +65,11 @@ def check_bounds(value: object) -> Value:
                 raise ExpansionError(f"the value is longer than {MAX_LENGTH}")
             return value
         case _:
-            raise ExpansionError(f"a value of type {type(value).__name__} is not used here")
+            raise ExpansionError(f"a value of type {type(value).__name__} is not supported")
 
 
 def size(value: Value) -> int:
-    """Characters of a text; values in a list, those in its lists too."""
+    """Return the number of characters of a text, or of values in a list, including nested ones."""
     match value:
         case str():
             return len(value)
@@ -87,16 +87,16 @@ def parse_literal(text: str) -> Value:
         return text[1:-1]
     if "_" in text:  # Python would read 1_000 as a number
         return text
-    for reading in (int, float, parse_bool):
+    for convert in (int, float, parse_bool):
         try:
-            return reading(text)
+            return convert(text)
         except (ValueError, ExpansionError):
             continue
     return text
 
 
 def parse_bool(value: Value) -> bool:
-    """Convert the value of `<xacro:if value=…>`; raises Refused."""
+    """Convert the value of `<xacro:if value=…>`; raises ExpansionError."""
     if not isinstance(value, str):
         return bool(value)
     if value in ("true", "True", "false", "False"):

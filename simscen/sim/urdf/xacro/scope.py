@@ -1,4 +1,4 @@
-"""Properties and macros by name, each scope in front of the one around it."""
+"""Nested scopes of properties."""
 
 from dataclasses import dataclass, field
 from typing import Union
@@ -9,14 +9,14 @@ from simscen.sim.urdf.xml_source import Element
 
 @dataclass(frozen=True, eq=False)
 class Lazy:
-    """A property's text, evaluated where it is first used."""
+    """Text of a property that is evaluated on first use."""
 
     text: str
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Elements to insert; `whole` = with the element that holds them."""
+    """Elements to insert: the children of `element`, or with `whole` the element itself."""
 
     element: Element
     whole: bool
@@ -24,24 +24,24 @@ class Block:
 
 @dataclass(eq=False)
 class Resolving:
-    """A property that is being evaluated: to meet it again is a circle."""
+    """Marks a property that is being evaluated; using it again is a circular definition."""
 
 
-Held = Union[Value, Lazy, Block, Resolving, "Scope"]
+ScopeValue = Union[Value, Lazy, Block, Resolving, "Scope"]
 
 
 @dataclass(eq=False)
 class Scope:
-    """The properties of the file, of an included namespace or of one call of a macro."""
+    """Properties of a file, of an included namespace, or of one call of a macro."""
 
     parent: "Scope | None" = None
     namespace: bool = False
-    held: dict[str, Held] = field(default_factory=dict)
+    values: dict[str, ScopeValue] = field(default_factory=dict)
 
     def owner(self, name: str) -> "Scope | None":
         """Return the innermost scope with a property of this name."""
         scope: Scope | None = self
-        while scope is not None and name not in scope.held:
+        while scope is not None and name not in scope.values:
             scope = scope.parent
         return scope
 
@@ -60,8 +60,8 @@ class Scope:
         return scope or self.top()
 
     def remove(self, name: str) -> None:
-        """Forget a property in this scope and all around it."""
+        """Remove a property from this scope and all enclosing ones."""
         scope: Scope | None = self
         while scope is not None:
-            scope.held.pop(name, None)
+            scope.values.pop(name, None)
             scope = scope.parent

@@ -1,4 +1,4 @@
-"""Text with `${expressions}` and `$(substitutions)`."""
+"""Evaluates text with `${expressions}` and `$(substitutions)`."""
 
 import re
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ class TextEvaluator:
         self._folders = folders
 
     def value(self, text: str, scope: Scope) -> Value:
-        """Evaluate a text in a scope; a single expression keeps its type. Raises Refused."""
+        """Evaluate a text in a scope; a single expression keeps its type. Raises ExpansionError."""
         self.budget.spend(1 + len(text) // 16)
         if "$" not in text:
             return text
@@ -42,29 +42,29 @@ class TextEvaluator:
         return joined
 
     def text(self, text: str, scope: Scope) -> str:
-        """Evaluate a text and return text; raises Refused."""
+        """Evaluate a text and return text; raises ExpansionError."""
         return str(self.value(text, scope))
 
     def literal(self, text: str, scope: Scope) -> Value:
-        """Evaluate a text and convert it to a number or boolean if it is one; raises Refused."""
+        """Evaluate a text and convert it to a number or boolean if it is one; raises ExpansionError."""
         value = self.value(text, scope)
         return parse_literal(value) if isinstance(value, str) else value
 
     def property(self, scope: Scope, name: str) -> "Value | Scope":
-        """Return a property of a scope, evaluated on first use; raises KeyError or Refused."""
+        """Return a property of a scope, evaluated on first use; raises KeyError or ExpansionError."""
         owner = scope.owner(name)
         if owner is None:
             raise KeyError(name)
-        match owner.held[name]:
+        match owner.values[name]:
             case Lazy(text) as lazy:
-                owner.held[name] = Resolving()
+                owner.values[name] = Resolving()
                 try:
                     with self.budget:
                         value = self.literal(text, owner)
                 except ExpansionError:
-                    owner.held[name] = lazy
+                    owner.values[name] = lazy
                     raise
-                owner.held[name] = value
+                owner.values[name] = value
                 return value
             case Resolving():
                 raise ExpansionError(f"the property {name!r} is defined by itself")
@@ -79,16 +79,16 @@ class TextEvaluator:
         if token.startswith("${"):
             expression = str(self.value(token[2:-1], scope))
             try:
-                return evaluate(expression, _Scoped(self, scope), self.budget)
-            except ExpansionError as refused:
-                if refused.message.startswith("${"):
+                return evaluate(expression, _ScopeNames(self, scope), self.budget)
+            except ExpansionError as error:
+                if error.message.startswith("${"):
                     raise
-                raise ExpansionError(f"${{{expression[:100]}}}: {refused.message}", refused.hint) from None
+                raise ExpansionError(f"${{{expression[:100]}}}: {error.message}", error.hint) from None
         if token.startswith("$("):
-            return self._substituted(str(self.value(token[2:-1], scope)))
+            return self._substitute(str(self.value(token[2:-1], scope)))
         return token
 
-    def _substituted(self, command: str) -> str:
+    def _substitute(self, command: str) -> str:
         match command.split():
             case ["arg", name] if name in self.arguments:
                 return self.arguments[name]
@@ -97,7 +97,7 @@ class TextEvaluator:
                     f"$(arg {name[:60]}): there is no such argument", 'give it a <xacro:arg default="…">'
                 )
             case ["optenv", _, *default]:
-                return " ".join(default)  # whatever the environment says, a run is that of its files
+                return " ".join(default)  # a run must not depend on the environment
             case ["find", package]:
                 return self._package(package)
             case ["dirname"]:
@@ -105,7 +105,7 @@ class TextEvaluator:
             case ["env", *_]:
                 raise ExpansionError(f"$({command[:60]}): the environment is not read", "write the value into the file")
             case _:
-                raise ExpansionError(f"$({command[:60]}) is not expanded", "arg, find, dirname and optenv are")
+                raise ExpansionError(f"$({command[:60]}) is not supported", "use arg, find, dirname, or optenv")
 
     def _package(self, name: str) -> str:
         try:
@@ -114,23 +114,23 @@ class TextEvaluator:
             raise MissingFile(f"$(find {name[:60]}): {trouble}", trouble.hint) from None
 
 
-class _Scoped:
+class _ScopeNames:
     def __init__(self, texts: TextEvaluator, scope: Scope) -> None:
         self._texts, self._scope = texts, scope
 
     def value(self, path: tuple[str, ...]) -> Value:
-        held: Value | Scope = self._scope
+        current: Value | Scope = self._scope
         for name in path:
-            if not isinstance(held, Scope):
+            if not isinstance(current, Scope):
                 raise KeyError(name)
-            held = self._texts.property(held, name)
-        if isinstance(held, Scope):
+            current = self._texts.property(current, name)
+        if isinstance(current, Scope):
             raise KeyError(path[-1])
-        return held
+        return current
 
 
 def required_attribute(element: Element, attribute: str, empty: bool = False) -> str:
-    """Return a required attribute as written; raises Refused."""
+    """Return a required attribute without evaluation; raises ExpansionError if it is missing."""
     text = element.attributes.get(attribute)
     if text is None or not (text or empty):
         raise ExpansionError(f'<{element.tag[:60]}> without {attribute}="…"')

@@ -75,7 +75,7 @@ def test_wheels_on_a_suspension_are_not_steered(infer):
 
 
 def test_a_robot_without_wheels_is_not_guessed(infer):
-    with pytest.raises(InvalidInput, match="cannot tell from its wheels"):
+    with pytest.raises(InvalidInput, match="cannot be inferred from its wheels"):
         infer(to_urdf(build_robot_body(shipped("omni"))))
 
 

@@ -246,7 +246,7 @@ def test_44_three_thousand_links_are_too_many(refusal):
         ('<box size="-1 1 1"/>', "size must be greater than 0"),
         ('<box size="1 1"/>', "size has 2 numbers instead of 3"),
         ('<sphere radius="nan"/>', "finite"),
-        ('<cylinder radius="x" length="1"/>', "are not numbers"),
+        ('<cylinder radius="x" length="1"/>', "must consist of numbers"),
         ('<torus radius="1"/>', "unknown geometry <torus>"),
         ("", "<geometry> is empty"),
     ],
@@ -264,8 +264,8 @@ def test_50_negative_masses_are_refused(refusal):
     [
         ('<link name="base"/>', "two <link>s are called 'base'"),
         ('<link name="loose"/>', "expected one root link, found 2"),
-        ('<joint name="j" type="fixed"><parent link="base"/><child link="gone"/></joint>', "'gone' that is not there"),
-        ('<joint name="j" type="fixed"><parent link="left"/><child link="right"/></joint>', "hangs on two joints"),
+        ('<joint name="j" type="fixed"><parent link="base"/><child link="gone"/></joint>', "that does not exist"),
+        ('<joint name="j" type="fixed"><parent link="left"/><child link="right"/></joint>', "child of two joints"),
         ('<link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'
          '<joint name="k" type="fixed"><parent link="b"/><child link="a"/></joint>', "loop of joints"),
         ('<joint name="j" type="fixed"><child link="left"/></joint>', "<joint> without <parent>"),
