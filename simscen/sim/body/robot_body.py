@@ -116,7 +116,7 @@ def is_stable(body: RobotBody) -> bool:
     return len(points) < 3 or body.drive.type == "mecanum" or polygon_contains(convex_hull(np.array(points)), (x, y))
 
 
-MIN_GROUND_CLEARANCE_M = 0.005
+MIN_GROUND_CLEARANCE_M = 0.003
 """Minimum height in m of a hull above the ground."""
 
 

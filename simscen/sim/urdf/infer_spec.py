@@ -71,7 +71,7 @@ def _drive(tree: Tree, wheels: list[WheelJoint]) -> Drive:
     separation = float(np.mean([w.place[1] for w in left]) - np.mean([w.place[1] for w in right]))
     axles = [w.place[0] for w in driven]
     size = {"wheel_radius": driven[0].radius, "wheel_separation": separation, "wheel_width": driven[0].width}
-    steered = [wheel.place[0] for wheel in wheels if wheel.steered]
+    steered = [wheel.place[0] for wheel in wheels if wheel.steered and not wheel.is_caster]
     if steered:
         check_front_steering(wheels)
         base = float(np.mean(steered) - np.mean(axles))

@@ -1,13 +1,13 @@
 """Finds the wheels and the steering joints of a URDF, and warns about misaligned ones."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
-from simscen.core.geometry.shapes import Cylinder, Sphere
+from simscen.core.geometry.shapes import Cylinder, Mesh, Solid, Sphere
 from simscen.model.robot import Ackermann, Differential, Drive, Omnidirectional
 from simscen.sim.body.outline import hull_points
 from simscen.sim.urdf.elements import Joint
@@ -18,30 +18,55 @@ MIN_AXIS_COSINE = 0.99
 
 STEERING_JOINT_TYPES = ("revolute", "continuous")
 """Types of joints that can steer; a vertical prismatic joint is a suspension."""
+ROUNDNESS_TOLERANCE = 0.05
+"""Largest difference of the extents of a round mesh, and of its center from its axis, relative to the radius."""
+MIN_CASTER_TRAIL_RADII = 0.1
+"""Smallest distance along x, in wheel radii, of a caster's wheel from its swivel axis; a steered wheel has none."""
 
 
 @dataclass(frozen=True, eq=False)
 class WheelJoint:
-    """A wheel in the root frame: the `place` of its center, `radius`, and `width` in meters."""
+    """A wheel in the root frame: the `place` of its center, `radius`, and `width` in meters.
+
+    `trail` is its distance in m along x from the axis of its steering joint.
+    """
 
     joint: Joint
     place: tuple[float, float, float]
     radius: float
     width: float
     steered: bool
+    trail: float = 0.0
+
+    @property
+    def is_caster(self) -> bool:
+        """Whether the wheel follows the motion of the robot instead of being steered."""
+        return self.steered and self.trail > MIN_CASTER_TRAIL_RADII * self.radius
 
 
 def infer_wheels(tree: Tree) -> list[WheelJoint]:
     """Return the wheels in a URDF: continuous joints with a lateral axis and a round link."""
-    steering = steered_links(
-        tree, [j for j in tree.joints.values() if j.type in STEERING_JOINT_TYPES and _has_axis_along(tree, j, 2)]
-    )
-    wheels = [
-        wheel_joint(tree, joint, joint.child in steering)
-        for joint in tree.joints.values()
-        if joint.type == "continuous" and _has_axis_along(tree, joint, 1)
+    joints = tree.joints.values()
+    steering_joints = [
+        joint for joint in joints if joint.type in STEERING_JOINT_TYPES and _has_axis_along(tree, joint, 2)
     ]
-    return sorted((w for w in wheels if w is not None), key=lambda w: (w.place[0], -w.place[1], w.joint.name))
+    steered = steered_links(tree, steering_joints)
+    wheels = [
+        _with_trail(tree, wheel, steering_joints)
+        for joint in joints
+        if joint.type == "continuous"
+        and _has_axis_along(tree, joint, 1)
+        and (wheel := wheel_joint(tree, joint, joint.child in steered)) is not None
+    ]
+    return sorted(wheels, key=lambda w: (w.place[0], -w.place[1], w.joint.name))
+
+
+def _with_trail(tree: Tree, wheel: WheelJoint, steering_joints: Sequence[Joint]) -> WheelJoint:
+    """Return a wheel with its distance along x from the axis of its steering joint."""
+    for joint in steering_joints:
+        if wheel.joint.child in tree.subtree(joint.child):
+            return replace(wheel, trail=abs(wheel.place[0] - tree.poses[joint.child].x))
+    return wheel
 
 
 def select_wheels(tree: Tree, drive: Drive) -> list[WheelJoint]:
@@ -87,9 +112,31 @@ def wheel_joint(tree: Tree, joint: Joint, steered: bool) -> WheelJoint | None:
                 return WheelJoint(joint, place, radius, length, steered)
             case Sphere(radius):
                 return WheelJoint(joint, place, radius, radius / 2, steered)
+            case Mesh() if (mesh := _round_mesh(joint, solid)) is not None:
+                center, radius, width = mesh
+                return WheelJoint(joint, tree.poses[joint.child].compose(center).position, radius, width, steered)
             case _:
                 continue
     return None
+
+
+def _round_mesh(joint: Joint, solid: Solid) -> tuple[Pose3, float, float] | None:
+    """Return center (in the frame of the joint), radius, and width of a mesh in m; None if it is not round.
+
+    The extents in eight directions across the axis of the joint must be equal.
+    """
+    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    across = np.linalg.svd(axis[None])[2][1:]  # two unit vectors (2, 3) perpendicular to the axis
+    points = solid.pose.apply(hull_points(solid.shape))
+    angles = np.arange(8) * (np.pi / 8)
+    extents = (points @ across.T) @ np.array([np.cos(angles), np.sin(angles)])  # (n, 8)
+    radii, offsets = np.ptp(extents, axis=0) / 2, (extents.max(axis=0) + extents.min(axis=0)) / 2
+    radius = float(radii.mean())
+    if np.ptp(radii) > ROUNDNESS_TOLERANCE * radius or np.abs(offsets).max() > ROUNDNESS_TOLERANCE * radius:
+        return None
+    along = points @ axis
+    x, y, z = (axis * (along.max() + along.min()) / 2).tolist()
+    return Pose3(x, y, z), radius, float(np.ptp(along))
 
 
 def _has_axis_along(tree: Tree, joint: Joint, direction: int) -> bool:

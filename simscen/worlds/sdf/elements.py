@@ -87,8 +87,14 @@ def _number(word: str) -> float:
     return value
 
 
-def read_sizes(parent: Element, tag: str, count: int, default: Sequence[float] | None = None) -> tuple[float, ...]:
-    """Return `count` positive lengths in meters from the child `tag`."""
+def read_sizes(
+    parent: Element,
+    tag: str,
+    count: int,
+    default: Sequence[float] | None = None,
+    largest: float = MAX_COORDINATE_M,
+) -> tuple[float, ...]:
+    """Return `count` positive lengths in meters, each at most `largest`, from the child `tag`."""
     element = parent.child(tag)
     if element is None:
         if default is None:
@@ -97,8 +103,8 @@ def read_sizes(parent: Element, tag: str, count: int, default: Sequence[float] |
     sizes = read_numbers(element, count)
     if any(size <= 0 for size in sizes):
         raise element.unusable(f"must be positive, got {element.text}")
-    if any(size > MAX_COORDINATE_M for size in sizes):
-        raise element.unusable(f"larger than {MAX_COORDINATE_M:g} m")
+    if any(size > largest for size in sizes):
+        raise element.unusable(f"larger than {largest:g} m")
     return sizes
 
 

@@ -86,7 +86,8 @@ def _read_primitive(element: Element) -> Shape | None:
 def _read_plane(plane: Element, world_from_plane: Pose3, report: ImportReport) -> Solid | None:
     """Return a thin slab whose upper face is the plane, or None for the ground."""
     normal = _read_normal(plane)
-    x, y = read_sizes(plane, "size", 2, default=(1.0, 1.0))
+    x, y = read_sizes(plane, "size", 2, default=(1.0, 1.0), largest=math.inf)
+    x, y = min(x, MAX_COORDINATE_M), min(y, MAX_COORDINATE_M)
     world_normal = world_from_plane.rotation() @ normal
     if world_normal[2] >= MIN_LEVEL_NORMAL_Z:
         if abs(world_from_plane.z) <= GROUND_TOLERANCE_M:

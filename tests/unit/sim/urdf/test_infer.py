@@ -2,9 +2,11 @@ import math
 from pathlib import Path
 
 import pytest
+import trimesh
 from playground import shipped
 
 from simscen.core.errors import InvalidInput
+from simscen.loading.builders import read_mesh
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.urdf.infer_spec import infer_robot_spec
 from simscen.sim.urdf.writer import to_urdf
@@ -87,3 +89,46 @@ def test_the_jackal_is_skid_steered():
     assert spec.drive.wheel_base == pytest.approx(0.262)
     assert spec.drive.turning_scale == pytest.approx(1.487, abs=0.001)
     assert build_robot_body(spec, JACKAL).mass == pytest.approx(18.4, abs=0.1)
+
+
+SWIVEL = """
+  <link name="fork"/><joint name="swivel" type="continuous"><parent link="base_link"/><child link="fork"/>
+  <origin xyz="-0.1 0 0.04"/><axis xyz="0 0 1"/></joint>
+  <link name="roller"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>
+  <joint name="roll" type="continuous"><parent link="fork"/><child link="roller"/>
+  <origin xyz="TRAIL 0 -0.02"/><axis xyz="0 1 0"/></joint></robot>"""
+
+
+def test_a_wheel_that_trails_its_steering_axis_is_a_caster(infer):
+    text = to_urdf(build_robot_body(shipped("turtlebot"))).replace("</robot>", SWIVEL)
+    assert infer(text.replace("TRAIL", "-0.015")).drive.type == "differential"
+    with pytest.raises(InvalidInput, match="only front steering is simulated"):
+        infer(text.replace("TRAIL", "0"))
+
+
+@pytest.mark.parametrize("stretch", [1.0, 1.2])
+def test_wheels_may_be_round_meshes(tmp_path, stretch):
+    cylinder = trimesh.creation.cylinder(radius=0.05, height=0.03, sections=48)
+    cylinder.apply_scale((stretch, 1.0, 1.0))
+    cylinder.apply_transform(trimesh.transformations.rotation_matrix(math.pi / 2, (1, 0, 0)))
+    cylinder.apply_translation((0.0, 0.01, 0.0))
+    cylinder.export(tmp_path / "wheel.stl")
+    wheel = """
+  <link name="SIDE"><inertial><mass value="0.2"/><inertia ixx="1e-4" iyy="2e-4" izz="1e-4"/></inertial><collision><geometry><mesh filename="wheel.stl"/></geometry></collision></link>
+  <joint name="SIDE_joint" type="continuous"><parent link="base"/><child link="SIDE"/><origin xyz="0 Y 0.05"/>
+  <axis xyz="0 1 0"/></joint>"""
+    wheels = wheel.replace("SIDE", "left").replace("Y", "0.2") + wheel.replace("SIDE", "right").replace("Y", "-0.2")
+    (tmp_path / "robot.urdf").write_text(
+        '<robot name="r"><link name="base"><inertial><mass value="5"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>'
+        '<collision><origin xyz="0 0 0.1"/><geometry><box size="0.4 0.3 0.1"/>'
+        f"</geometry></collision></link>{wheels}</robot>"
+    )
+    if stretch != 1.0:
+        with pytest.raises(InvalidInput, match="cannot be inferred"):
+            infer_robot_spec(tmp_path / "robot.urdf", [tmp_path], read_mesh)
+        return
+    drive = infer_robot_spec(tmp_path / "robot.urdf", [tmp_path], read_mesh).drive
+    assert drive.type == "differential"
+    assert drive.wheel_radius == pytest.approx(0.05, rel=0.01)
+    assert drive.wheel_width == pytest.approx(0.03)
+    assert drive.wheel_separation == pytest.approx(0.4)
