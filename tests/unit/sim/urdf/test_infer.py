@@ -114,12 +114,14 @@ def test_wheels_may_be_round_meshes(tmp_path, stretch):
     cylinder.apply_translation((0.0, 0.01, 0.0))
     cylinder.export(tmp_path / "wheel.stl")
     wheel = """
-  <link name="SIDE"><inertial><mass value="0.2"/><inertia ixx="1e-4" iyy="2e-4" izz="1e-4"/></inertial><collision><geometry><mesh filename="wheel.stl"/></geometry></collision></link>
+  <link name="SIDE"><inertial><mass value="0.2"/><inertia ixx="1e-4" iyy="2e-4" izz="1e-4"/></inertial>
+  <collision><geometry><mesh filename="wheel.stl"/></geometry></collision></link>
   <joint name="SIDE_joint" type="continuous"><parent link="base"/><child link="SIDE"/><origin xyz="0 Y 0.05"/>
   <axis xyz="0 1 0"/></joint>"""
     wheels = wheel.replace("SIDE", "left").replace("Y", "0.2") + wheel.replace("SIDE", "right").replace("Y", "-0.2")
     (tmp_path / "robot.urdf").write_text(
-        '<robot name="r"><link name="base"><inertial><mass value="5"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>'
+        '<robot name="r"><link name="base"><inertial><mass value="5"/>'
+        '<inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>'
         '<collision><origin xyz="0 0 0.1"/><geometry><box size="0.4 0.3 0.1"/>'
         f"</geometry></collision></link>{wheels}</robot>"
     )

@@ -159,7 +159,8 @@ def test_a_world_of_only_a_ground_plane_is_empty_and_says_so(load):
 def test_planes_larger_than_a_world_are_cut(load):
     plane = (
         '<model name="NAME"><static>1</static><pose>0 0 HEIGHT 0 0 0</pose><link name="l">'
-        "<collision name='c'><geometry><plane><normal>0 0 1</normal><size>100000 3</size></plane></geometry></collision></link></model>"
+        "<collision name='c'><geometry>"
+        "<plane><normal>0 0 1</normal><size>100000 3</size></plane></geometry></collision></link></model>"
     )
     ground, shelf = (plane.replace("NAME", name).replace("HEIGHT", z) for name, z in (("ground", "0"), ("shelf", "2")))
     (slab,) = load(ground + shelf).solids
