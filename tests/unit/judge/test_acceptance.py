@@ -180,3 +180,8 @@ def test_a_likelihood_ratio_that_equals_its_limit_decides() -> None:
     assert decide(sprt, [False, True]) == (1, ClaimStatus.REFUTED)  # 0.25 / 0.5 = 1 - power
     sprt = claim(min=0.375, target=0.75, confidence=0.5, power=0.9, method="sprt", runs=10)
     assert decide(sprt, [True, False]) == (1, ClaimStatus.HELD)  # 0.75 / 0.375 = 1 / (1 - confidence)
+
+
+def test_a_rate_on_the_boundary_is_not_compatible_with_the_runs() -> None:
+    anytime = claim(min=0.25, confidence=0.5, method="anytime", runs=5)
+    assert decide(anytime, [True, False]) == (1, ClaimStatus.HELD)  # (1 + 1) · 0.25 = 1 - confidence

@@ -135,13 +135,21 @@ def test_ten_different_values_are_listed_and_more_are_divided_into_four_ranges()
     ]
     words = study_of("gap", [f"{k}" + "abc" for k in range(11)], [1.0] * 11)
     assert len(words.rates) == 11
-    numbers = study_of("gap", [k / 7 for k in range(1, 13)], [1.0] * 12)
+    numbers = study_of("gap", [k / 7 for k in range(1, 21)], [1.0] * 20)
     assert [row.value for row in numbers.rates] == [
-        "0.143 … 0.429",
-        "0.571 … 0.857",
-        "1 … 1.29",
-        "1.43 … 1.71",
+        "0.143 … 0.714",
+        "0.857 … 1.43",
+        "1.57 … 2.14",
+        "2.29 … 2.86",
     ]
+    mixed = study_of("gap", [*range(10), "wide"], [1.0] * 11)
+    assert [row.value for row in mixed.rates] == [*map(str, range(10)), "wide"]
+
+
+def test_rates_are_in_the_order_of_the_names_of_the_parameters() -> None:
+    names = [f"events.{name}.at" for name in "hgfedcba"]
+    study = evaluate_study(plan_of([dict.fromkeys(names, 1)]), [run(1)])
+    assert [row.path for row in study.rates] == sorted(names)
 
 
 @pytest.mark.parametrize(
@@ -222,6 +230,7 @@ def test_no_effect_without_enough_runs_and_differences(values: Sequence[Any], ma
 def test_eight_runs_and_three_groups_are_enough_for_an_effect() -> None:
     assert len(study_of("x", list(range(8)), [float(k) for k in range(8)]).effects) == 1
     assert len(study_of("x", list("abcabcab"), [float(k) for k in range(8)]).effects) == 1
+    assert len(study_of("x", list(range(8)), [0.0, 1.0] * 4).effects) == 1
 
 
 def test_only_runs_with_a_margin_count_for_an_effect() -> None:
